@@ -1,0 +1,145 @@
+//! What comes from outside while a party runs: commands on standard input, and signals.
+
+use std::io;
+use std::os::fd::{AsFd, BorrowedFd};
+
+use nix::errno::Errno;
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use nix::sys::signal::{SigSet, Signal};
+use nix::sys::signalfd::{SfdFlags, SignalFd};
+
+use crate::error::BusError;
+use crate::orders::{Control, Order};
+
+/// Whether commands are read, one a line: `stop` and `release`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Commands {
+    /// None: standard input is left alone.
+    None,
+    /// Commands are read; the end of standard input means nothing.
+    Read,
+    /// Commands are read, and the party ends with standard input: whoever started it is gone then.
+    ReadAndEndWithInput,
+}
+
+/// A line without an end is cut here.
+const LINE_BYTES: usize = 256;
+
+/// SIGINT and SIGTERM as a file descriptor. Made before any other thread starts, because threads inherit the mask and one that
+/// does not have it would die of the signal.
+pub(crate) fn ending_signals() -> Result<SignalFd, BusError> {
+    let mut signals = SigSet::empty();
+    signals.add(Signal::SIGINT);
+    signals.add(Signal::SIGTERM);
+    signals
+        .thread_block()
+        .map_err(BusError::system("to hold back SIGINT and SIGTERM"))?;
+    SignalFd::with_flags(&signals, SfdFlags::SFD_CLOEXEC | SfdFlags::SFD_NONBLOCK)
+        .map_err(BusError::system("a signalfd"))
+}
+
+/// Passes commands and signals on until `finished` becomes readable. Lines that are no command go to `unknown`.
+pub(crate) fn watch(
+    commands: Commands,
+    signals: &SignalFd,
+    finished: BorrowedFd<'_>,
+    control: &Control,
+    mut unknown: impl FnMut(String),
+) -> Result<(), BusError> {
+    let input = io::stdin();
+    let mut lines = Lines::default();
+    let mut reads = commands != Commands::None;
+    loop {
+        let mut descriptors = vec![
+            PollFd::new(finished, PollFlags::POLLIN),
+            PollFd::new(signals.as_fd(), PollFlags::POLLIN),
+        ];
+        if reads {
+            descriptors.push(PollFd::new(input.as_fd(), PollFlags::POLLIN));
+        }
+        match poll(&mut descriptors, PollTimeout::NONE) {
+            Ok(_) => {}
+            Err(Errno::EINTR) => continue,
+            Err(error) => return Err(BusError::system("to wait for commands")(error)),
+        }
+        let ready: Vec<bool> = descriptors
+            .iter()
+            .map(|descriptor| descriptor.any().unwrap_or(false))
+            .collect();
+        if ready[0] {
+            return Ok(());
+        }
+        if ready[1] && matches!(signals.read_signal(), Ok(Some(_))) {
+            control.give(Order::Stop);
+        }
+        if reads && ready[2] {
+            let mut bytes = [0; LINE_BYTES];
+            match nix::unistd::read(&input, &mut bytes) {
+                Ok(0) | Err(Errno::EIO) => {
+                    reads = false;
+                    if commands == Commands::ReadAndEndWithInput {
+                        control.give(Order::Stop);
+                    }
+                }
+                Ok(length) => {
+                    for line in lines.take(&bytes[..length]) {
+                        match line.as_str() {
+                            "stop" => control.give(Order::Stop),
+                            "release" => control.give(Order::Release),
+                            "" => {}
+                            _ => unknown(line),
+                        }
+                    }
+                }
+                Err(_) => {}
+            }
+        }
+    }
+}
+
+/// Lines out of pieces.
+#[derive(Debug, Default)]
+struct Lines {
+    begun: Vec<u8>,
+}
+
+impl Lines {
+    fn take(&mut self, piece: &[u8]) -> Vec<String> {
+        let mut lines = Vec::new();
+        for &byte in piece {
+            if byte == b'\n' || self.begun.len() == LINE_BYTES {
+                let line = String::from_utf8_lossy(&std::mem::take(&mut self.begun)).into_owned();
+                lines.push(line.trim().to_owned());
+            }
+            if byte != b'\n' {
+                self.begun.push(byte);
+            }
+        }
+        lines
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(pieces: &[&[u8]], expected: &[&str]) {
+        let mut lines = Lines::default();
+        let found: Vec<String> = pieces.iter().flat_map(|piece| lines.take(piece)).collect();
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn lines_are_put_together_from_pieces() {
+        check(&[b"st", b"op\nrel", b"ease\r\n"], &["stop", "release"]);
+        check(&[b"stop"], &[]);
+        check(&[b"\n\xff\n"], &["", "\u{fffd}"]);
+    }
+
+    #[test]
+    fn a_line_without_an_end_is_cut() {
+        let long = [b'a'; LINE_BYTES * 3 + 1];
+        let cut = "a".repeat(LINE_BYTES);
+        check(&[&long], &[&cut, &cut, &cut]);
+    }
+}

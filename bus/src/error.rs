@@ -1,0 +1,102 @@
+//! Why a party cannot run.
+
+use std::io;
+use std::net::SocketAddr;
+
+use understudy_wire::Party;
+
+/// What stops a party before or while it runs. The codes are stable.
+#[derive(Debug, thiserror::Error)]
+pub enum BusError {
+    /// Another process listens there.
+    #[error("U0501: port {} of {} is in use by another process", address.port(), address.ip())]
+    PortInUse {
+        /// Where this party was to listen.
+        address: SocketAddr,
+    },
+    /// The address is none of this machine, or may not be used.
+    #[error("U0502: cannot listen on {address}: {source}")]
+    Listen {
+        /// Where this party was to listen.
+        address: SocketAddr,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Zenoh did not start.
+    #[error("U0503: Zenoh does not start on {address}: {reason}")]
+    Zenoh {
+        /// Where this party was to listen.
+        address: SocketAddr,
+        /// What Zenoh said.
+        reason: String,
+    },
+    /// A party is not in the list, so that it has no address.
+    #[error("U0504: {party:?} has no address in the cluster")]
+    NoAddress {
+        /// Who.
+        party: Party,
+    },
+    /// Two parties with one address.
+    #[error("U0505: {first} and {second} have the same address {address}")]
+    SharedAddress {
+        /// One name.
+        first: String,
+        /// The other name.
+        second: String,
+        /// Of both.
+        address: SocketAddr,
+    },
+    /// The system refused something that every process needs.
+    #[error("U0506: {what}: {source}")]
+    System {
+        /// What was asked of it.
+        what: &'static str,
+        /// What it said.
+        source: io::Error,
+    },
+    /// The cycle's thread ended by a panic: a mistake in this program.
+    #[error("U0507: the cycle ended by a panic: {message}")]
+    Panicked {
+        /// What the panic said.
+        message: String,
+    },
+    /// A process of a benchmark did not do its part.
+    #[error("U0508: {party:?} of the benchmark {reason}")]
+    Benchmark {
+        /// Which of its parties.
+        party: Party,
+        /// What it did instead.
+        reason: String,
+    },
+}
+
+impl BusError {
+    /// The stable code, such as `U0501`.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::PortInUse { .. } => "U0501",
+            Self::Listen { .. } => "U0502",
+            Self::Zenoh { .. } => "U0503",
+            Self::NoAddress { .. } => "U0504",
+            Self::SharedAddress { .. } => "U0505",
+            Self::System { .. } => "U0506",
+            Self::Panicked { .. } => "U0507",
+            Self::Benchmark { .. } => "U0508",
+        }
+    }
+
+    pub(crate) fn listen(address: SocketAddr, source: io::Error) -> Self {
+        if source.kind() == io::ErrorKind::AddrInUse {
+            Self::PortInUse { address }
+        } else {
+            Self::Listen { address, source }
+        }
+    }
+
+    pub(crate) fn system(what: &'static str) -> impl FnOnce(nix::Error) -> Self {
+        move |error| Self::System {
+            what,
+            source: error.into(),
+        }
+    }
+}

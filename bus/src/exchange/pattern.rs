@@ -1,0 +1,200 @@
+//! A machine that follows the cycle's pattern of speaking and does nothing else.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::Duration;
+
+use understudy_wire::{
+    Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
+    Input, Lineage, Machine, Moment, Output, Party, ProgramId, ProgramSet, Sample, StationId,
+    StationSet, Time, Turn, Word,
+};
+
+/// Stations that speak in the pattern: three controllers and their understudy.
+pub const STATIONS: u8 = 4;
+/// Programs, and remote I/Os, in the pattern.
+pub const PROGRAMS: u8 = 3;
+/// Who paces, and measures.
+pub(super) const PACEMAKER: Party = Party::Station(StationId(0));
+/// Bits of each sample and of each output.
+const WIDTH: usize = 8;
+
+/// One party of the pattern. Station 0 paces: every period it says Sync, whether or not the last cycle was complete.
+#[derive(Debug)]
+pub struct Pattern {
+    own: Party,
+    period: Duration,
+    due: Time,
+    moment: Moment,
+    sampled: ProgramSet,
+    spoken: StationSet,
+    said: VecDeque<Arc<Frame>>,
+}
+
+impl Pattern {
+    /// The part of `own`, a station below [`STATIONS`] or a remote I/O below [`PROGRAMS`]; anybody else is silent.
+    pub fn new(own: Party, period: Duration) -> Self {
+        Self {
+            own,
+            period,
+            due: Time::default(),
+            // As long as a real epoch is on the wire.
+            moment: Moment {
+                epoch: Epoch(u64::MAX),
+                cycle: Cycle(0),
+            },
+            sampled: ProgramSet::EMPTY,
+            spoken: StationSet::EMPTY,
+            said: VecDeque::new(),
+        }
+    }
+
+    fn paces(&self) -> bool {
+        self.own == PACEMAKER
+    }
+
+    fn begin(&mut self, moment: Moment) {
+        self.moment = moment;
+        self.sampled = ProgramSet::EMPTY;
+        self.spoken = StationSet::EMPTY;
+    }
+
+    fn say(&mut self, body: Body) {
+        let frame = frame(self.own, self.moment, body);
+        self.said.push_back(Arc::new(frame));
+    }
+
+    /// Takes the turn of this station where it has the token: station 0 after all samples, the others after their predecessor.
+    fn take_turn(&mut self) {
+        let Party::Station(own) = self.own else {
+            return;
+        };
+        let has_token = match own.0.checked_sub(1) {
+            None => self.sampled.len() == usize::from(PROGRAMS),
+            Some(before) => self.spoken.contains(StationId(before)),
+        };
+        if has_token && own.0 < STATIONS && !self.spoken.contains(own) {
+            self.spoken.insert(own);
+            self.say(turn(own));
+        }
+    }
+}
+
+impl Machine for Pattern {
+    type Event = ();
+
+    fn handle_input(&mut self, now: Time, input: Input<'_>) {
+        match input {
+            Input::Wakeup if self.paces() && now >= self.due => {
+                self.due = now + self.period;
+                self.begin(self.moment.plus(1));
+                self.say(Body::Sync);
+            }
+            Input::Frame(frame) => {
+                match (&frame.body, frame.header.sender) {
+                    (Body::Sync, _) if frame.header.moment > self.moment => {
+                        self.begin(frame.header.moment);
+                        if matches!(self.own, Party::RemoteIo(program) if program.0 < PROGRAMS) {
+                            self.say(sample());
+                        }
+                    }
+                    (Body::Sample(_), Party::RemoteIo(program))
+                        if frame.header.moment == self.moment =>
+                    {
+                        self.sampled.insert(program);
+                    }
+                    (Body::Turn(_), Party::Station(station))
+                        if frame.header.moment == self.moment =>
+                    {
+                        self.spoken.insert(station);
+                    }
+                    _ => return,
+                }
+                self.take_turn();
+            }
+            _ => {}
+        }
+    }
+
+    fn poll_output(&mut self) -> Option<Output<()>> {
+        self.said.pop_front().map(Output::Send)
+    }
+
+    fn wakeup(&self) -> Time {
+        if self.paces() {
+            self.due
+        } else {
+            Time(u64::MAX)
+        }
+    }
+}
+
+fn frame(sender: Party, moment: Moment, body: Body) -> Frame {
+    Frame {
+        header: Header {
+            // As long as real hashes are on the wire.
+            cluster: ClusterHash(u64::MAX),
+            configuration: ConfigurationHash(u64::MAX),
+            moment,
+            sender,
+            alone: false,
+        },
+        body,
+    }
+}
+
+/// Eight samples, as a remote I/O with the default history says them.
+fn sample() -> Body {
+    Body::Sample(Sample {
+        born: moment(),
+        base: Lineage(u64::MAX),
+        before: Lineage(u64::MAX),
+        history: (0..8).map(|_| Image::zero(WIDTH)).collect(),
+        applied: None,
+    })
+}
+
+/// A controller holds its own program, the understudy all.
+fn turn(own: StationId) -> Body {
+    let members: ProgramSet = if own.0 < PROGRAMS {
+        ProgramSet::only(ProgramId(own.0))
+    } else {
+        ProgramSet::first(usize::from(PROGRAMS))
+    };
+    let holding = |program| Holding {
+        program,
+        born: moment(),
+        lineage: Lineage(u64::MAX),
+        stepped: moment(),
+        digest: Digest(u64::MAX),
+    };
+    Body::Turn(Turn {
+        heard: StationSet::first(usize::from(own.0)),
+        holdings: members.iter().map(holding).collect(),
+        words: [Word {
+            members,
+            sum: Image::zero(WIDTH),
+        }]
+        .into_iter()
+        .collect(),
+    })
+}
+
+fn moment() -> Moment {
+    Moment {
+        epoch: Epoch(u64::MAX),
+        cycle: Cycle(1_000_000),
+    }
+}
+
+/// The frames of one cycle in the order in which they are said, for the yardstick that carries as many bytes.
+pub(super) fn frames_of_a_cycle() -> Vec<Frame> {
+    let station = |rank| Party::Station(StationId(rank));
+    let samples = (0..PROGRAMS).map(|program| (Party::RemoteIo(ProgramId(program)), sample()));
+    let turns = (0..STATIONS).map(|rank| (station(rank), turn(StationId(rank))));
+    std::iter::once((PACEMAKER, Body::Sync))
+        .chain(samples)
+        .chain(turns)
+        .map(|(sender, body)| frame(sender, moment(), body))
+        .collect()
+}

@@ -1,0 +1,70 @@
+//! What stands between a remote I/O and its sensors and actuators.
+
+use std::sync::Arc;
+
+use understudy_wire::{Actuation, Agreement, Body, Frame, Header, Image, Moment, Party, ProgramId};
+
+/// Drives and senses the field of one party; never blocks.
+pub trait FieldDriver: Send {
+    /// Drives y(i) in the cycle `moment`; answers with a frame where the field is reached over the link.
+    fn drive(&mut self, moment: Moment, outputs: &Image) -> Option<Frame>;
+
+    /// u(i), where `frame` comes from this field.
+    fn sense<'frame>(&mut self, frame: &'frame Frame) -> Option<&'frame Image>;
+}
+
+/// Of a station or a plant: there is no field.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct NoField;
+
+impl FieldDriver for NoField {
+    fn drive(&mut self, _moment: Moment, _outputs: &Image) -> Option<Frame> {
+        None
+    }
+
+    fn sense<'frame>(&mut self, _frame: &'frame Frame) -> Option<&'frame Image> {
+        None
+    }
+}
+
+/// Of a remote I/O whose plant is a process of its own and is reached over the link.
+#[derive(Debug, Clone)]
+pub struct SimulatedField {
+    program: ProgramId,
+    agreement: Arc<Agreement>,
+}
+
+impl SimulatedField {
+    /// The field of the remote I/O of `program`.
+    pub fn new(program: ProgramId, agreement: Arc<Agreement>) -> Self {
+        Self { program, agreement }
+    }
+}
+
+impl FieldDriver for SimulatedField {
+    fn drive(&mut self, moment: Moment, outputs: &Image) -> Option<Frame> {
+        Some(Frame {
+            header: Header {
+                cluster: self.agreement.cluster,
+                configuration: self.agreement.configuration,
+                moment,
+                sender: Party::RemoteIo(self.program),
+                alone: false,
+            },
+            body: Body::Actuation(Actuation {
+                outputs: outputs.clone(),
+            }),
+        })
+    }
+
+    fn sense<'frame>(&mut self, frame: &'frame Frame) -> Option<&'frame Image> {
+        let header = &frame.header;
+        let ours = header.cluster == self.agreement.cluster
+            && header.configuration == self.agreement.configuration
+            && header.sender == Party::Plant(self.program);
+        match &frame.body {
+            Body::Field(field) if ours => Some(&field.sensors),
+            _ => None,
+        }
+    }
+}

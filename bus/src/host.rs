@@ -1,0 +1,258 @@
+//! The loop that runs one party on real time: drain what it says, sleep until something arrives or its time has come.
+//!
+//! Invariants: the loop never waits for anything but [`ppoll`]; it never spins; and between two looks at the party's own
+//! times it takes [`INPUTS_IN_A_ROW`] datagrams at most, so that no flood keeps a party from its turn.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use nix::errno::Errno;
+use nix::poll::{PollFd, PollFlags, ppoll};
+use nix::sys::time::TimeSpec;
+use serde::{Deserialize, Serialize};
+use understudy_wire::{
+    Body, Frame, FrameError, Input, Machine, Moment, Output, Time, decode, encode,
+};
+
+use crate::clock::Clock;
+use crate::error::BusError;
+use crate::field::FieldDriver;
+use crate::journal::{EventSink, HostEvent, Noted};
+use crate::link::{Link, LinkCounters};
+use crate::observer::Observer;
+use crate::orders::{Order, Orders};
+
+/// Datagrams taken before the party's own times are looked at again.
+const INPUTS_IN_A_ROW: usize = 64;
+/// Times that a party is woken without sleep in between, when it asks for times that have passed.
+const WAKEUPS_IN_A_ROW: u32 = 16;
+/// How long it sleeps then.
+const BREATH: Duration = Duration::from_millis(1);
+/// Troubles of one kind are reported together, so often at most.
+const TROUBLE_PERIOD: Duration = Duration::from_secs(1);
+
+/// What a party did while it ran.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Summary {
+    /// Frames that it said.
+    pub frames_said: u64,
+    /// Frames that it heard, copies included.
+    pub frames_heard: u64,
+    /// Datagrams that were no frames.
+    pub refused: u64,
+    /// Frames that broke a bound of the wire and were not sent.
+    pub unsendable: u64,
+    /// The latest that it was woken after the time that it had asked for, in nanoseconds.
+    pub latest_wakeup_ns: u64,
+    /// What the link could not do.
+    pub link: LinkCounters,
+}
+
+/// One party with everything that it needs of the world.
+pub struct Host<'a, M: Machine> {
+    /// The party.
+    pub machine: &'a mut M,
+    /// Carries its frames.
+    pub link: &'a mut dyn Link,
+    /// Its sensors and actuators.
+    pub field: &'a mut dyn FieldDriver,
+    /// Takes what it reports.
+    pub sink: &'a mut dyn EventSink<M::Event>,
+    /// Looks on.
+    pub observer: &'a mut dyn Observer,
+    /// What the operator and the system want of it.
+    pub orders: &'a Orders,
+    /// Its time.
+    pub clock: Clock,
+}
+
+/// Things that went wrong and are not yet reported.
+#[derive(Debug, Default)]
+struct Trouble {
+    count: u64,
+    last: Option<FrameError>,
+}
+
+impl Trouble {
+    fn note(&mut self, error: FrameError) {
+        self.count += 1;
+        self.last = Some(error);
+    }
+
+    fn take(&mut self) -> Option<(u64, String)> {
+        let last = self.last.take()?;
+        Some((std::mem::take(&mut self.count), last.to_string()))
+    }
+}
+
+/// What the loop keeps from one round to the next.
+#[derive(Debug, Default)]
+struct Round {
+    received: Vec<u8>,
+    encoded: Vec<u8>,
+    moment: Moment,
+    wakeups_in_a_row: u32,
+    refused: Trouble,
+    unsendable: Trouble,
+    reported: Time,
+    summary: Summary,
+}
+
+impl<M: Machine> Host<'_, M> {
+    /// Runs the party on the calling thread until it is told to stop, or its observer is satisfied.
+    ///
+    /// # Errors
+    /// [`BusError::System`] where the system refuses to let it sleep.
+    pub fn run(mut self) -> Result<Summary, BusError> {
+        let mut round = Round::default();
+        self.drain(self.clock.now(), &mut round);
+        loop {
+            if self.obey(&mut round) || self.observer.satisfied() {
+                break;
+            }
+            let heard = self.listen(&mut round);
+            let now = self.clock.now();
+            let due = self.machine.wakeup();
+            if now >= due && round.wakeups_in_a_row < WAKEUPS_IN_A_ROW {
+                round.wakeups_in_a_row += 1;
+                let late_ns = u64::try_from(now.since(due).as_nanos()).unwrap_or(u64::MAX);
+                // What it asks for before its first input is asked of a clock that it has not seen yet.
+                if due > Time::default() {
+                    round.summary.latest_wakeup_ns = round.summary.latest_wakeup_ns.max(late_ns);
+                }
+                self.machine.handle_input(now, Input::Wakeup);
+                self.drain(now, &mut round);
+            } else if heard < INPUTS_IN_A_ROW {
+                let until = if now >= due { now + BREATH } else { due };
+                self.sleep(now, until)?;
+                round.wakeups_in_a_row = 0;
+            }
+            self.report_trouble(now, TROUBLE_PERIOD, &mut round);
+        }
+        let now = self.clock.now();
+        self.report_trouble(now, Duration::ZERO, &mut round);
+        if let Some(event) = self.observer.finish() {
+            self.sink.record(now, Noted::Host(event));
+        }
+        round.summary.link = self.link.counters();
+        let stopped = HostEvent::Stopped(round.summary);
+        self.sink.record(now, Noted::Host(stopped));
+        Ok(round.summary)
+    }
+
+    /// True where it is to stop.
+    fn obey(&mut self, round: &mut Round) -> bool {
+        while let Some(order) = self.orders.take() {
+            match order {
+                Order::Stop => return true,
+                Order::Release => {
+                    let now = self.clock.now();
+                    self.machine.handle_input(now, Input::Release);
+                    self.drain(now, round);
+                }
+            }
+        }
+        false
+    }
+
+    /// Takes what has arrived, and says how many datagrams that were.
+    fn listen(&mut self, round: &mut Round) -> usize {
+        for taken in 0..INPUTS_IN_A_ROW {
+            if !self.link.receive(&mut round.received) {
+                return taken;
+            }
+            let now = self.clock.now();
+            match decode(&round.received) {
+                Ok(frame) => {
+                    let frame = Arc::new(frame);
+                    round.summary.frames_heard += 1;
+                    self.observer.frame(now, &frame);
+                    // Which epoch counts is for the party to say, by its own frames; another's Sync only moves it on in that one.
+                    let (known, said) = (round.moment, frame.header.moment);
+                    let moves_on = said.epoch == known.epoch && said > known;
+                    if matches!(frame.body, Body::Sync) && (known == Moment::default() || moves_on)
+                    {
+                        round.moment = said;
+                    }
+                    let input = match self.field.sense(&frame) {
+                        Some(sensors) => Input::Field(sensors),
+                        None => Input::Frame(&frame),
+                    };
+                    self.machine.handle_input(now, input);
+                    self.drain(now, round);
+                }
+                Err(error) => {
+                    round.summary.refused += 1;
+                    round.refused.note(error);
+                }
+            }
+        }
+        INPUTS_IN_A_ROW
+    }
+
+    fn drain(&mut self, now: Time, round: &mut Round) {
+        while let Some(output) = self.machine.poll_output() {
+            match output {
+                Output::Send(frame) => {
+                    round.moment = frame.header.moment;
+                    self.say(now, &frame, round);
+                }
+                Output::Drive(outputs) => {
+                    if let Some(frame) = self.field.drive(round.moment, &outputs) {
+                        self.say(now, &frame, round);
+                    }
+                }
+                Output::Report(event) => self.sink.record(now, Noted::Party(event)),
+            }
+        }
+    }
+
+    fn say(&mut self, now: Time, frame: &Frame, round: &mut Round) {
+        round.encoded.clear();
+        match encode(frame, &mut round.encoded) {
+            Ok(()) => {
+                round.summary.frames_said += 1;
+                self.observer.frame(now, frame);
+                self.link.send(frame, &round.encoded);
+            }
+            Err(error) => {
+                round.summary.unsendable += 1;
+                round.unsendable.note(error);
+            }
+        }
+    }
+
+    fn sleep(&self, now: Time, until: Time) -> Result<(), BusError> {
+        let mut descriptors = [
+            PollFd::new(self.link.readiness(), PollFlags::POLLIN),
+            PollFd::new(self.orders.readiness(), PollFlags::POLLIN),
+        ];
+        match ppoll(
+            &mut descriptors,
+            Some(TimeSpec::from_duration(until.since(now))),
+            None,
+        ) {
+            Ok(_) | Err(Errno::EINTR) => Ok(()),
+            Err(error) => Err(BusError::system("to sleep until something arrives")(error)),
+        }
+    }
+
+    fn report_trouble(&mut self, now: Time, period: Duration, round: &mut Round) {
+        if now.since(round.reported) < period {
+            return;
+        }
+        let refused = round.refused.take();
+        let unsendable = round.unsendable.take();
+        if refused.is_some() || unsendable.is_some() {
+            round.reported = now;
+        }
+        if let Some((datagrams, reason)) = refused {
+            let event = HostEvent::RefusedBytes { datagrams, reason };
+            self.sink.record(now, Noted::Host(event));
+        }
+        if let Some((frames, reason)) = unsendable {
+            let event = HostEvent::UnsendableFrames { frames, reason };
+            self.sink.record(now, Noted::Host(event));
+        }
+    }
+}

@@ -1,0 +1,370 @@
+//! What a party reports, one JSON object a line.
+//!
+//! The cycle never waits for the journal: records go through a bounded queue to a thread of their own; what does not fit is
+//! dropped, counted, and said in the journal as soon as it takes something again. When writing fails (a full disk, a reader that is gone)
+//! the thread goes on taking records, and counts them as lost.
+
+use std::borrow::Cow;
+use std::io::{self, BufWriter, Write};
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::JoinHandle;
+
+use serde::{Deserialize, Serialize};
+use understudy_wire::{Party, Time};
+
+use crate::clock::Clock;
+use crate::error::BusError;
+use crate::host::Summary;
+use crate::link::LinkKind;
+use crate::rights::Rights;
+
+/// Records that wait to be written, at most: some seconds of a party at 10 ms.
+pub const JOURNAL_RECORDS: usize = 4096;
+
+/// One line of the journal.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Record<'name, E> {
+    /// Nanoseconds of the host's CLOCK_MONOTONIC; comparable among the processes of one host.
+    pub at_ns: u64,
+    /// Who reports.
+    pub party: Party,
+    /// Its name in the cluster file.
+    pub name: Cow<'name, str>,
+    /// What happened.
+    pub event: Noted<E>,
+}
+
+/// Something that a party reports, or the process that it runs in; told apart by the value of `event`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Noted<E> {
+    /// By the process.
+    Host(HostEvent),
+    /// By the party.
+    Party(E),
+}
+
+/// What the process of a party reports.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "event", rename_all = "kebab-case")]
+pub enum HostEvent {
+    /// It listens, and its cycle starts.
+    Ready {
+        /// Process id.
+        process: u32,
+        /// Where it listens.
+        address: SocketAddr,
+        /// What carries its frames.
+        link: LinkKind,
+        /// What the system lets it have.
+        rights: Rights,
+    },
+    /// Datagrams arrived that are no frames, since the last such record.
+    RefusedBytes {
+        /// How many.
+        datagrams: u64,
+        /// Why the last one is none.
+        reason: String,
+    },
+    /// The party said frames that break a bound of the wire, since the last such record: a mistake in this program.
+    UnsendableFrames {
+        /// How many.
+        frames: u64,
+        /// Which bound, for the last one.
+        reason: String,
+    },
+    /// Records were lost because the journal was too slow, since the last such record.
+    JournalLost {
+        /// How many.
+        records: u64,
+    },
+    /// A line was read that is no command.
+    UnknownCommand {
+        /// The line.
+        line: String,
+    },
+    /// From the first frame of a cycle to the last turn heard, over all cycles that were complete.
+    Exchange(crate::exchange::Exchange),
+    /// The party ends as it was told to.
+    Stopped(Summary),
+}
+
+/// Takes what is reported; never blocks.
+pub trait EventSink<E> {
+    /// Takes one record.
+    fn record(&mut self, now: Time, event: Noted<E>);
+}
+
+/// The cycle's end of the journal.
+#[derive(Debug)]
+pub struct JournalSender<E> {
+    sender: SyncSender<(Time, Noted<E>)>,
+    lost: Arc<AtomicU64>,
+}
+
+impl<E> Clone for JournalSender<E> {
+    fn clone(&self) -> Self {
+        Self {
+            sender: self.sender.clone(),
+            lost: Arc::clone(&self.lost),
+        }
+    }
+}
+
+impl<E> EventSink<E> for JournalSender<E> {
+    fn record(&mut self, now: Time, event: Noted<E>) {
+        let lost = self.lost.swap(0, Ordering::Relaxed);
+        let mut missed = 0;
+        if lost > 0 {
+            let note = Noted::Host(HostEvent::JournalLost { records: lost });
+            if self.sender.try_send((now, note)).is_err() {
+                missed += lost;
+            }
+        }
+        if self.sender.try_send((now, event)).is_err() {
+            missed += 1;
+        }
+        if missed > 0 {
+            self.lost.fetch_add(missed, Ordering::Relaxed);
+        }
+    }
+}
+
+/// The thread that writes. It ends when all senders are gone.
+#[derive(Debug)]
+pub struct Journal {
+    thread: JoinHandle<u64>,
+}
+
+impl Journal {
+    /// Starts the thread; at most `bound` records wait.
+    ///
+    /// # Errors
+    /// [`BusError::System`] where there is no thread to be had.
+    pub fn start<E>(
+        bound: usize,
+        clock: Clock,
+        party: Party,
+        name: String,
+        output: impl Write + Send + 'static,
+    ) -> Result<(JournalSender<E>, Self), BusError>
+    where
+        E: Serialize + Send + 'static,
+    {
+        let (sender, receiver) = sync_channel(bound);
+        let lost = Arc::new(AtomicU64::new(0));
+        let left = Arc::clone(&lost);
+        let thread = std::thread::Builder::new()
+            .name("journal".into())
+            .spawn(move || {
+                let mut output = BufWriter::new(output);
+                let unwritten = write_all(&receiver, &mut output, |(now, event)| Record {
+                    at_ns: clock.host_ns(now),
+                    party,
+                    name: Cow::Borrowed(&name),
+                    event,
+                });
+                unwritten + left.load(Ordering::Relaxed)
+            })
+            .map_err(|source| BusError::System {
+                what: "a thread for the journal",
+                source,
+            })?;
+        Ok((JournalSender { sender, lost }, Self { thread }))
+    }
+
+    /// Waits until everything is written, and says how many records are lost without a word about it in the journal.
+    pub fn finish(self) -> u64 {
+        self.thread.join().unwrap_or(0)
+    }
+}
+
+/// Writes until all senders are gone; the number of records that could not be written.
+fn write_all<'name, E: Serialize + 'name>(
+    receiver: &Receiver<(Time, Noted<E>)>,
+    output: &mut impl Write,
+    record: impl Fn((Time, Noted<E>)) -> Record<'name, E>,
+) -> u64 {
+    let mut unwritten = 0;
+    while let Ok(first) = receiver.recv() {
+        // Flushed when nothing waits: a reader sees each record at once, and a burst costs one write.
+        let burst = std::iter::once(first).chain(receiver.try_iter());
+        for noted in burst {
+            if write_line(output, &record(noted)).is_err() {
+                unwritten += 1;
+            }
+        }
+        if output.flush().is_err() {
+            unwritten += 1;
+        }
+    }
+    unwritten
+}
+
+fn write_line<E: Serialize>(output: &mut impl Write, record: &Record<'_, E>) -> io::Result<()> {
+    serde_json::to_writer(&mut *output, record)?;
+    output.write_all(b"\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+    use std::sync::mpsc::channel;
+    use std::time::Duration;
+
+    use understudy_wire::{ProgramId, StationId};
+
+    use super::*;
+
+    /// Writes only after it was let.
+    struct Held {
+        let_go: std::sync::mpsc::Receiver<()>,
+        written: Arc<Mutex<Vec<u8>>>,
+    }
+
+    impl Write for Held {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            let _ = self.let_go.recv();
+            self.written
+                .lock()
+                .expect("no panic")
+                .extend_from_slice(bytes);
+            Ok(bytes.len())
+        }
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    fn events(written: &[u8]) -> Vec<Noted<u32>> {
+        let lines = std::str::from_utf8(written).expect("text").lines();
+        lines
+            .map(|line| {
+                serde_json::from_str::<Record<'_, u32>>(line)
+                    .expect("a record")
+                    .event
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_journal_that_is_stuck_loses_records_and_says_how_many() {
+        const RECORDS: u32 = 1000;
+        let (let_go, held) = channel();
+        let written = Arc::new(Mutex::new(Vec::new()));
+        let output = Held {
+            let_go: held,
+            written: Arc::clone(&written),
+        };
+        let party = Party::Station(StationId(0));
+        let (mut sender, journal) =
+            Journal::start::<u32>(8, Clock::start(), party, "robot".into(), output)
+                .expect("a thread");
+        for number in 0..RECORDS {
+            sender.record(Time(u64::from(number)), Noted::Party(number));
+        }
+        drop(let_go);
+        // The thread takes records again from here on; whoever reports next says what was lost before.
+        let mut number = RECORDS;
+        let clock = Clock::start();
+        while !events(&written.lock().expect("no panic"))
+            .iter()
+            .any(|event| matches!(event, Noted::Host(_)))
+        {
+            assert!(
+                clock.now() < Time(0) + Duration::from_secs(20),
+                "nothing is said"
+            );
+            sender.record(Time(0), Noted::Party(number));
+            number += 1;
+            std::thread::yield_now();
+        }
+        drop(sender);
+        let unsaid = journal.finish();
+        let events = events(&written.lock().expect("no panic"));
+        let kept = events
+            .iter()
+            .filter(|event| matches!(event, Noted::Party(_)))
+            .count() as u64;
+        let lost: u64 = events
+            .iter()
+            .map(|event| match event {
+                Noted::Host(HostEvent::JournalLost { records }) => *records,
+                _ => 0,
+            })
+            .sum();
+        assert!(
+            lost >= u64::from(RECORDS) - 8 - 1 - BURST,
+            "{lost} of {number}"
+        );
+        assert_eq!(kept + lost + unsaid, u64::from(number));
+    }
+
+    /// What the thread may have taken into its own buffer before the first write was held: 8 KiB of lines.
+    const BURST: u64 = 8192 / 60;
+
+    #[test]
+    fn a_line_is_what_a_reader_of_journals_expects() {
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+        #[serde(tag = "event", rename_all = "kebab-case")]
+        enum Event {
+            Paces { cycle: u64 },
+        }
+        let record = |event| Record {
+            at_ns: 12,
+            party: Party::RemoteIo(ProgramId(1)),
+            name: "press-io".into(),
+            event,
+        };
+        let records = [
+            record(Noted::Host(HostEvent::Ready {
+                process: 4711,
+                address: ([127, 0, 0, 1], 7450).into(),
+                link: LinkKind::Zenoh,
+                rights: Rights {
+                    real_time: true,
+                    locked_memory: true,
+                    lacking: Vec::new(),
+                },
+            })),
+            record(Noted::Party(Event::Paces { cycle: 3 })),
+            record(Noted::Host(HostEvent::JournalLost { records: 5 })),
+            record(Noted::Host(HostEvent::Stopped(Summary::default()))),
+        ];
+        let mut text = Vec::new();
+        for record in &records {
+            write_line(&mut text, record).expect("it is memory");
+        }
+        let text = String::from_utf8(text).expect("JSON is text");
+        insta::assert_snapshot!(text);
+        for (line, record) in text.lines().zip(&records) {
+            let read: Record<'_, Event> = serde_json::from_str(line).expect("it was written");
+            assert_eq!(read, *record);
+        }
+    }
+
+    #[test]
+    fn a_disk_that_is_full_stops_the_journal_and_not_its_senders() {
+        struct Full;
+        impl Write for Full {
+            fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+                Err(io::ErrorKind::StorageFull.into())
+            }
+            fn flush(&mut self) -> io::Result<()> {
+                Err(io::ErrorKind::StorageFull.into())
+            }
+        }
+        let party = Party::Station(StationId(0));
+        let (mut sender, journal) =
+            Journal::start::<u32>(8, Clock::start(), party, "robot".into(), Full)
+                .expect("a thread");
+        for number in 0..1000 {
+            sender.record(Time(0), Noted::Party(number));
+        }
+        drop(sender);
+        assert!(journal.finish() > 0);
+    }
+}

@@ -1,0 +1,36 @@
+//! Parties on real clocks, threads and networks.
+//!
+//! A party (a station, a remote I/O, a plant) is a pure [`understudy_wire::Machine`]. This crate gives it a thread, a clock,
+//! a link to its peers ([`LinkKind`]: Zenoh or plain UDP) and a journal, and runs it ([`Host`], or [`run_party`] for a process
+//! of its own). Nothing here decides anything about the cycle.
+
+mod clock;
+mod control;
+mod doorbell;
+mod endpoints;
+mod error;
+pub mod exchange;
+mod field;
+mod host;
+mod journal;
+mod link;
+mod observer;
+mod orders;
+mod party;
+mod rights;
+mod udp;
+mod zenoh_link;
+
+pub use clock::Clock;
+pub use control::Commands;
+pub use endpoints::{Endpoints, Peer};
+pub use error::BusError;
+pub use field::{FieldDriver, NoField, SimulatedField};
+pub use host::{Host, Summary};
+pub use journal::{EventSink, HostEvent, JOURNAL_RECORDS, Journal, JournalSender, Noted, Record};
+pub use link::{Link, LinkCounters, LinkKind, NoSuchLink};
+pub use observer::{NoObserver, Observer};
+pub use orders::{Control, Order, Orders, orders};
+pub use party::{PartySettings, run_party};
+pub use rights::Rights;
+pub use zenoh_link::ZENOH_RUNTIME;

@@ -1,0 +1,31 @@
+//! Who looks on while a party runs.
+
+use understudy_wire::{Frame, Time};
+
+use crate::journal::HostEvent;
+
+/// Sees every frame that a party says or hears, copies included; changes nothing.
+pub trait Observer: Send {
+    /// One frame: before it is sent, or before the party is told.
+    fn frame(&mut self, now: Time, frame: &Frame);
+
+    /// Whether it has seen all that it came for; the party stops then.
+    fn satisfied(&self) -> bool {
+        false
+    }
+
+    /// What it has to report when the party stops.
+    fn finish(&mut self) -> Option<HostEvent>;
+}
+
+/// Nobody.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct NoObserver;
+
+impl Observer for NoObserver {
+    fn frame(&mut self, _now: Time, _frame: &Frame) {}
+
+    fn finish(&mut self) -> Option<HostEvent> {
+        None
+    }
+}

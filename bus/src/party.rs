@@ -1,0 +1,160 @@
+//! One party as one process: what `understudy node`, `remote-io` and `plant` run.
+
+use std::any::Any;
+use std::io::Write;
+use std::os::fd::AsFd;
+
+use nix::sys::eventfd::{EfdFlags, EventFd};
+use nix::sys::prctl::set_pdeathsig;
+use nix::sys::signal::Signal;
+use serde::Serialize;
+use understudy_wire::Machine;
+
+use crate::clock::Clock;
+use crate::control::{Commands, ending_signals, watch};
+use crate::endpoints::Endpoints;
+use crate::error::BusError;
+use crate::field::FieldDriver;
+use crate::host::{Host, Summary};
+use crate::journal::{EventSink, HostEvent, JOURNAL_RECORDS, Journal, Noted};
+use crate::link::LinkKind;
+use crate::observer::Observer;
+use crate::orders::{Order, orders};
+use crate::rights::{CYCLE_PRIORITY, Rights, run_in_real_time, sleep_exactly};
+
+/// What a process needs to know besides its party.
+pub struct PartySettings {
+    /// Who is where.
+    pub endpoints: Endpoints,
+    /// What carries the frames.
+    pub link: LinkKind,
+    /// Sensors and actuators.
+    pub field: Box<dyn FieldDriver>,
+    /// Who looks on.
+    pub observer: Box<dyn Observer>,
+    /// Whether commands are read from standard input.
+    pub commands: Commands,
+    /// Whether the process is killed when the thread that started it ends (PR_SET_PDEATHSIG).
+    pub ends_with_parent: bool,
+    /// Whether SCHED_FIFO and locked memory are asked for.
+    pub real_time: bool,
+}
+
+/// Runs a party until it is told to stop by a command, by SIGINT or SIGTERM, or by the end of standard input.
+///
+/// To be called from the main thread, before any other is started. Each report is one line of JSON on `output`
+/// ([`crate::Record`]); the first is [`HostEvent::Ready`], the last [`HostEvent::Stopped`].
+///
+/// # Errors
+/// [`BusError::PortInUse`], [`BusError::Listen`] or [`BusError::Zenoh`] where there is no link; [`BusError::System`] where the
+/// system refuses what every process needs; [`BusError::Panicked`] where the cycle panics. Rights that are lacking are no error;
+/// the ready record names them.
+pub fn run_party<M>(
+    mut machine: M,
+    settings: PartySettings,
+    output: impl Write + Send + 'static,
+) -> Result<Summary, BusError>
+where
+    M: Machine + Send,
+    M::Event: Serialize + Send + 'static,
+{
+    let clock = Clock::start();
+    let PartySettings {
+        endpoints,
+        link: kind,
+        mut field,
+        mut observer,
+        commands,
+        ends_with_parent,
+        real_time,
+    } = settings;
+    if ends_with_parent {
+        set_pdeathsig(Signal::SIGKILL).map_err(BusError::system(
+            "to end with the process that started this one",
+        ))?;
+    }
+    let signals = ending_signals()?;
+    let finished = EventFd::from_flags(EfdFlags::EFD_CLOEXEC)
+        .map_err(BusError::system("an eventfd for the end"))?;
+    let own = endpoints.own().clone();
+    // The journal's thread starts before the rights are claimed, so that it inherits none.
+    let (mut sink, journal) =
+        Journal::start::<M::Event>(JOURNAL_RECORDS, clock, own.party, own.name, output)?;
+    let mut rights = if real_time {
+        Rights::claim()
+    } else {
+        Rights::unclaimed()
+    };
+    let raises = rights.real_time;
+    let mut link = kind.open(&endpoints)?;
+    if real_time {
+        rights.lock();
+    }
+    let ready = HostEvent::Ready {
+        process: std::process::id(),
+        address: link.address(),
+        link: kind,
+        rights,
+    };
+    sink.record(clock.now(), Noted::Host(ready));
+    let (control, orders) = orders()?;
+    let mut noted = sink.clone();
+    let finished_here = &finished;
+    let summary = std::thread::scope(|scope| {
+        let cycle = std::thread::Builder::new()
+            .name("cycle".into())
+            .spawn_scoped(scope, move || {
+                let _finished = Finished(finished_here);
+                sleep_exactly();
+                if raises && let Err(error) = run_in_real_time(CYCLE_PRIORITY) {
+                    tracing::warn!(error, "the cycle keeps the priority of the link");
+                }
+                Host {
+                    machine: &mut machine,
+                    link: link.as_mut(),
+                    field: field.as_mut(),
+                    sink: &mut sink,
+                    observer: observer.as_mut(),
+                    orders: &orders,
+                    clock,
+                }
+                .run()
+            })
+            .map_err(|source| BusError::System {
+                what: "a thread for the cycle",
+                source,
+            })?;
+        let watched = watch(commands, &signals, finished.as_fd(), &control, |line| {
+            let event = HostEvent::UnknownCommand { line };
+            noted.record(clock.now(), Noted::Host(event));
+        });
+        if watched.is_err() {
+            control.give(Order::Stop);
+        }
+        let ran = cycle.join().unwrap_or_else(|panic| {
+            Err(BusError::Panicked {
+                message: said(panic.as_ref()),
+            })
+        });
+        watched.and(ran)
+    });
+    drop(noted);
+    journal.finish();
+    summary
+}
+
+/// Tells the main thread that the cycle has ended, also where it ends by a panic.
+struct Finished<'a>(&'a EventFd);
+
+impl Drop for Finished<'_> {
+    fn drop(&mut self) {
+        // A new eventfd takes one write.
+        let _ = self.0.write(1);
+    }
+}
+
+fn said(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().copied();
+    let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    text.unwrap_or("(without words)").to_owned()
+}

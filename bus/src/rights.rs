@@ -1,0 +1,122 @@
+//! What the system lets a process have for keeping its times.
+
+use std::cell::Cell;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use nix::sys::mman::{MlockAllFlags, mlockall};
+use nix::sys::prctl::set_timerslack;
+use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit};
+use nix::unistd::geteuid;
+use serde::{Deserialize, Serialize};
+use thread_priority::{
+    RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
+    set_thread_priority_and_policy, thread_native_id,
+};
+
+/// Of SCHED_FIFO, for the thread of the cycle.
+pub(crate) const CYCLE_PRIORITY: u8 = 40;
+/// Of SCHED_FIFO, for the threads on which a link hears, which run only when there is something to carry.
+const LINK_PRIORITY: u8 = 30;
+
+/// Of SCHED_FIFO, for a process that starts: before programs that are not in real time, and behind every party that runs.
+const START_PRIORITY: u8 = 10;
+
+/// Whether this process has claimed its rights, so that the threads of its link may raise themselves.
+static LINK_IN_REAL_TIME: AtomicBool = AtomicBool::new(false);
+
+thread_local! {
+    static RAISED: Cell<bool> = const { Cell::new(false) };
+}
+
+/// What a process has, and what it lacks, said for people.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Rights {
+    /// Whether the cycle runs under SCHED_FIFO.
+    pub real_time: bool,
+    /// Whether its memory stays in memory.
+    pub locked_memory: bool,
+    /// What is lacking, what it costs, and how to grant it; one sentence each.
+    pub lacking: Vec<String>,
+}
+
+impl Rights {
+    /// Asks for real time before the process starts its threads, which inherit it.
+    ///
+    /// A process that starts does much at once and must not delay those that run: the threads of the link raise themselves later, by
+    /// [`raise_link_thread`].
+    pub(crate) fn claim() -> Self {
+        let mut lacking = Vec::new();
+        let real_time = match run_in_real_time(START_PRIORITY) {
+            Ok(()) => true,
+            Err(error) => {
+                lacking.push(format!(
+                    "no SCHED_FIFO ({error}): other programs delay the cycle; grant it with `ulimit -r 50` or CAP_SYS_NICE"
+                ));
+                false
+            }
+        };
+        LINK_IN_REAL_TIME.store(real_time, Ordering::Relaxed);
+        Self {
+            real_time,
+            locked_memory: false,
+            lacking,
+        }
+    }
+
+    /// Locks the memory, once what the process needs is there.
+    pub(crate) fn lock(&mut self) {
+        match lock_memory() {
+            Ok(()) => self.locked_memory = true,
+            Err(reason) => self.lacking.push(format!(
+                "memory is not locked ({reason}): paging may delay the cycle; grant it with `ulimit -l unlimited` or CAP_IPC_LOCK"
+            )),
+        }
+    }
+
+    /// None was asked for.
+    pub(crate) fn unclaimed() -> Self {
+        Self {
+            real_time: false,
+            locked_memory: false,
+            lacking: vec!["no real-time rights were asked for".into()],
+        }
+    }
+}
+
+/// Called by a thread of the link when it hears something: where the process has its rights, the thread takes its own.
+pub(crate) fn raise_link_thread() {
+    if LINK_IN_REAL_TIME.load(Ordering::Relaxed) && !RAISED.get() {
+        RAISED.set(true);
+        if let Err(error) = run_in_real_time(LINK_PRIORITY) {
+            tracing::warn!(error, "a thread of the link keeps its priority");
+        }
+    }
+}
+
+/// Puts the calling thread under SCHED_FIFO.
+pub(crate) fn run_in_real_time(priority: u8) -> Result<(), String> {
+    let value = ThreadPriorityValue::try_from(priority)?;
+    let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
+    set_thread_priority_and_policy(
+        thread_native_id(),
+        ThreadPriority::Crossplatform(value),
+        policy,
+    )
+    .map_err(|error| error.to_string())
+}
+
+/// Without SCHED_FIFO the system may add 50 µs to every sleep so as to wake several threads at once.
+pub(crate) fn sleep_exactly() {
+    // It can only fail on kernels that do not know it, and costs exactness there, nothing else.
+    let _ = set_timerslack(1);
+}
+
+fn lock_memory() -> Result<(), String> {
+    // Under a limit the call may succeed and every later allocation past the limit fail, so it is not tried.
+    let (limit, _) = getrlimit(Resource::RLIMIT_MEMLOCK).map_err(|error| error.to_string())?;
+    if limit != RLIM_INFINITY && !geteuid().is_root() {
+        return Err(format!("at most {limit} bytes may be locked"));
+    }
+    mlockall(MlockAllFlags::MCL_CURRENT | MlockAllFlags::MCL_FUTURE)
+        .map_err(|error| error.desc().to_owned())
+}

@@ -1,0 +1,88 @@
+//! Plain UDP: one socket, one datagram for each receiver.
+//!
+//! A datagram's sender is not looked at: what is in a frame decides. One send for each receiver, and not one sendmmsg for all,
+//! because on loopback the time goes into delivering each datagram and not into entering the kernel.
+
+use std::net::{SocketAddr, UdpSocket};
+use std::os::fd::{AsFd, BorrowedFd};
+
+use nix::sys::socket::{setsockopt, sockopt};
+use understudy_wire::{Body, Frame, MAXIMUM_FRAME_BYTES, Party};
+
+use crate::endpoints::{Endpoints, Topic};
+use crate::error::BusError;
+use crate::link::{Link, LinkCounters};
+
+/// Asked of the system for datagrams that wait while this party is not scheduled; the system may give less.
+const RECEIVE_BUFFER_BYTES: usize = 1024 * 1024;
+
+pub(crate) struct UdpLink {
+    socket: UdpSocket,
+    address: SocketAddr,
+    audiences: [Vec<(Party, SocketAddr)>; Topic::ALL.len()],
+    datagram: Box<[u8]>,
+    unsent: u64,
+}
+
+impl UdpLink {
+    pub(crate) fn open(endpoints: &Endpoints) -> Result<Self, BusError> {
+        let address = endpoints.own().address;
+        let failed = |source| BusError::listen(address, source);
+        let socket = UdpSocket::bind(address).map_err(failed)?;
+        socket.set_nonblocking(true).map_err(failed)?;
+        setsockopt(&socket, sockopt::RcvBuf, &RECEIVE_BUFFER_BYTES)
+            .map_err(BusError::system("a receive buffer for the socket"))?;
+        let audience = |topic| {
+            let peers = endpoints.audience(topic);
+            peers.map(|peer| (peer.party, peer.address)).collect()
+        };
+        Ok(Self {
+            address: socket.local_addr().map_err(failed)?,
+            socket,
+            audiences: Topic::ALL.map(audience),
+            // One byte more than a frame may have, so that what is too long is seen to be.
+            datagram: vec![0; MAXIMUM_FRAME_BYTES + 1].into(),
+            unsent: 0,
+        })
+    }
+}
+
+impl Link for UdpLink {
+    fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    fn send(&mut self, frame: &Frame, bytes: &[u8]) {
+        let only = match &frame.body {
+            Body::Transfer(transfer) => Some(Party::Station(transfer.to)),
+            _ => None,
+        };
+        for (party, address) in &self.audiences[Topic::of(&frame.body) as usize] {
+            if only.is_none_or(|only| only == *party)
+                && self.socket.send_to(bytes, address).is_err()
+            {
+                self.unsent += 1;
+            }
+        }
+    }
+
+    fn receive(&mut self, bytes: &mut Vec<u8>) -> bool {
+        let Ok(length) = self.socket.recv(&mut self.datagram) else {
+            return false;
+        };
+        bytes.clear();
+        bytes.extend_from_slice(&self.datagram[..length]);
+        true
+    }
+
+    fn readiness(&self) -> BorrowedFd<'_> {
+        self.socket.as_fd()
+    }
+
+    fn counters(&self) -> LinkCounters {
+        LinkCounters {
+            unsent: self.unsent,
+            ..LinkCounters::default()
+        }
+    }
+}

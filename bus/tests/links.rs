@@ -1,0 +1,368 @@
+//! Parties in threads over each link: all hear all, whatever arrives beside the frames.
+
+#![allow(missing_docs, reason = "a test")]
+#![allow(
+    clippy::disallowed_methods,
+    reason = "real links take real time, and a test that waits has a deadline"
+)]
+
+mod parties;
+
+use std::collections::BTreeSet;
+use std::net::{SocketAddr, UdpSocket};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use parties::{Chat, Chatter, agreement, endpoints, peers, plant, remote_io, station};
+use understudy_bus::{
+    Clock, Control, EventSink, FieldDriver, Host, HostEvent, LinkKind, NoField, NoObserver, Noted,
+    Order, Peer, SimulatedField, Summary, orders,
+};
+use understudy_wire::{Party, Time};
+
+/// Past it a test has failed; nothing waits for it otherwise.
+const DEADLINE: Duration = Duration::from_secs(20);
+
+struct Sink {
+    own: Party,
+    reports: Sender<(Party, Noted<Chat>)>,
+}
+
+impl EventSink<Chat> for Sink {
+    fn record(&mut self, _now: Time, event: Noted<Chat>) {
+        // A test that has ended listens no more.
+        let _ = self.reports.send((self.own, event));
+    }
+}
+
+struct Running {
+    control: Control,
+    thread: JoinHandle<Summary>,
+}
+
+impl Running {
+    fn start(
+        own: Party,
+        life: u64,
+        link: LinkKind,
+        peers: &[Peer],
+        reports: &Sender<(Party, Noted<Chat>)>,
+    ) -> Self {
+        let mut link = link.open(&endpoints(own, peers)).expect("a free port");
+        let (control, orders) = orders().expect("an eventfd");
+        let mut sink = Sink {
+            own,
+            reports: reports.clone(),
+        };
+        let thread = std::thread::spawn(move || {
+            let mut field: Box<dyn FieldDriver> = match own {
+                Party::RemoteIo(program) => Box::new(SimulatedField::new(program, agreement())),
+                _ => Box::new(NoField),
+            };
+            Host {
+                machine: &mut Chatter::new(own, life),
+                link: link.as_mut(),
+                field: field.as_mut(),
+                sink: &mut sink,
+                observer: &mut NoObserver,
+                orders: &orders,
+                clock: Clock::start(),
+            }
+            .run()
+            .expect("it sleeps")
+        });
+        Self { control, thread }
+    }
+
+    fn stop(self) -> Summary {
+        self.control.give(Order::Stop);
+        self.thread.join().expect("no panic")
+    }
+}
+
+const CELL: [fn() -> Party; 7] = [
+    || station(0),
+    || station(1),
+    || station(2),
+    || remote_io(0),
+    || remote_io(1),
+    || plant(0),
+    || plant(1),
+];
+
+fn cell() -> Vec<Party> {
+    CELL.iter().map(|party| party()).collect()
+}
+
+/// Everything that the parties of the cell have to report when `changed` lives its `life` and all others their first.
+fn expected(changed: Party, life: u64) -> BTreeSet<(Party, Chat)> {
+    let mut expected = BTreeSet::new();
+    let life_of = |speaker| if speaker == changed { life } else { 1 };
+    for listener in cell() {
+        for speaker in cell() {
+            let heard = match (speaker, listener) {
+                (Party::Plant(plant), Party::RemoteIo(program)) if plant == program => {
+                    expected.insert((listener, Chat::Sensed));
+                    false
+                }
+                (Party::RemoteIo(program), Party::Plant(plant)) => program == plant,
+                (Party::Plant(feeder), Party::Plant(fed)) => feeder.0 == 0 && fed.0 == 1,
+                (Party::Plant(_), _) | (_, Party::Plant(_)) => false,
+                (Party::RemoteIo(_), Party::RemoteIo(_)) => false,
+                _ => speaker != listener,
+            };
+            if heard {
+                let life = life_of(speaker);
+                expected.insert((listener, Chat::Heard { speaker, life }));
+            }
+        }
+    }
+    expected
+}
+
+/// Takes reports until all of `missing` have come.
+fn wait_for(
+    reports: &Receiver<(Party, Noted<Chat>)>,
+    mut missing: BTreeSet<(Party, Chat)>,
+    what: &str,
+) -> Duration {
+    let start = Instant::now();
+    while !missing.is_empty() {
+        let left = DEADLINE.saturating_sub(start.elapsed());
+        let Ok((party, event)) = reports.recv_timeout(left) else {
+            panic!("{what}: these are still missing: {missing:?}");
+        };
+        if let Noted::Party(chat) = event {
+            missing.remove(&(party, chat));
+        }
+    }
+    start.elapsed()
+}
+
+fn all_hear_all_and_one_who_comes_back(link: LinkKind) {
+    let peers = peers(&cell());
+    let (sender, reports) = channel();
+    let start = |own, life| Running::start(own, life, link, &peers, &sender);
+    let mut running: Vec<Running> = cell().into_iter().map(|own| start(own, 1)).collect();
+    wait_for(&reports, expected(station(0), 1), "at first");
+    // One whom all others call, one in the middle, and one who calls: each comes back on its own port in another life.
+    for place in [0, 3, 5] {
+        let own = cell()[place];
+        let stopped = running.remove(place).stop();
+        assert!(stopped.frames_said > 0 && stopped.frames_heard > 0);
+        running.insert(place, start(own, 2));
+        let again = expected(own, 2).into_iter().filter(|(listener, chat)| {
+            let new = matches!(chat, Chat::Heard { life: 2, .. });
+            new || *listener == own
+        });
+        wait_for(&reports, again.collect(), "after a restart");
+        running.remove(place).stop();
+        running.insert(place, start(own, 1));
+    }
+    let summaries: Vec<Summary> = running.into_iter().map(Running::stop).collect();
+    assert!(summaries.iter().all(|summary| summary.unsendable == 0));
+}
+
+#[test]
+fn all_hear_all_over_udp() {
+    all_hear_all_and_one_who_comes_back(LinkKind::Udp);
+}
+
+#[test]
+fn all_hear_all_over_zenoh() {
+    all_hear_all_and_one_who_comes_back(LinkKind::Zenoh);
+}
+
+#[test]
+fn all_hear_all_over_zenoh_and_tcp() {
+    all_hear_all_and_one_who_comes_back(LinkKind::ZenohTcp);
+}
+
+/// Bytes that are no frame, empty and long ones among them.
+fn garbage(target: SocketAddr) {
+    let socket = UdpSocket::bind(("127.0.0.1", 0)).expect("a free port");
+    for length in [0, 1, 9, 60, 1400, 40_000] {
+        let bytes: Vec<u8> = (0..length)
+            .map(|place| (place * 31 + length) as u8)
+            .collect();
+        socket.send_to(&bytes, target).expect("it is loopback");
+    }
+}
+
+fn garbage_changes_nothing(link: LinkKind) {
+    let peers = peers(&cell());
+    let (sender, reports) = channel();
+    let start = |own, life| Running::start(own, life, link, &peers, &sender);
+    let mut running: Vec<Running> = cell().into_iter().map(|own| start(own, 1)).collect();
+    wait_for(&reports, expected(station(0), 1), "at first");
+    peers.iter().for_each(|peer| garbage(peer.address));
+    running.remove(1).stop();
+    running.insert(1, start(station(1), 2));
+    let again = expected(station(1), 2)
+        .into_iter()
+        .filter(|(_, chat)| matches!(chat, Chat::Heard { life: 2, .. }));
+    wait_for(&reports, again.collect(), "after garbage");
+    if link == LinkKind::Udp {
+        // On plain UDP garbage reaches the host, which says so.
+        let start = Instant::now();
+        loop {
+            let left = DEADLINE.saturating_sub(start.elapsed());
+            let (_, event) = reports.recv_timeout(left).expect("it is said");
+            if let Noted::Host(HostEvent::RefusedBytes { datagrams, reason }) = event {
+                assert!(datagrams > 0 && !reason.is_empty());
+                break;
+            }
+        }
+    }
+    running.into_iter().for_each(|running| {
+        running.stop();
+    });
+}
+
+#[test]
+fn garbage_changes_nothing_on_udp() {
+    garbage_changes_nothing(LinkKind::Udp);
+}
+
+#[test]
+fn garbage_changes_nothing_on_zenoh() {
+    garbage_changes_nothing(LinkKind::Zenoh);
+}
+
+#[test]
+fn a_port_in_use_is_said_with_its_number() {
+    let taken = UdpSocket::bind(("127.0.0.1", 0)).expect("a free port");
+    let mut peers = peers(&cell());
+    peers[0].address = taken.local_addr().expect("bound");
+    for link in [LinkKind::Udp, LinkKind::Zenoh] {
+        let error = link
+            .open(&endpoints(station(0), &peers))
+            .err()
+            .expect("the port is in use");
+        assert_eq!(error.code(), "U0501");
+        assert!(
+            error
+                .to_string()
+                .contains(&peers[0].address.port().to_string())
+        );
+    }
+}
+
+/// Passes datagrams on to `target` and back, and loses one of ten in each direction.
+struct LossyWire {
+    address: SocketAddr,
+    ended: Arc<AtomicBool>,
+}
+
+impl LossyWire {
+    fn to(target: SocketAddr, seed: u64) -> Self {
+        let socket = UdpSocket::bind(("127.0.0.1", 0)).expect("a free port");
+        let address = socket.local_addr().expect("bound");
+        let ended = Arc::new(AtomicBool::new(false));
+        let over = Arc::clone(&ended);
+        std::thread::spawn(move || {
+            let mut clients: Vec<(SocketAddr, UdpSocket)> = Vec::new();
+            let mut loss = Loss(seed);
+            let mut bytes = vec![0; 65536];
+            loop {
+                let Ok((length, client)) = socket.recv_from(&mut bytes) else {
+                    return;
+                };
+                if over.load(Ordering::Relaxed) {
+                    return;
+                }
+                let known = clients.iter().position(|(address, _)| *address == client);
+                let place = known.unwrap_or_else(|| {
+                    let out = UdpSocket::bind(("127.0.0.1", 0)).expect("a free port");
+                    out.connect(target).expect("it is loopback");
+                    let back = out.try_clone().expect("a descriptor");
+                    let front = socket.try_clone().expect("a descriptor");
+                    let (over, mut loss) = (
+                        Arc::clone(&over),
+                        Loss(seed ^ 0x5555 ^ u64::from(client.port())),
+                    );
+                    back.set_read_timeout(Some(Duration::from_millis(100)))
+                        .expect("a timeout");
+                    std::thread::spawn(move || {
+                        let mut bytes = vec![0; 65536];
+                        while !over.load(Ordering::Relaxed) {
+                            if let Ok(length) = back.recv(&mut bytes)
+                                && !loss.lost()
+                            {
+                                let _ = front.send_to(&bytes[..length], client);
+                            }
+                        }
+                    });
+                    clients.push((client, out));
+                    clients.len() - 1
+                });
+                if !loss.lost() {
+                    let _ = clients[place].1.send(&bytes[..length]);
+                }
+            }
+        });
+        Self { address, ended }
+    }
+}
+
+impl Drop for LossyWire {
+    fn drop(&mut self) {
+        self.ended.store(true, Ordering::Relaxed);
+        garbage(self.address);
+    }
+}
+
+/// One of ten, by the same sequence for the same seed.
+struct Loss(u64);
+
+impl Loss {
+    fn lost(&mut self) -> bool {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33).is_multiple_of(10)
+    }
+}
+
+fn all_hear_all_where_one_of_ten_is_lost(link: LinkKind, seed: u64) {
+    let peers = peers(&cell());
+    let wires: Vec<LossyWire> = peers
+        .iter()
+        .zip(seed..)
+        .map(|(peer, seed)| LossyWire::to(peer.address, seed))
+        .collect();
+    let (sender, reports) = channel();
+    let seen_by = |own: Party| -> Vec<Peer> {
+        let seen = peers.iter().zip(&wires).map(|(peer, wire)| Peer {
+            address: if peer.party == own {
+                peer.address
+            } else {
+                wire.address
+            },
+            ..peer.clone()
+        });
+        seen.collect()
+    };
+    let running: Vec<Running> = cell()
+        .into_iter()
+        .map(|own| Running::start(own, 1, link, &seen_by(own), &sender))
+        .collect();
+    wait_for(&reports, expected(station(0), 1), "with loss");
+    running.into_iter().for_each(|running| {
+        running.stop();
+    });
+}
+
+#[test]
+fn all_hear_all_where_one_of_ten_is_lost_on_udp() {
+    all_hear_all_where_one_of_ten_is_lost(LinkKind::Udp, 1);
+}
+
+#[test]
+fn all_hear_all_where_one_of_ten_is_lost_on_zenoh() {
+    all_hear_all_where_one_of_ten_is_lost(LinkKind::Zenoh, 1);
+}

@@ -1,0 +1,183 @@
+//! A party that says who it is and reports whom it hears, and clusters of such parties.
+
+use std::collections::{BTreeSet, VecDeque};
+use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+use understudy_bus::{Endpoints, Peer};
+use understudy_wire::{
+    Agreement, Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Field, Frame, Header, Image,
+    Input, Lineage, Machine, Mode, Moment, Output, Party, ProgramId, Sample, Schedule, StationId,
+    Time,
+};
+
+/// How often each party says something.
+const PERIOD: Duration = Duration::from_millis(10);
+
+/// What a party reports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(tag = "event", rename_all = "kebab-case")]
+pub(crate) enum Chat {
+    /// It hears this life of another one for the first time.
+    Heard { speaker: Party, life: u64 },
+    /// It hears another one say its 100th, 200th, … frame, or one of the 99 after that.
+    StillHears { speaker: Party, hundreds: u64 },
+    /// Its sensors say something for the first time.
+    Sensed,
+    /// The operator has released its outputs.
+    Released,
+}
+
+/// Says one frame every period; a remote I/O drives its plant as well.
+pub(crate) struct Chatter {
+    own: Party,
+    life: u64,
+    cycle: u64,
+    due: Time,
+    heard: BTreeSet<Chat>,
+    said: VecDeque<Output<Chat>>,
+}
+
+impl Chatter {
+    pub(crate) fn new(own: Party, life: u64) -> Self {
+        Self {
+            own,
+            life,
+            cycle: 0,
+            due: Time(0),
+            heard: BTreeSet::new(),
+            said: VecDeque::new(),
+        }
+    }
+
+    fn report_once(&mut self, chat: Chat) {
+        if self.heard.insert(chat) {
+            self.said.push_back(Output::Report(chat));
+        }
+    }
+}
+
+impl Machine for Chatter {
+    type Event = Chat;
+
+    fn handle_input(&mut self, now: Time, input: Input<'_>) {
+        match input {
+            Input::Wakeup => {
+                self.due = now + PERIOD;
+                self.cycle += 1;
+                let body = match self.own {
+                    Party::Station(_) => Body::Sync,
+                    Party::RemoteIo(_) => Body::Sample(sample()),
+                    Party::Plant(_) => Body::Field(field()),
+                };
+                let agreement = agreement();
+                self.said.push_back(Output::Send(Arc::new(Frame {
+                    header: Header {
+                        cluster: agreement.cluster,
+                        configuration: agreement.configuration,
+                        moment: Moment {
+                            epoch: Epoch(self.life),
+                            cycle: Cycle(self.cycle),
+                        },
+                        sender: self.own,
+                        alone: false,
+                    },
+                    body,
+                })));
+                if matches!(self.own, Party::RemoteIo(_)) {
+                    self.said.push_back(Output::Drive(Image::zero(3)));
+                }
+            }
+            Input::Frame(frame) => {
+                let header = frame.header;
+                self.report_once(Chat::Heard {
+                    speaker: header.sender,
+                    life: header.moment.epoch.0,
+                });
+                self.report_once(Chat::StillHears {
+                    speaker: header.sender,
+                    hundreds: header.moment.cycle.0 / 100,
+                });
+            }
+            Input::Field(_) => self.report_once(Chat::Sensed),
+            Input::Release => self.said.push_back(Output::Report(Chat::Released)),
+        }
+    }
+
+    fn poll_output(&mut self) -> Option<Output<Chat>> {
+        self.said.pop_front()
+    }
+
+    fn wakeup(&self) -> Time {
+        self.due
+    }
+}
+
+fn sample() -> Sample {
+    Sample {
+        born: Moment::default(),
+        base: Lineage(1),
+        before: Lineage(1),
+        history: [Image::zero(3)].into_iter().collect(),
+        applied: None,
+    }
+}
+
+fn field() -> Field {
+    Field {
+        sensors: Image::zero(3),
+        handed_over: 0,
+        finished: 0,
+        mishaps: 0,
+        positions: [].into_iter().collect(),
+    }
+}
+
+pub(crate) fn agreement() -> Arc<Agreement> {
+    Arc::new(Agreement {
+        cluster: ClusterHash(7),
+        configuration: ConfigurationHash(8),
+        schedule: Schedule::new(PERIOD, 2, 1, 1).expect("within the bounds"),
+        mode: Mode::Full,
+        history: 1,
+        flag_after: 1,
+        shadow_cycles: 1,
+        listen_cycles: 1,
+    })
+}
+
+pub(crate) fn station(rank: u8) -> Party {
+    Party::Station(StationId(rank))
+}
+
+pub(crate) fn remote_io(program: u8) -> Party {
+    Party::RemoteIo(ProgramId(program))
+}
+
+pub(crate) fn plant(program: u8) -> Party {
+    Party::Plant(ProgramId(program))
+}
+
+/// Gives each party a port that was free a moment ago.
+pub(crate) fn peers(parties: &[Party]) -> Vec<Peer> {
+    let sockets: Vec<UdpSocket> = parties
+        .iter()
+        .map(|_| UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).expect("a free port"))
+        .collect();
+    let address = |socket: &UdpSocket| -> SocketAddr { socket.local_addr().expect("bound") };
+    let named = parties.iter().zip(&sockets);
+    named
+        .map(|(&party, socket)| Peer {
+            party,
+            name: format!("{party:?}"),
+            address: address(socket),
+        })
+        .collect()
+}
+
+pub(crate) fn endpoints(own: Party, peers: &[Peer]) -> Endpoints {
+    let feeds = vec![(ProgramId(0), ProgramId(1))];
+    Endpoints::new(agreement().cluster, own, peers.to_vec(), feeds).expect("own is among them")
+}

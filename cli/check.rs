@@ -1,0 +1,194 @@
+//! `understudy check`: everything that is wrong with ladders, clusters and scenarios, in one run.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde::Serialize;
+use understudy_cluster::Overrides;
+use understudy_diagnostic::{Report, Severity};
+use understudy_scenarios::{Parties, looks_like_a_scenario, read};
+
+use crate::answer::{Answer, Failure, Status};
+use crate::files::read_cluster;
+
+/// Read ladders, clusters and scenarios, and report everything that is wrong with them
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy check cluster.toml kill.toml
+  understudy check --json robot.ladder
+
+The ladders that a cluster names are checked with it. The names in a scenario are checked against the cluster file that is
+given with it, or else against the cluster.toml beside it. Warnings do not change the exit status.")]
+pub(crate) struct Arguments {
+    /// Ladder programs (.ladder), cluster files and scenario files (.toml)
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
+}
+
+#[derive(Serialize)]
+struct Result {
+    files: Vec<CheckedFile>,
+    errors: usize,
+    warnings: usize,
+}
+
+#[derive(Serialize)]
+struct CheckedFile {
+    name: String,
+    /// `ladder`, `cluster` or `scenario`; nothing for a file that cannot be read.
+    kind: Option<&'static str>,
+    errors: usize,
+    warnings: usize,
+}
+
+#[derive(Default)]
+struct Found {
+    reports: Vec<(&'static str, Report)>,
+    failures: Vec<Failure>,
+    unreadable: Vec<String>,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Answer {
+    let mut found = Found::default();
+    let mut scenarios = Vec::new();
+    let mut clusters = Vec::new();
+    for path in &arguments.files {
+        let Some(text) = found.text(path) else {
+            continue;
+        };
+        if path.extension().is_none_or(|extension| extension != "toml") {
+            let parsed = understudy_ladder::parse(&text);
+            found.add(
+                "ladder",
+                Report {
+                    name: path.display().to_string(),
+                    text,
+                    diagnostics: parsed.diagnostics,
+                },
+            );
+        } else if looks_like_a_scenario(&text) {
+            scenarios.push((path, text));
+        } else {
+            let loaded = read_cluster(path, &text, Overrides::default());
+            for (index, report) in loaded.reports.into_iter().enumerate() {
+                found.add(if index == 0 { "cluster" } else { "ladder" }, report);
+            }
+            clusters.extend(loaded.cluster.as_ref().map(Parties::of));
+        }
+    }
+    for (path, text) in scenarios {
+        let parties = match clusters.as_slice() {
+            [only] => Some(only.clone()),
+            _ => parties_beside(path),
+        };
+        let scenario = read(&path.display().to_string(), &text, parties.as_ref());
+        found.add("scenario", scenario.report);
+    }
+    found.answer()
+}
+
+/// Of the `cluster.toml` in the folder of a scenario, where there is a right one.
+fn parties_beside(scenario: &Path) -> Option<Parties> {
+    let path = scenario.with_file_name("cluster.toml");
+    let text = fs::read_to_string(&path).ok()?;
+    let cluster = read_cluster(&path, &text, Overrides::default()).cluster?;
+    Some(Parties::of(&cluster))
+}
+
+impl Found {
+    fn text(&mut self, path: &Path) -> Option<String> {
+        match fs::read_to_string(path) {
+            Ok(text) => Some(text),
+            Err(error) => {
+                self.unreadable.push(path.display().to_string());
+                self.failures.push(Failure {
+                    code: "U0601".to_owned(),
+                    message: format!("{} cannot be read: {error}", path.display()),
+                });
+                None
+            }
+        }
+    }
+
+    /// A ladder that two clusters name, or that is also given by itself, is reported once.
+    fn add(&mut self, kind: &'static str, report: Report) {
+        if !self
+            .reports
+            .iter()
+            .any(|(_, known)| known.name == report.name)
+        {
+            self.reports.push((kind, report));
+        }
+    }
+
+    fn answer(self) -> Answer {
+        let count = |report: &Report, severity| {
+            let diagnostics = report.diagnostics.iter();
+            diagnostics
+                .filter(|diagnostic| diagnostic.severity == severity)
+                .count()
+        };
+        let checked = self.reports.iter().map(|(kind, report)| CheckedFile {
+            name: report.name.clone(),
+            kind: Some(kind),
+            errors: count(report, Severity::Error),
+            warnings: count(report, Severity::Warning),
+        });
+        let unreadable = self.unreadable.into_iter().map(|name| CheckedFile {
+            name,
+            kind: None,
+            errors: 1,
+            warnings: 0,
+        });
+        let files: Vec<CheckedFile> = checked.chain(unreadable).collect();
+        let errors = files.iter().map(|file| file.errors).sum();
+        let warnings = files.iter().map(|file| file.warnings).sum();
+        let mut text = String::new();
+        let width = files
+            .iter()
+            .map(|file| file.name.chars().count())
+            .max()
+            .unwrap_or(0);
+        for file in &files {
+            let verdict = match (file.errors, file.warnings) {
+                (0, 0) => "right".to_owned(),
+                (0, warnings) => format!("right, {}", number(warnings, "warning")),
+                (errors, 0) => number(errors, "error"),
+                (errors, warnings) => {
+                    format!(
+                        "{}, {}",
+                        number(errors, "error"),
+                        number(warnings, "warning")
+                    )
+                }
+            };
+            let kind = file.kind.unwrap_or("");
+            let _ = writeln!(text, "{:width$}  {kind:8}  {verdict}", file.name);
+        }
+        let status = if errors == 0 {
+            Status::Done
+        } else {
+            Status::BadInput
+        };
+        let result = Result {
+            files,
+            errors,
+            warnings,
+        };
+        let mut answer = Answer::done(text, result)
+            .with_status(status)
+            .with_reports(self.reports.into_iter().map(|(_, report)| report).collect());
+        answer.failures = self.failures;
+        answer
+    }
+}
+
+fn number(count: usize, what: &str) -> String {
+    match count {
+        1 => format!("1 {what}"),
+        _ => format!("{count} {what}s"),
+    }
+}

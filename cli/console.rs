@@ -1,0 +1,162 @@
+//! The only place that prints: answers on standard output, diagnostics and progress on standard error.
+
+use std::io::{self, IsTerminal, Write};
+use std::process::ExitCode;
+use std::time::Duration;
+
+use codespan_reporting::diagnostic::{Diagnostic as Drawn, Label};
+use codespan_reporting::files::SimpleFile;
+use codespan_reporting::term::termcolor::{ColorChoice, StandardStream};
+use codespan_reporting::term::{self, Config};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use understudy_diagnostic::{Diagnostic, Report, Severity};
+use understudy_scenarios::Progress;
+
+use crate::answer::{Answer, Envelope};
+
+/// Where a command talks to.
+pub(crate) struct Console {
+    json: bool,
+    progress: Option<ProgressBar>,
+    /// Whether the cycles of the scenario have begun.
+    in_step: bool,
+    said: String,
+}
+
+impl Console {
+    pub(crate) fn new(json: bool) -> Self {
+        Self {
+            json,
+            progress: None,
+            in_step: false,
+            said: String::new(),
+        }
+    }
+
+    /// Prints the answer and gives the exit status.
+    pub(crate) fn finish(self, command: &str, answer: &Answer) -> ExitCode {
+        // A reader that is gone needs no answer.
+        let _ = if self.json {
+            print_json(command, answer)
+        } else {
+            print_text(answer)
+        };
+        ExitCode::from(answer.status.code())
+    }
+
+    /// How far a run is: a bar on a terminal, lines elsewhere, nothing under `--json`.
+    pub(crate) fn show(&mut self, progress: &Progress) {
+        if self.json {
+            return;
+        }
+        let bar = io::stderr().is_terminal();
+        match progress {
+            Progress::Cycle { cycle, cycles } if bar => {
+                let bar = self.progress.get_or_insert_with(|| cycle_bar(*cycles));
+                bar.set_position(*cycle);
+            }
+            Progress::Cycle { .. } if self.in_step => {}
+            Progress::Cycle { .. } => {
+                self.in_step = true;
+                self.say("in step: the cycles of the scenario begin");
+            }
+            Progress::Starting { parties, .. } => {
+                self.say(&format!("starting {parties} processes"));
+            }
+            Progress::ComingIntoStep { .. } => self.say("waiting until everybody is in step"),
+            Progress::Step { cycle, what } => self.say(&format!("cycle {cycle:>5}: {what}")),
+            Progress::Ending => {
+                if let Some(bar) = self.progress.take() {
+                    bar.finish_and_clear();
+                }
+            }
+        }
+    }
+
+    /// One line, unless it is the last one again.
+    fn say(&mut self, line: &str) {
+        if self.said == line {
+            return;
+        }
+        line.clone_into(&mut self.said);
+        match &self.progress {
+            Some(bar) => bar.println(line),
+            None => {
+                let _ = writeln!(io::stderr(), "{line}");
+            }
+        }
+    }
+}
+
+fn cycle_bar(cycles: u64) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(cycles), ProgressDrawTarget::stderr_with_hz(10));
+    if let Ok(style) = ProgressStyle::with_template("{bar:40} cycle {pos} of {len}, {eta} left") {
+        bar.set_style(style);
+    }
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar
+}
+
+fn print_json(command: &str, answer: &Answer) -> io::Result<()> {
+    let mut output = io::stdout().lock();
+    serde_json::to_writer(&mut output, &Envelope::new(command, answer))?;
+    writeln!(output)
+}
+
+fn print_text(answer: &Answer) -> io::Result<()> {
+    for report in &answer.reports {
+        for diagnostic in &report.diagnostics {
+            print_diagnostic(report, diagnostic)?;
+        }
+    }
+    let mut output = io::stdout().lock();
+    output.write_all(answer.text.as_bytes())?;
+    if !answer.text.is_empty() && !answer.text.ends_with('\n') {
+        writeln!(output)?;
+    }
+    output.flush()?;
+    let mut errors = io::stderr().lock();
+    for failure in &answer.failures {
+        // Errors of the crates below begin with their code for those who only see the text.
+        let prefix = format!("{}: ", failure.code);
+        let message = failure
+            .message
+            .strip_prefix(&prefix)
+            .unwrap_or(&failure.message);
+        writeln!(errors, "error[{}]: {message}", failure.code)?;
+    }
+    Ok(())
+}
+
+fn print_diagnostic(report: &Report, diagnostic: &Diagnostic) -> io::Result<()> {
+    let choice = if io::stderr().is_terminal() {
+        ColorChoice::Auto
+    } else {
+        ColorChoice::Never
+    };
+    let drawn = match diagnostic.severity {
+        Severity::Error => Drawn::error(),
+        Severity::Warning => Drawn::warning(),
+    };
+    let mut label = Label::primary((), diagnostic.span.clone());
+    label.message = diagnostic.label.clone().unwrap_or_default();
+    let related = diagnostic
+        .related
+        .iter()
+        .map(|related| Label::secondary((), related.span.clone()).with_message(&related.message));
+    let drawn = drawn
+        .with_code(diagnostic.code)
+        .with_message(&diagnostic.message)
+        .with_labels(std::iter::once(label).chain(related).collect())
+        .with_notes(
+            diagnostic
+                .help
+                .iter()
+                .map(|help| format!("help: {help}"))
+                .collect(),
+        );
+    let file = SimpleFile::new(&report.name, &report.text);
+    let mut errors = StandardStream::stderr(choice);
+    term::emit_to_write_style(&mut errors, &Config::default(), &file, &drawn)
+        .map_err(io::Error::other)
+}

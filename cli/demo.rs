@@ -1,0 +1,81 @@
+//! `understudy demo`: the experiment of section V.B on real processes.
+
+use std::path::PathBuf;
+use std::time::SystemTime;
+
+use clap::Args;
+use understudy_cluster::{Cluster, press_cell};
+use understudy_scenarios::{Parties, RunDirectory, Scenario, TABLE_TWO, read};
+
+use crate::answer::{Answer, Status};
+use crate::console::Console;
+use crate::files;
+use crate::lab::{RunArguments, in_laboratory};
+
+/// Run the robot and the press of the paper on real processes, and kill each station once
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy demo
+  understudy demo --period 5ms --link udp
+
+Station 1 is killed at cycle 200 and started again at 327, station 2 at 400 and 527, station 3 at 600 and 727 (Table II).
+Exit status 0 only when every plant stayed functional and nothing wrong was applied.")]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    run: RunArguments,
+}
+
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
+    let cell = match PressCell::write(&arguments.run) {
+        Ok(cell) => cell,
+        Err(answer) => return answer,
+    };
+    let parties = Parties::of(&cell.cluster);
+    let found = read("table-two.toml", TABLE_TWO, Some(&parties));
+    let Some(scenario) = found.scenario else {
+        return Answer::bad_files(vec![found.report]);
+    };
+    cell.run(&scenario, &arguments.run, console)
+}
+
+/// The cluster of section V, written into the directory of its run.
+pub(crate) struct PressCell {
+    pub(crate) cluster: Cluster,
+    directory: RunDirectory,
+    file: PathBuf,
+}
+
+impl PressCell {
+    pub(crate) fn write(arguments: &RunArguments) -> Result<Self, Answer> {
+        let directory = RunDirectory::create(&arguments.out, SystemTime::now())
+            .map_err(|error| Answer::failed(Status::Failed, "U0602", error.to_string()))?;
+        let folder = directory.file("cluster");
+        files::write_template(&folder, press_cell())?;
+        let file = folder.join("cluster.toml");
+        let (cluster, _) = files::cluster(&file, arguments.overrides.overrides())?;
+        Ok(Self {
+            cluster,
+            directory,
+            file,
+        })
+    }
+
+    pub(crate) fn run(
+        &self,
+        scenario: &Scenario,
+        arguments: &RunArguments,
+        console: &mut Console,
+    ) -> Answer {
+        let scenario = scenario.clone().shortened(arguments.cycles);
+        let file = self.file.clone();
+        in_laboratory(
+            &self.cluster,
+            &scenario,
+            file,
+            arguments,
+            &self.directory,
+            console,
+        )
+    }
+}

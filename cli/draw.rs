@@ -1,0 +1,71 @@
+//! `understudy draw`: a ladder program as a picture.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use serde_json::json;
+use understudy_diagnostic::Report;
+use understudy_ladder::{draw_svg, draw_text, parse};
+
+use crate::answer::Answer;
+use crate::files;
+
+/// Draw a ladder program as text or SVG
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy draw examples/press-cell/robot.ladder
+  understudy draw robot.ladder --as svg --output robot.svg")]
+pub(crate) struct Arguments {
+    /// The ladder program
+    #[arg(value_name = "FILE.ladder")]
+    ladder: PathBuf,
+    /// In which form
+    #[arg(long = "as", value_enum, default_value = "text")]
+    form: Form,
+    /// A file to write to, in place of standard output
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Form {
+    /// Box-drawing characters
+    Text,
+    /// A picture for pages and print
+    Svg,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Answer {
+    let source = match files::text(&arguments.ladder) {
+        Ok(source) => source,
+        Err(answer) => return answer,
+    };
+    let parsed = parse(&source);
+    let report = Report {
+        name: arguments.ladder.display().to_string(),
+        text: source,
+        diagnostics: parsed.diagnostics,
+    };
+    if report.has_errors() {
+        return Answer::bad_files(vec![report]);
+    }
+    let text = match arguments.form {
+        Form::Text => draw_text(&parsed.program),
+        Form::Svg => draw_svg(&parsed.program),
+    };
+    let answer = match &arguments.output {
+        None => {
+            let result = json!({ "text": text });
+            Answer::done(text, result)
+        }
+        Some(path) => match files::write(path, &text) {
+            Ok(()) => {
+                let name = path.display().to_string();
+                Answer::done(format!("written to {name}"), json!({ "file": name }))
+            }
+            Err(answer) => answer,
+        },
+    };
+    answer.with_reports(vec![report])
+}

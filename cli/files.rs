@@ -1,0 +1,86 @@
+//! Reading the files that a command is given.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use understudy_cluster::{Cluster, Loaded, Overrides, TemplateFile};
+use understudy_diagnostic::Report;
+use understudy_scenarios::{Parties, Scenario, read as read_scenario};
+
+use crate::answer::{Answer, Status};
+
+/// The text of a file; a failure names it and says why not.
+pub(crate) fn text(path: &Path) -> Result<String, Answer> {
+    fs::read_to_string(path).map_err(|error| {
+        let message = format!("{} cannot be read: {error}", path.display());
+        Answer::failed(Status::BadInput, "U0601", message)
+    })
+}
+
+/// Writes a file; a failure names it and says why not.
+pub(crate) fn write(path: &Path, text: &str) -> Result<(), Answer> {
+    fs::write(path, text).map_err(|error| {
+        let message = format!("{} cannot be written: {error}", path.display());
+        Answer::failed(Status::Failed, "U0602", message)
+    })
+}
+
+/// Reads a cluster file and the ladders that it names, which stand beside it.
+pub(crate) fn read_cluster(path: &Path, text: &str, overrides: Overrides) -> Loaded {
+    let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+    let mut loaded =
+        understudy_cluster::read_with(&path.display().to_string(), text, overrides, &mut |name| {
+            fs::read_to_string(folder.join(name)).map_err(|error| error.to_string())
+        });
+    // Ladders are shown as a person would open them from here.
+    for report in loaded.reports.iter_mut().skip(1) {
+        report.name = folder.join(&report.name).display().to_string();
+    }
+    loaded
+}
+
+/// A cluster without errors, and the files that it came from with their warnings.
+pub(crate) fn cluster(path: &Path, overrides: Overrides) -> Result<(Cluster, Vec<Report>), Answer> {
+    let Loaded { cluster, reports } = read_cluster(path, &text(path)?, overrides);
+    match cluster {
+        Some(cluster) => Ok((cluster, reports)),
+        None => Err(Answer::bad_files(reports)),
+    }
+}
+
+/// A scenario for a cluster, without errors.
+pub(crate) fn scenario(path: &Path, cluster: &Cluster) -> Result<Scenario, Answer> {
+    let text = text(path)?;
+    let found = read_scenario(
+        &path.display().to_string(),
+        &text,
+        Some(&Parties::of(cluster)),
+    );
+    found
+        .scenario
+        .ok_or_else(|| Answer::bad_files(vec![found.report]))
+}
+
+/// Writes files of a template into a folder that has none of them.
+pub(crate) fn write_template(
+    folder: &Path,
+    files: &[TemplateFile],
+) -> Result<Vec<PathBuf>, Answer> {
+    let failed = |path: &Path, error: std::io::Error| {
+        let message = format!("{} cannot be written: {error}", path.display());
+        Answer::failed(Status::Failed, "U0602", message)
+    };
+    let paths: Vec<PathBuf> = files.iter().map(|file| folder.join(file.name)).collect();
+    if let Some(path) = paths.iter().find(|path| path.exists()) {
+        let message = format!(
+            "{} exists already, and nothing is overwritten",
+            path.display()
+        );
+        return Err(Answer::failed(Status::BadInput, "U0603", message));
+    }
+    fs::create_dir_all(folder).map_err(|error| failed(folder, error))?;
+    for (file, path) in files.iter().zip(&paths) {
+        write(path, file.text)?;
+    }
+    Ok(paths)
+}

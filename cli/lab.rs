@@ -1,0 +1,132 @@
+//! `understudy lab`: a cluster and a scenario on real processes.
+
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use clap::Args;
+use understudy_cluster::Cluster;
+use understudy_scenarios::{
+    Expectation, LaboratorySettings, RunDirectory, Scenario, Summary, World, run_laboratory,
+};
+
+use crate::answer::{Answer, Status};
+use crate::console::Console;
+use crate::files;
+use crate::overrides::OverrideArguments;
+use crate::run::{answer, circumstances, command_line, machine};
+
+/// Run a cluster on real processes of this machine, and break it as a scenario says
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy lab examples/press-cell/cluster.toml --scenario scenarios/kill-each.toml --link udp")]
+pub(crate) struct Arguments {
+    /// The cluster file
+    #[arg(value_name = "CLUSTER.toml")]
+    cluster: PathBuf,
+    #[command(flatten)]
+    pub(crate) run: RunArguments,
+    /// The scenario file; without one the cluster runs undisturbed
+    #[arg(long, value_name = "FILE")]
+    scenario: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RunArguments {
+    /// Cycles in place of the scenario's; steps and expectations past them are left out
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=understudy_scenarios::MAXIMUM_CYCLES))]
+    pub(crate) cycles: Option<u64>,
+    #[command(flatten)]
+    pub(crate) overrides: OverrideArguments,
+    /// Where runs are kept, each in a directory of its own
+    #[arg(long, value_name = "DIR", default_value = "runs")]
+    pub(crate) out: PathBuf,
+}
+
+/// Cycles of a run without a scenario.
+const UNDISTURBED_CYCLES: u64 = 1000;
+
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
+    let overrides = arguments.run.overrides.overrides();
+    let (cluster, reports) = match files::cluster(&arguments.cluster, overrides) {
+        Ok(read) => read,
+        Err(answer) => return answer,
+    };
+    let scenario = match scenario_or_undisturbed(arguments.scenario.as_deref(), &cluster) {
+        Ok(scenario) => scenario.shortened(arguments.run.cycles),
+        Err(answer) => return answer,
+    };
+    let directory = match RunDirectory::create(&arguments.run.out, SystemTime::now()) {
+        Ok(directory) => directory,
+        Err(error) => return Answer::failed(Status::Failed, "U0602", error.to_string()),
+    };
+    let cluster_file = arguments.cluster.clone();
+    in_laboratory(
+        &cluster,
+        &scenario,
+        cluster_file,
+        &arguments.run,
+        &directory,
+        console,
+    )
+    .with_reports(reports)
+}
+
+pub(crate) fn scenario_or_undisturbed(
+    path: Option<&Path>,
+    cluster: &Cluster,
+) -> Result<Scenario, Answer> {
+    match path {
+        Some(path) => files::scenario(path, cluster),
+        None => Ok(Scenario {
+            title: format!("{} undisturbed", cluster.name()),
+            cycles: UNDISTURBED_CYCLES,
+            steps: Vec::new(),
+            network: None,
+            expect: Expectation::default(),
+        }),
+    }
+}
+
+/// Runs, writes the results and answers.
+pub(crate) fn in_laboratory(
+    cluster: &Cluster,
+    scenario: &Scenario,
+    cluster_file: PathBuf,
+    arguments: &RunArguments,
+    directory: &RunDirectory,
+    console: &mut Console,
+) -> Answer {
+    let program = match std::env::current_exe() {
+        Ok(program) => program,
+        Err(error) => {
+            let message = format!("this program does not know where it lies: {error}");
+            return Answer::failed(Status::Failed, "U0604", message);
+        }
+    };
+    let settings = LaboratorySettings {
+        program,
+        cluster_file,
+        arguments: arguments.overrides.to_arguments(),
+    };
+    let mut watch = |progress| console.show(&progress);
+    let run = match run_laboratory(cluster, scenario, settings, directory, &mut watch) {
+        Ok(run) => run,
+        Err(error) => return Answer::failed(Status::Failed, error.code(), error.to_string()),
+    };
+    let machine = machine().into_iter().chain(run.machine).collect();
+    let circumstances = circumstances(cluster, World::Laboratory, None, machine, command_line());
+    let (mut summary, account) = Summary::new(run.account, scenario, circumstances, run.journal);
+    if run.failure.is_some() {
+        summary.passed = false;
+    }
+    let written = directory.write_results(&summary, &account);
+    let mut answer = answer(&summary, Some(directory.path()));
+    if let Err(error) = written {
+        answer = answer.and_failure(Status::Failed, "U0602", error.to_string());
+    }
+    match run.failure {
+        Some(failure) => answer.and_failure(Status::Failed, failure.code(), failure.to_string()),
+        None => answer,
+    }
+}

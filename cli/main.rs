@@ -1,0 +1,138 @@
+//! The `understudy` command: parses, calls one function a command, prints, exits.
+
+#![allow(
+    clippy::disallowed_methods,
+    reason = "the command line names runs by the time, and measures speed"
+)]
+
+mod answer;
+mod automata;
+mod bench;
+mod check;
+mod console;
+mod demo;
+mod des;
+mod draw;
+mod files;
+mod init;
+mod lab;
+mod measure;
+mod overrides;
+mod parity;
+mod party;
+mod reliability;
+mod run;
+mod schema;
+mod shell;
+mod simulate;
+mod supervisor_to_ladder;
+mod synth;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use answer::Answer;
+use console::Console;
+
+/// A redundant array of independent controllers: RAID for PLCs.
+#[derive(Debug, Parser)]
+#[command(
+    name = "understudy",
+    version,
+    after_help = "\
+Example:
+  understudy demo                    the robot and the press of the paper, on real processes
+  understudy init cell               a small cluster of your own, to begin with
+
+Exit status: 0 when all is well, 1 when a run or a check of it failed, 2 when an input is wrong and nothing was started.
+Understudy is not a safety PLC."
+)]
+struct Arguments {
+    /// Answer with one JSON document on standard output (docs/json.md)
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Demo(demo::Arguments),
+    Lab(lab::Arguments),
+    Simulate(simulate::Arguments),
+    Check(check::Arguments),
+    Parity(parity::Arguments),
+    Draw(draw::Arguments),
+    Des(des::Arguments),
+    Synth(synth::Arguments),
+    SupervisorToLadder(supervisor_to_ladder::Arguments),
+    Reliability(reliability::Arguments),
+    Measure(measure::Arguments),
+    Init(init::Arguments),
+    Node(party::Arguments),
+    RemoteIo(party::RemoteIoArguments),
+    Plant(party::PlantArguments),
+    Bench(bench::Arguments),
+    Schema(schema::Arguments),
+    Completions(shell::CompletionsArguments),
+    Man(shell::ManArguments),
+}
+
+impl Command {
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Demo(_) => "demo",
+            Self::Lab(_) => "lab",
+            Self::Simulate(_) => "simulate",
+            Self::Check(_) => "check",
+            Self::Parity(_) => "parity",
+            Self::Draw(_) => "draw",
+            Self::Des(_) => "des",
+            Self::Synth(_) => "synth",
+            Self::SupervisorToLadder(_) => "supervisor-to-ladder",
+            Self::Reliability(_) => "reliability",
+            Self::Measure(_) => "measure",
+            Self::Init(_) => "init",
+            Self::Node(_) => "node",
+            Self::RemoteIo(_) => "remote-io",
+            Self::Plant(_) => "plant",
+            Self::Bench(_) => "bench",
+            Self::Schema(_) => "schema",
+            Self::Completions(_) => "completions",
+            Self::Man(_) => "man",
+        }
+    }
+
+    fn run(self, console: &mut Console) -> Answer {
+        match self {
+            Self::Demo(arguments) => demo::run(&arguments, console),
+            Self::Lab(arguments) => lab::run(&arguments, console),
+            Self::Simulate(arguments) => simulate::run(&arguments),
+            Self::Check(arguments) => check::run(&arguments),
+            Self::Parity(arguments) => parity::run(&arguments),
+            Self::Draw(arguments) => draw::run(&arguments),
+            Self::Des(arguments) => des::run(&arguments),
+            Self::Synth(arguments) => synth::run(&arguments),
+            Self::SupervisorToLadder(arguments) => supervisor_to_ladder::run(&arguments),
+            Self::Reliability(arguments) => reliability::run(&arguments),
+            Self::Measure(arguments) => measure::run(&arguments),
+            Self::Init(arguments) => init::run(&arguments),
+            Self::Node(arguments) => party::run_station(&arguments),
+            Self::RemoteIo(arguments) => party::run_remote_io(&arguments.common),
+            Self::Plant(arguments) => party::run_plant(&arguments.common),
+            Self::Bench(arguments) => bench::run(arguments, console),
+            Self::Schema(arguments) => schema::run(&arguments),
+            Self::Completions(arguments) => shell::completions(&arguments),
+            Self::Man(arguments) => shell::man(&arguments),
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    let Arguments { json, command } = Arguments::parse();
+    let mut console = Console::new(json);
+    let name = command.name();
+    let answer = command.run(&mut console);
+    console.finish(name, &answer)
+}

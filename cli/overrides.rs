@@ -1,0 +1,125 @@
+//! What the command line says instead of the cluster file, and passes on to every process.
+
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+use understudy_bus::LinkKind;
+use understudy_cluster::{Cluster, Link, Overrides};
+use understudy_wire::Mode;
+
+#[derive(Debug, Clone, Default, Args)]
+pub(crate) struct OverrideArguments {
+    /// Period of a cycle in place of the cluster file's, such as 10ms
+    #[arg(long, value_name = "TIME", value_parser = parse_time)]
+    period: Option<Duration>,
+    /// What carries the frames, in place of the cluster file's
+    #[arg(long, value_enum)]
+    link: Option<LinkArgument>,
+    /// How many failures are masked, in place of the cluster file's
+    #[arg(long, value_enum)]
+    mode: Option<ModeArgument>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum LinkArgument {
+    /// Zenoh
+    Zenoh,
+    /// Plain UDP
+    Udp,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ModeArgument {
+    /// Any number, as long as an understudy lives
+    Full,
+    /// One, as in the paper
+    Paper,
+}
+
+impl OverrideArguments {
+    pub(crate) fn overrides(&self) -> Overrides {
+        Overrides {
+            period: self.period,
+            link: self.link.map(|link| match link {
+                LinkArgument::Zenoh => Link::Zenoh,
+                LinkArgument::Udp => Link::Udp,
+            }),
+            mode: self.mode.map(|mode| match mode {
+                ModeArgument::Full => Mode::Full,
+                ModeArgument::Paper => Mode::Paper,
+            }),
+        }
+    }
+
+    /// The same as arguments of another process.
+    pub(crate) fn to_arguments(&self) -> Vec<String> {
+        let mut arguments = Vec::new();
+        if let Some(period) = self.period {
+            arguments.extend(["--period".to_owned(), format!("{}ns", period.as_nanos())]);
+        }
+        let mut word = |name: &str, value: Option<clap::builder::PossibleValue>| {
+            if let Some(value) = value {
+                arguments.extend([name.to_owned(), value.get_name().to_owned()]);
+            }
+        };
+        word(
+            "--link",
+            self.link.and_then(|link| link.to_possible_value()),
+        );
+        word(
+            "--mode",
+            self.mode.and_then(|mode| mode.to_possible_value()),
+        );
+        arguments
+    }
+}
+
+/// What carries the frames of a cluster.
+pub(crate) fn link_kind(cluster: &Cluster) -> LinkKind {
+    match cluster.link() {
+        Link::Zenoh => LinkKind::Zenoh,
+        Link::Udp => LinkKind::Udp,
+    }
+}
+
+/// `10ms`, `500us`, `2s`, `100ns`.
+fn parse_time(text: &str) -> Result<Duration, String> {
+    let expected = || format!("{text:?} is no time with its unit, such as 10ms, 500us or 1s");
+    let unit = text
+        .find(|letter: char| letter.is_ascii_alphabetic())
+        .ok_or_else(expected)?;
+    let (number, unit) = text.split_at(unit);
+    let nanoseconds = match unit {
+        "s" => 1e9,
+        "ms" => 1e6,
+        "us" => 1e3,
+        "ns" => 1.0,
+        _ => return Err(expected()),
+    };
+    let number: f64 = number.trim().parse().map_err(|_| expected())?;
+    let time = number * nanoseconds;
+    if (1.0..1e13).contains(&time) {
+        Ok(Duration::from_nanos(time as u64))
+    } else {
+        Err(expected())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_have_units() {
+        let check = |text, expected| assert_eq!(parse_time(text).ok(), expected, "{text}");
+        check("10ms", Some(Duration::from_millis(10)));
+        check("1.5s", Some(Duration::from_millis(1500)));
+        check("200 us", Some(Duration::from_micros(200)));
+        check("10000000ns", Some(Duration::from_millis(10)));
+        check("10", None);
+        check("ms", None);
+        check("-1s", None);
+        check("1e99s", None);
+        check("10min", None);
+    }
+}

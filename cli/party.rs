@@ -1,0 +1,265 @@
+//! `understudy node`, `remote-io` and `plant`: one party as one process.
+
+use std::io;
+use std::net::SocketAddr;
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use clap::Args;
+use serde::Serialize;
+use serde_json::json;
+use understudy_bus::{
+    Commands, Endpoints, FieldDriver, LinkKind, NoField, NoObserver, PartySettings, Peer,
+    SimulatedField, ZENOH_RUNTIME, run_party,
+};
+use understudy_cluster::Cluster;
+use understudy_node::Station;
+use understudy_plant::PlantMachine;
+use understudy_remote_io::RemoteIo;
+use understudy_wire::{Epoch, Machine, Party, ProgramId, Time};
+
+use crate::answer::{Answer, Status};
+use crate::files;
+use crate::overrides::{OverrideArguments, link_kind};
+
+/// Run one station, a controller or an understudy, as this process
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy node cluster.toml --name robot
+
+Reports are JSON lines on standard output (docs/run-directory.md). Every party needs an address in the cluster file, or in
+the file of --endpoints. SIGINT and SIGTERM end it in order; the lines `stop` and `release` on standard input are commands.")]
+pub(crate) struct Arguments {
+    /// The cluster file
+    #[arg(value_name = "CLUSTER.toml")]
+    cluster: PathBuf,
+    /// Which party of the cluster, by its name
+    #[arg(long, value_name = "NAME")]
+    name: String,
+    /// A JSON list of parties, names and addresses, in place of the addresses of the cluster file
+    #[arg(long, value_name = "FILE")]
+    endpoints: Option<PathBuf>,
+    /// End with standard input and with the process that started this one
+    #[arg(long)]
+    in_laboratory: bool,
+    /// Do not ask for real-time rights
+    #[arg(long)]
+    no_real_time: bool,
+    #[command(flatten)]
+    overrides: OverrideArguments,
+}
+
+/// Run one remote I/O as this process
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy remote-io cluster.toml --name robot-io")]
+pub(crate) struct RemoteIoArguments {
+    #[command(flatten)]
+    pub(crate) common: Arguments,
+}
+
+/// Run one simulated plant as this process
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy plant cluster.toml --name arm")]
+pub(crate) struct PlantArguments {
+    #[command(flatten)]
+    pub(crate) common: Arguments,
+}
+
+pub(crate) fn run_station(arguments: &Arguments) -> Answer {
+    with_cluster(arguments, |cluster, party| {
+        let Party::Station(station) = party else {
+            return Err(wrong_kind(arguments, "station", "understudy node"));
+        };
+        let settings = cluster.station_settings(station, epoch_of_the_clock());
+        let settings =
+            settings.ok_or_else(|| wrong_kind(arguments, "station", "understudy node"))?;
+        play(
+            arguments,
+            cluster,
+            party,
+            Station::new(Time::default(), settings),
+            Box::new(NoField),
+        )
+    })
+}
+
+pub(crate) fn run_remote_io(arguments: &Arguments) -> Answer {
+    with_cluster(arguments, |cluster, party| {
+        let wrong = || wrong_kind(arguments, "remote I/O", "understudy remote-io");
+        let Party::RemoteIo(program) = party else {
+            return Err(wrong());
+        };
+        let settings = cluster.remote_io_settings(program).ok_or_else(wrong)?;
+        let field = SimulatedField::new(program, cluster.agreement().clone());
+        play(
+            arguments,
+            cluster,
+            party,
+            RemoteIo::new(Time::default(), settings),
+            Box::new(field),
+        )
+    })
+}
+
+pub(crate) fn run_plant(arguments: &Arguments) -> Answer {
+    with_cluster(arguments, |cluster, party| {
+        let wrong = || wrong_kind(arguments, "plant", "understudy plant");
+        let Party::Plant(program) = party else {
+            return Err(wrong());
+        };
+        let settings = cluster.plant_settings(program).ok_or_else(wrong)?;
+        play(
+            arguments,
+            cluster,
+            party,
+            PlantMachine::new(settings, Time::default()),
+            Box::new(NoField),
+        )
+    })
+}
+
+fn with_cluster(
+    arguments: &Arguments,
+    run: impl FnOnce(&Cluster, Party) -> Result<Answer, Answer>,
+) -> Answer {
+    let (cluster, _) = match files::cluster(&arguments.cluster, arguments.overrides.overrides()) {
+        Ok(read) => read,
+        Err(answer) => return answer,
+    };
+    let Some(party) = cluster.party(&arguments.name) else {
+        let names: Vec<&str> = cluster
+            .parties()
+            .filter_map(|party| cluster.party_name(party))
+            .collect();
+        let message = format!(
+            "the cluster has no `{}`; it has {}",
+            arguments.name,
+            names.join(", ")
+        );
+        return Answer::failed(Status::BadInput, "U0605", message);
+    };
+    run(&cluster, party).unwrap_or_else(|answer| answer)
+}
+
+fn wrong_kind(arguments: &Arguments, wanted: &str, command: &str) -> Answer {
+    let message = format!(
+        "`{}` is no {wanted}, which `{command}` runs",
+        arguments.name
+    );
+    Answer::failed(Status::BadInput, "U0606", message)
+}
+
+/// Runs the machine until it is told to end.
+fn play<M>(
+    arguments: &Arguments,
+    cluster: &Cluster,
+    party: Party,
+    machine: M,
+    field: Box<dyn FieldDriver>,
+) -> Result<Answer, Answer>
+where
+    M: Machine + Send,
+    M::Event: Serialize + Send + 'static,
+{
+    let link = link_kind(cluster);
+    start_again_for_zenoh(link);
+    let parties = match &arguments.endpoints {
+        Some(path) => listed(path)?,
+        None => addressed(cluster)?,
+    };
+    let feeds = cluster
+        .plants()
+        .iter()
+        .enumerate()
+        .filter_map(|(fed, place)| {
+            let feeder = place.as_ref()?.fed_by?;
+            Some((feeder, ProgramId(fed as u8)))
+        });
+    let endpoints = Endpoints::new(cluster.agreement().cluster, party, parties, feeds.collect());
+    let endpoints = endpoints
+        .map_err(|error| Answer::failed(Status::BadInput, error.code(), error.to_string()))?;
+    let settings = PartySettings {
+        endpoints,
+        link,
+        field,
+        observer: Box::new(NoObserver),
+        commands: if arguments.in_laboratory {
+            Commands::ReadAndEndWithInput
+        } else {
+            Commands::Read
+        },
+        ends_with_parent: arguments.in_laboratory,
+        real_time: !arguments.no_real_time,
+    };
+    match run_party(machine, settings, io::stdout()) {
+        // Its last record has said it already.
+        Ok(_) => Ok(Answer::done("", json!(null))),
+        Err(error) => Err(Answer::failed(
+            Status::Failed,
+            error.code(),
+            error.to_string(),
+        )),
+    }
+}
+
+fn listed(path: &Path) -> Result<Vec<Peer>, Answer> {
+    serde_json::from_str(&files::text(path)?).map_err(|error| {
+        let message = format!("{} is no list of endpoints: {error}", path.display());
+        Answer::failed(Status::BadInput, "U0607", message)
+    })
+}
+
+fn addressed(cluster: &Cluster) -> Result<Vec<Peer>, Answer> {
+    let name = |party| cluster.party_name(party).unwrap_or_default().to_owned();
+    let known: Vec<(Party, Option<SocketAddr>)> = cluster
+        .parties()
+        .map(|party| (party, cluster.address(party)))
+        .collect();
+    let lacking = known.iter().filter(|(_, address)| address.is_none());
+    let lacking: Vec<String> = lacking.map(|(party, _)| name(*party)).collect();
+    if !lacking.is_empty() {
+        let message = format!(
+            "no address for {}; give each an `address = \"HOST:PORT\"` in the cluster file",
+            lacking.join(", ")
+        );
+        return Err(Answer::failed(Status::BadInput, "U0608", message));
+    }
+    let peers = known.into_iter().filter_map(|(party, address)| {
+        Some(Peer {
+            party,
+            name: name(party),
+            address: address?,
+        })
+    });
+    Ok(peers.collect())
+}
+
+/// Zenoh takes the number of its threads from the environment only, and only when a process starts.
+fn start_again_for_zenoh(link: LinkKind) {
+    let (variable, value) = ZENOH_RUNTIME;
+    if link == LinkKind::Udp || std::env::var_os(variable).is_some() {
+        return;
+    }
+    if let Ok(program) = std::env::current_exe() {
+        // It only comes back where it fails; then Zenoh has more threads than it needs, and works.
+        let _ = Command::new(program)
+            .args(std::env::args_os().skip(1))
+            .env(variable, value)
+            .exec();
+    }
+}
+
+/// Later than any epoch that the cluster has had.
+fn epoch_of_the_clock() -> Epoch {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    Epoch(since.map_or(1, |since| {
+        u64::try_from(since.as_micros()).unwrap_or(u64::MAX)
+    }))
+}

@@ -1,0 +1,193 @@
+//! What `demo`, `lab` and `simulate` have in common: circumstances, results and the verdict.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use serde::Serialize;
+use understudy_cluster::Cluster;
+use understudy_scenarios::{Circumstances, Summary, Table, World};
+use understudy_wire::Mode;
+
+use crate::answer::{Answer, Status};
+use crate::overrides::link_kind;
+
+pub(crate) fn circumstances(
+    cluster: &Cluster,
+    world: World,
+    seed: Option<u64>,
+    machine: Vec<String>,
+    repeat: String,
+) -> Circumstances {
+    let agreement = cluster.agreement();
+    Circumstances {
+        world,
+        seed,
+        cluster: cluster.name().to_owned(),
+        configuration: agreement.configuration.to_string(),
+        mode: match agreement.mode {
+            Mode::Full => "full",
+            Mode::Paper => "paper",
+        }
+        .to_owned(),
+        period_us: u64::try_from(agreement.schedule.period().as_micros()).unwrap_or(u64::MAX),
+        link: match world {
+            World::Laboratory => link_kind(cluster).to_string(),
+            World::Simulator => "simulated".to_owned(),
+        },
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        machine,
+        repeat,
+    }
+}
+
+/// The machine in words.
+pub(crate) fn machine() -> Vec<String> {
+    let read = |path| {
+        std::fs::read_to_string(path)
+            .unwrap_or_default()
+            .trim()
+            .to_owned()
+    };
+    let kernel = read("/proc/sys/kernel/osrelease");
+    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    vec![format!(
+        "{} {kernel}, {processors} processors",
+        std::env::consts::OS
+    )]
+}
+
+/// How this command was called, to be called again.
+pub(crate) fn command_line() -> String {
+    let arguments = std::env::args().skip(1);
+    let quoted = arguments.map(|argument| {
+        let plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./=:,".contains(letter);
+        if !argument.is_empty() && argument.chars().all(plain) {
+            argument
+        } else {
+            format!("'{}'", argument.replace('\'', r"'\''"))
+        }
+    });
+    std::iter::once("understudy".to_owned())
+        .chain(quoted)
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
+#[derive(Serialize)]
+struct Result<'a> {
+    /// Where the results lie.
+    directory: Option<String>,
+    summary: &'a Summary,
+}
+
+/// Table II, a verdict for each plant, and what was expected and did not come.
+pub(crate) fn answer(summary: &Summary, directory: Option<&Path>) -> Answer {
+    let status = if summary.passed {
+        Status::Done
+    } else {
+        Status::Failed
+    };
+    let result = Result {
+        directory: directory.map(|path| path.display().to_string()),
+        summary,
+    };
+    Answer::done(text(summary, directory), result).with_status(status)
+}
+
+fn text(summary: &Summary, directory: Option<&Path>) -> String {
+    let mut text = format!("{}\n\n{}\n", summary.title, Table::new(summary));
+    let names = summary.remote_ios.iter().map(|remote_io| &remote_io.name);
+    let names = names.chain(summary.plants.iter().map(|plant| &plant.name));
+    let width = names.map(|name| name.chars().count()).max().unwrap_or(0);
+    for plant in &summary.plants {
+        let verdict = if plant.functional {
+            "functional throughout"
+        } else {
+            "NOT FUNCTIONAL"
+        };
+        let mishaps = match plant.mishaps {
+            0 => String::new(),
+            mishaps => format!(", {mishaps} mishaps"),
+        };
+        let _ = writeln!(
+            text,
+            "{:width$}  {verdict}, {} parts finished{mishaps}",
+            plant.name, plant.finished
+        );
+    }
+    for remote_io in &summary.remote_ios {
+        let counts = &remote_io.counts;
+        let numbers = [
+            (counts.direct, "direct"),
+            (counts.reconstructed, "reconstructed"),
+            (counts.held, "held"),
+            (counts.held_by_stall, "held while the host stood still"),
+            (counts.fail_safe, "fail-safe"),
+            (
+                counts.fail_safe_by_stall,
+                "fail-safe while the host stood still",
+            ),
+            (counts.unserved, "unserved"),
+        ];
+        let shown = numbers
+            .iter()
+            .filter(|(number, word)| *number > 0 || *word == "held");
+        let shown: Vec<String> = shown
+            .map(|(number, word)| format!("{number} {word}"))
+            .collect();
+        let _ = writeln!(
+            text,
+            "{:width$}  {}, {} wrong",
+            remote_io.name,
+            shown.join(", "),
+            counts.wrong
+        );
+    }
+    text.push('\n');
+    for expectation in summary
+        .expectations
+        .iter()
+        .filter(|expectation| !expectation.met)
+    {
+        let _ = writeln!(
+            text,
+            "NOT MET: {}; found {}",
+            expectation.expected, expectation.found
+        );
+    }
+    for violation in summary.violations.iter().take(5) {
+        let _ = writeln!(text, "VIOLATION at {}: {}", violation.name, violation.what);
+    }
+    for refused in &summary.refused {
+        let _ = writeln!(text, "REFUSED: {}: {}", refused.name, refused.why);
+    }
+    if let Some(reason) = &summary.journal.stopped_by {
+        let lost = summary.journal.lost;
+        let _ = writeln!(
+            text,
+            "the journal stopped ({reason}): {lost} records are lost"
+        );
+    }
+    let verdict = match (summary.passed, summary.interrupted) {
+        (true, _) => "passed: every expectation was met".to_owned(),
+        (false, true) => format!(
+            "interrupted after {} of {} cycles",
+            summary.cycles_run, summary.cycles_asked
+        ),
+        (false, false) if summary.cycles_run < summary.cycles_asked => {
+            format!(
+                "FAILED: only {} of {} cycles were run",
+                summary.cycles_run, summary.cycles_asked
+            )
+        }
+        (false, false) => "FAILED".to_owned(),
+    };
+    let _ = writeln!(text, "{verdict}");
+    if !summary.passed && summary.circumstances.seed.is_some() {
+        let _ = writeln!(text, "repeat it with: {}", summary.circumstances.repeat);
+    }
+    if let Some(directory) = directory {
+        let _ = writeln!(text, "report: {}", directory.join("report.html").display());
+    }
+    text
+}

@@ -1,0 +1,266 @@
+//! `understudy synth`: a supervisor for a model.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+use understudy_diagnostic::Severity;
+use understudy_supervisor::operations::{supreduce, sync};
+use understudy_supervisor::{
+    Automaton, Bounds, Finding, Model, SymbolicBounds, Together, model_findings, modular_findings,
+    synthesis_findings, synthesise, synthesise_modularly, synthesise_symbolically, write_model,
+};
+
+use crate::answer::{Answer, Failure, Status};
+use crate::automata::{self, Sources, description, summary};
+use crate::files;
+
+/// Synthesise the least restrictive nonblocking supervisor of a model
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy synth examples/small-factory/model.toml --reduce -o supervisor.toml
+  understudy supervisor-to-ladder supervisor.toml --plant supervisor.toml
+
+Specifications restrain only the events that they know. What is wrong with a model is said with the shortest sequence of
+events that shows it. The symbolic engine counts and decides without listing states; the modular one makes a supervisor for
+each specification and says whether they conflict.")]
+pub(crate) struct Arguments {
+    /// The model: plants and specifications
+    #[arg(value_name = "MODEL.toml")]
+    model: PathBuf,
+    /// How
+    #[arg(long, value_enum, default_value = "explicit")]
+    engine: Engine,
+    /// Reduce each supervisor: fewer states, the same effect on the plant
+    #[arg(long)]
+    reduce: bool,
+    /// A file to write to: .toml is the model with its supervisors; .ADS, .dot and .svg take a single supervisor
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// The most that a product may take in memory
+    #[arg(long, value_name = "MEGABYTES", default_value_t = 2000)]
+    memory: usize,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Engine {
+    /// State by state
+    Explicit,
+    /// Sets of states as decision diagrams
+    Symbolic,
+    /// A supervisor for each specification
+    Modular,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Answer {
+    let Sources {
+        read: model,
+        reports,
+    } = match automata::model(&arguments.model) {
+        Ok(sources) => sources,
+        Err(answer) => return answer,
+    };
+    let findings = model_findings(&model);
+    let answer = if findings
+        .iter()
+        .any(|finding| finding.severity == Severity::Error)
+    {
+        with_findings(Answer::done("", json!({})), &findings, Status::BadInput)
+    } else {
+        match made(arguments, model) {
+            Ok(answer) | Err(answer) => answer,
+        }
+    };
+    answer.with_reports(reports)
+}
+
+fn failed(code: &str, message: String) -> Answer {
+    Answer::failed(Status::Failed, code, message)
+}
+
+fn made(arguments: &Arguments, model: Model) -> Result<Answer, Answer> {
+    let bounds = Bounds {
+        memory_bytes: arguments.memory.saturating_mul(1_000_000),
+    };
+    match arguments.engine {
+        Engine::Explicit => explicit(arguments, model, bounds),
+        Engine::Symbolic => symbolic(arguments, &model, bounds),
+        Engine::Modular => modular(arguments, model, bounds),
+    }
+}
+
+fn explicit(arguments: &Arguments, model: Model, bounds: Bounds) -> Result<Answer, Answer> {
+    let result = synthesise(&model.plants(), &model.specifications(), bounds)
+        .map_err(|error| failed(error.code(), error.to_string()))?;
+    let findings = synthesis_findings(&model, &result);
+    let supervisor = reduced(arguments, &model.plants(), result.supervisor, bounds)?;
+    let mut value = description(&supervisor);
+    value["engine"] = json!("explicit");
+    value["product_states"] = json!(result.product_states);
+    let answer = Answer::done(summary(&supervisor), value);
+    written(
+        arguments,
+        model,
+        vec![supervisor],
+        with_findings(answer, &findings, Status::Failed),
+    )
+}
+
+fn modular(arguments: &Arguments, model: Model, bounds: Bounds) -> Result<Answer, Answer> {
+    let result = synthesise_modularly(&model.plants(), &model.specifications(), bounds)
+        .map_err(|error| failed(error.code(), error.to_string()))?;
+    let findings = modular_findings(&model, &result);
+    let mut supervisors = Vec::new();
+    let mut values = Vec::new();
+    for local in &result.local {
+        let specification = local
+            .specification
+            .map(|number| model.specifications[number].name());
+        let plants: Vec<&Automaton> = local
+            .plants
+            .iter()
+            .map(|&plant| &model.plants[plant])
+            .collect();
+        let name = format!("SUPER_{}", specification.unwrap_or(plants[0].name()));
+        let supervisor =
+            reduced(arguments, &plants, local.result.supervisor.clone(), bounds)?.with_name(name);
+        let mut value = description(&supervisor);
+        value["specification"] = json!(specification);
+        value["plants"] = json!(plants.iter().map(|plant| plant.name()).collect::<Vec<_>>());
+        values.push(value);
+        supervisors.push(supervisor);
+    }
+    let together = match result.together {
+        Together::Nonconflicting => "nonconflicting",
+        Together::Conflicting(_) | Together::ConflictingSomewhere => "conflicting",
+        Together::Undecided => "undecided",
+    };
+    let lines: Vec<String> = supervisors.iter().map(summary).collect();
+    let text = format!("{}\ntogether: {together}", lines.join("\n"));
+    let value = json!({ "engine": "modular", "supervisors": values, "together": together });
+    let answer = with_findings(Answer::done(text, value), &findings, Status::Failed);
+    written(arguments, model, supervisors, answer)
+}
+
+fn symbolic(arguments: &Arguments, model: &Model, bounds: Bounds) -> Result<Answer, Answer> {
+    let (plants, specifications) = (model.plants(), model.specifications());
+    let made = synthesise_symbolically(&plants, &specifications, SymbolicBounds::default())
+        .map_err(|error| failed(error.code(), error.to_string()))?;
+    let transitions = made
+        .transition_count()
+        .map_err(|error| failed(error.code(), error.to_string()))?;
+    let count = |count: Option<u128>| count.map_or("more than 2^128".to_owned(), |n| n.to_string());
+    // JSON has no numbers of that size; a machine gets a text where a double would round.
+    let number = |value: Option<u128>| match value.map(u64::try_from) {
+        Some(Ok(small)) if small < 1 << 53 => json!(small),
+        _ => json!(count(value)),
+    };
+    let states = made.state_count();
+    let value = json!({
+        "engine": "symbolic",
+        "states": number(states),
+        "transitions": number(transitions),
+        "nodes": made.node_count(),
+    });
+    let text = format!(
+        "SUPER: {} states, {} transitions, in {} nodes of a decision diagram",
+        count(states),
+        count(transitions),
+        made.node_count()
+    );
+    let mut answer = Answer::done(text, value);
+    if made.is_empty() {
+        let message =
+            "there is no supervisor; the explicit engine shows why, where the product fits"
+                .to_owned();
+        answer = answer.and_failure(Status::Failed, "U0841", message);
+    }
+    if arguments.output.is_none() && !arguments.reduce {
+        return Ok(answer);
+    }
+    let listed = made
+        .to_automaton(bounds)
+        .map_err(|error| failed(error.code(), error.to_string()))?;
+    let supervisor = reduced(arguments, &plants, listed, bounds)?;
+    let mut value = description(&supervisor);
+    value["engine"] = json!("symbolic");
+    answer.text = format!("{}\n{}", answer.text, summary(&supervisor));
+    answer.result = value;
+    written(arguments, model.clone(), vec![supervisor], answer)
+}
+
+fn reduced(
+    arguments: &Arguments,
+    plants: &[&Automaton],
+    supervisor: Automaton,
+    bounds: Bounds,
+) -> Result<Automaton, Answer> {
+    if !arguments.reduce {
+        return Ok(supervisor);
+    }
+    let plant = sync(plants, bounds);
+    plant
+        .and_then(|plant| supreduce(&plant, &supervisor, bounds))
+        .map_err(|error| failed(error.code(), error.to_string()))
+}
+
+/// Errors are failures of the answer; warnings stand before its text.
+fn with_findings(mut answer: Answer, findings: &[Finding], status: Status) -> Answer {
+    let mut warnings = String::new();
+    for finding in findings {
+        match finding.severity {
+            Severity::Warning => {
+                warnings.push_str(&format!("warning[{}]: {}\n", finding.code, finding.message));
+            }
+            Severity::Error => {
+                answer.status = status;
+                answer.failures.push(Failure {
+                    code: finding.code.to_owned(),
+                    message: finding.message.clone(),
+                });
+            }
+        }
+    }
+    answer.text.insert_str(0, &warnings);
+    let listed = findings.iter().map(|finding| {
+        json!({ "code": finding.code, "severity": finding.severity, "message": finding.message })
+    });
+    answer.result["findings"] = Value::Array(listed.collect());
+    answer
+}
+
+fn written(
+    arguments: &Arguments,
+    model: Model,
+    supervisors: Vec<Automaton>,
+    mut answer: Answer,
+) -> Result<Answer, Answer> {
+    let Some(path) = &arguments.output else {
+        return Ok(answer);
+    };
+    match supervisors.as_slice() {
+        _ if automata::is_model(path) => {
+            files::write(
+                path,
+                &write_model(&Model {
+                    supervisors,
+                    ..model
+                }),
+            )?;
+        }
+        [only] => automata::write(path, only)?,
+        _ => {
+            let message = format!(
+                "{}: {} supervisors need a file that ends in .toml",
+                path.display(),
+                supervisors.len()
+            );
+            return Err(Answer::failed(Status::BadInput, "U0654", message));
+        }
+    }
+    let name = path.display().to_string();
+    answer.text.push_str(&format!("\nwritten to {name}"));
+    answer.result["file"] = Value::String(name);
+    Ok(answer)
+}

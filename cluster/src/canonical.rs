@@ -1,0 +1,137 @@
+//! The canonical texts behind the hashes: equal texts mean equal behaviour, and whatever does not matter to behaviour is not in
+//! them (addresses, file names, comments, titles of rungs).
+
+use std::fmt::Write;
+
+use understudy_logic::{Circuit, Expression, Operation, Variable};
+use understudy_wire::ProgramHash;
+
+/// A circuit, line by line: its inputs, registers with initial values, outputs, and the operations that they reach.
+///
+/// Operations are numbered in the order in which a depth-first walk from the roots leaves them, so that the order in which
+/// they were made does not matter.
+pub(crate) fn circuit_text(circuit: &Circuit) -> String {
+    let mut walk = Walk {
+        circuit,
+        numbers: vec![None; circuit.graph().operations().len()],
+        count: 0,
+        text: String::new(),
+    };
+    for input in circuit.inputs() {
+        walk.line(format_args!("input {input}"));
+    }
+    for register in circuit.registers() {
+        let initial = u8::from(register.initial);
+        walk.line(format_args!("register {} {initial}", register.name));
+    }
+    for register in circuit.registers() {
+        let number = walk.number(register.next);
+        walk.line(format_args!("next {number}"));
+    }
+    for output in circuit.outputs() {
+        let number = walk.number(output.value);
+        walk.line(format_args!("output {} {number}", output.name));
+    }
+    walk.text
+}
+
+/// Of the canonical text; the program's own name is not in it, its role is the cluster's affair.
+pub(crate) fn program_hash(circuit: &Circuit) -> ProgramHash {
+    ProgramHash::of(circuit_text(circuit).as_bytes())
+}
+
+struct Walk<'a> {
+    circuit: &'a Circuit,
+    numbers: Vec<Option<usize>>,
+    count: usize,
+    text: String,
+}
+
+impl Walk<'_> {
+    fn line(&mut self, line: std::fmt::Arguments<'_>) {
+        writeln!(self.text, "{line}").expect("a string takes everything");
+    }
+
+    /// Writes what `root` reaches and was not written yet. Not recursive: ladders may be deep.
+    fn number(&mut self, root: Expression) -> usize {
+        let graph = self.circuit.graph();
+        let mut stack = vec![root];
+        while let Some(&expression) = stack.last() {
+            if self.numbers[expression.index()].is_some() {
+                stack.pop();
+                continue;
+            }
+            let operation = graph.operation(expression);
+            let open: Vec<Expression> = operation
+                .operands()
+                .filter(|operand| self.numbers[operand.index()].is_none())
+                .collect();
+            if open.is_empty() {
+                self.write(operation);
+                self.numbers[expression.index()] = Some(self.count);
+                self.count += 1;
+                stack.pop();
+            } else {
+                stack.extend(open.into_iter().rev());
+            }
+        }
+        self.numbers[root.index()].expect("it was written")
+    }
+
+    fn write(&mut self, operation: Operation) {
+        let operands: Vec<String> = operation
+            .operands()
+            .map(|operand| {
+                let number = self.numbers[operand.index()].expect("operands come first");
+                number.to_string()
+            })
+            .collect();
+        let operands = operands.join(" ");
+        match operation {
+            Operation::Constant(value) => self.line(format_args!("constant {}", u8::from(value))),
+            Operation::Variable(Variable::Input(index)) => self.line(format_args!("u {index}")),
+            Operation::Variable(Variable::Register(index)) => self.line(format_args!("x {index}")),
+            Operation::Not(_) => self.line(format_args!("not {operands}")),
+            Operation::And(..) => self.line(format_args!("and {operands}")),
+            Operation::Or(..) => self.line(format_args!("or {operands}")),
+            Operation::Xor(..) => self.line(format_args!("xor {operands}")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use understudy_logic::CircuitBuilder;
+
+    use super::*;
+
+    /// x(t+1) = a ∧ ¬x, y = x, with operations made in either order and with some that nothing reaches.
+    fn circuit(detour: bool, initial: bool) -> Circuit {
+        let mut builder = CircuitBuilder::new(if detour { "b" } else { "a" });
+        let a = builder.input("a");
+        if detour {
+            let zero = builder.graph().constant(false);
+            builder.graph().any([zero, a]);
+        }
+        let (register, x) = builder.register("x", initial);
+        if detour {
+            builder.graph().xor(x, a);
+        }
+        let negated = builder.graph().not(x);
+        let next = builder.graph().and(a, negated);
+        builder.set_next(register, next);
+        builder.output("y", x);
+        builder.finish().expect("a circuit")
+    }
+
+    #[test]
+    fn the_text_depends_on_behaviour_alone() {
+        let text = circuit_text(&circuit(false, true));
+        assert_eq!(
+            text,
+            "input a\nregister x 1\nu 0\nx 0\nnot 1\nand 0 2\nnext 3\noutput y 1\n"
+        );
+        assert_eq!(circuit_text(&circuit(true, true)), text);
+        assert_ne!(circuit_text(&circuit(true, false)), text);
+    }
+}

@@ -1,0 +1,247 @@
+//! A cluster as all its parties know it.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use understudy_ladder::Program as LadderProgram;
+use understudy_logic::Circuit;
+use understudy_node::Program;
+use understudy_parity::ParityController;
+use understudy_plant::Plant;
+use understudy_remote_io::Release;
+use understudy_wire::{Agreement, Epoch, Image, Party, ProgramHash, ProgramId, StationId};
+
+/// What carries the frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Link {
+    /// Zenoh.
+    #[default]
+    Zenoh,
+    /// Plain UDP.
+    Udp,
+}
+
+/// One of the N.
+#[derive(Debug, Clone)]
+pub struct Controller {
+    /// The station's name.
+    pub name: String,
+    /// The file with its program, as the cluster file names it.
+    pub ladder: String,
+    /// Its program, under the station's name.
+    pub program: LadderProgram,
+    /// The program for the period of the cluster.
+    pub circuit: Circuit,
+    /// Of the circuit.
+    pub hash: ProgramHash,
+    /// Where it listens, if the file says so.
+    pub address: Option<SocketAddr>,
+}
+
+/// A generated parity controller.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Understudy {
+    /// The station's name.
+    pub name: String,
+    /// Where it listens, if the file says so.
+    pub address: Option<SocketAddr>,
+}
+
+/// The plant's side of a controller.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RemoteIo {
+    /// Its name.
+    pub name: String,
+    /// Cycles for which the last true outputs are kept when nothing true is there.
+    pub hold_cycles: u32,
+    /// y(i) after that.
+    pub fail_safe: Image,
+    /// Who releases the outputs after a cold start.
+    pub release: Release,
+    /// Where it listens, if the file says so.
+    pub address: Option<SocketAddr>,
+}
+
+/// A simulated plant behind a remote I/O.
+#[derive(Debug, Clone)]
+pub struct PlantPlace {
+    /// Its name.
+    pub name: String,
+    /// "robot", "press" or the file of a ladder.
+    pub model: String,
+    /// Bound to its controller, in its initial state.
+    pub plant: Plant,
+    /// The program of the plant whose parts it takes.
+    pub fed_by: Option<ProgramId>,
+    /// Periods without an actuation after which the fail-safe outputs are in force.
+    pub watchdog_cycles: u32,
+    /// Where it listens, if the file says so.
+    pub address: Option<SocketAddr>,
+}
+
+/// Programs, stations, remote I/Os and plants.
+///
+/// Invariant: names are unique over all parties; controller i, remote I/O i and plant i stand at index i; every image of
+/// the cluster fits into a frame.
+#[derive(Debug, Clone)]
+pub struct Cluster {
+    pub(crate) name: String,
+    pub(crate) link: Link,
+    pub(crate) agreement: Arc<Agreement>,
+    pub(crate) canonical_text: String,
+    pub(crate) controllers: Vec<Controller>,
+    pub(crate) understudies: Vec<Understudy>,
+    pub(crate) remote_ios: Vec<RemoteIo>,
+    pub(crate) plants: Vec<Option<PlantPlace>>,
+    pub(crate) programs: Arc<[Program]>,
+    pub(crate) parity: ParityController,
+}
+
+impl Cluster {
+    /// Its name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What carries the frames.
+    pub fn link(&self) -> Link {
+        self.link
+    }
+
+    /// What all parties agree on.
+    pub fn agreement(&self) -> &Arc<Agreement> {
+        &self.agreement
+    }
+
+    /// The text that the configuration hash is of: what differs between two configurations can be read in it.
+    pub fn canonical_text(&self) -> &str {
+        &self.canonical_text
+    }
+
+    /// In the order of their programs.
+    pub fn controllers(&self) -> &[Controller] {
+        &self.controllers
+    }
+
+    /// In the order of their ranks.
+    pub fn understudies(&self) -> &[Understudy] {
+        &self.understudies
+    }
+
+    /// In the order of their programs.
+    pub fn remote_ios(&self) -> &[RemoteIo] {
+        &self.remote_ios
+    }
+
+    /// In the order of their programs; nothing where a program has no simulated plant.
+    pub fn plants(&self) -> &[Option<PlantPlace>] {
+        &self.plants
+    }
+
+    /// All programs, compiled, in order.
+    pub fn programs(&self) -> &Arc<[Program]> {
+        &self.programs
+    }
+
+    /// The generated controller N+1, (7)-(9).
+    pub fn parity(&self) -> &ParityController {
+        &self.parity
+    }
+
+    /// Every party: stations by rank, then remote I/Os, then plants.
+    pub fn parties(&self) -> impl Iterator<Item = Party> + '_ {
+        let stations = 0..self.agreement.schedule.stations();
+        let plants = self.plants.iter().enumerate();
+        let plants = plants.filter(|(_, plant)| plant.is_some());
+        stations
+            .map(|rank| Party::Station(StationId(rank as u8)))
+            .chain((0..self.remote_ios.len()).map(|index| Party::RemoteIo(ProgramId(index as u8))))
+            .chain(plants.map(|(index, _)| Party::Plant(ProgramId(index as u8))))
+    }
+
+    /// The name of a party; nothing where the cluster has no such party.
+    pub fn party_name(&self, party: Party) -> Option<&str> {
+        self.place(party).map(|(name, _)| name)
+    }
+
+    /// The party of a name.
+    pub fn party(&self, name: &str) -> Option<Party> {
+        self.parties()
+            .find(|&party| self.party_name(party) == Some(name))
+    }
+
+    /// Where a party listens; nothing where the file does not say so.
+    pub fn address(&self, party: Party) -> Option<SocketAddr> {
+        self.place(party).and_then(|(_, address)| address)
+    }
+
+    fn place(&self, party: Party) -> Option<(&str, Option<SocketAddr>)> {
+        match party {
+            Party::Station(station) => {
+                let rank = station.index();
+                let controller = self.controllers.get(rank);
+                let controller = controller.map(|found| (found.name.as_str(), found.address));
+                let understudy = rank.checked_sub(self.controllers.len());
+                controller.or_else(|| {
+                    let found = self.understudies.get(understudy?)?;
+                    Some((&found.name, found.address))
+                })
+            }
+            Party::RemoteIo(program) => {
+                let found = self.remote_ios.get(program.index())?;
+                Some((&found.name, found.address))
+            }
+            Party::Plant(program) => {
+                let found = self.plants.get(program.index())?.as_ref()?;
+                Some((&found.name, found.address))
+            }
+        }
+    }
+
+    /// What a station is told when it starts; `epoch` is the one that it starts when nobody is there.
+    ///
+    /// Nothing where the cluster has no such station.
+    pub fn station_settings(
+        &self,
+        station: StationId,
+        epoch: Epoch,
+    ) -> Option<understudy_node::Settings> {
+        self.party_name(Party::Station(station))?;
+        Some(understudy_node::Settings {
+            station,
+            agreement: Arc::clone(&self.agreement),
+            programs: Arc::clone(&self.programs),
+            epoch,
+        })
+    }
+
+    /// What a remote I/O is told when it starts; nothing where the cluster has no such program.
+    pub fn remote_io_settings(&self, program: ProgramId) -> Option<understudy_remote_io::Settings> {
+        let remote_io = self.remote_ios.get(program.index())?;
+        let controller = &self.controllers[program.index()];
+        Some(understudy_remote_io::Settings {
+            program,
+            agreement: Arc::clone(&self.agreement),
+            hash: controller.hash,
+            inputs: controller.circuit.inputs().len(),
+            hold_cycles: remote_io.hold_cycles,
+            fail_safe: remote_io.fail_safe.clone(),
+            release: remote_io.release,
+        })
+    }
+
+    /// What a plant is told when it starts; nothing where the program has no simulated plant.
+    pub fn plant_settings(&self, program: ProgramId) -> Option<understudy_plant::Settings> {
+        let place = self.plants.get(program.index())?.as_ref()?;
+        Some(understudy_plant::Settings {
+            program,
+            agreement: Arc::clone(&self.agreement),
+            plant: place.plant.clone(),
+            fed_by: place.fed_by,
+            fail_safe: self.remote_ios[program.index()].fail_safe.clone(),
+            watchdog_cycles: place.watchdog_cycles,
+        })
+    }
+}

@@ -1,0 +1,88 @@
+//! The canonical text of a configuration: everything that the parties have to agree on, and nothing else.
+//!
+//! Not in it: addresses, the link, file names, comments, titles, and the names inside of programs' texts that are not signals.
+
+use std::fmt::Write;
+
+use understudy_plant::{ModelKind, Signals};
+use understudy_wire::{Mode, ProgramId};
+
+use crate::canonical::circuit_text;
+use crate::cluster::Cluster;
+
+/// Raised when equal texts would mean something else than before.
+const VERSION: u32 = 1;
+
+/// `plants` in the order of programs, from [`plant_text`]; empty where there is none.
+pub(crate) fn configuration_text(cluster: &Cluster, plants: &[String]) -> String {
+    let agreement = &cluster.agreement;
+    let schedule = &agreement.schedule;
+    let mut text = String::new();
+    let mut line = |line: std::fmt::Arguments<'_>| {
+        writeln!(text, "{line}").expect("a string takes everything");
+    };
+    line(format_args!("configuration {VERSION}"));
+    line(format_args!("cluster {}", cluster.name));
+    line(format_args!("period {} ns", schedule.period().as_nanos()));
+    let mode = match agreement.mode {
+        Mode::Full => "full",
+        Mode::Paper => "paper",
+    };
+    line(format_args!("mode {mode}"));
+    line(format_args!("copies {}", schedule.copies()));
+    line(format_args!("history {}", agreement.history));
+    line(format_args!("flag after {}", agreement.flag_after));
+    line(format_args!("shadow {}", agreement.shadow_cycles));
+    line(format_args!("listen {}", agreement.listen_cycles));
+    let remote_ios = cluster.remote_ios.iter().zip(&cluster.plants).zip(plants);
+    for (controller, ((remote_io, plant), plant_text)) in cluster.controllers.iter().zip(remote_ios)
+    {
+        line(format_args!("controller {}", controller.name));
+        line(format_args!(
+            "{}",
+            indented(&circuit_text(&controller.circuit))
+        ));
+        line(format_args!("remote io {}", remote_io.name));
+        line(format_args!("  hold {}", remote_io.hold_cycles));
+        line(format_args!("  fail-safe {}", remote_io.fail_safe));
+        line(format_args!("  release {:?}", remote_io.release));
+        if let Some(plant) = plant {
+            line(format_args!("plant {}", plant.name));
+            line(format_args!("  watchdog {}", plant.watchdog_cycles));
+            line(format_args!("{}", indented(plant_text)));
+        }
+    }
+    for understudy in &cluster.understudies {
+        line(format_args!("understudy {}", understudy.name));
+    }
+    text
+}
+
+/// A plant's model, its signals and its feeder.
+pub(crate) fn plant_text(kind: &ModelKind, signals: &Signals, fed_by: Option<ProgramId>) -> String {
+    let mut text = match kind {
+        ModelKind::Robot(parameters) => format!(
+            "robot {} {} {}\n",
+            parameters.horizontal_cycles, parameters.vertical_cycles, parameters.feed_cycles
+        ),
+        ModelKind::Press(parameters) => {
+            format!(
+                "press {} {}\n",
+                parameters.ram_cycles, parameters.feed_cycles
+            )
+        }
+        ModelKind::Ladder(circuit) => format!("ladder\n{}", circuit_text(circuit)),
+    };
+    for (terminal, signal) in signals {
+        writeln!(text, "signal {terminal} {signal}").expect("a string takes everything");
+    }
+    if let Some(feeder) = fed_by {
+        writeln!(text, "fed by {}", feeder.0).expect("a string takes everything");
+    }
+    text
+}
+
+fn indented(text: &str) -> String {
+    let lines: Vec<String> = text.lines().map(|line| format!("  {line}")).collect();
+    lines.join("\n")
+}

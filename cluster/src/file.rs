@@ -1,0 +1,266 @@
+//! A cluster file as it was written: its sections with the places of their values, before any name is looked up.
+
+use std::collections::BTreeMap;
+use std::net::SocketAddr;
+use std::ops::Range;
+use std::time::Duration;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+use understudy_diagnostic::Diagnostic;
+use understudy_plant::{PressParameters, RobotParameters};
+
+use crate::fields::{Fields, Placed, unknown_key, wrong_type};
+use crate::format::{
+    CLUSTER, CONTROLLER, LADDER_PARAMETERS, MODELS, PLANT, PRESS_PARAMETERS, REMOTE_IO,
+    ROBOT_PARAMETERS, SECTIONS, Section, UNDERSTUDY,
+};
+
+/// What a text says; whole only where no diagnostic is an error.
+#[derive(Debug)]
+pub(crate) struct ClusterFile {
+    pub(crate) cluster: ClusterSection,
+    pub(crate) controllers: Vec<ControllerSection>,
+    /// Nothing where the file does not speak of understudies.
+    pub(crate) understudies: Option<Vec<UnderstudySection>>,
+    pub(crate) remote_ios: Vec<RemoteIoSection>,
+    pub(crate) plants: Vec<PlantSection>,
+}
+
+#[derive(Debug)]
+pub(crate) struct ClusterSection {
+    pub(crate) span: Range<usize>,
+    pub(crate) name: Option<Placed<String>>,
+    pub(crate) period: Duration,
+    /// Index into [`crate::format::MODES`].
+    pub(crate) mode: usize,
+    pub(crate) copies: u32,
+    pub(crate) history: u32,
+    pub(crate) flag_after: u32,
+    pub(crate) shadow_cycles: u32,
+    pub(crate) listen_cycles: u32,
+    /// Index into [`crate::format::LINKS`].
+    pub(crate) link: usize,
+}
+
+#[derive(Debug)]
+pub(crate) struct ControllerSection {
+    pub(crate) span: Range<usize>,
+    pub(crate) name: Option<Placed<String>>,
+    pub(crate) ladder: Option<Placed<String>>,
+    pub(crate) address: Option<Placed<SocketAddr>>,
+}
+
+#[derive(Debug)]
+pub(crate) struct UnderstudySection {
+    pub(crate) name: Option<Placed<String>>,
+    pub(crate) address: Option<Placed<SocketAddr>>,
+}
+
+#[derive(Debug)]
+pub(crate) struct RemoteIoSection {
+    pub(crate) name: Option<Placed<String>>,
+    pub(crate) controller: Option<Placed<String>>,
+    pub(crate) hold_cycles: u32,
+    pub(crate) fail_safe: Vec<(Placed<String>, bool)>,
+    /// Index into [`crate::format::RELEASES`].
+    pub(crate) release: usize,
+    pub(crate) address: Option<Placed<SocketAddr>>,
+}
+
+#[derive(Debug)]
+pub(crate) struct PlantSection {
+    pub(crate) span: Range<usize>,
+    pub(crate) name: Option<Placed<String>>,
+    pub(crate) controller: Option<Placed<String>>,
+    pub(crate) model: Option<ModelSection>,
+    pub(crate) fed_by: Option<Placed<String>>,
+    /// By terminal: where the terminal stands, and the signal.
+    pub(crate) signals: BTreeMap<String, (Range<usize>, Placed<String>)>,
+    pub(crate) watchdog_cycles: u32,
+    pub(crate) address: Option<Placed<SocketAddr>>,
+}
+
+#[derive(Debug)]
+pub(crate) enum ModelSection {
+    Robot(RobotParameters),
+    Press(PressParameters),
+    Ladder(Placed<String>),
+}
+
+/// Reads all sections; where the text is no TOML, says so and nothing else.
+pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<ClusterFile> {
+    let (root, errors) = DeTable::parse_recoverable(text);
+    for error in &errors {
+        let span = error.span().unwrap_or(text.len()..text.len());
+        let message = format!("this is no TOML: {}", error.message().trim_end());
+        diagnostics.push(Diagnostic::error("U0201", message, span));
+    }
+    // What the recovery made of a broken text would only bring errors that follow from the first ones.
+    if !errors.is_empty() {
+        return None;
+    }
+    let root = root.get_ref();
+    let known = SECTIONS.map(|section| section.name);
+    for key in root.keys() {
+        if !known.contains(&key.get_ref().as_ref()) {
+            diagnostics.push(unknown_key(key, "a cluster file", &known));
+        }
+    }
+    let empty = DeTable::new();
+    let cluster = cluster(root, diagnostics);
+    let controllers: Vec<_> = tables(root, &CONTROLLER, diagnostics)
+        .unwrap_or_default()
+        .iter()
+        .map(|fields| ControllerSection {
+            span: fields.span.clone(),
+            name: fields.name("name", diagnostics),
+            ladder: fields.text("ladder", diagnostics),
+            address: fields.address("address", diagnostics),
+        })
+        .collect();
+    if controllers.is_empty() && !root.contains_key(CONTROLLER.name) {
+        diagnostics.push(missing(&CONTROLLER));
+    }
+    let understudies = tables(root, &UNDERSTUDY, diagnostics).map(|tables| {
+        let read = |fields: &Fields<'_, '_>| UnderstudySection {
+            name: fields.name("name", diagnostics),
+            address: fields.address("address", diagnostics),
+        };
+        tables.iter().map(read).collect()
+    });
+    let remote_ios = tables(root, &REMOTE_IO, diagnostics).unwrap_or_default();
+    let remote_ios = remote_ios
+        .iter()
+        .map(|fields| RemoteIoSection {
+            name: fields.name("name", diagnostics),
+            controller: fields.text("controller", diagnostics),
+            hold_cycles: fields.count("hold_cycles", diagnostics),
+            fail_safe: fields.bits("fail_safe", diagnostics),
+            release: fields.word("release", diagnostics),
+            address: fields.address("address", diagnostics),
+        })
+        .collect();
+    let plants = tables(root, &PLANT, diagnostics).unwrap_or_default();
+    let plants = plants
+        .iter()
+        .map(|fields| PlantSection {
+            span: fields.span.clone(),
+            name: fields.name("name", diagnostics),
+            controller: fields.text("controller", diagnostics),
+            model: model(fields, &empty, diagnostics),
+            fed_by: fields.text("fed_by", diagnostics),
+            signals: fields.names("signals", diagnostics),
+            watchdog_cycles: fields.count("watchdog_cycles", diagnostics),
+            address: fields.address("address", diagnostics),
+        })
+        .collect();
+    Some(ClusterFile {
+        cluster: cluster?,
+        controllers,
+        understudies,
+        remote_ios,
+        plants,
+    })
+}
+
+fn missing(section: &Section) -> Diagnostic {
+    let message = format!("a cluster file needs {}", section.header());
+    Diagnostic::error("U0203", message, 0..0).with_help(format!("add it: {}", section.meaning))
+}
+
+fn cluster(root: &DeTable<'_>, diagnostics: &mut Vec<Diagnostic>) -> Option<ClusterSection> {
+    let Some(value) = root.get(CLUSTER.name) else {
+        diagnostics.push(missing(&CLUSTER));
+        return None;
+    };
+    let Some(table) = value.get_ref().as_table() else {
+        diagnostics.push(wrong_type(CLUSTER.name, value, "a table, [cluster]"));
+        return None;
+    };
+    let fields = Fields::new(&CLUSTER, table, value.span(), diagnostics);
+    Some(ClusterSection {
+        span: fields.span.clone(),
+        name: fields.name("name", diagnostics),
+        period: fields.time("period", diagnostics),
+        mode: fields.word("mode", diagnostics),
+        copies: fields.count("copies", diagnostics),
+        history: fields.count("history", diagnostics),
+        flag_after: fields.count("flag_after", diagnostics),
+        shadow_cycles: fields.count("shadow_cycles", diagnostics),
+        listen_cycles: fields.count("listen_cycles", diagnostics),
+        link: fields.word("link", diagnostics),
+    })
+}
+
+/// All tables of a repeated section; nothing where the file has no such key.
+fn tables<'a, 't>(
+    root: &'a DeTable<'t>,
+    section: &'static Section,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<Vec<Fields<'a, 't>>> {
+    let value = root.get(section.name)?;
+    let wanted = format!("tables, each under {}", section.header());
+    let Some(entries) = value.get_ref().as_array() else {
+        diagnostics.push(wrong_type(section.name, value, &wanted));
+        return Some(Vec::new());
+    };
+    let table = |entry: &'a Spanned<DeValue<'t>>| match entry.get_ref().as_table() {
+        Some(table) => Some(Fields::new(section, table, entry.span(), diagnostics)),
+        None => {
+            diagnostics.push(wrong_type(section.name, entry, &wanted));
+            None
+        }
+    };
+    Some(entries.iter().filter_map(table).collect())
+}
+
+fn model<'a, 't>(
+    fields: &Fields<'a, 't>,
+    empty: &'a DeTable<'t>,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<ModelSection> {
+    let either = "a plant is either a built-in `model` or a `ladder`";
+    match (fields.has("model"), fields.has("ladder")) {
+        (true, true) | (false, false) => {
+            diagnostics.push(
+                Diagnostic::error("U0214", either, fields.span.clone()).with_help(format!(
+                    "models are {}; a ladder is named by its file",
+                    MODELS.join(", ")
+                )),
+            );
+            None
+        }
+        (false, true) => {
+            fields.table("parameters", &LADDER_PARAMETERS, empty, diagnostics);
+            fields.text("ladder", diagnostics).map(ModelSection::Ladder)
+        }
+        (true, false) => {
+            let before = diagnostics.len();
+            let model = MODELS[fields.word("model", diagnostics)];
+            // The parameters of a model that does not exist cannot be judged.
+            if diagnostics.len() > before {
+                return None;
+            }
+            Some(match model {
+                "robot" => {
+                    let parameters =
+                        fields.table("parameters", &ROBOT_PARAMETERS, empty, diagnostics);
+                    ModelSection::Robot(RobotParameters {
+                        horizontal_cycles: parameters.count("horizontal_cycles", diagnostics),
+                        vertical_cycles: parameters.count("vertical_cycles", diagnostics),
+                        feed_cycles: parameters.count("feed_cycles", diagnostics),
+                    })
+                }
+                _ => {
+                    let parameters =
+                        fields.table("parameters", &PRESS_PARAMETERS, empty, diagnostics);
+                    ModelSection::Press(PressParameters {
+                        ram_cycles: parameters.count("ram_cycles", diagnostics),
+                        feed_cycles: parameters.count("feed_cycles", diagnostics),
+                    })
+                }
+            })
+        }
+    }
+}

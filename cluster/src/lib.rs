@@ -1,0 +1,25 @@
+//! The cluster file: which programs, stations, remote I/Os and plants there are.
+//!
+//! [`read`] takes the text of a `cluster.toml` and a function that gives the ladders that it names, and answers with a
+//! [`Cluster`] and with everything that is wrong in any of these files. From a cluster comes what each party is told when it
+//! starts. Two parties that read equal files have equal [`configuration`](understudy_wire::Agreement::configuration) hashes,
+//! and only such parties work together; the hash is of [`Cluster::canonical_text`].
+//!
+//! The format is described in `docs/cluster-file.md`.
+
+mod canonical;
+mod cluster;
+mod configuration;
+mod duration;
+mod fields;
+mod file;
+mod format;
+mod read;
+mod schema;
+mod template;
+
+pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Understudy};
+pub use fields::MAXIMUM_NAME_LENGTH;
+pub use read::{Loaded, MAXIMUM_TEXT_BYTES, Overrides, read, read_with};
+pub use schema::schema;
+pub use template::{TemplateFile, press_cell, template};

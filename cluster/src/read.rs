@@ -1,0 +1,414 @@
+//! From a cluster file and the ladders that it names to a [`Cluster`], with everything that is wrong in one run.
+//!
+//! | code | what is wrong |
+//! |---|---|
+//! | U0201 | the text is no TOML |
+//! | U0202 | a key that the section does not have |
+//! | U0203 | a key or a section that is missing |
+//! | U0204 | a value of another type than expected |
+//! | U0205 | a number or a time out of its bounds |
+//! | U0206 | a name that is none |
+//! | U0207 | a word that is none of those allowed |
+//! | U0208 | a name, or the place of a remote I/O or of a plant, that is taken |
+//! | U0209 | a name that nothing has |
+//! | U0210 | an address that is none, or that is taken |
+//! | U0211 | a ladder that cannot be read |
+//! | U0212 | a program that does not become a circuit |
+//! | U0213 | more stations, or wider images, than there may be |
+//! | U0214 | a plant with both a model and a ladder, or with neither |
+//! | U0215 | a plant that feeds itself |
+//! | U0216 | two sensors of a plant on one input |
+//! | U0251 | warning: an input that no sensor drives |
+//! | U0252 | warning: an output that moves nothing |
+//! | U0253 | warning: not one understudy where the mode wants one |
+//! | U0254 | warning: parts that never come |
+
+mod ladders;
+mod limits;
+mod names;
+mod plants;
+
+use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
+use std::time::Duration;
+
+use understudy_diagnostic::{Diagnostic, Report};
+use understudy_ladder::Program as LadderProgram;
+use understudy_logic::{Circuit, Scan};
+use understudy_node::Program;
+use understudy_remote_io::Release;
+use understudy_wire::{
+    Agreement, ClusterHash, ConfigurationHash, Image, MAXIMUM_PROGRAMS, Mode, Schedule,
+};
+
+use self::ladders::Ladders;
+use self::names::Names;
+use crate::canonical::program_hash;
+use crate::cluster::{Cluster, Controller, Link, RemoteIo, Understudy};
+use crate::configuration::configuration_text;
+use crate::fields::{MAXIMUM_MISFITS, suggestion};
+use crate::file::{self, ClusterFile, ControllerSection};
+
+/// The longest cluster file in bytes.
+pub const MAXIMUM_TEXT_BYTES: usize = 1 << 20;
+
+/// What reading answers.
+#[derive(Debug)]
+pub struct Loaded {
+    /// Nothing where one of the reports has errors.
+    pub cluster: Option<Cluster>,
+    /// Of the cluster file, then of each ladder in the order in which they were read.
+    pub reports: Vec<Report>,
+}
+
+/// What the command line says instead of the cluster file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Overrides {
+    /// In place of `period`; the same bounds hold.
+    pub period: Option<Duration>,
+    /// In place of `link`.
+    pub link: Option<Link>,
+    /// In place of `mode`.
+    pub mode: Option<Mode>,
+}
+
+/// Reads a cluster file; `open` gives the text of a ladder by the name that stands in the file, or says why it cannot.
+pub fn read(
+    name: &str,
+    text: &str,
+    open: &mut dyn FnMut(&str) -> Result<String, String>,
+) -> Loaded {
+    read_with(name, text, Overrides::default(), open)
+}
+
+/// As [`read`], with some values of the file replaced. All parties of a cluster have to replace the same.
+pub fn read_with(
+    name: &str,
+    text: &str,
+    overrides: Overrides,
+    open: &mut dyn FnMut(&str) -> Result<String, String>,
+) -> Loaded {
+    let mut diagnostics = Vec::new();
+    let mut ladders = Ladders::new(open);
+    let file = if text.len() > MAXIMUM_TEXT_BYTES {
+        let bytes = text.len();
+        let message = format!("the file has {bytes} bytes; it may have {MAXIMUM_TEXT_BYTES}");
+        diagnostics.push(Diagnostic::error("U0213", message, 0..0));
+        None
+    } else {
+        file::read(text, &mut diagnostics)
+    };
+    let cluster = file.and_then(|file| build(file, overrides, &mut ladders, &mut diagnostics));
+    diagnostics.sort_by_key(|diagnostic| (diagnostic.span.start, diagnostic.span.end));
+    let mut reports = vec![Report {
+        name: name.to_owned(),
+        text: text.to_owned(),
+        diagnostics,
+    }];
+    reports.extend(ladders.into_reports());
+    Loaded {
+        cluster: cluster.filter(|_| !reports.iter().any(Report::has_errors)),
+        reports,
+    }
+}
+
+/// A controller that was read as far as possible.
+pub(crate) struct Member {
+    pub(crate) section: ControllerSection,
+    /// The station's name, empty where it has none.
+    pub(crate) name: String,
+    /// Nothing where its ladder has errors or was not found; no error about its signals follows then.
+    pub(crate) lowered: Option<(LadderProgram, Circuit)>,
+}
+
+fn build(
+    mut file: ClusterFile,
+    overrides: Overrides,
+    ladders: &mut Ladders<'_>,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<Cluster> {
+    let period = overrides.period.unwrap_or(file.cluster.period);
+    let cluster = &file.cluster;
+    let understudy_count = file.understudies.as_ref().map_or(1, Vec::len);
+    let schedule = Schedule::new(
+        period,
+        file.controllers.len(),
+        understudy_count,
+        cluster.copies,
+    );
+    // Where there is no controller at all, that was said already.
+    if let Err(error) = &schedule
+        && !file.controllers.is_empty()
+    {
+        let span = cluster.span.clone();
+        diagnostics.push(Diagnostic::error("U0213", error.to_string(), span));
+    }
+    file.controllers.truncate(MAXIMUM_PROGRAMS);
+    let mut names = Names::default();
+    let members = members(file.controllers, period, ladders, &mut names, diagnostics);
+    let understudies = understudies(file.understudies, &mut names, diagnostics);
+    let remote_ios = remote_ios(file.remote_ios, &members, &mut names, diagnostics);
+    let plants = plants::place(
+        file.plants,
+        period,
+        &members,
+        ladders,
+        &mut names,
+        diagnostics,
+    );
+    limits::check(&members, cluster.history, diagnostics);
+    let mode = overrides
+        .mode
+        .unwrap_or([Mode::Full, Mode::Paper][cluster.mode]);
+    check_understudies(understudy_count, mode, &cluster.span, diagnostics);
+    let link = overrides
+        .link
+        .unwrap_or([Link::Zenoh, Link::Udp][cluster.link]);
+
+    let controllers: Option<Vec<Controller>> = members.into_iter().map(controller).collect();
+    let (controllers, name) = (controllers?, cluster.name.as_ref()?.value.clone());
+    let circuits: Vec<&Circuit> = controllers
+        .iter()
+        .map(|controller| &controller.circuit)
+        .collect();
+    let parity = match understudy_parity::generate(&circuits) {
+        Ok(parity) => parity,
+        // Names of stations are unique here unless that was reported; only dots in names of signals could still collide.
+        Err(error) => {
+            let code = error.code();
+            diagnostics.push(Diagnostic::error(
+                code,
+                error.to_string(),
+                cluster.span.clone(),
+            ));
+            return None;
+        }
+    };
+    let programs = controllers
+        .iter()
+        .map(|controller| Program {
+            hash: controller.hash,
+            scan: Scan::new(&controller.circuit),
+        })
+        .collect();
+    let agreement = Agreement {
+        cluster: ClusterHash::of(name.as_bytes()),
+        configuration: ConfigurationHash::default(),
+        schedule: schedule.ok()?,
+        mode,
+        history: cluster.history as usize,
+        flag_after: cluster.flag_after,
+        shadow_cycles: cluster.shadow_cycles,
+        listen_cycles: cluster.listen_cycles,
+    };
+    let mut cluster = Cluster {
+        name,
+        link,
+        agreement: Arc::new(agreement.clone()),
+        canonical_text: String::new(),
+        controllers,
+        understudies,
+        remote_ios,
+        plants: plants.places,
+        programs,
+        parity,
+    };
+    cluster.canonical_text = configuration_text(&cluster, &plants.texts);
+    let configuration = ConfigurationHash::of(cluster.canonical_text.as_bytes());
+    cluster.agreement = Arc::new(Agreement {
+        configuration,
+        ..agreement
+    });
+    Some(cluster)
+}
+
+fn members(
+    sections: Vec<ControllerSection>,
+    period: Duration,
+    ladders: &mut Ladders<'_>,
+    names: &mut Names,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Vec<Member> {
+    let mut members = Vec::new();
+    for section in sections {
+        let name = match &section.name {
+            Some(name) => {
+                names.declare(&name.value, name.span.clone(), diagnostics);
+                name.value.clone()
+            }
+            None => String::new(),
+        };
+        names.listen(section.address.as_ref(), diagnostics);
+        let lowered = section
+            .ladder
+            .as_ref()
+            .and_then(|file| ladders.lower(file, &name, period, diagnostics));
+        members.push(Member {
+            section,
+            name,
+            lowered,
+        });
+    }
+    members
+}
+
+fn controller(member: Member) -> Option<Controller> {
+    let (program, circuit) = member.lowered?;
+    Some(Controller {
+        name: member.name,
+        ladder: member.section.ladder?.value,
+        hash: program_hash(&circuit),
+        program,
+        circuit,
+        address: member.section.address.map(|address| address.value),
+    })
+}
+
+fn understudies(
+    sections: Option<Vec<file::UnderstudySection>>,
+    names: &mut Names,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Vec<Understudy> {
+    let Some(sections) = sections else {
+        let name = "understudy".to_owned();
+        names.declare(&name, 0..0, diagnostics);
+        return vec![Understudy {
+            name,
+            address: None,
+        }];
+    };
+    let mut understudies = Vec::new();
+    for section in sections {
+        names.listen(section.address.as_ref(), diagnostics);
+        let name = section.name.map(|name| {
+            names.declare(&name.value, name.span, diagnostics);
+            name.value
+        });
+        understudies.push(Understudy {
+            name: name.unwrap_or_default(),
+            address: section.address.map(|address| address.value),
+        });
+    }
+    understudies
+}
+
+fn remote_ios(
+    sections: Vec<file::RemoteIoSection>,
+    members: &[Member],
+    names: &mut Names,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Vec<RemoteIo> {
+    let mut places: BTreeMap<usize, RemoteIo> = BTreeMap::new();
+    let mut taken = BTreeMap::new();
+    for section in sections {
+        names.listen(section.address.as_ref(), diagnostics);
+        if let Some(name) = &section.name {
+            names.declare(&name.value, name.span.clone(), diagnostics);
+        }
+        let Some(controller) = &section.controller else {
+            continue;
+        };
+        let Some(index) =
+            names::find_controller(members, controller, "a remote I/O", &mut taken, diagnostics)
+        else {
+            continue;
+        };
+        let member = &members[index];
+        let fail_safe = fail_safe(member, &section.fail_safe, diagnostics);
+        let name = section.name.map(|name| name.value);
+        let remote_io = RemoteIo {
+            name: name.unwrap_or_else(|| {
+                let name = default_remote_io_name(member);
+                names.declare(&name, controller.span.clone(), diagnostics);
+                name
+            }),
+            hold_cycles: section.hold_cycles,
+            fail_safe,
+            release: [Release::Automatic, Release::Operator][section.release],
+            address: section.address.map(|address| address.value),
+        };
+        places.insert(index, remote_io);
+    }
+    let place = |(index, member): (usize, &Member)| {
+        places.remove(&index).unwrap_or_else(|| {
+            let name = default_remote_io_name(member);
+            // Two controllers of one name were reported; their remote I/Os would only repeat it.
+            let first = members.iter().position(|other| other.name == member.name);
+            if let Some(station) = &member.section.name
+                && first == Some(index)
+            {
+                names.declare(&name, station.span.clone(), diagnostics);
+            }
+            RemoteIo {
+                name,
+                hold_cycles: crate::format::REMOTE_IO.default_count("hold_cycles"),
+                fail_safe: fail_safe(member, &[], diagnostics),
+                release: Release::default(),
+                address: None,
+            }
+        })
+    };
+    members.iter().enumerate().map(place).collect()
+}
+
+fn default_remote_io_name(member: &Member) -> String {
+    format!("{}-io", member.name)
+}
+
+/// y(i) from the names that are set.
+fn fail_safe(
+    member: &Member,
+    entries: &[(crate::fields::Placed<String>, bool)],
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Image {
+    let Some((_, circuit)) = &member.lowered else {
+        return Image::default();
+    };
+    let outputs = circuit.outputs().iter();
+    let outputs: Vec<&str> = outputs.map(|output| output.name.as_str()).collect();
+    let places: HashMap<&str, usize> = outputs.iter().copied().zip(0..).collect();
+    let mut bits = vec![false; outputs.len()];
+    let mut misfits = 0;
+    for (name, bit) in entries {
+        if let Some(place) = places.get(name.value.as_str()) {
+            bits[*place] = *bit;
+            continue;
+        }
+        misfits += 1;
+        if misfits <= MAXIMUM_MISFITS {
+            let message = format!("`{}` has no output `{}`", member.name, name.value);
+            diagnostics.push(
+                Diagnostic::error("U0209", message, name.span.clone())
+                    .with_help(suggestion(&name.value, outputs.iter().copied())),
+            );
+        }
+    }
+    if misfits > MAXIMUM_MISFITS {
+        let more = misfits - MAXIMUM_MISFITS;
+        let message = format!("`{}` has none of {more} more outputs", member.name);
+        let span = member.section.span.clone();
+        diagnostics.push(Diagnostic::error("U0209", message, span));
+    }
+    bits.truncate(understudy_wire::MAXIMUM_IMAGE_BITS);
+    Image::from_bits(bits)
+}
+
+fn check_understudies(
+    understudies: usize,
+    mode: Mode,
+    span: &std::ops::Range<usize>,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let (message, help) = match (understudies, mode) {
+        (0, _) => (
+            "there is no understudy: no failure is masked".to_owned(),
+            "leave `understudy = []` out",
+        ),
+        (count @ 2.., Mode::Paper) => (
+            format!("the paper's mode has one understudy, and there are {count}"),
+            "use `mode = \"full\"` for more than one",
+        ),
+        _ => return,
+    };
+    diagnostics.push(Diagnostic::warning("U0253", message, span.clone()).with_help(help));
+}

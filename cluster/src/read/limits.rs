@@ -1,0 +1,186 @@
+//! Whether what a cluster says fits into its frames.
+//!
+//! The bounds are those of the layout at its longest: an integer takes at most 9 bytes, and a frame has a header besides.
+
+use understudy_diagnostic::Diagnostic;
+use understudy_logic::Circuit;
+use understudy_wire::{MAXIMUM_FRAME_BYTES, MAXIMUM_IMAGE_BITS};
+
+use super::Member;
+
+/// Of an integer as it travels.
+const INTEGER_BYTES: usize = 9;
+/// Magic, header, checksum, and the fields beside the images of any body.
+const FRAME_BYTES: usize = 256;
+/// One state that a turn speaks of.
+const HOLDING_BYTES: usize = 8 * INTEGER_BYTES;
+
+/// At most so many bytes of an image, with the members of a word besides.
+fn image_bytes(bits: usize) -> usize {
+    (bits.div_ceil(64) + 3) * INTEGER_BYTES
+}
+
+/// A sample: the inputs of each cycle of its history, and the outputs that were applied last.
+fn sample_bytes(inputs: usize, outputs: usize, history: usize) -> usize {
+    FRAME_BYTES + history * image_bytes(inputs) + image_bytes(outputs)
+}
+
+/// A transfer: one state.
+fn transfer_bytes(registers: usize) -> usize {
+    FRAME_BYTES + image_bytes(registers)
+}
+
+/// The turn of an understudy: a word for each program that is silent, one for the rest, and all that it holds.
+fn turn_bytes(programs: usize, widest_outputs: usize) -> usize {
+    FRAME_BYTES + (programs + 1) * image_bytes(widest_outputs) + programs * HOLDING_BYTES
+}
+
+/// Reports every program whose samples, state or turn could be longer than a frame.
+pub(crate) fn check(members: &[Member], history: u32, diagnostics: &mut Vec<Diagnostic>) {
+    let mut widest = 0;
+    for member in members {
+        let Some((_, circuit)) = &member.lowered else {
+            continue;
+        };
+        let inputs = circuit.inputs().len();
+        let registers = circuit.registers().len();
+        let outputs = circuit.outputs().len();
+        widest = widest.max(outputs);
+        if let Some(message) = too_wide(&member.name, circuit) {
+            let span = member.section.span.clone();
+            diagnostics.push(Diagnostic::error("U0213", message, span));
+        }
+        let mut report = |what: String, bytes: usize, help: &str| {
+            if bytes <= MAXIMUM_FRAME_BYTES {
+                return;
+            }
+            let message = format!(
+                "`{}` has {what}: up to {bytes} bytes in a frame, which takes {MAXIMUM_FRAME_BYTES}",
+                member.name
+            );
+            let span = member.section.span.clone();
+            diagnostics.push(Diagnostic::error("U0213", message, span).with_help(help));
+        };
+        report(
+            format!("{inputs} inputs, sent {history} times, and {outputs} outputs"),
+            sample_bytes(inputs, outputs, history as usize),
+            "a smaller `history` makes samples shorter",
+        );
+        report(
+            format!("{registers} state bits"),
+            transfer_bytes(registers),
+            "divide the program: memory, timers and counters are state bits",
+        );
+    }
+    let bytes = turn_bytes(members.len(), widest);
+    if bytes > MAXIMUM_FRAME_BYTES {
+        let message = format!(
+            "{} programs of up to {widest} outputs: a turn of the understudy takes up to {bytes} bytes, and a frame {MAXIMUM_FRAME_BYTES}",
+            members.len()
+        );
+        diagnostics.push(Diagnostic::error("U0213", message, 0..0));
+    }
+}
+
+/// What is to be said of a program with more inputs, state bits or outputs than an image may have.
+pub(crate) fn too_wide(name: &str, circuit: &Circuit) -> Option<String> {
+    let widths = [
+        ("inputs", circuit.inputs().len()),
+        ("state bits", circuit.registers().len()),
+        ("outputs", circuit.outputs().len()),
+    ];
+    let mut widths = widths.into_iter();
+    let (what, bits) = widths.find(|(_, bits)| *bits > MAXIMUM_IMAGE_BITS)?;
+    Some(format!(
+        "`{name}` has {bits} {what}; there may be {MAXIMUM_IMAGE_BITS}"
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use understudy_wire::{
+        Applied, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header,
+        Holding, Image, Lineage, MAXIMUM_HISTORY, Moment, Party, ProgramHash, ProgramId,
+        ProgramSet, Sample, Source, StationId, StationSet, Transfer, Turn, Word, encode,
+    };
+
+    use super::*;
+
+    const LATE: Moment = Moment {
+        epoch: Epoch(u64::MAX),
+        cycle: Cycle(u64::MAX),
+    };
+
+    fn ones(bits: usize) -> Image {
+        Image::from_bits(std::iter::repeat_n(true, bits))
+    }
+
+    /// The frame with the longest integers is not longer than was thought.
+    fn check_body(sender: Party, body: Body, bound: usize) {
+        let header = Header {
+            cluster: ClusterHash(u64::MAX),
+            configuration: ConfigurationHash(u64::MAX),
+            moment: LATE,
+            sender,
+            alone: true,
+        };
+        let mut bytes = Vec::new();
+        encode(&Frame { header, body }, &mut bytes).expect("it is within the bound of a frame");
+        assert!(bytes.len() <= bound, "{} of {bound} bytes", bytes.len());
+    }
+
+    #[test]
+    fn no_frame_is_longer_than_its_bound() {
+        for bits in [0, 1, 64, 65, 1000] {
+            for history in [1, 8, MAXIMUM_HISTORY] {
+                let sample = Sample {
+                    born: LATE,
+                    base: Lineage(u64::MAX),
+                    before: Lineage(u64::MAX),
+                    history: std::iter::repeat_n(ones(bits), history).collect(),
+                    applied: Some(Applied {
+                        moment: LATE,
+                        source: Source::FailSafe,
+                        outputs: ones(bits),
+                    }),
+                };
+                let bound = sample_bytes(bits, bits, history);
+                check_body(Party::RemoteIo(ProgramId(63)), Body::Sample(sample), bound);
+            }
+            let transfer = Transfer {
+                to: StationId(63),
+                program: ProgramId(63),
+                hash: ProgramHash(u64::MAX),
+                born: LATE,
+                lineage: Lineage(u64::MAX),
+                stepped: LATE,
+                digest: Digest(u64::MAX),
+                state: ones(bits),
+            };
+            let station = Party::Station(StationId(63));
+            check_body(station, Body::Transfer(transfer), transfer_bytes(bits));
+            for programs in [1, 2, 63] {
+                let holding = |program| Holding {
+                    program: ProgramId(program),
+                    born: LATE,
+                    lineage: Lineage(u64::MAX),
+                    stepped: LATE,
+                    digest: Digest(u64::MAX),
+                };
+                let word = Word {
+                    members: ProgramSet::first(programs),
+                    sum: ones(bits),
+                };
+                let turn = Turn {
+                    heard: StationSet::first(64),
+                    holdings: (0..programs as u8).map(holding).collect(),
+                    words: std::iter::repeat_n(word, programs + 1).collect(),
+                };
+                check_body(station, Body::Turn(turn), turn_bytes(programs, bits));
+            }
+        }
+        let widest = MAXIMUM_IMAGE_BITS;
+        assert!(transfer_bytes(widest) <= MAXIMUM_FRAME_BYTES);
+        assert!(transfer_bytes(4 * widest) > MAXIMUM_FRAME_BYTES);
+    }
+}

@@ -1,0 +1,262 @@
+//! Plants: models bound to their controllers, and who feeds whom.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::time::Duration;
+
+use understudy_diagnostic::Diagnostic;
+use understudy_logic::Circuit;
+use understudy_plant::{BindingProblem, Direction, ModelKind, Plant, Signals};
+use understudy_wire::ProgramId;
+
+use super::Member;
+use super::ladders::Ladders;
+use super::limits::too_wide;
+use super::names::{Names, find_controller};
+use crate::cluster::PlantPlace;
+use crate::configuration::plant_text;
+use crate::fields::{MAXIMUM_MISFITS, Placed, nearest, suggestion};
+use crate::file::{ModelSection, PlantSection};
+
+/// The plants by program, and what the configuration hash has to know of each.
+pub(crate) struct Plants {
+    pub(crate) places: Vec<Option<PlantPlace>>,
+    pub(crate) texts: Vec<String>,
+}
+
+struct Draft {
+    section: PlantSection,
+    name: String,
+    program: usize,
+    kind: Option<ModelKind>,
+}
+
+pub(crate) fn place(
+    sections: Vec<PlantSection>,
+    period: Duration,
+    members: &[Member],
+    ladders: &mut Ladders<'_>,
+    names: &mut Names,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Plants {
+    let mut taken = BTreeMap::new();
+    let mut drafts = Vec::new();
+    for section in sections {
+        names.listen(section.address.as_ref(), diagnostics);
+        if let Some(name) = &section.name {
+            names.declare(&name.value, name.span.clone(), diagnostics);
+        }
+        let controller = section.controller.as_ref();
+        let program = controller.and_then(|controller| {
+            find_controller(members, controller, "a plant", &mut taken, diagnostics)
+        });
+        let name = section.name.as_ref().map(|name| name.value.clone());
+        let name = name.unwrap_or_else(|| {
+            let Some(controller) = controller else {
+                return String::new();
+            };
+            let name = format!("{}-plant", controller.value);
+            names.declare(&name, controller.span.clone(), diagnostics);
+            name
+        });
+        let kind = match &section.model {
+            Some(ModelSection::Robot(parameters)) => Some(ModelKind::Robot(parameters.clone())),
+            Some(ModelSection::Press(parameters)) => Some(ModelKind::Press(parameters.clone())),
+            Some(ModelSection::Ladder(file)) => {
+                let lowered = ladders.lower(file, &name, period, diagnostics);
+                let circuit = lowered.map(|(_, circuit)| circuit);
+                let too_wide = circuit
+                    .as_ref()
+                    .and_then(|circuit| too_wide(&file.value, circuit));
+                let circuit = circuit.filter(|_| too_wide.is_none());
+                if let Some(message) = too_wide {
+                    diagnostics.push(Diagnostic::error("U0213", message, file.span.clone()));
+                }
+                circuit.map(|circuit| ModelKind::Ladder(Box::new(circuit)))
+            }
+            None => None,
+        };
+        if let Some(program) = program {
+            drafts.push(Draft {
+                section,
+                name,
+                program,
+                kind,
+            });
+        }
+    }
+    let mut plants = Plants {
+        places: members.iter().map(|_| None).collect(),
+        texts: vec![String::new(); members.len()],
+    };
+    for draft in &drafts {
+        let fed_by = feeder(draft, &drafts, diagnostics);
+        let (Some(kind), Some((_, circuit))) = (&draft.kind, &members[draft.program].lowered)
+        else {
+            continue;
+        };
+        plants.texts[draft.program] = plant_text(kind, &signals(&draft.section), fed_by);
+        plants.places[draft.program] = bound(draft, kind, circuit, fed_by, diagnostics);
+    }
+    plants
+}
+
+fn signals(section: &PlantSection) -> Signals {
+    section
+        .signals
+        .iter()
+        .map(|(terminal, (_, signal))| (terminal.clone(), signal.value.clone()))
+        .collect()
+}
+
+fn bound(
+    draft: &Draft,
+    kind: &ModelKind,
+    circuit: &Circuit,
+    fed_by: Option<ProgramId>,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<PlantPlace> {
+    let section = &draft.section;
+    let (plant, problems) = Plant::new(kind, circuit, &signals(section), fed_by.is_some());
+    let more = problems.len().saturating_sub(MAXIMUM_MISFITS);
+    let problems = problems.into_iter().take(MAXIMUM_MISFITS);
+    diagnostics.extend(problems.map(|problem| describe(problem, draft)));
+    if more > 0 {
+        let message = format!(
+            "{more} more signals of the plant `{}` do not fit",
+            draft.name
+        );
+        let span = section.span.clone();
+        diagnostics.push(match plant {
+            Some(_) => Diagnostic::warning("U0251", message, span),
+            None => Diagnostic::error("U0209", message, span),
+        });
+    }
+    Some(PlantPlace {
+        name: draft.name.clone(),
+        model: match section.model.as_ref()? {
+            ModelSection::Robot(_) => "robot".into(),
+            ModelSection::Press(_) => "press".into(),
+            ModelSection::Ladder(file) => file.value.clone(),
+        },
+        plant: plant?,
+        fed_by,
+        watchdog_cycles: section.watchdog_cycles,
+        address: section.address.as_ref().map(|address| address.value),
+    })
+}
+
+/// Who feeds it. Reports feeders that are not there, and parts that never come.
+fn feeder(draft: &Draft, drafts: &[Draft], diagnostics: &mut Vec<Diagnostic>) -> Option<ProgramId> {
+    let Placed { value, span } = draft.section.fed_by.as_ref()?;
+    if *value == draft.name {
+        let message = format!("the plant `{value}` feeds itself");
+        diagnostics.push(
+            Diagnostic::error("U0215", message, span.clone())
+                .with_help("leave `fed_by` out: a built-in model has a feeder of its own"),
+        );
+        return None;
+    }
+    let Some(feeder) = drafts.iter().find(|other| other.name == *value) else {
+        let message = format!("there is no plant `{value}`");
+        let known = drafts.iter().map(|other| other.name.as_str());
+        let known = known.filter(|name| *name != draft.name);
+        diagnostics.push(
+            Diagnostic::error("U0209", message, span.clone()).with_help(suggestion(value, known)),
+        );
+        return None;
+    };
+    let hands_over = feeder.kind.as_ref().is_none_or(ModelKind::hands_over);
+    let takes_parts = draft.kind.as_ref().is_none_or(ModelKind::takes_parts);
+    for (fits, message, help) in [
+        (
+            hands_over,
+            format!("`{value}` never hands a part over"),
+            "its ladder needs an output `handed_over`",
+        ),
+        (
+            takes_parts,
+            format!("`{}` never takes a part", draft.name),
+            "its ladder needs an input `part_arrives`",
+        ),
+    ] {
+        if !fits {
+            let span = span.clone();
+            diagnostics.push(Diagnostic::warning("U0254", message, span).with_help(help));
+        }
+    }
+    Some(ProgramId(feeder.program as u8))
+}
+
+fn describe(problem: BindingProblem, draft: &Draft) -> Diagnostic {
+    let section = &draft.section;
+    let controller = section
+        .controller
+        .as_ref()
+        .map(|controller| controller.value.clone())
+        .unwrap_or_default();
+    // Where the model is named: the place to look at when nothing was written about a terminal.
+    let model: Range<usize> = match &section.model {
+        Some(ModelSection::Ladder(file)) => file.span.clone(),
+        _ => section.span.clone(),
+    };
+    let signal_span = |terminal: &str| {
+        let entry = section.signals.get(terminal);
+        entry.map_or(model.clone(), |(_, signal)| signal.span.clone())
+    };
+    let known_names =
+        |name: &str, known: &[String]| suggestion(name, known.iter().map(String::as_str));
+    match problem {
+        BindingProblem::UnknownTerminal { terminal, known } => {
+            let message = format!("the plant `{}` has no terminal `{terminal}`", draft.name);
+            let entry = section.signals.get(&terminal);
+            let span = entry.map_or(model.clone(), |(span, _)| span.clone());
+            Diagnostic::error("U0209", message, span).with_help(known_names(&terminal, &known))
+        }
+        BindingProblem::UnknownSignal {
+            terminal,
+            direction,
+            signal,
+            known,
+        } => {
+            let side = match direction {
+                Direction::Sensor => "input",
+                Direction::Actuator => "output",
+            };
+            let message = format!(
+                "`{controller}` has no {side} `{signal}` for the plant `{}`",
+                draft.name
+            );
+            // A terminal that nothing was written about is bound by its own name: the way out is to write it.
+            let near = nearest(&signal, known.iter().map(String::as_str));
+            let help = match near {
+                Some(near) if !section.signals.contains_key(&terminal) => {
+                    format!(
+                        "did you mean `{near}`? bind it with `signals = {{ {terminal} = \"{near}\" }}`"
+                    )
+                }
+                _ => known_names(&signal, &known),
+            };
+            Diagnostic::error("U0209", message, signal_span(&terminal)).with_help(help)
+        }
+        BindingProblem::DrivenTwice { terminal, signal } => {
+            let message = format!("two sensors drive the input `{signal}` of `{controller}`");
+            Diagnostic::error("U0216", message, signal_span(&terminal))
+                .with_help(format!("the second is `{terminal}`"))
+        }
+        BindingProblem::InputStaysZero { input } => {
+            let message = format!(
+                "no sensor of the plant `{}` drives the input `{input}` of `{controller}`: it stays 0",
+                draft.name
+            );
+            Diagnostic::warning("U0251", message, model)
+        }
+        BindingProblem::OutputHasNoEffect { output } => {
+            let message = format!(
+                "the output `{output}` of `{controller}` moves nothing in the plant `{}`",
+                draft.name
+            );
+            Diagnostic::warning("U0252", message, model)
+        }
+    }
+}

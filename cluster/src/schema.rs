@@ -1,0 +1,89 @@
+//! The JSON schema of a cluster file, for editors and other programs; made from the same tables as the reader.
+
+use schemars::Schema;
+use serde_json::{Map, Value, json};
+
+use crate::fields::MAXIMUM_NAME_LENGTH;
+use crate::format::{
+    CLUSTER, CONTROLLER, Key, Kind, PRESS_PARAMETERS, ROBOT_PARAMETERS, SECTIONS, Section,
+};
+
+/// JSON Schema 2020-12 of the data of a `cluster.toml`.
+///
+/// Bounds of times, and that names, addresses and signals fit together, are beyond a schema; [`crate::read`] checks them.
+pub fn schema() -> Schema {
+    let sections = SECTIONS.map(|section| {
+        let table = table(section);
+        let value = if section.repeated {
+            let least = usize::from(section.name == CONTROLLER.name);
+            json!({ "type": "array", "items": table, "minItems": least })
+        } else {
+            table
+        };
+        (section.name.to_owned(), value)
+    });
+    schemars::json_schema!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Cluster file of Understudy",
+        "type": "object",
+        "additionalProperties": false,
+        "required": [CLUSTER.name, CONTROLLER.name],
+        "properties": Value::Object(sections.into_iter().collect()),
+    })
+}
+
+fn table(section: &Section) -> Value {
+    let properties: Map<String, Value> = section
+        .keys
+        .iter()
+        .map(|key| (key.name.to_owned(), property(key)))
+        .collect();
+    let required: Vec<&str> = section
+        .keys
+        .iter()
+        .filter(|key| key.required)
+        .map(|key| key.name)
+        .collect();
+    json!({
+        "type": "object",
+        "description": section.meaning,
+        "additionalProperties": false,
+        "required": required,
+        "properties": properties,
+    })
+}
+
+fn property(key: &Key) -> Value {
+    let mut property = match &key.kind {
+        Kind::Name => json!({
+            "type": "string",
+            "pattern": "^[A-Za-z][A-Za-z0-9_-]*$",
+            "maxLength": MAXIMUM_NAME_LENGTH,
+        }),
+        Kind::Text | Kind::Address => json!({ "type": "string" }),
+        Kind::Count {
+            least,
+            most,
+            default,
+        } => {
+            json!({ "type": "integer", "minimum": least, "maximum": most, "default": default })
+        }
+        Kind::Time { .. } => {
+            json!({ "type": "string", "pattern": "^\\s*[0-9]+(\\.[0-9]*)?\\s*(s|ms|us|ns)\\s*$" })
+        }
+        Kind::Word { words, .. } => json!({ "enum": words }),
+        Kind::Bits => json!({ "type": "object", "additionalProperties": { "type": "boolean" } }),
+        Kind::Names => json!({ "type": "object", "additionalProperties": { "type": "string" } }),
+        Kind::Parameters => {
+            json!({ "anyOf": [table(&ROBOT_PARAMETERS), table(&PRESS_PARAMETERS)] })
+        }
+    };
+    let entries = property.as_object_mut().expect("each kind is an object");
+    entries.insert("description".into(), key.meaning.into());
+    if let Kind::Time { .. } | Kind::Word { .. } = key.kind
+        && let Some(default) = key.kind.default()
+    {
+        entries.insert("default".into(), default.trim_matches('"').into());
+    }
+    property
+}

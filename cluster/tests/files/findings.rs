@@ -1,0 +1,281 @@
+//! Everything that is wrong with a cluster file is found in one run, in the order of its places.
+
+use crate::common::{findings, load, split};
+use proptest::prelude::*;
+use understudy_cluster::press_cell;
+use understudy_diagnostic::Report;
+
+const ROBOT: &str = "program robot\ninput there\ninput lost\noutput go\nrung there lost ( go )\n";
+const PRESS: &str = "program press\ninput ram_up\noutput down\nrung ram_up ( down )\n";
+const BROKEN: &str = "program broken\ninput a\noutput b\nrung aa ( b )\n";
+const BELT: &str =
+    "program belt\ninput go\noutput there\noutput lots\nrung go ( there ) ( lots )\n";
+
+const FILES: [(&str, &str); 4] = [
+    ("robot.ladder", ROBOT),
+    ("press.ladder", PRESS),
+    ("broken.ladder", BROKEN),
+    ("belt.ladder", BELT),
+];
+
+/// One controller to hang a section on.
+const HEAD: &str =
+    "[cluster]\nname = \"cell\"\n[[controller]]\nname = \"robot\"\nladder = \"robot.ladder\"\n";
+
+/// The findings of a whole file.
+fn check(cluster: &str) -> String {
+    let loaded = load(cluster, &FILES);
+    let errors = loaded.reports.iter().any(Report::has_errors);
+    assert_eq!(loaded.cluster.is_none(), errors, "a cluster, or errors");
+    findings(&loaded.reports)
+}
+
+#[test]
+fn a_text_that_is_no_toml() {
+    insta::assert_snapshot!(check(
+        "[cluster]\nname = cell\nperiod = \"10ms\n[[controller]\n"
+    ));
+}
+
+#[test]
+fn an_empty_file() {
+    insta::assert_snapshot!(check(""));
+}
+
+#[test]
+fn keys_and_values_of_every_kind() {
+    insta::assert_snapshot!(check(
+        r#"
+[clutser]
+[cluster]
+nam = "cell"
+period = "10"
+mode = "papper"
+copies = 5
+history = "8"
+flag_after = 0
+shadow_cycles = 1.5
+listen_cycles = true
+link = "udp "
+
+[[controller]]
+name = "1robot"
+ladder = 3
+address = "localhost:7450"
+
+[[controller]]
+name = "press line"
+lader = "press.ladder"
+
+[[remote_io]]
+controller = ["robot"]
+fail_safe = { go = 1 }
+hold_cycles = -1
+
+[plant]
+controller = "robot"
+"#
+    ));
+}
+
+#[test]
+fn periods_out_of_bounds() {
+    insta::assert_snapshot!(check(&HEAD.replace("[[c", "period = \"20us\"\n[[c")));
+}
+
+#[test]
+fn names_and_addresses_that_are_taken_or_unknown() {
+    insta::assert_snapshot!(check(
+        r#"
+[cluster]
+name = "cell"
+[[controller]]
+name = "robot"
+ladder = "robot.ladder"
+address = "127.0.0.1:7001"
+[[controller]]
+name = "robot"
+ladder = "press.ladder"
+[[controller]]
+name = "robot-io"
+ladder = "nowhere.ladder"
+[[understudy]]
+name = "understudy"
+address = "127.0.0.1:7001"
+[[remote_io]]
+controller = "robbot"
+[[remote_io]]
+name = "a"
+controller = "robot"
+fail_safe = { goo = true, zebra = false }
+[[remote_io]]
+name = "b"
+controller = "robot"
+[[plant]]
+controller = "robot"
+ladder = "belt.ladder"
+fed_by = "robot-plannt"
+[[plant]]
+name = "b"
+controller = "robot"
+model = "robot"
+"#
+    ));
+}
+
+#[test]
+fn errors_of_a_ladder_stand_beside_those_of_the_cluster_file() {
+    let cluster = HEAD.replace("robot.ladder", "broken.ladder") + "adress = \"x\"\n";
+    insta::assert_snapshot!(check(&cluster));
+}
+
+#[test]
+fn plants_that_do_not_fit_their_controllers() {
+    let cluster = HEAD.to_owned()
+        + r#"
+[[controller]]
+name = "press"
+ladder = "press.ladder"
+[[plant]]
+name = "belt"
+controller = "robot"
+ladder = "belt.ladder"
+signals = { lotts = "lost" }
+parameters = { speed = 3 }
+[[plant]]
+name = "ram"
+controller = "press"
+model = "press"
+fed_by = "ram"
+signals = { part_present = "ram_up", move_down = "down", move_up = "upp" }
+parameters = { ram_cycle = 3, feed_cycles = -1 }
+"#;
+    insta::assert_snapshot!(check(&cluster));
+}
+
+#[test]
+fn a_plant_is_one_thing() {
+    let both = "[[plant]]\ncontroller = \"robot\"\nmodel = \"robot\"\nladder = \"belt.ladder\"\n";
+    let unknown = "[[plant]]\ncontroller = \"robot\"\nmodel = \"robots\"\nparameters = { x = 1 }\n";
+    insta::assert_snapshot!(check(&(HEAD.to_owned() + both)));
+    insta::assert_snapshot!(check(&(HEAD.to_owned() + unknown)));
+}
+
+#[test]
+fn what_is_legal_and_probably_not_meant() {
+    let cluster = "understudy = []\n".to_owned()
+        + HEAD
+        + r#"
+[[controller]]
+name = "press"
+ladder = "press.ladder"
+[[plant]]
+name = "belt"
+controller = "robot"
+ladder = "belt.ladder"
+signals = { lots = "lost" }
+fed_by = "ram"
+[[plant]]
+name = "ram"
+controller = "press"
+ladder = "ram.ladder"
+fed_by = "belt"
+"#;
+    let ram = "program ram\ninput part_arrives\noutput finished\nrung part_arrives ( finished )\n";
+    let files: Vec<_> = FILES.into_iter().chain([("ram.ladder", ram)]).collect();
+    let loaded = load(&cluster, &files);
+    assert!(loaded.cluster.is_some());
+    insta::assert_snapshot!(findings(&loaded.reports));
+}
+
+#[test]
+fn more_than_there_may_be() {
+    let mut cluster = "[cluster]\nname = \"cell\"\nhistory = 32\n".to_owned();
+    for index in 0..65 {
+        let ladder = if index == 3 { "wide" } else { "press" };
+        cluster += &format!("[[controller]]\nname = \"c{index}\"\nladder = \"{ladder}.ladder\"\n");
+    }
+    let mut wide = "program wide\noutput go\n".to_owned();
+    let mut rung = "rung".to_owned();
+    for index in 0..10_000 {
+        wide += &format!("input i{index}\n");
+        rung += &format!(" i{index}");
+    }
+    wide += &(rung + " ( go )\n");
+    let loaded = load(&cluster, &[("press.ladder", PRESS), ("wide.ladder", &wide)]);
+    assert!(loaded.cluster.is_none());
+    insta::assert_snapshot!(findings(&loaded.reports));
+    // A counter or a memory bit is a state bit; so is each of these latches, in a controller and in a plant.
+    let mut states = "program states\ninput there\noutput go\n".to_owned();
+    for index in 0..=65_536 {
+        states += &format!("memory m{index}\n");
+    }
+    states += "rung there";
+    for index in 0..=65_536 {
+        states += &format!(" ( S m{index} )");
+    }
+    states += "\nrung m0 ( go )\n";
+    let cluster =
+        HEAD.to_owned() + "[[plant]]\ncontroller = \"robot\"\nladder = \"robot.ladder\"\n";
+    let loaded = load(&cluster, &[("robot.ladder", &states)]);
+    assert!(loaded.cluster.is_none());
+    insta::assert_snapshot!(findings(&loaded.reports[..1]));
+    let huge = "#".repeat(understudy_cluster::MAXIMUM_TEXT_BYTES + 1);
+    insta::assert_snapshot!(check(&huge));
+}
+
+/// A plant and a fail-safe table that fit nowhere: what is found is bounded, and its last word says how much more there is.
+#[test]
+fn findings_are_bounded() {
+    let mut fail_safe = String::new();
+    let mut plant = "program belt\ninput go\n".to_owned();
+    let mut rung = "rung go".to_owned();
+    for index in 0..150 {
+        fail_safe += &format!("o{index} = true, ");
+        plant += &format!("output o{index}\n");
+        rung += &format!(" ( o{index} )");
+    }
+    let belt = plant + &rung + "\n";
+    let cluster = format!(
+        "{HEAD}[[remote_io]]\ncontroller = \"robot\"\nfail_safe = {{ {fail_safe} }}\n\
+         [[plant]]\ncontroller = \"robot\"\nladder = \"belt.ladder\"\n"
+    );
+    let loaded = load(&cluster, &[("robot.ladder", ROBOT), ("belt.ladder", &belt)]);
+    let found = findings(&loaded.reports[..1]);
+    assert_eq!(loaded.reports[0].diagnostics.len(), 202);
+    assert!(
+        found.contains("`robot` has none of 50 more outputs"),
+        "{found}"
+    );
+    assert!(
+        found.contains("50 more signals of the plant `robot-plant` do not fit"),
+        "{found}"
+    );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Whatever happens to a good file on its way: an answer, and never a cluster beside an error.
+    #[test]
+    fn no_text_brings_the_reader_down(
+        start in 0.0..1.0_f64,
+        length in 0..40_usize,
+        insert in prop::sample::select(vec!["", "\"", "[", "]]", "=", "\n", "é", "0", "true", "{ }", "name"]),
+    ) {
+        let (cluster, ladders) = split(press_cell());
+        let mut characters: Vec<char> = cluster.chars().collect();
+        let start = (start * characters.len() as f64) as usize;
+        let end = characters.len().min(start + length);
+        characters.splice(start..end, insert.chars());
+        let text: String = characters.into_iter().collect();
+        let loaded = load(&text, &ladders);
+        let errors = loaded.reports.iter().any(Report::has_errors);
+        prop_assert_eq!(loaded.cluster.is_none(), errors);
+        for report in &loaded.reports {
+            for diagnostic in &report.diagnostics {
+                prop_assert!(diagnostic.span.end <= report.text.len());
+            }
+        }
+    }
+}

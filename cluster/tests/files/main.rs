@@ -1,0 +1,8 @@
+//! Cluster files as a whole: what loads, what is found, what the hash is of.
+
+mod common;
+mod configuration;
+mod findings;
+mod press_cell;
+mod schema;
+mod template;

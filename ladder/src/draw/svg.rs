@@ -1,0 +1,287 @@
+//! A ladder as one self-contained SVG picture, light and dark as the reader's screen is.
+
+use std::collections::HashMap;
+use std::fmt::Write;
+
+use crate::layout::{Frame, Shape, rung};
+use crate::program::{Program, Signal};
+
+/// A cell of the layout in pixels.
+const CELL_WIDTH: f64 = 8.0;
+const CELL_HEIGHT: f64 = 19.0;
+const MARGIN: f64 = 24.0;
+/// Height of a line of text outside of the rungs.
+const LINE_HEIGHT: f64 = 19.0;
+
+/// Every selector begins at the picture's own class, so that a page can hold several pictures.
+const STYLE: &str = "\
+.ladder{--paper:#fff;--ink:#1c2733;--soft:#667788;--wire:#41505f;--rail:#1f5fa8;--name:#0b4f8a;--fill:#f3f7fb}
+@media(prefers-color-scheme:dark){
+.ladder{--paper:#12181f;--ink:#e4eaf0;--soft:#93a3b3;--wire:#a9b8c6;--rail:#6db1ff;--name:#9accff;--fill:#1b242e}}
+.ladder .paper{fill:var(--paper)}
+.ladder text{font:13px ui-monospace,'DejaVu Sans Mono',Menlo,Consolas,monospace;fill:var(--ink);white-space:pre}
+.ladder .heading{font-weight:bold;font-size:17px}
+.ladder .title{font-weight:bold}
+.ladder .soft{fill:var(--soft)}
+.ladder .name{fill:var(--name)}
+.ladder .wire{stroke:var(--wire);stroke-width:1.5;fill:none;stroke-linecap:square}
+.ladder .bar{stroke:var(--ink);stroke-width:2;fill:none}
+.ladder .box{stroke:var(--ink);stroke-width:1.5;fill:var(--fill)}
+.ladder .rail{stroke:var(--rail);stroke-width:3}";
+
+/// The picture of a program: its signals, then its rungs between their rails. Signals show address and comment on hover.
+pub fn draw_svg(program: &Program) -> String {
+    let mut picture = Picture::new(program);
+    picture.header(program);
+    let frame = Frame::of(program);
+    for (place, content) in program.rungs.iter().enumerate() {
+        picture.top += LINE_HEIGHT * 0.6;
+        let number = (place + 1).to_string();
+        picture.text(MARGIN, "soft", &number);
+        if let Some(title) = &content.title {
+            picture.text(MARGIN + CELL_WIDTH * 4.0, "title", title);
+        }
+        picture.top += LINE_HEIGHT;
+        for comment in &content.comments {
+            picture.text(MARGIN + CELL_WIDTH * 4.0, "soft", comment);
+            picture.top += LINE_HEIGHT;
+        }
+        let piece = rung(content, frame);
+        picture.top += CELL_HEIGHT * f64::from(piece.above);
+        for shape in &piece.shapes {
+            picture.paint(shape);
+        }
+        picture.fit(MARGIN + CELL_WIDTH * f64::from(piece.width));
+        picture.top += CELL_HEIGHT * f64::from(piece.below + 1);
+    }
+    picture.finish(program)
+}
+
+struct Picture {
+    body: String,
+    /// What a name means, for hovering.
+    meanings: HashMap<String, String>,
+    /// The next line's row, or the wire of the rung being painted, in pixels.
+    top: f64,
+    width: f64,
+}
+
+impl Picture {
+    fn new(program: &Program) -> Self {
+        let signals = program.inputs.iter().chain(program.writable());
+        let meanings = signals.map(|signal| (signal.name.to_string(), meaning(signal)));
+        Self {
+            body: String::new(),
+            meanings: meanings
+                .filter(|(_, meaning)| !meaning.is_empty())
+                .collect(),
+            top: MARGIN,
+            width: 0.0,
+        }
+    }
+
+    fn fit(&mut self, right: f64) {
+        self.width = self.width.max(right);
+    }
+
+    fn header(&mut self, program: &Program) {
+        self.text(MARGIN, "heading", &program.name);
+        self.top += LINE_HEIGHT * 1.3;
+        let lines = program.description.iter().chain(&program.comments);
+        for line in lines {
+            self.text(MARGIN, "soft", line);
+            self.top += LINE_HEIGHT;
+        }
+        let groups = [
+            ("inputs", &program.inputs),
+            ("outputs", &program.outputs),
+            ("memory", &program.memory),
+        ];
+        let signals = groups.iter().flat_map(|(_, signals)| signals.iter());
+        let widest = signals.map(|signal| signal.name.chars().count()).max();
+        let column = MARGIN
+            + CELL_WIDTH * (4.0 + f64::from(u32::try_from(widest.unwrap_or(0)).unwrap_or(0)));
+        for (heading, signals) in groups {
+            if signals.is_empty() {
+                continue;
+            }
+            self.top += LINE_HEIGHT * 0.5;
+            self.text(MARGIN, "title", heading);
+            self.top += LINE_HEIGHT;
+            for signal in signals {
+                self.text(MARGIN + CELL_WIDTH * 2.0, "name", &signal.name);
+                self.text(column, "soft", &meaning(signal));
+                self.top += LINE_HEIGHT;
+            }
+        }
+    }
+
+    fn text(&mut self, left: f64, class: &str, text: &str) {
+        if text.is_empty() {
+            return;
+        }
+        let baseline = self.top + 4.5;
+        let _ = writeln!(
+            self.body,
+            r#"<text class="{class}" x="{left:.1}" y="{baseline:.1}">{}</text>"#,
+            escaped(text)
+        );
+        let length = u32::try_from(text.chars().count()).unwrap_or(0);
+        self.fit(left + CELL_WIDTH * f64::from(length));
+    }
+
+    fn across(column: i32) -> f64 {
+        MARGIN + CELL_WIDTH * (f64::from(column) + 0.5)
+    }
+
+    fn down(&self, row: i32) -> f64 {
+        self.top + CELL_HEIGHT * f64::from(row)
+    }
+
+    fn line(&mut self, class: &str, [x1, y1, x2, y2]: [f64; 4]) {
+        if (x1, y1) == (x2, y2) {
+            return;
+        }
+        let _ = writeln!(
+            self.body,
+            r#"<path class="{class}" d="M{x1:.1} {y1:.1}L{x2:.1} {y2:.1}"/>"#
+        );
+    }
+
+    fn centred(&mut self, middle: f64, row: i32, text: &str) {
+        let baseline = self.down(row) + 4.5;
+        let _ = writeln!(
+            self.body,
+            r#"<text x="{middle:.1}" y="{baseline:.1}" text-anchor="middle">{}</text>"#,
+            escaped(text)
+        );
+    }
+
+    fn paint(&mut self, shape: &Shape) {
+        match shape {
+            Shape::Wire { left, right, row } => {
+                let y = self.down(*row);
+                self.line("wire", [Self::across(*left), y, Self::across(*right), y]);
+            }
+            Shape::Riser {
+                column,
+                top,
+                bottom,
+            } => {
+                let x = Self::across(*column);
+                self.line("wire", [x, self.down(*top), x, self.down(*bottom)]);
+            }
+            Shape::Rail {
+                column,
+                top,
+                bottom,
+            } => {
+                let x = Self::across(*column);
+                let half = CELL_HEIGHT / 2.0;
+                let ends = [x, self.down(*top) - half, x, self.down(*bottom) + half];
+                self.line("rail", ends);
+            }
+            Shape::Contact {
+                left,
+                right,
+                row,
+                sign,
+            } => {
+                let (x1, x2, y) = (Self::across(*left), Self::across(*right), self.down(*row));
+                self.line("bar", [x1, y - 8.0, x1, y + 8.0]);
+                self.line("bar", [x2, y - 8.0, x2, y + 8.0]);
+                match sign.as_str() {
+                    " " => {}
+                    "/" => self.line("bar", [x1 - 2.0, y + 8.0, x2 + 2.0, y - 8.0]),
+                    _ => self.centred((x1 + x2) / 2.0, *row, sign),
+                }
+            }
+            Shape::Coil { left, row, sign } => {
+                let (x1, x2, y) = (Self::across(*left), Self::across(left + 2), self.down(*row));
+                let (top, bottom) = (y - 8.0, y + 8.0);
+                let _ = writeln!(
+                    self.body,
+                    r#"<path class="bar" d="M{a:.1} {top:.1}Q{p:.1} {y:.1} {a:.1} {bottom:.1}M{b:.1} {top:.1}Q{q:.1} {y:.1} {b:.1} {bottom:.1}"/>"#,
+                    a = x1 + 3.0,
+                    b = x2 - 3.0,
+                    p = x1 - 3.0,
+                    q = x2 + 3.0,
+                );
+                self.centred((x1 + x2) / 2.0, *row, sign.trim());
+            }
+            Shape::Outline {
+                left,
+                right,
+                top,
+                bottom,
+            } => {
+                let (x, y) = (Self::across(*left), self.down(*top));
+                let _ = writeln!(
+                    self.body,
+                    r#"<rect class="box" x="{x:.1}" y="{y:.1}" width="{:.1}" height="{:.1}" rx="3"/>"#,
+                    Self::across(*right) - x,
+                    self.down(*bottom) - y,
+                );
+            }
+            Shape::Label { text, .. } if text.is_empty() => {}
+            Shape::Label {
+                column,
+                row,
+                text,
+                signal,
+            } => {
+                let x = MARGIN + CELL_WIDTH * f64::from(*column);
+                let baseline = self.down(*row) + 4.5;
+                let class = if *signal { "name" } else { "pin" };
+                let meaning = self.meanings.get(text).filter(|_| *signal);
+                let title = meaning.map_or(String::new(), |meaning| {
+                    format!("<title>{}</title>", escaped(meaning))
+                });
+                let length =
+                    CELL_WIDTH * f64::from(u32::try_from(text.chars().count()).unwrap_or(0));
+                let _ = writeln!(
+                    self.body,
+                    r#"<text class="{class}" x="{x:.1}" y="{baseline:.1}" textLength="{length:.1}">{title}{}</text>"#,
+                    escaped(text)
+                );
+            }
+        }
+    }
+
+    fn finish(self, program: &Program) -> String {
+        let (width, height) = (self.width + MARGIN, self.top + MARGIN);
+        format!(
+            "<svg class=\"ladder\" xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" viewBox=\"0 0 {width:.0} {height:.0}\">\n\
+             <title>{}</title>\n<style>\n{STYLE}\n</style>\n\
+             <rect class=\"paper\" width=\"100%\" height=\"100%\"/>\n{}</svg>\n",
+            escaped(&program.name),
+            self.body
+        )
+    }
+}
+
+/// Address, initial value and comment of a signal on one line.
+fn meaning(signal: &Signal) -> String {
+    let address = signal.address.as_ref().map(ToString::to_string);
+    let initial = signal
+        .initial
+        .map(|initial| format!("= {}", u8::from(initial)));
+    let parts = [address, initial, signal.description.clone()];
+    parts.into_iter().flatten().collect::<Vec<_>>().join("  ")
+}
+
+fn escaped(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            // XML has no way to write the other control characters.
+            _ if character.is_control() => escaped.push('\u{fffd}'),
+            _ => escaped.push(character),
+        }
+    }
+    escaped
+}

@@ -1,0 +1,13 @@
+//! What the ladder crate promises, against references and recorded facts.
+
+mod cell;
+mod diagnostics;
+mod drawing;
+mod format;
+mod generated;
+mod lowering;
+mod printing;
+mod random;
+mod structured_text_reader;
+mod support;
+mod vectors;

@@ -1,0 +1,341 @@
+//! Binary decision diagrams: canonical, so two functions of one [`Diagrams`] are equal exactly when their diagrams are.
+//!
+//! The diagrams are those of the library `oxidd`; no other module names its types. They are the plain ones: with complemented edges
+//! version 0.13 keeps f ⊕ g and f ⊕ ¬g in the same place of its cache, where they evict each other, and sums, of which parity is
+//! made, take exponential time. What is bounded is the number of nodes alive at once. Recursion is as deep as there are variables; past [`SHALLOW`] of them the work is done on the
+//! deep stack that the library keeps for it.
+
+use std::collections::{HashMap, HashSet};
+
+use oxidd::bdd::{BDDFunction, BDDManagerRef, new_manager};
+use oxidd::util::{AllocResult, OptBool, SatCountCache};
+use oxidd::{BooleanFunction, Function, HasWorkers, Manager, ManagerRef, VarNo, WorkerPool};
+
+use crate::expression::{Expression, Graph, Operation, Variable};
+
+/// So many variables are no danger to an ordinary stack.
+const SHALLOW: usize = 500;
+
+/// Why a diagram could not be made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum BddError {
+    /// Its nodes and those of the diagrams beside it pass the bound.
+    #[error(
+        "U0412: the decision diagram needs more than {limit} nodes; split the function or raise the bound"
+    )]
+    TooManyNodes {
+        /// The bound that was set.
+        limit: usize,
+    },
+    /// A variable that was not declared when the diagrams were set up.
+    #[error("U0413: {0:?} is not among the variables of the decision diagrams")]
+    UnknownVariable(Variable),
+}
+
+impl BddError {
+    /// Stable code for people.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::TooManyNodes { .. } => "U0412",
+            Self::UnknownVariable(_) => "U0413",
+        }
+    }
+}
+
+/// Diagrams over one static order of variables.
+pub struct Diagrams {
+    manager: BDDManagerRef,
+    variables: Vec<Variable>,
+    numbers: HashMap<Variable, VarNo>,
+    limit: usize,
+}
+
+/// One function; equal to another of the same [`Diagrams`] exactly when the functions are equal.
+#[derive(Clone, PartialEq, Eq, Hash)]
+pub struct Diagram(BDDFunction);
+
+impl Diagrams {
+    /// Nodes alive at once by default; about 100 MB when they are all in use.
+    pub const DEFAULT_LIMIT: usize = 4_000_000;
+
+    /// Diagrams over `order`, the top variable first, with at most `limit` nodes alive at once.
+    pub fn new(order: impl IntoIterator<Item = Variable>, limit: usize) -> Self {
+        let mut numbers = HashMap::new();
+        let mut variables = Vec::new();
+        for variable in order {
+            numbers.entry(variable).or_insert_with(|| {
+                variables.push(variable);
+                variables.len() as VarNo - 1
+            });
+        }
+        let cache = (limit / 8).clamp(1 << 8, 1 << 17);
+        let manager = new_manager(limit, cache, 1);
+        manager.with_manager_exclusive(|manager| manager.add_vars(variables.len() as VarNo));
+        Self {
+            manager,
+            variables,
+            numbers,
+            limit,
+        }
+    }
+
+    /// Diagrams over the variables that `roots` depend on, in the order of [`depth_first_order`].
+    pub fn for_roots(graph: &Graph, roots: &[Expression], limit: usize) -> Self {
+        Self::new(depth_first_order(graph, roots), limit)
+    }
+
+    /// The declared variables, the top one first.
+    pub fn variables(&self) -> &[Variable] {
+        &self.variables
+    }
+
+    /// Makes diagrams of expressions of `graph`, each variable renamed by `place`.
+    pub fn builder<'a>(
+        &'a self,
+        graph: &'a Graph,
+        place: impl Fn(Variable) -> Variable + Send + 'a,
+    ) -> Builder<'a> {
+        Builder {
+            diagrams: self,
+            graph,
+            place: Box::new(place),
+            made: HashMap::new(),
+        }
+    }
+
+    /// The diagram of one expression of `graph`.
+    ///
+    /// # Errors
+    /// Too many nodes, or a variable that is not declared.
+    pub fn of(&self, graph: &Graph, root: Expression) -> Result<Diagram, BddError> {
+        self.builder(graph, |variable| variable).diagram(root)
+    }
+
+    /// 0 or 1.
+    pub fn constant(&self, value: bool) -> Diagram {
+        self.manager.with_manager_shared(|manager| {
+            Diagram(if value {
+                BDDFunction::t(manager)
+            } else {
+                BDDFunction::f(manager)
+            })
+        })
+    }
+
+    /// A declared variable.
+    ///
+    /// # Errors
+    /// It is not declared, or there is no node left.
+    pub fn variable(&self, variable: Variable) -> Result<Diagram, BddError> {
+        let number = *self
+            .numbers
+            .get(&variable)
+            .ok_or(BddError::UnknownVariable(variable))?;
+        self.checked(
+            self.manager
+                .with_manager_shared(|manager| BDDFunction::var(manager, number)),
+        )
+    }
+
+    /// Negation.
+    pub fn not(&self, operand: &Diagram) -> Result<Diagram, BddError> {
+        self.checked(self.deep(|| operand.0.not()))
+    }
+
+    /// Logical product.
+    pub fn and(&self, left: &Diagram, right: &Diagram) -> Result<Diagram, BddError> {
+        self.checked(self.deep(|| left.0.and(&right.0)))
+    }
+
+    /// Logical sum.
+    pub fn or(&self, left: &Diagram, right: &Diagram) -> Result<Diagram, BddError> {
+        self.checked(self.deep(|| left.0.or(&right.0)))
+    }
+
+    /// Exclusive or.
+    pub fn xor(&self, left: &Diagram, right: &Diagram) -> Result<Diagram, BddError> {
+        self.checked(self.deep(|| left.0.xor(&right.0)))
+    }
+
+    /// `one` where `condition` holds, `zero` elsewhere.
+    ///
+    /// # Errors
+    /// Too many nodes.
+    pub fn choose(
+        &self,
+        condition: &Diagram,
+        one: &Diagram,
+        zero: &Diagram,
+    ) -> Result<Diagram, BddError> {
+        self.checked(self.deep(|| condition.0.ite(&one.0, &zero.0)))
+    }
+
+    /// Under how many assignments of all declared variables the function is 1; `None` for more than 127 variables.
+    pub fn count(&self, diagram: &Diagram) -> Option<u128> {
+        let variables = u32::try_from(self.variables.len()).ok()?;
+        (variables <= 127).then(|| {
+            let mut cache: SatCountCache<u128, std::hash::RandomState> = SatCountCache::default();
+            diagram.0.sat_count(variables, &mut cache)
+        })
+    }
+
+    /// An assignment under which the function is 1, of as few variables as the diagram asks for; `None` if it is 0.
+    pub fn satisfying(&self, diagram: &Diagram) -> Option<Vec<(Variable, bool)>> {
+        let cube = self.deep(|| diagram.0.pick_cube(|_, _, _| false))?;
+        let values = self.variables.iter().zip(cube);
+        let chosen = values.filter_map(|(&variable, value)| match value {
+            OptBool::None => None,
+            OptBool::False => Some((variable, false)),
+            OptBool::True => Some((variable, true)),
+        });
+        Some(chosen.collect())
+    }
+
+    /// An assignment under which the two functions differ; `None` where they are equal.
+    ///
+    /// # Errors
+    /// Too many nodes.
+    pub fn difference(
+        &self,
+        left: &Diagram,
+        right: &Diagram,
+    ) -> Result<Option<Vec<(Variable, bool)>>, BddError> {
+        if left == right {
+            return Ok(None);
+        }
+        Ok(self.satisfying(&self.xor(left, right)?))
+    }
+
+    /// The place of the top variable among [`Self::variables`]; `None` for a constant.
+    pub fn top(&self, diagram: &Diagram) -> Option<usize> {
+        let level = diagram
+            .0
+            .with_manager_shared(|manager, edge| manager.get_node(edge).level());
+        Some(level as usize).filter(|&level| level < self.variables.len())
+    }
+
+    /// The functions where the variable at `place`, at or above the top one, is 0 and is 1.
+    pub fn cofactors(&self, diagram: &Diagram, place: usize) -> (Diagram, Diagram) {
+        match diagram.0.cofactors() {
+            Some((one, zero)) if self.top(diagram) == Some(place) => (Diagram(zero), Diagram(one)),
+            _ => (diagram.clone(), diagram.clone()),
+        }
+    }
+
+    /// Does `work` where the stack is deep enough for recursion over all variables.
+    pub(crate) fn deep<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+        if self.variables.len() <= SHALLOW {
+            return work();
+        }
+        self.manager
+            .with_manager_shared(|manager| manager.workers().install(work))
+    }
+
+    fn checked(&self, made: AllocResult<BDDFunction>) -> Result<Diagram, BddError> {
+        made.map(Diagram)
+            .map_err(|_| BddError::TooManyNodes { limit: self.limit })
+    }
+
+    fn collect_garbage(&self) {
+        self.manager.with_manager_shared(|manager| manager.gc());
+    }
+}
+
+impl Diagram {
+    /// Whether it is 1 (or 0) under every assignment.
+    pub fn is_constant(&self, value: bool) -> bool {
+        if value {
+            self.0.valid()
+        } else {
+            !self.0.satisfiable()
+        }
+    }
+
+    /// Its nodes, the terminal included.
+    pub fn node_count(&self) -> usize {
+        self.0.node_count()
+    }
+}
+
+/// Makes diagrams of the expressions of one graph, and remembers those of shared subexpressions.
+pub struct Builder<'a> {
+    diagrams: &'a Diagrams,
+    graph: &'a Graph,
+    place: Box<dyn Fn(Variable) -> Variable + Send + 'a>,
+    made: HashMap<Expression, Diagram>,
+}
+
+impl Builder<'_> {
+    /// The diagram of `root`.
+    ///
+    /// # Errors
+    /// Too many nodes even for this one alone, or a variable that is not declared.
+    pub fn diagram(&mut self, root: Expression) -> Result<Diagram, BddError> {
+        let diagrams = self.diagrams;
+        diagrams.deep(|| match self.make(root) {
+            Err(BddError::TooManyNodes { .. }) => {
+                // What is remembered for sharing may be what fills the memory.
+                self.made.clear();
+                diagrams.collect_garbage();
+                self.make(root)
+            }
+            result => result,
+        })
+    }
+
+    fn make(&mut self, root: Expression) -> Result<Diagram, BddError> {
+        let made = &mut self.made;
+        let mut pending = vec![root];
+        while let Some(&expression) = pending.last() {
+            if made.contains_key(&expression) {
+                pending.pop();
+                continue;
+            }
+            let operation = self.graph.operation(expression);
+            let waiting = pending.len();
+            pending.extend(
+                operation
+                    .operands()
+                    .filter(|operand| !made.contains_key(operand)),
+            );
+            if pending.len() > waiting {
+                continue;
+            }
+            let diagrams = self.diagrams;
+            let diagram = match operation {
+                Operation::Constant(value) => diagrams.constant(value),
+                Operation::Variable(variable) => diagrams.variable((self.place)(variable))?,
+                Operation::Not(operand) => diagrams.not(&made[&operand])?,
+                Operation::And(left, right) => diagrams.and(&made[&left], &made[&right])?,
+                Operation::Or(left, right) => diagrams.or(&made[&left], &made[&right])?,
+                Operation::Xor(left, right) => diagrams.xor(&made[&left], &made[&right])?,
+            };
+            made.insert(expression, diagram);
+        }
+        Ok(made[&root].clone())
+    }
+}
+
+/// The variables that `roots` depend on, in the order in which a reader from left to right meets them.
+///
+/// What is used together comes together, and programs that share no variable stay apart; so the diagram of a sum over such
+/// programs is only as large as theirs together.
+pub fn depth_first_order(graph: &Graph, roots: &[Expression]) -> Vec<Variable> {
+    let mut order = Vec::new();
+    let mut seen = HashSet::new();
+    for &root in roots {
+        let mut pending = vec![root];
+        while let Some(expression) = pending.pop() {
+            if !seen.insert(expression) {
+                continue;
+            }
+            let operation = graph.operation(expression);
+            if let Operation::Variable(variable) = operation {
+                order.push(variable);
+            }
+            let operands: Vec<Expression> = operation.operands().collect();
+            pending.extend(operands.into_iter().rev());
+        }
+    }
+    order
+}

@@ -1,0 +1,130 @@
+//! A compiled circuit does in one state, and in 64 at once, what the expressions say.
+
+mod common;
+
+use common::{circuit, configuration, recipe};
+use proptest::prelude::*;
+use understudy_logic::{Circuit, CircuitBuilder, Expression, Scan, Scratch, Variable};
+
+fn bit(words: &[u64], place: usize) -> bool {
+    words[place / 64] >> (place % 64) & 1 == 1
+}
+
+/// One step of `circuit` from packed `state` under packed `inputs`, by [`understudy_logic::Graph::evaluate`].
+fn expected(circuit: &Circuit, state: &[u64], inputs: &[u64]) -> (Vec<bool>, Vec<bool>) {
+    let value = |root: Expression| {
+        circuit.graph().evaluate(root, |variable| match variable {
+            Variable::Input(place) => bit(inputs, place as usize),
+            Variable::Register(place) => bit(state, place as usize),
+        })
+    };
+    let next = circuit
+        .registers()
+        .iter()
+        .map(|register| value(register.next));
+    let outputs = circuit.outputs().iter().map(|output| value(output.value));
+    (next.collect(), outputs.collect())
+}
+
+fn packed(bits: &[bool]) -> Vec<u64> {
+    let chunks = bits.chunks(64);
+    chunks
+        .map(|bits| {
+            (0..)
+                .zip(bits)
+                .fold(0, |word, (place, &bit)| word | u64::from(bit) << place)
+        })
+        .collect()
+}
+
+/// Steps through `samples` in one state; and in 64, each with the samples rotated by its lane.
+fn check(circuit: &Circuit, samples: &[Vec<u64>]) {
+    let scan = Scan::new(circuit);
+    let initial: Vec<bool> = circuit
+        .registers()
+        .iter()
+        .map(|register| register.initial)
+        .collect();
+    assert_eq!(scan.initial(), packed(&initial));
+    let mut scratch = Scratch::default();
+    let mut lane_states: Vec<u64> = initial
+        .iter()
+        .map(|&bit| u64::from(bit).wrapping_neg())
+        .collect();
+    let mut lane_outputs = vec![0; scan.output_count()];
+    let mut states = vec![scan.initial().to_vec(); 64];
+    let mut outputs = vec![0; scan.output_count().div_ceil(64)];
+    for cycle in 0..samples.len() {
+        let sample = |lane: usize| &samples[(cycle + lane) % samples.len()];
+        let lane_inputs: Vec<u64> = (0..scan.input_count())
+            .map(|place| {
+                (0..64).fold(0, |word, lane| {
+                    word | u64::from(bit(sample(lane), place)) << lane
+                })
+            })
+            .collect();
+        scan.step_lanes(
+            &mut scratch,
+            &mut lane_states,
+            &lane_inputs,
+            &mut lane_outputs,
+        );
+        for (lane, state) in states.iter_mut().enumerate() {
+            let (next, values) = expected(circuit, state, sample(lane));
+            scan.step(&mut scratch, state, sample(lane), &mut outputs);
+            assert_eq!(*state, packed(&next));
+            assert_eq!(outputs, packed(&values));
+            let of_lane = |words: &[u64]| -> Vec<bool> {
+                words.iter().map(|word| word >> lane & 1 == 1).collect()
+            };
+            assert_eq!(of_lane(&lane_states), next);
+            assert_eq!(of_lane(&lane_outputs), values);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(configuration(60))]
+
+    #[test]
+    fn random_circuits(recipe in recipe(), samples in prop::collection::vec(any::<u64>(), 1..5)) {
+        let samples: Vec<Vec<u64>> = samples.into_iter().map(|word| vec![word]).collect();
+        check(&circuit("random", &recipe), &samples);
+    }
+}
+
+/// More than one word of each; constants and negations as roots; a register that copies another reads its old value.
+#[test]
+fn wide_images() {
+    let mut builder = CircuitBuilder::new("wide");
+    let inputs: Vec<Expression> = (0..70)
+        .map(|place| builder.input(format!("u{place}")))
+        .collect();
+    let registers: Vec<_> = (0..130)
+        .map(|place| builder.register(format!("x{place}"), place % 3 == 0))
+        .collect();
+    for place in 0..130 {
+        let before = registers[(place + 129) % 130].1;
+        let input = inputs[place % 70];
+        let next = match place % 3 {
+            0 => before,
+            1 => builder.graph().not(before),
+            _ => builder.graph().xor(before, input),
+        };
+        builder.set_next(registers[place].0, next);
+        builder.output(format!("y{place}"), next);
+    }
+    let one = builder.graph().constant(true);
+    builder.output("one", one);
+    let zero = builder.graph().constant(false);
+    builder.output("zero", zero);
+    let circuit = builder.finish().expect("names are numbered");
+    check(
+        &circuit,
+        &[
+            vec![0x5555_0000_ffff_1234, 0x2a],
+            vec![u64::MAX, 0x3f],
+            vec![0, 0],
+        ],
+    );
+}

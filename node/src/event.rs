@@ -1,0 +1,91 @@
+//! What a station reports, for the journal.
+
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+use smallvec::SmallVec;
+use understudy_wire::{
+    ConfigurationHash, Lineage, Moment, Party, ProgramId, ProgramSet, StationId, Word,
+};
+
+/// One thing that happened to a station.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "event", rename_all = "kebab-case")]
+pub enum Event {
+    /// It took its turn.
+    Spoke {
+        /// In this cycle.
+        moment: Moment,
+        /// Its outputs.
+        words: SmallVec<[Word; 2]>,
+    },
+    /// It starts the cycles from now on.
+    Paces {
+        /// From this cycle.
+        moment: Moment,
+    },
+    /// Another station was silent for too long: θ = 1, and its slot is closed.
+    Flagged {
+        /// In this cycle.
+        moment: Moment,
+        /// Who was silent.
+        station: StationId,
+    },
+    /// A flagged station speaks again.
+    Cleared {
+        /// In this cycle.
+        moment: Moment,
+        /// Who speaks.
+        station: StationId,
+    },
+    /// It listens, and asks for the states that it lacks.
+    Joins {
+        /// In this cycle.
+        moment: Moment,
+        /// The programs whose states it lacks.
+        wants: ProgramSet,
+    },
+    /// It has the state of a program: from another station, or by replaying from the initial state.
+    Adopted {
+        /// In this cycle.
+        moment: Moment,
+        /// Whose state.
+        program: ProgramId,
+        /// Where it stands now.
+        lineage: Lineage,
+        /// Who gave it; nobody where it was replayed from the initial state.
+        from: Option<StationId>,
+    },
+    /// A copy proved itself in shadow: from now on it takes part in the turns.
+    InStep {
+        /// In this cycle.
+        moment: Moment,
+        /// Whose state.
+        program: ProgramId,
+    },
+    /// Equal lineages and unequal digests: a value fault here or there.
+    DigestDiffers {
+        /// In this cycle.
+        moment: Moment,
+        /// Whose state.
+        program: ProgramId,
+        /// The station with the other digest.
+        station: StationId,
+    },
+    /// A party of this cluster runs another configuration; its frames are dropped.
+    Refused {
+        /// Who.
+        party: Party,
+        /// Its configuration.
+        theirs: ConfigurationHash,
+        /// The configuration of this station.
+        ours: ConfigurationHash,
+    },
+    /// The host woke this station too late to keep its times.
+    Stalled {
+        /// In this cycle.
+        moment: Moment,
+        /// Behind the time that it had asked for.
+        late: Duration,
+    },
+}

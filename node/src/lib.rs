@@ -1,0 +1,13 @@
+//! A station: the cycle, the token, and repair, as a pure state machine.
+//!
+//! [`Station`] is a controller or an understudy: they differ in which programs they run, and in the words that they say.
+
+mod event;
+mod replica;
+mod settings;
+mod station;
+mod words;
+
+pub use event::Event;
+pub use settings::{Program, Settings};
+pub use station::Station;

@@ -1,0 +1,355 @@
+//! A copy of one program's state, advanced with the very samples that its remote I/O sends (invariant *Same inputs*).
+//!
+//! A copy knows where it stands by its lineage alone. Each sample carries the lineages of the last few cycles, so a copy finds
+//! itself in that history and replays what it missed. One that does not find itself there goes back to a state that it had a
+//! few steps ago, starts from the initial state where the history does, or is [`Standing::Lost`] until somebody
+//! gives it a state. It never steps on a guess.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use understudy_logic::Scratch;
+use understudy_wire::{
+    Body, Digest, Frame, Holding, Image, Lineage, Moment, ProgramId, Sample, StationId, Transfer,
+};
+
+use crate::settings::Program;
+
+/// How much a copy may be trusted to speak.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Standing {
+    /// There is no copy, or none that the program's remote I/O knows.
+    Lost,
+    /// Adopted from another station; takes no part in the turns for so many more cycles in step.
+    Shadow(u32),
+    /// Replayed from the initial state, or proved in shadow.
+    Proven,
+}
+
+/// A station's copy of one program.
+#[derive(Debug)]
+pub(crate) struct Replica {
+    id: ProgramId,
+    standing: Standing,
+    copy: Option<Copied>,
+    /// States before the last steps, oldest first; at most as many as a sample's history.
+    past: VecDeque<State>,
+    /// y(i) of the last step, and the lineage after it: a state that was given has no outputs until it is stepped.
+    outputs: Image,
+    outputs_of: Option<Lineage>,
+    /// The last sample that could not be followed, for replaying it onto a state that is given later.
+    unfollowed: Option<Arc<Frame>>,
+    history: usize,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct State {
+    bits: Image,
+    lineage: Lineage,
+    stepped: Moment,
+}
+
+#[derive(Debug)]
+struct Copied {
+    born: Moment,
+    state: State,
+    /// Of the state before the last step.
+    digest: Digest,
+}
+
+/// What a sample did to a copy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Followed {
+    /// It is current.
+    InStep,
+    /// It is current, and stands where it does because the history starts from the initial state.
+    FromGenesis(Lineage),
+    /// It does not find itself in the history.
+    Lost,
+}
+
+impl Replica {
+    pub(crate) fn new(id: ProgramId, program: &Program, history: usize) -> Self {
+        Self {
+            id,
+            standing: Standing::Lost,
+            copy: None,
+            past: VecDeque::with_capacity(history),
+            outputs: Image::zero(program.scan.output_count()),
+            outputs_of: None,
+            unfollowed: None,
+            history,
+        }
+    }
+
+    pub(crate) fn id(&self) -> ProgramId {
+        self.id
+    }
+
+    pub(crate) fn standing(&self) -> Standing {
+        self.standing
+    }
+
+    /// Whether it was stepped with the sample of `moment`, and so knows y(i) of that cycle.
+    pub(crate) fn is_current(&self, moment: Moment) -> bool {
+        let knows = |copy: &Copied| {
+            copy.state.stepped == moment && self.outputs_of == Some(copy.state.lineage)
+        };
+        self.standing != Standing::Lost && self.copy.as_ref().is_some_and(knows)
+    }
+
+    /// Whether it may speak of `moment`.
+    pub(crate) fn may_speak(&self, moment: Moment) -> bool {
+        self.standing == Standing::Proven && self.is_current(moment)
+    }
+
+    /// y(i) of the last step.
+    pub(crate) fn outputs(&self) -> &Image {
+        &self.outputs
+    }
+
+    pub(crate) fn lineage(&self) -> Option<Lineage> {
+        self.copy.as_ref().map(|copy| copy.state.lineage)
+    }
+
+    /// What it says of itself; a lost copy too, for it may be the newest that lives.
+    pub(crate) fn holding(&self) -> Option<Holding> {
+        self.copy.as_ref().map(|copy| Holding {
+            program: self.id,
+            born: copy.born,
+            lineage: copy.state.lineage,
+            stepped: copy.state.stepped,
+            digest: copy.digest,
+        })
+    }
+
+    /// Follows the sample of `moment`, a frame whose body is `sample`.
+    pub(crate) fn follow(
+        &mut self,
+        program: &Program,
+        scratch: &mut Scratch,
+        frame: &Arc<Frame>,
+        shadow_cycles: u32,
+    ) -> Followed {
+        let Body::Sample(sample) = &frame.body else {
+            return Followed::Lost;
+        };
+        let moment = frame.header.moment;
+        if sample.history.len() > self.history
+            || sample.history[0].width() != program.scan.input_count()
+        {
+            return Followed::Lost;
+        }
+        if self.is_current(moment) {
+            return Followed::InStep;
+        }
+        let newest = &sample.history[sample.history.len() - 1];
+        if self
+            .copy
+            .as_ref()
+            .is_some_and(|copy| copy.state.lineage == sample.before)
+        {
+            self.step(program, scratch, newest, moment);
+            return self.in_step(shadow_cycles);
+        }
+        let lineages = lineages_of(sample);
+        if let Some(place) = self.find(&lineages) {
+            self.replay(program, scratch, sample, place, moment);
+            return self.in_step(shadow_cycles);
+        }
+        let genesis = Lineage::genesis(program.hash, sample.born);
+        if let Some(place) = lineages.iter().position(|&lineage| lineage == genesis) {
+            let initial = Image::from_words(program.scan.register_count(), program.scan.initial());
+            self.past.clear();
+            self.copy = Some(Copied {
+                born: sample.born,
+                state: State {
+                    bits: initial.expect("a circuit packs its initial state"),
+                    lineage: genesis,
+                    stepped: sample.born,
+                },
+                digest: Digest::default(),
+            });
+            self.replay(program, scratch, sample, place, moment);
+            self.standing = Standing::Proven;
+            self.unfollowed = None;
+            return Followed::FromGenesis(self.lineage().unwrap_or(genesis));
+        }
+        self.standing = Standing::Lost;
+        self.unfollowed = Some(Arc::clone(frame));
+        Followed::Lost
+    }
+
+    /// Takes a state from another station if it leads to the last sample heard. True if it was taken.
+    pub(crate) fn adopt(
+        &mut self,
+        program: &Program,
+        scratch: &mut Scratch,
+        transfer: &Transfer,
+        shadow_cycles: u32,
+    ) -> bool {
+        if self.standing != Standing::Lost
+            || transfer.hash != program.hash
+            || transfer.state.width() != program.scan.register_count()
+        {
+            return false;
+        }
+        let unfollowed = self.unfollowed.take();
+        let place = match unfollowed.as_deref() {
+            Some(Frame {
+                body: Body::Sample(sample),
+                ..
+            }) => {
+                let place = lineages_of(sample)
+                    .iter()
+                    .position(|&lineage| lineage == transfer.lineage);
+                if place.is_none() {
+                    self.unfollowed = unfollowed;
+                    return false;
+                }
+                place
+            }
+            // No sample was heard: its remote I/O is down, and the state is kept for when it comes back.
+            _ if self.copy.is_none() => None,
+            _ => return false,
+        };
+        self.past.clear();
+        self.copy = Some(Copied {
+            born: transfer.born,
+            state: State {
+                bits: transfer.state.clone(),
+                lineage: transfer.lineage,
+                stepped: transfer.stepped,
+            },
+            digest: transfer.digest,
+        });
+        self.standing = Standing::Shadow(shadow_cycles);
+        if let (Some(place), Some(frame)) = (place, unfollowed)
+            && let Body::Sample(sample) = &frame.body
+        {
+            self.replay(program, scratch, sample, place, frame.header.moment);
+        }
+        true
+    }
+
+    /// The state itself, for one who lacks it; none from a copy that is lost.
+    pub(crate) fn transfer(&self, program: &Program, to: StationId) -> Option<Transfer> {
+        let copy = self
+            .copy
+            .as_ref()
+            .filter(|_| self.standing == Standing::Proven)?;
+        Some(Transfer {
+            to,
+            program: self.id,
+            hash: program.hash,
+            born: copy.born,
+            lineage: copy.state.lineage,
+            stepped: copy.state.stepped,
+            digest: copy.digest,
+            state: copy.state.bits.clone(),
+        })
+    }
+
+    /// Ends the cycle `moment`. True where the copy has just proved itself.
+    pub(crate) fn close_cycle(&mut self, moment: Moment) -> bool {
+        match self.standing {
+            Standing::Shadow(left) if self.is_current(moment) => {
+                self.standing = match left {
+                    0 | 1 => Standing::Proven,
+                    _ => Standing::Shadow(left - 1),
+                };
+                self.standing == Standing::Proven
+            }
+            _ => false,
+        }
+    }
+
+    /// Throws the copy away: it computes otherwise than its twin.
+    pub(crate) fn discard(&mut self) {
+        self.copy = None;
+        self.past.clear();
+        self.standing = Standing::Lost;
+        self.unfollowed = None;
+    }
+
+    fn in_step(&mut self, shadow_cycles: u32) -> Followed {
+        if self.standing == Standing::Lost {
+            self.standing = Standing::Shadow(shadow_cycles);
+        }
+        self.unfollowed = None;
+        Followed::InStep
+    }
+
+    /// The place in the history at which this copy stands now, or stood a few steps ago; it stands there afterwards.
+    fn find(&mut self, lineages: &[Lineage]) -> Option<usize> {
+        let copy = self.copy.as_mut()?;
+        let place_of = |lineage| lineages.iter().rposition(|&known| known == lineage);
+        if let Some(place) = place_of(copy.state.lineage) {
+            return Some(place);
+        }
+        let (back, place) = self
+            .past
+            .iter()
+            .enumerate()
+            .rev()
+            .find_map(|(back, state)| place_of(state.lineage).map(|place| (back, place)))?;
+        self.past.truncate(back + 1);
+        copy.state = self.past.pop_back()?;
+        Some(place)
+    }
+
+    /// Steps through the history from `place` on. A place past its end means that the copy has this sample already: voided
+    /// samples may come again as they were.
+    fn replay(
+        &mut self,
+        program: &Program,
+        scratch: &mut Scratch,
+        sample: &Sample,
+        place: usize,
+        moment: Moment,
+    ) {
+        for inputs in &sample.history[place.min(sample.history.len())..] {
+            self.step(program, scratch, inputs, moment);
+        }
+        if let Some(copy) = &mut self.copy {
+            copy.state.stepped = moment;
+        }
+    }
+
+    fn step(&mut self, program: &Program, scratch: &mut Scratch, inputs: &Image, moment: Moment) {
+        let Some(copy) = self.copy.as_mut() else {
+            return;
+        };
+        let mut before = if self.past.len() < self.history {
+            copy.state.clone()
+        } else {
+            self.past.pop_front().unwrap_or_else(|| copy.state.clone())
+        };
+        before.clone_from(&copy.state);
+        self.past.push_back(before);
+        copy.digest = Digest::of(&copy.state.bits);
+        program.scan.step(
+            scratch,
+            copy.state.bits.words_mut(),
+            inputs.words(),
+            self.outputs.words_mut(),
+        );
+        copy.state.lineage = copy.state.lineage.after(inputs);
+        copy.state.stepped = moment;
+        self.outputs_of = Some(copy.state.lineage);
+    }
+}
+
+/// The lineage before each sample of the history, and last the one after all of them.
+fn lineages_of(sample: &Sample) -> smallvec::SmallVec<[Lineage; 16]> {
+    let mut lineage = sample.base;
+    let mut lineages = smallvec::smallvec![lineage];
+    for inputs in &sample.history {
+        lineage = lineage.after(inputs);
+        lineages.push(lineage);
+    }
+    lineages
+}
+
+#[cfg(test)]
+mod tests;

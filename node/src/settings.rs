@@ -1,0 +1,42 @@
+//! What a station is told when it starts.
+
+use std::sync::Arc;
+
+use understudy_logic::Scan;
+use understudy_wire::{Agreement, Epoch, ProgramHash, ProgramId, StationId};
+
+/// One of the cluster's programs, compiled.
+#[derive(Debug, Clone)]
+pub struct Program {
+    /// Of its circuit.
+    pub hash: ProgramHash,
+    /// Its f and h.
+    pub scan: Scan,
+}
+
+/// A station's own settings.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// Its rank.
+    pub station: StationId,
+    /// What all agreed on.
+    pub agreement: Arc<Agreement>,
+    /// All programs of the cluster, in order; a controller runs its own, an understudy all of them.
+    pub programs: Arc<[Program]>,
+    /// The epoch that it starts when nobody is there: later than any that the cluster has had (the wall clock at start serves).
+    pub epoch: Epoch,
+}
+
+impl Settings {
+    /// The programs that this station runs.
+    pub fn runs(&self) -> impl Iterator<Item = ProgramId> + use<> {
+        let own = self.station.0;
+        let controllers = self.agreement.schedule.controllers() as u8;
+        let range = if own < controllers {
+            own..own + 1
+        } else {
+            0..controllers
+        };
+        range.map(ProgramId)
+    }
+}

@@ -1,0 +1,260 @@
+//! The station: a controller or an understudy in the cycle.
+//!
+//! ```text
+//!            any frame of a later cycle, or its own turn to pace
+//!        ┌───────────────────────────────────────────────────────┐
+//!        ▼                                                       │
+//!   samples come: copies follow ──► its turn: words ──► rest: asks for what it lacks, gives what others lack
+//! ```
+//!
+//! It speaks when it knows its outputs and its predecessor has spoken or its own slot starts, whichever is first; at the last
+//! call it speaks whatever it knows; and only with copies that are proven (invariant *In step or silent*). It decides nothing
+//! for others: what is applied is decided by each remote I/O for itself (*No election*).
+
+mod pacing;
+mod repair;
+mod turn;
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use smallvec::SmallVec;
+use understudy_logic::Scratch;
+use understudy_wire::{
+    Admission, Arrival, Attendance, Body, Copies, CycleClock, Frame, Header, Holding, Input,
+    Machine, Output, Party, ProgramId, ProgramSet, Reception, StationId, StationSet, Time,
+};
+
+use crate::event::Event;
+use crate::replica::{Followed, Replica, Standing};
+use crate::settings::Settings;
+
+/// One controller or understudy. See [`Machine`] for how it is driven.
+#[derive(Debug)]
+pub struct Station {
+    settings: Settings,
+    reception: Reception,
+    clock: CycleClock,
+    attendance: Attendance,
+    replicas: SmallVec<[Replica; 2]>,
+    scratch: Scratch,
+    copies: Copies,
+    outbox: VecDeque<Output<Event>>,
+    cycle: CycleNotes,
+    started: Time,
+    /// When it wants to be woken, as of its last input.
+    asked: Time,
+    /// What it had asked for when it last reported a stall.
+    stalled: Time,
+    /// Whether this station starts the cycles.
+    paces: bool,
+    wanted: ProgramSet,
+    /// Stations that asked to join in the last cycle; they pace only when nobody who speaks does.
+    joining: StationSet,
+}
+
+/// What a station remembers of the current cycle only.
+#[derive(Debug, Default)]
+struct CycleNotes {
+    spoken: bool,
+    asked: bool,
+    /// Programs whose own controller has said its outputs.
+    spoke: ProgramSet,
+    /// Programs that a station of lower rank can give the state of.
+    others_have: ProgramSet,
+    /// Who asked to join.
+    joiners: StationSet,
+}
+
+impl Station {
+    /// A station that has just started: it listens first.
+    pub fn new(now: Time, settings: Settings) -> Self {
+        let agreement = &settings.agreement;
+        let replicas = settings
+            .runs()
+            .map(|id| Replica::new(id, &settings.programs[id.index()], agreement.history))
+            .collect();
+        let mut station = Self {
+            reception: Reception::new(Party::Station(settings.station), agreement),
+            clock: CycleClock::default(),
+            attendance: Attendance::new(agreement.schedule.stations(), agreement.flag_after),
+            replicas,
+            scratch: Scratch::default(),
+            copies: Copies::default(),
+            outbox: VecDeque::new(),
+            cycle: CycleNotes::default(),
+            started: now,
+            asked: now,
+            stalled: now,
+            paces: false,
+            wanted: ProgramSet::EMPTY,
+            joining: StationSet::EMPTY,
+            settings,
+        };
+        station.asked = station.next_wakeup();
+        station
+    }
+
+    fn own(&self) -> StationId {
+        self.settings.station
+    }
+
+    fn is_understudy(&self) -> bool {
+        self.settings.agreement.schedule.is_understudy(self.own())
+    }
+
+    fn speaks(&self) -> bool {
+        self.replicas
+            .iter()
+            .any(|replica| replica.standing() == Standing::Proven)
+    }
+
+    fn report(&mut self, event: Event) {
+        self.outbox.push_back(Output::Report(event));
+    }
+
+    fn send(&mut self, body: Body) -> Arc<Frame> {
+        let agreement = &self.settings.agreement;
+        let frame = Arc::new(Frame {
+            header: Header {
+                cluster: agreement.cluster,
+                configuration: agreement.configuration,
+                moment: self.clock.moment().unwrap_or_default(),
+                sender: Party::Station(self.own()),
+                alone: self.clock.alone(),
+            },
+            body,
+        });
+        self.outbox.push_back(Output::Send(Arc::clone(&frame)));
+        frame
+    }
+
+    fn send_cyclic(&mut self, now: Time, body: Body) {
+        let frame = self.send(body);
+        self.copies
+            .sent(now, &frame, &self.settings.agreement.schedule);
+    }
+
+    fn receive(&mut self, now: Time, frame: &Arc<Frame>) {
+        if matches!(frame.body, Body::Field(_) | Body::Actuation(_)) {
+            return;
+        }
+        match self.reception.admit(&frame.header) {
+            Admission::Admitted => {}
+            Admission::Foreign => return,
+            Admission::Refused { theirs, first } => {
+                if first {
+                    self.report(Event::Refused {
+                        party: frame.header.sender,
+                        theirs,
+                        ours: self.settings.agreement.configuration,
+                    });
+                }
+                return;
+            }
+        }
+        match self
+            .clock
+            .arrival(now, frame, self.settings.agreement.schedule.period())
+        {
+            Arrival::Stale => return,
+            Arrival::Present => {}
+            Arrival::Begins(anchor) => {
+                self.close_cycle();
+                self.clock.begin(now, frame.header.moment, anchor);
+                let pacer = matches!(frame.body, Body::Sync);
+                self.paces &= !pacer;
+            }
+        }
+        match (&frame.body, frame.header.sender) {
+            (Body::Sample(_), Party::RemoteIo(program)) => self.follow(program, frame),
+            (Body::Turn(turn), Party::Station(station)) => self.hear_turn(station, turn),
+            (Body::Join(join), Party::Station(station)) => self.hear_join(station, join),
+            (Body::Transfer(transfer), Party::Station(station)) => self.adopt(station, transfer),
+            _ => {}
+        }
+        self.speak_if_it_is_time(now);
+    }
+
+    fn follow(&mut self, program: ProgramId, frame: &Arc<Frame>) {
+        let Some(replica) = self
+            .replicas
+            .iter_mut()
+            .find(|replica| replica.id() == program)
+        else {
+            return;
+        };
+        let followed = replica.follow(
+            &self.settings.programs[program.index()],
+            &mut self.scratch,
+            frame,
+            self.settings.agreement.shadow_cycles,
+        );
+        if let Followed::FromGenesis(lineage) = followed {
+            self.report(Event::Adopted {
+                moment: frame.header.moment,
+                program,
+                lineage,
+                from: None,
+            });
+        }
+    }
+
+    fn holdings(&self) -> SmallVec<[Holding; 2]> {
+        self.replicas.iter().filter_map(Replica::holding).collect()
+    }
+
+    fn next_wakeup(&self) -> Time {
+        [self.copies.wakeup(), self.speaks_at(), self.asks_at()]
+            .into_iter()
+            .flatten()
+            .fold(self.paces_at(), Time::min)
+    }
+
+    /// Reports once that it was not woken at a time that it had asked for, whatever woke it.
+    fn notice_stall(&mut self, now: Time) {
+        let due = self.asked;
+        let late = now.since(due);
+        if late > self.settings.agreement.schedule.period() / 5 && due != self.stalled {
+            self.stalled = due;
+            let moment = self.clock.moment().unwrap_or_default();
+            self.report(Event::Stalled { moment, late });
+        }
+    }
+
+    fn wake(&mut self, now: Time) {
+        while let Some(frame) = self.copies.take_due(now, &self.settings.agreement.schedule) {
+            self.outbox.push_back(Output::Send(frame));
+        }
+        self.speak_if_it_is_time(now);
+        if self.asks_at().is_some_and(|due| due <= now) {
+            self.ask();
+        }
+        let planned = self.paces_at();
+        if planned <= now {
+            self.pace(now, planned);
+        }
+    }
+}
+
+impl Machine for Station {
+    type Event = Event;
+
+    fn handle_input(&mut self, now: Time, input: Input<'_>) {
+        self.notice_stall(now);
+        match input {
+            Input::Wakeup => self.wake(now),
+            Input::Frame(frame) => self.receive(now, frame),
+            Input::Field(_) | Input::Release => {}
+        }
+        self.asked = self.next_wakeup();
+    }
+
+    fn poll_output(&mut self) -> Option<Output<Event>> {
+        self.outbox.pop_front()
+    }
+
+    fn wakeup(&self) -> Time {
+        self.asked
+    }
+}

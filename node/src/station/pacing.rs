@@ -1,0 +1,78 @@
+//! Where one cycle ends and the next begins.
+//!
+//! The pacemaker is the lowest-ranked living station. Every other one waits a guard time for each that comes before it, so that the
+//! next rank takes over when the pacemaker is silent; two that pace at once start the same cycle, which harms nobody.
+
+use understudy_wire::{Body, Change, Output, StationSet, Time};
+
+use super::{CycleNotes, Station};
+use crate::event::Event;
+
+impl Station {
+    /// Ends the current cycle: flags, and copies that have proved themselves.
+    pub(super) fn close_cycle(&mut self) {
+        let Some(moment) = self.clock.moment() else {
+            return;
+        };
+        if self.cycle.spoken {
+            self.attendance.heard(self.own());
+        }
+        let outbox = &mut self.outbox;
+        self.attendance.close_cycle(|change| {
+            outbox.push_back(Output::Report(match change {
+                Change::Flagged(station) => Event::Flagged { moment, station },
+                Change::Cleared(station) => Event::Cleared { moment, station },
+            }));
+        });
+        for replica in &mut self.replicas {
+            if replica.close_cycle(moment) {
+                let program = replica.id();
+                self.outbox
+                    .push_back(Output::Report(Event::InStep { moment, program }));
+            }
+        }
+        self.copies.clear();
+        self.joining = self.cycle.joiners;
+        self.cycle = CycleNotes::default();
+    }
+
+    /// When this station starts the next cycle if nobody else does: each living one of lower rank is given a guard time.
+    pub(super) fn paces_at(&self) -> Time {
+        let agreement = &self.settings.agreement;
+        let (schedule, own) = (&agreement.schedule, self.own());
+        let lower = StationSet::first(own.index());
+        if self.clock.moment().is_none() {
+            let listens = schedule.period() * agreement.listen_cycles;
+            return self.started + listens + schedule.guard() * u32::from(own.0);
+        }
+        let all = StationSet::first(schedule.stations());
+        let living = all.without(self.attendance.flagged());
+        let first = if self.speaks() {
+            living.and(lower)
+        } else {
+            living
+                .or(self.joining.and(lower))
+                .without(StationSet::only(own))
+        };
+        self.clock.anchor() + schedule.period() + schedule.guard() * first.len() as u32
+    }
+
+    pub(super) fn pace(&mut self, now: Time, planned: Time) {
+        self.close_cycle();
+        // A pacemaker keeps to its plan, so that late wake-ups do not add up; one that is far behind starts from now.
+        let schedule = &self.settings.agreement.schedule;
+        let anchor = if now.since(planned) < schedule.guard() {
+            planned
+        } else {
+            now
+        };
+        let moment = self
+            .clock
+            .pace(now, self.settings.epoch, anchor, schedule.period());
+        if !self.paces {
+            self.paces = true;
+            self.report(Event::Paces { moment });
+        }
+        self.send_cyclic(now, Body::Sync);
+    }
+}

@@ -1,0 +1,82 @@
+//! Repair: a station asks for the states that it lacks, and gives those that others lack.
+//!
+//! The first who holds a state answers: its controller, then the understudies by rank. What is given is checked by
+//! [`crate::replica::Replica::adopt`]: it has to lead to the last sample heard.
+
+use understudy_wire::{Body, Join, ProgramSet, StationId, Time, Transfer};
+
+use super::Station;
+use crate::event::Event;
+use crate::replica::{Replica, Standing};
+
+impl Station {
+    pub(super) fn hear_join(&mut self, station: StationId, join: &Join) {
+        if self.cycle.joiners.contains(station) {
+            return;
+        }
+        self.cycle.joiners.insert(station);
+        for program in join.wants.iter() {
+            if self.cycle.others_have.contains(program) && self.own().0 != program.0 {
+                continue;
+            }
+            let transfer = self
+                .replicas
+                .iter()
+                .find(|replica| replica.id() == program)
+                .and_then(|replica| {
+                    replica.transfer(&self.settings.programs[program.index()], station)
+                });
+            if let Some(transfer) = transfer {
+                self.send(Body::Transfer(transfer));
+            }
+        }
+    }
+
+    pub(super) fn adopt(&mut self, from: StationId, transfer: &Transfer) {
+        if transfer.to != self.own() {
+            return;
+        }
+        let Some(replica) = self
+            .replicas
+            .iter_mut()
+            .find(|replica| replica.id() == transfer.program)
+        else {
+            return;
+        };
+        let program = &self.settings.programs[transfer.program.index()];
+        let shadow_cycles = self.settings.agreement.shadow_cycles;
+        if replica.adopt(program, &mut self.scratch, transfer, shadow_cycles) {
+            let event = Event::Adopted {
+                moment: self.clock.moment().unwrap_or_default(),
+                program: transfer.program,
+                lineage: replica.lineage().unwrap_or(transfer.lineage),
+                from: Some(from),
+            };
+            self.report(event);
+        }
+    }
+
+    pub(super) fn ask(&mut self) {
+        self.cycle.asked = true;
+        let Some(moment) = self.clock.moment() else {
+            return;
+        };
+        let lost = |replica: &&Replica| replica.standing() == Standing::Lost;
+        let wants: ProgramSet = self.replicas.iter().filter(lost).map(Replica::id).collect();
+        if wants != self.wanted {
+            self.wanted = wants;
+            if !wants.is_empty() {
+                self.report(Event::Joins { moment, wants });
+            }
+        }
+        if !wants.is_empty() || !self.speaks() {
+            let holdings = self.holdings();
+            self.send(Body::Join(Join { wants, holdings }));
+        }
+    }
+
+    pub(super) fn asks_at(&self) -> Option<Time> {
+        let due = self.clock.anchor() + self.settings.agreement.schedule.rest();
+        (self.clock.moment().is_some() && !self.cycle.asked).then_some(due)
+    }
+}

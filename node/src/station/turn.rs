@@ -1,0 +1,141 @@
+//! The token: whose turns were heard, and when this station takes its own.
+
+use smallvec::SmallVec;
+use understudy_wire::{
+    Body, Holding, Moment, Output, ProgramId, ProgramSet, StationId, StationSet, Time, Turn,
+};
+
+use super::Station;
+use crate::event::Event;
+use crate::replica::{Replica, Standing};
+use crate::words;
+
+impl Station {
+    pub(super) fn hear_turn(&mut self, station: StationId, turn: &Turn) {
+        if !self.attendance.heard(station) {
+            return;
+        }
+        let own_program = ProgramId(station.0);
+        let understudy = self.settings.agreement.schedule.is_understudy(station);
+        for word in &turn.words {
+            if !understudy && word.members == ProgramSet::only(own_program) {
+                self.cycle.spoke.insert(own_program);
+            }
+            if station < self.own() {
+                self.cycle.others_have = self.cycle.others_have.or(word.members);
+            }
+        }
+        self.compare(station, &turn.holdings);
+    }
+
+    /// Equal lineages mean equal states; where the digests differ all the same, a value has been corrupted.
+    pub(super) fn compare(&mut self, station: StationId, holdings: &[Holding]) {
+        let moment = self.clock.moment().unwrap_or_default();
+        for theirs in holdings {
+            let Some(replica) = self
+                .replicas
+                .iter_mut()
+                .find(|replica| replica.id() == theirs.program)
+            else {
+                continue;
+            };
+            let differs = replica
+                .holding()
+                .is_some_and(|ours| ours.lineage == theirs.lineage && ours.digest != theirs.digest);
+            if !differs {
+                continue;
+            }
+            if matches!(replica.standing(), Standing::Shadow(_)) {
+                replica.discard();
+            }
+            self.outbox.push_back(Output::Report(Event::DigestDiffers {
+                moment,
+                program: theirs.program,
+                station,
+            }));
+        }
+    }
+
+    /// It speaks when it has the token and knows its outputs, and at the last call whatever it knows.
+    pub(super) fn speak_if_it_is_time(&mut self, now: Time) {
+        let Some(moment) = self.clock.moment() else {
+            return;
+        };
+        if self.cycle.spoken || !self.speaks() {
+            return;
+        }
+        let due = self.speaks_by(moment);
+        if now >= due || (self.has_token() && self.knows_all_outputs(moment)) {
+            self.speak(now, moment);
+        }
+    }
+
+    /// Whether everybody whom it has to wait for has spoken: its predecessor, or for an understudy all before it.
+    pub(super) fn has_token(&self) -> bool {
+        let before = StationSet::first(self.own().index());
+        let waited_for = before.without(self.attendance.flagged());
+        let missing = waited_for.without(self.attendance.spoke());
+        if self.is_understudy() {
+            missing.is_empty()
+        } else {
+            let predecessor = waited_for.iter().last();
+            predecessor.is_none_or(|predecessor| !missing.contains(predecessor))
+        }
+    }
+
+    pub(super) fn knows_all_outputs(&self, moment: Moment) -> bool {
+        self.replicas
+            .iter()
+            .filter(|replica| replica.standing() == Standing::Proven)
+            .all(|replica| replica.is_current(moment))
+    }
+
+    pub(super) fn speak(&mut self, now: Time, moment: Moment) {
+        self.cycle.spoken = true;
+        let may_speak = |replica: &&Replica| replica.may_speak(moment);
+        let words = if self.is_understudy() {
+            let known = self.replicas.iter().filter(may_speak);
+            words::of_understudy(
+                self.settings.agreement.mode,
+                ProgramSet::first(self.settings.agreement.schedule.controllers()),
+                known.map(Replica::id).collect(),
+                self.cycle.spoke,
+                |program| {
+                    let replica = self.replicas.iter().find(|replica| replica.id() == program);
+                    replica.map(Replica::outputs)
+                },
+            )
+        } else {
+            let known = self.replicas.iter().find(may_speak);
+            known.map_or_else(SmallVec::new, |replica| {
+                words::of_controller(replica.id(), replica.outputs())
+            })
+        };
+        self.report(Event::Spoke {
+            moment,
+            words: words.clone(),
+        });
+        let turn = Turn {
+            heard: self.attendance.spoke(),
+            holdings: self.holdings(),
+            words,
+        };
+        self.send_cyclic(now, Body::Turn(turn));
+    }
+
+    pub(super) fn speaks_at(&self) -> Option<Time> {
+        let moment = self.clock.moment()?;
+        let may = !self.cycle.spoken && self.speaks();
+        may.then(|| self.speaks_by(moment))
+    }
+
+    fn speaks_by(&self, moment: Moment) -> Time {
+        let schedule = &self.settings.agreement.schedule;
+        self.clock.anchor()
+            + if self.knows_all_outputs(moment) {
+                schedule.slot(self.own())
+            } else {
+                schedule.last_call()
+            }
+    }
+}

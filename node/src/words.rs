@@ -1,0 +1,90 @@
+//! What a station says of a cycle: its parity words, each with a mask.
+//!
+//! A controller has one word, y(i) over its own program. An understudy, which speaks last and so knows who was silent, says
+//!
+//! ```text
+//! one word over all programs that spoke for themselves        Σ h(j)(x(j), u(j)), (9) when nobody was silent
+//! one word for each program whose controller was silent       h(j)(x(j), u(j))
+//! ```
+//!
+//! A program of which it does not know this cycle's output is in no word, instead of spoiling one.
+
+use smallvec::SmallVec;
+use understudy_wire::{Image, Mode, ProgramId, ProgramSet, Word};
+
+/// The word of a controller.
+pub(crate) fn of_controller(program: ProgramId, outputs: &Image) -> SmallVec<[Word; 2]> {
+    smallvec::smallvec![Word {
+        members: ProgramSet::only(program),
+        sum: outputs.clone(),
+    }]
+}
+
+/// The words of an understudy that knows the outputs of `known` (those that `outputs_of` answers for), in a cluster of
+/// the programs `all`, where the controllers of `spoke` have said theirs in this cycle.
+pub(crate) fn of_understudy<'a>(
+    mode: Mode,
+    all: ProgramSet,
+    known: ProgramSet,
+    spoke: ProgramSet,
+    outputs_of: impl Fn(ProgramId) -> Option<&'a Image>,
+) -> SmallVec<[Word; 2]> {
+    let sum = |members: ProgramSet| {
+        let mut sum = Image::default();
+        for outputs in members.iter().filter_map(&outputs_of) {
+            sum.add(outputs);
+        }
+        Word { members, sum }
+    };
+    match mode {
+        Mode::Paper if known == all => smallvec::smallvec![sum(all)],
+        Mode::Paper => SmallVec::new(),
+        Mode::Full => {
+            let together = known.and(spoke);
+            let silent = known.without(spoke);
+            let first = (!together.is_empty()).then_some(together);
+            first
+                .into_iter()
+                .chain(silent.iter().map(ProgramSet::only))
+                .map(sum)
+                .collect()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every cluster of three programs: whoever was silent, every known output can be had from the words and the turns.
+    #[test]
+    fn no_silence_spoils_a_word() {
+        let outputs: Vec<Image> = [0b101_u64, 0b11, 0b1]
+            .iter()
+            .zip([3, 2, 1])
+            .map(|(&word, width)| Image::from_words(width, &[word]).expect("fits"))
+            .collect();
+        let all = ProgramSet::first(3);
+        for known in (0..8).map(ProgramSet::from_bits) {
+            for spoke in (0..8).map(ProgramSet::from_bits) {
+                let of = |program: ProgramId| outputs.get(program.index());
+                let words = of_understudy(Mode::Full, all, known, spoke, of);
+                let mut covered = ProgramSet::EMPTY;
+                for word in &words {
+                    assert!(covered.and(word.members).is_empty());
+                    covered = covered.or(word.members);
+                    let alone = word.members.len() == 1;
+                    assert!(alone || word.members.without(spoke).is_empty());
+                    let expected = word
+                        .members
+                        .iter()
+                        .fold(0, |sum, program| sum ^ outputs[program.index()].words()[0]);
+                    assert_eq!(word.sum.words(), [expected]);
+                }
+                assert_eq!(covered, known);
+                let paper = of_understudy(Mode::Paper, all, known, spoke, of);
+                assert_eq!(paper.len(), usize::from(known == all));
+            }
+        }
+    }
+}

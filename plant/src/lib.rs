@@ -1,0 +1,25 @@
+//! Small models of plants for the laboratory, and a plant as a party of its own.
+//!
+//! A [`Plant`] is stepped once a cycle with y(i) and shows u(i): it closes the loop of (1)-(2) through the outside. Invariant:
+//! a model sees and moves signals only by name, through the [`Signals`] that bind its terminals to the inputs and outputs of
+//! its controller, so that the same model serves any program that uses those names. The model is deterministic: equal
+//! outputs and equal arrivals in equal order show equal sensors.
+//!
+//! Counts ([`understudy_wire::Field`]) are all that a verdict needs: a plant is functional while `finished` grows, and nothing
+//! may ever be counted in `mishaps`.
+
+mod binding;
+mod event;
+mod feeder;
+mod ladder_model;
+mod machine;
+mod model;
+mod press;
+mod robot;
+
+pub use binding::{BindingProblem, Signals};
+pub use event::{Event, Pace};
+pub use machine::{PlantMachine, Settings, WATCHDOG_CYCLES};
+pub use model::{Direction, ModelKind, Plant, Terminals};
+pub use press::PressParameters;
+pub use robot::RobotParameters;

@@ -1,0 +1,240 @@
+//! A plant as a party of its own.
+//!
+//! ```text
+//!            ┌── each period: say the field ──┐
+//!   start ──►│ not driven yet                 │
+//!            └──────────┬─────────────────────┘
+//!             actuation │ step
+//!                       ▼
+//!            ┌ driven ◄── actuation of a new moment: step ──┐
+//!            │   │ none for 1.5 periods                      │
+//!            │   ▼                                           │
+//!            │ alone: a step each period, last outputs ──────┤
+//!            │   │ none for `watchdog_cycles` periods        │
+//!            │   ▼                                           │
+//!            └ watchdog: a step each period, fail-safe ──────┘
+//! ```
+//!
+//! Invariant: an actuation steps the plant once, however often its frame arrives, and an older one never does, except where the
+//! watchdog has run out or the epoch of the last one bound nobody. At most one step a wake-up: time that its host lost is lost.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::Duration;
+
+use understudy_wire::{
+    Admission, Agreement, Body, Field, Frame, Header, Image, Input, Machine, Moment, Output, Party,
+    ProgramId, Reception, Time,
+};
+
+use crate::event::{Event, Pace};
+use crate::model::Plant;
+
+/// Periods without an actuation after which the fail-safe outputs are in force, unless configured otherwise.
+pub const WATCHDOG_CYCLES: u32 = 3;
+
+/// A plant's own settings.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// The program that it is the plant of.
+    pub program: ProgramId,
+    /// What all agreed on.
+    pub agreement: Arc<Agreement>,
+    /// In its initial state.
+    pub plant: Plant,
+    /// The program of the plant whose parts it takes.
+    pub fed_by: Option<ProgramId>,
+    /// y(i) where the watchdog has run out; its width is that of the outputs.
+    pub fail_safe: Image,
+    /// Periods without an actuation after which that is so: at least 2.
+    pub watchdog_cycles: u32,
+}
+
+/// A plant between its remote I/O and the plants that it feeds.
+#[derive(Debug, Clone)]
+pub struct PlantMachine {
+    settings: Settings,
+    /// The last actuation: when it came, of which moment, and what it drives.
+    driven: Option<Driven>,
+    wakeup: Time,
+    feed: Feed,
+    reception: Reception,
+    said: VecDeque<Output<Event>>,
+}
+
+#[derive(Debug, Clone)]
+struct Driven {
+    at: Time,
+    moment: Moment,
+    /// Whether that moment is of an epoch that only its founder knows.
+    alone: bool,
+    outputs: Image,
+}
+
+/// Parts on their way from the feeding plant. Its counter never falls but at its restart, so that lost frames heal.
+#[derive(Debug, Clone, Default)]
+struct Feed {
+    moment: Moment,
+    handed_over: u64,
+    arrived: u64,
+}
+
+impl Feed {
+    fn hear(&mut self, moment: Moment, handed_over: u64) {
+        // The counter itself tells old frames from new ones; moments do not, where an epoch was given up for an older one.
+        if handed_over < self.handed_over {
+            // A plant that was not driven yet has no moment: it has just started, and counts from 0.
+            let restarted = moment == Moment::default() || moment > self.moment;
+            if !restarted {
+                return;
+            }
+            self.handed_over = 0;
+        }
+        self.arrived += handed_over - self.handed_over;
+        self.handed_over = handed_over;
+        self.moment = moment;
+    }
+}
+
+impl PlantMachine {
+    /// A plant that starts at `now` and says at once what it shows.
+    pub fn new(settings: Settings, now: Time) -> Self {
+        Self {
+            driven: None,
+            wakeup: now,
+            feed: Feed::default(),
+            reception: Reception::new(Party::Plant(settings.program), &settings.agreement),
+            settings,
+            said: VecDeque::new(),
+        }
+    }
+
+    /// What it shows now.
+    pub fn field(&self) -> Field {
+        self.settings.plant.field()
+    }
+
+    fn period(&self) -> Duration {
+        self.settings.agreement.schedule.period()
+    }
+
+    fn watchdog_has_run_out(&self, now: Time) -> bool {
+        let limit = self.period() * self.settings.watchdog_cycles;
+        let late = |driven: &Driven| now.since(driven.at) >= limit;
+        self.driven.as_ref().is_none_or(late)
+    }
+
+    fn hear(&mut self, now: Time, frame: &Frame) {
+        let header = &frame.header;
+        match self.reception.admit(header) {
+            Admission::Admitted => {}
+            Admission::Refused {
+                theirs,
+                first: true,
+            } => {
+                self.said.push_back(Output::Report(Event::Refused {
+                    party: header.sender,
+                    theirs,
+                    ours: self.settings.agreement.configuration,
+                }));
+                return;
+            }
+            Admission::Refused { .. } | Admission::Foreign => return,
+        }
+        match (&frame.body, header.sender) {
+            (Body::Actuation(actuation), Party::RemoteIo(program))
+                if program == self.settings.program =>
+            {
+                self.drive(now, header, &actuation.outputs);
+            }
+            (Body::Field(field), Party::Plant(program))
+                if Some(program) == self.settings.fed_by =>
+            {
+                self.feed.hear(header.moment, field.handed_over);
+            }
+            _ => {}
+        }
+    }
+
+    fn drive(&mut self, now: Time, header: &Header, outputs: &Image) {
+        let moment = header.moment;
+        let newer = |driven: &Driven| {
+            moment > driven.moment || (driven.alone && moment.epoch != driven.moment.epoch)
+        };
+        if !self.driven.as_ref().is_none_or(newer) && !self.watchdog_has_run_out(now) {
+            return;
+        }
+        self.driven = Some(Driven {
+            at: now,
+            moment,
+            alone: header.alone,
+            outputs: outputs.clone(),
+        });
+        self.wakeup = now + self.period() * 3 / 2;
+        self.step(moment, outputs.clone(), Pace::Driven);
+    }
+
+    fn wake(&mut self, now: Time) {
+        if now < self.wakeup {
+            return;
+        }
+        self.wakeup = now + self.period();
+        let watchdog = self.watchdog_has_run_out(now);
+        let Some(driven) = &self.driven else {
+            self.say_field(Moment::default(), self.field());
+            return;
+        };
+        let moment = driven.moment;
+        if watchdog {
+            self.step(moment, self.settings.fail_safe.clone(), Pace::Watchdog);
+        } else {
+            self.step(moment, driven.outputs.clone(), Pace::Alone);
+        }
+    }
+
+    fn step(&mut self, moment: Moment, outputs: Image, pace: Pace) {
+        let arrived = std::mem::take(&mut self.feed.arrived);
+        let field = self.settings.plant.step(&outputs, arrived);
+        self.say_field(moment, field.clone());
+        self.said.push_back(Output::Report(Event::Stepped {
+            moment,
+            pace,
+            outputs,
+            field,
+        }));
+    }
+
+    fn say_field(&mut self, moment: Moment, field: Field) {
+        let agreement = &self.settings.agreement;
+        self.said.push_back(Output::Send(Arc::new(Frame {
+            header: Header {
+                cluster: agreement.cluster,
+                configuration: agreement.configuration,
+                moment,
+                sender: Party::Plant(self.settings.program),
+                alone: false,
+            },
+            body: Body::Field(field),
+        })));
+    }
+}
+
+impl Machine for PlantMachine {
+    type Event = Event;
+
+    fn handle_input(&mut self, now: Time, input: Input<'_>) {
+        match input {
+            Input::Wakeup => self.wake(now),
+            Input::Frame(frame) => self.hear(now, frame),
+            Input::Field(_) | Input::Release => {}
+        }
+    }
+
+    fn poll_output(&mut self) -> Option<Output<Event>> {
+        self.said.pop_front()
+    }
+
+    fn wakeup(&self) -> Time {
+        self.wakeup
+    }
+}

@@ -1,0 +1,224 @@
+//! A model bound to its controller's signals.
+
+use serde::{Deserialize, Serialize};
+use smallvec::SmallVec;
+use understudy_logic::Circuit;
+use understudy_wire::{Field, Image};
+
+use crate::binding::{Binding, BindingProblem, Signals};
+use crate::ladder_model::{self, LadderModel};
+use crate::press::{self, Press, PressParameters};
+use crate::robot::{self, Robot, RobotParameters};
+
+/// Where a moving part is at its far end.
+pub(crate) const SHOWN: u16 = 1000;
+
+/// The inside of a plant. Shapes: `actuators` and `sensors` as long as its [`Terminals`].
+pub(crate) trait Model {
+    /// One cycle, in which `arrived` parts came from the plant that feeds this one.
+    fn step(&mut self, actuators: &[bool], arrived: u64);
+    /// What its sensors see now.
+    fn sensors(&self, sensors: &mut [bool]);
+    fn counts(&self) -> Counts;
+    /// 0 to [`SHOWN`] each.
+    fn positions(&self) -> SmallVec<[u16; 4]>;
+}
+
+/// Since the start of the plant; none ever falls.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Counts {
+    pub(crate) handed_over: u64,
+    pub(crate) finished: u64,
+    pub(crate) mishaps: u64,
+}
+
+/// Which model, with all that it needs.
+#[derive(Debug, Clone)]
+pub enum ModelKind {
+    /// The arm of section V.
+    Robot(RobotParameters),
+    /// The press of section V.
+    Press(PressParameters),
+    /// A ladder program, lowered with the period of the cluster.
+    Ladder(Box<Circuit>),
+}
+
+/// Whether a terminal is seen or driven by the controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Direction {
+    /// An input of the controller.
+    Sensor,
+    /// An output of the controller.
+    Actuator,
+}
+
+/// The names by which a model is bound to a controller.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Terminals {
+    /// What it shows.
+    pub sensors: Vec<String>,
+    /// What moves it.
+    pub actuators: Vec<String>,
+    /// Inputs that its controller may have and that are 0 as long as nobody is there to press them.
+    pub always_zero: Vec<String>,
+    /// Its moving parts, in the order of [`Field::positions`].
+    pub positions: Vec<String>,
+}
+
+impl Terminals {
+    /// Sensors, then actuators.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        let names = self.sensors.iter().chain(&self.actuators);
+        names.map(String::as_str)
+    }
+}
+
+impl ModelKind {
+    /// The names by which it is bound.
+    pub fn terminals(&self) -> Terminals {
+        let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
+        match self {
+            Self::Robot(_) => Terminals {
+                sensors: names(&robot::SENSORS),
+                actuators: names(&robot::ACTUATORS),
+                always_zero: names(&["stop"]),
+                positions: names(&robot::POSITIONS),
+            },
+            Self::Press(_) => Terminals {
+                sensors: names(&press::SENSORS),
+                actuators: names(&press::ACTUATORS),
+                always_zero: names(&["stop"]),
+                positions: names(&press::POSITIONS),
+            },
+            Self::Ladder(circuit) => Terminals {
+                sensors: ladder_model::sensors(circuit),
+                actuators: ladder_model::actuators(circuit),
+                always_zero: Vec::new(),
+                positions: Vec::new(),
+            },
+        }
+    }
+
+    /// Whether parts from another plant change anything in it.
+    pub fn takes_parts(&self) -> bool {
+        match self {
+            Self::Robot(_) | Self::Press(_) => true,
+            Self::Ladder(circuit) => {
+                let mut inputs = circuit.inputs().iter();
+                inputs.any(|input| input == ladder_model::PART_ARRIVES)
+            }
+        }
+    }
+
+    /// Whether it ever hands parts over to a plant that it feeds.
+    pub fn hands_over(&self) -> bool {
+        match self {
+            Self::Robot(_) | Self::Press(_) => true,
+            Self::Ladder(circuit) => {
+                let mut outputs = circuit.outputs().iter();
+                outputs.any(|output| output.name == ladder_model::HANDED_OVER)
+            }
+        }
+    }
+}
+
+/// A plant in its initial state and later.
+#[derive(Debug, Clone)]
+pub struct Plant {
+    inside: Inside,
+    binding: Binding,
+    actuators: Vec<bool>,
+    sensors: Vec<bool>,
+    position_names: Vec<String>,
+}
+
+#[derive(Debug, Clone)]
+enum Inside {
+    Robot(Robot),
+    Press(Press),
+    Ladder(Box<LadderModel>),
+}
+
+impl Inside {
+    fn model(&self) -> &dyn Model {
+        match self {
+            Self::Robot(robot) => robot,
+            Self::Press(press) => press,
+            Self::Ladder(ladder) => ladder.as_ref(),
+        }
+    }
+
+    fn model_mut(&mut self) -> &mut dyn Model {
+        match self {
+            Self::Robot(robot) => robot,
+            Self::Press(press) => press,
+            Self::Ladder(ladder) => ladder.as_mut(),
+        }
+    }
+}
+
+impl Plant {
+    /// Binds a model to the signals of `controller`; `fed` where its parts come from another plant.
+    ///
+    /// Answers with every problem; the plant is there unless one of them is an obstacle.
+    pub fn new(
+        kind: &ModelKind,
+        controller: &Circuit,
+        signals: &Signals,
+        fed: bool,
+    ) -> (Option<Self>, Vec<BindingProblem>) {
+        let terminals = kind.terminals();
+        let (binding, problems) = Binding::new(&terminals, controller, signals);
+        let plant = binding.map(|binding| Self {
+            inside: match kind {
+                ModelKind::Robot(parameters) => Inside::Robot(Robot::new(parameters.clone(), fed)),
+                ModelKind::Press(parameters) => Inside::Press(Press::new(parameters.clone(), fed)),
+                ModelKind::Ladder(circuit) => Inside::Ladder(Box::new(LadderModel::new(circuit))),
+            },
+            actuators: vec![false; binding.actuators.len()],
+            sensors: vec![false; binding.sensors.len()],
+            position_names: terminals.positions,
+            binding,
+        });
+        (plant, problems)
+    }
+
+    /// One cycle under y(i), in which `arrived` parts came from the plant that feeds this one. Answers with what it shows then.
+    ///
+    /// Outputs past the width of `outputs` count as 0.
+    pub fn step(&mut self, outputs: &Image, arrived: u64) -> Field {
+        for (actuator, &place) in self.actuators.iter_mut().zip(&self.binding.actuators) {
+            *actuator = outputs.get(place);
+        }
+        self.inside.model_mut().step(&self.actuators, arrived);
+        self.show()
+    }
+
+    /// What it shows now.
+    pub fn field(&self) -> Field {
+        self.clone().show()
+    }
+
+    /// Names of [`Field::positions`], in order.
+    pub fn position_names(&self) -> &[String] {
+        &self.position_names
+    }
+
+    fn show(&mut self) -> Field {
+        let model = self.inside.model();
+        model.sensors(&mut self.sensors);
+        let mut sensors = Image::zero(self.binding.inputs);
+        for (&sensor, &place) in self.sensors.iter().zip(&self.binding.sensors) {
+            sensors.set(place, sensor);
+        }
+        let counts = model.counts();
+        Field {
+            sensors,
+            handed_over: counts.handed_over,
+            finished: counts.finished,
+            mishaps: counts.mishaps,
+            positions: model.positions(),
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! The answer about a chain of any shape.
+
+use std::fmt::Write;
+
+use serde::Serialize;
+
+use crate::chain::Chain;
+use crate::error::ReliabilityError;
+use crate::quantity::{Hours, grouped};
+use crate::transient::AfterFailure;
+
+/// States that are listed in text, at most.
+const MAXIMUM_LISTED: usize = 30;
+
+/// What a chain says. What is nothing does not exist for this chain, or was not asked for; `remarks` say why.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ChainAnswer {
+    /// States, failures too.
+    pub states: usize,
+    /// Mean time to the first failure.
+    pub mttf_hours: Option<f64>,
+    /// Standard deviation of the time to the first failure.
+    pub deviation_hours: Option<f64>,
+    /// Probability of a failure state in the long run.
+    pub unavailability: Option<f64>,
+    /// At the end of the mission.
+    #[serde(flatten)]
+    pub mission: Option<ChainMission>,
+    /// States with their probabilities.
+    pub by_state: Vec<StateAnswer>,
+    /// Why something is missing.
+    pub remarks: Vec<String>,
+}
+
+/// At the end of a mission.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ChainMission {
+    /// Its length.
+    pub mission_hours: f64,
+    /// Probability that there was no failure.
+    pub reliability: f64,
+    /// Probability that there was one.
+    pub unreliability: f64,
+    /// Probability of a failure state, where failures are repaired as the chain says.
+    pub point_unavailability: f64,
+}
+
+/// One state.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StateAnswer {
+    /// Its name.
+    pub name: String,
+    /// Whether it is a failure.
+    pub failure: bool,
+    /// Probability in the long run.
+    pub steady: Option<f64>,
+    /// Probability at the end of the mission, where failures are repaired as the chain says.
+    pub at_mission: Option<f64>,
+}
+
+/// Answers what can be answered about `chain`.
+///
+/// # Errors
+/// A mission that takes too many steps.
+pub fn answer_chain(
+    chain: &Chain,
+    mission: Option<Hours>,
+) -> Result<ChainAnswer, ReliabilityError> {
+    let mut remarks = Vec::new();
+    let mut kept = |found: Result<f64, ReliabilityError>| match found {
+        Ok(value) => Some(value),
+        Err(error) => {
+            remarks.push(error.to_string());
+            None
+        }
+    };
+    let mttf_hours = kept(chain.mttf());
+    let deviation_hours = match mttf_hours {
+        Some(_) => kept(
+            chain
+                .time_to_failure()
+                .map(|moments| moments.variance_hours_squared.sqrt()),
+        ),
+        None => None,
+    };
+    let steady = match chain.steady_state() {
+        Ok(steady) => Some(steady),
+        Err(error) => {
+            remarks.push(error.to_string());
+            None
+        }
+    };
+    let failures = || (0..chain.states()).filter(|state| chain.is_failure(*state));
+    let later = match mission {
+        Some(hours) => {
+            let first = chain.transient(hours.get(), AfterFailure::Final)?;
+            let later = chain.transient(hours.get(), AfterFailure::Repaired)?;
+            let alive = (0..chain.states()).filter(|state| !chain.is_failure(*state));
+            let answer = ChainMission {
+                mission_hours: hours.get(),
+                reliability: alive.map(|state| first.probabilities[state]).sum(),
+                unreliability: first.failed,
+                point_unavailability: later.failed,
+            };
+            Some((answer, later.probabilities))
+        }
+        None => None,
+    };
+    let by_state = (0..chain.states()).map(|state| StateAnswer {
+        name: chain.name(state),
+        failure: chain.is_failure(state),
+        steady: steady.as_ref().map(|steady| steady[state]),
+        at_mission: later
+            .as_ref()
+            .map(|(_, probabilities)| probabilities[state]),
+    });
+    Ok(ChainAnswer {
+        states: chain.states(),
+        mttf_hours,
+        deviation_hours,
+        unavailability: steady
+            .as_ref()
+            .map(|steady| failures().fold(0.0, |sum, state| sum + steady[state])),
+        by_state: by_state.collect(),
+        mission: later.map(|(answer, _)| answer),
+        remarks,
+    })
+}
+
+impl ChainAnswer {
+    /// The answer for people.
+    pub fn to_text(&self) -> String {
+        let mut text = format!("{} states\n", self.states);
+        let mut line = |name: &str, value: Option<String>| {
+            if let Some(value) = value {
+                let _ = writeln!(text, "{name:<24} {value}");
+            }
+        };
+        line(
+            "MTTF",
+            self.mttf_hours.map(|hours| format!("{} h", grouped(hours))),
+        );
+        line(
+            "standard deviation",
+            self.deviation_hours
+                .map(|hours| format!("{} h", grouped(hours))),
+        );
+        line(
+            "unavailability",
+            self.unavailability.map(|share| format!("{share:.6e}")),
+        );
+        if let Some(at) = &self.mission {
+            let hours = grouped(at.mission_hours);
+            line(
+                &format!("R({hours} h)"),
+                Some(format!("{:.12}", at.reliability)),
+            );
+            line(
+                &format!("1 - R({hours} h)"),
+                Some(format!("{:.6e}", at.unreliability)),
+            );
+        }
+        for state in self.by_state.iter().take(MAXIMUM_LISTED) {
+            let steady = state
+                .steady
+                .map(|share| format!("{share:.6e} in the long run"));
+            let later = state
+                .at_mission
+                .map(|share| format!("{share:.6e} at the end of the mission"));
+            let said: Vec<String> = [steady, later].into_iter().flatten().collect();
+            line(&state.name, (!said.is_empty()).then(|| said.join(", ")));
+        }
+        for remark in &self.remarks {
+            let _ = writeln!(text, "{remark}");
+        }
+        text
+    }
+}

@@ -1,0 +1,62 @@
+//! How long it works: Markov models of redundant controllers, estimates from what was measured, and their report.
+//!
+//! Calculated: [`ThreeState`] is the paper's model, (14) to (20), in closed form; [`System`] describes a plant's boxes and gives a
+//! [`Chain`]; a chain gives mean times by elimination and transients by uniformisation. Invariant of all of it: probabilities and times
+//! are sums of terms that are not negative, so that no result loses its digits, whatever the rates are.
+//!
+//! Measured: estimates with exact intervals, a test of fit against the law that the model implies, and simulation of what is too rare to
+//! wait for. Randomness is an argument.
+//!
+//! One function answers each question of the command line: [`calculate`], [`answer_chain`], [`assess`], [`outlook`], [`report_data`] with [`report`].
+
+mod answer;
+mod birth_death;
+mod campaign;
+mod chain;
+mod chain_answer;
+mod dense;
+mod drawing;
+mod elimination;
+mod error;
+mod figures;
+mod format;
+mod graph;
+mod measured;
+mod options;
+mod poisson_weights;
+mod product;
+mod quantile;
+mod quantity;
+mod report;
+mod sensitivity;
+mod system;
+mod three_state;
+mod transient;
+
+pub use answer::{Answer, Mission, calculate};
+pub use birth_death::{Level, birth_death_mttf};
+pub use campaign::{Assessment, Campaign, SystemFailure, assess};
+pub use chain::{Chain, ChainBuilder, MAXIMUM_STATES};
+pub use chain_answer::{ChainAnswer, ChainMission, StateAnswer, answer_chain};
+pub use elimination::TimeToFailure;
+pub use error::ReliabilityError;
+pub use figures::{FigurePoint, PerUnit, figures_5_and_6};
+pub use format::{MAXIMUM_TEXT_BYTES, ReadChain, read_chain};
+pub use measured::{
+    AccelerationBias, Fit, Interval, Law, MAXIMUM_ACCELERATION, Null, Observed, Outlook, RareEvent,
+    Simulated, Stopped, acceleration_bias, fit, mean_time, outlook, proportion, rare_event,
+    simulate, times_to_failure,
+};
+pub use options::Options;
+pub use product::{MAXIMUM_UNITS, Unit, at_most_down, poisson_binomial, product_reliability};
+pub use quantity::{Hours, MAXIMUM_HOURS, MINIMUM_HOURS, Probability, grouped};
+pub use report::{OverTime, Provenance, Report, ReportData, report, report_data};
+pub use sensitivity::{
+    ByUnderstudies, Sensitivity, WhatIf, by_understudies, sensitivities, what_if,
+};
+pub use system::{
+    BoxKind, CommonCause, CommonCauseConvention, MAXIMUM_BOXES, MAXIMUM_MODEL_STATES, Rule,
+    SharedPart, System,
+};
+pub use three_state::{StateProbabilities, ThreeState};
+pub use transient::{AfterFailure, Transient};

@@ -1,0 +1,412 @@
+//! A plant's controllers, their understudies and what else can fail, as one chain.
+//!
+//! Boxes of one kind are alike, so only how many of each kind are down is kept, and groups that are alike are only counted: the
+//! chain is exactly lumped. Two rules say when a group has failed:
+//!
+//! - [`Rule::Paper`]: at the second failure, (14);
+//! - [`Rule::AsBuilt`]: when all its understudies and at least one of its controllers are down. An understudy holds the state of every
+//!   controller, so while one lives all outputs can be restored.
+//!
+//! A failed box is repaired after it was detected; it is masked from the first cycle on, so detection costs time to repair and nothing
+//! else. The system fails with its first group, with a failure that is not covered, with a common cause, or with a shared part.
+
+use std::collections::HashMap;
+
+use serde::Serialize;
+
+use crate::chain::{Chain, explore};
+use crate::error::ReliabilityError;
+use crate::quantity::{Hours, Probability};
+
+/// Boxes of one system, at most.
+pub const MAXIMUM_BOXES: u32 = 1_000_000;
+
+/// States of one model, at most.
+pub const MAXIMUM_MODEL_STATES: usize = 300_000;
+
+/// Boxes that are alike.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BoxKind {
+    /// For people, such as `robot`.
+    pub name: String,
+    /// How many, in the whole system.
+    pub count: u32,
+    /// Mean time between failures of one.
+    pub mtbf: Hours,
+    /// Mean time to repair one, from its detection on, while a crew is at it.
+    pub mttr: Hours,
+}
+
+/// When a group has failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rule {
+    /// At the second failure of any of its boxes, (14).
+    Paper,
+    /// When all understudies and at least one controller are down.
+    AsBuilt,
+}
+
+/// How the share beta of failures that hit all boxes at once is counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CommonCauseConvention {
+    /// Boxes fail at λ as before, and all of them at β λ besides.
+    Additive,
+    /// Boxes fail at (1 - β) λ, and all of them at β λ. In a large system this can *raise* the MTTF, for λ counts N times and β λ once.
+    Split,
+}
+
+/// Failures that hit all boxes at once. λ is that of the kind that fails most often.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CommonCause {
+    /// β
+    pub beta: Probability,
+    /// How it is counted.
+    pub convention: CommonCauseConvention,
+}
+
+/// A part that everything depends on, such as the network or the power supply: its first failure is the system's.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SharedPart {
+    /// For people.
+    pub name: String,
+    /// Mean time between its failures.
+    pub mtbf: Hours,
+}
+
+/// All that a model is made from.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct System {
+    /// Controllers; their counts are of the whole system and divide by `groups`.
+    pub controllers: Vec<BoxKind>,
+    /// Understudies; the count is of one group.
+    pub understudies: BoxKind,
+    /// Groups that are alike, each with its own understudies.
+    pub groups: u32,
+    /// When a group has failed.
+    pub rule: Rule,
+    /// Boxes that are repaired at the same time, at most; nothing: a crew for each box. Where more are down, each is as likely to be
+    /// worked on as any other.
+    pub crews: Option<u32>,
+    /// Probability that a failure is masked at all.
+    pub coverage: Probability,
+    /// Mean time from a failure to its detection, after which repair starts.
+    pub detection: Option<Hours>,
+    /// Failures that hit all boxes at once.
+    pub common_cause: Option<CommonCause>,
+    /// Parts that everything depends on.
+    pub shared: Vec<SharedPart>,
+}
+
+/// Boxes of one kind within one group.
+struct Kind {
+    count: u32,
+    failure_rate: f64,
+    repair_rate: f64,
+    understudy: bool,
+}
+
+/// Boxes of a group that are down, by kind: undetected, then detected.
+type GroupState = Vec<(u32, u32)>;
+
+/// How many groups are in which state, by number of the state.
+type SystemState = Vec<(u32, u32)>;
+
+impl System {
+    /// Controllers in all.
+    pub fn controller_count(&self) -> u32 {
+        self.controllers.iter().map(|kind| kind.count).sum()
+    }
+
+    /// Boxes in all, understudies too.
+    pub fn boxes(&self) -> u32 {
+        self.controller_count() + self.groups * self.understudies.count
+    }
+
+    /// Every fault of the description.
+    ///
+    /// # Errors
+    /// Counts out of bounds, groups that do not divide.
+    pub fn check(&self) -> Result<(), Vec<ReliabilityError>> {
+        let mut errors = Vec::new();
+        let mut count = |what: &str, count: u32, minimum: u64, maximum: u32| {
+            if !(minimum..=u64::from(maximum)).contains(&u64::from(count)) {
+                errors.push(ReliabilityError::Count {
+                    what: what.into(),
+                    count: u64::from(count),
+                    minimum,
+                    maximum: u64::from(maximum),
+                });
+            }
+        };
+        count("the number of groups", self.groups, 1, MAXIMUM_BOXES);
+        for kind in &self.controllers {
+            count(
+                &format!("the number of {}", kind.name),
+                kind.count,
+                1,
+                MAXIMUM_BOXES,
+            );
+        }
+        let total: u64 = self
+            .controllers
+            .iter()
+            .map(|kind| u64::from(kind.count))
+            .sum();
+        let boxes = total + u64::from(self.groups) * u64::from(self.understudies.count);
+        let boxes = u32::try_from(boxes).unwrap_or(u32::MAX);
+        count("the number of boxes", boxes, 1, MAXIMUM_BOXES);
+        if self.controllers.is_empty() {
+            count("the number of controllers", 0, 1, MAXIMUM_BOXES);
+        }
+        if let Some(crews) = self.crews {
+            count("the number of repair crews", crews, 1, MAXIMUM_BOXES);
+        }
+        for kind in &self.controllers {
+            if self.groups > 0 && !kind.count.is_multiple_of(self.groups) {
+                errors.push(ReliabilityError::Groups {
+                    controllers: u64::from(kind.count),
+                    groups: u64::from(self.groups),
+                });
+            }
+        }
+        if errors.is_empty() {
+            Ok(())
+        } else {
+            Err(errors)
+        }
+    }
+
+    /// The chain of this system; its first state is the one in which all boxes work, its last `failed`.
+    ///
+    /// # Errors
+    /// As [`System::check`], and more states than [`MAXIMUM_MODEL_STATES`].
+    pub fn chain(&self) -> Result<Chain, Vec<ReliabilityError>> {
+        self.check()?;
+        let mut groups = Groups {
+            kinds: self.kinds(),
+            numbers: HashMap::new(),
+            states: Vec::new(),
+        };
+        let whole = groups.number(vec![(0, 0); groups.kinds.len()]);
+        let first: SystemState = vec![(whole, self.groups)];
+        let names = std::cell::RefCell::new(groups);
+        let (chain, _) = explore(
+            first,
+            MAXIMUM_MODEL_STATES,
+            |state| names.borrow().name(state, self),
+            |state, found| self.successors(&mut names.borrow_mut(), state, found),
+        )?;
+        Ok(chain)
+    }
+
+    /// Kinds of one group. Boxes that cannot be told apart are one kind; under the paper's rule that holds for the understudy too.
+    fn kinds(&self) -> Vec<Kind> {
+        let split = match self.common_cause {
+            Some(CommonCause {
+                beta,
+                convention: CommonCauseConvention::Split,
+            }) => 1.0 - beta.get(),
+            _ => 1.0,
+        };
+        let mut kinds: Vec<Kind> = Vec::new();
+        let controllers = self
+            .controllers
+            .iter()
+            .map(|kind| (kind, kind.count / self.groups, false));
+        let understudies = (
+            &self.understudies,
+            self.understudies.count,
+            self.rule == Rule::AsBuilt,
+        );
+        for (kind, count, understudy) in controllers.chain([understudies]) {
+            let failure_rate = kind.mtbf.rate() * split;
+            let repair_rate = kind.mttr.rate();
+            let alike = kinds.iter_mut().find(|known| {
+                (known.failure_rate, known.repair_rate, known.understudy)
+                    == (failure_rate, repair_rate, understudy)
+            });
+            match alike {
+                Some(known) => known.count += count,
+                None => kinds.push(Kind {
+                    count,
+                    failure_rate,
+                    repair_rate,
+                    understudy,
+                }),
+            }
+        }
+        kinds
+    }
+
+    /// Rate of what fails the system from every state.
+    fn lethal_rate(&self) -> f64 {
+        let shared: f64 = self.shared.iter().map(|part| part.mtbf.rate()).sum();
+        let kinds = self
+            .controllers
+            .iter()
+            .chain((self.understudies.count > 0).then_some(&self.understudies));
+        let fastest = kinds.map(|kind| kind.mtbf.rate()).fold(0.0, f64::max);
+        shared
+            + self
+                .common_cause
+                .map_or(0.0, |cause| cause.beta.get() * fastest)
+    }
+
+    fn group_fails(&self, kinds: &[Kind], state: &GroupState) -> bool {
+        let down = |understudy: bool| -> u32 {
+            let kinds = kinds
+                .iter()
+                .zip(state)
+                .filter(|(kind, _)| kind.understudy == understudy);
+            kinds
+                .map(|(_, (undetected, detected))| undetected + detected)
+                .sum()
+        };
+        match self.rule {
+            Rule::Paper => down(false) > 1,
+            Rule::AsBuilt => down(true) == self.understudies.count && down(false) > 0,
+        }
+    }
+
+    fn successors(
+        &self,
+        groups: &mut Groups,
+        state: &SystemState,
+        found: &mut Vec<(Option<SystemState>, f64)>,
+    ) {
+        let lethal = self.lethal_rate();
+        if lethal > 0.0 {
+            found.push((None, lethal));
+        }
+        let detected: u32 = state
+            .iter()
+            .map(|&(number, count)| {
+                let group = &groups.states[number as usize];
+                count * group.iter().map(|(_, detected)| detected).sum::<u32>()
+            })
+            .sum();
+        // Each box that is down is as likely to be worked on as any other.
+        let attended = match self.crews {
+            Some(crews) if crews < detected => f64::from(crews) / f64::from(detected),
+            _ => 1.0,
+        };
+        for &(number, count) in state {
+            let group = groups.states[number as usize].clone();
+            for index in 0..groups.kinds.len() {
+                let kind = &groups.kinds[index];
+                let (failure_rate, repair_rate) = (kind.failure_rate, kind.repair_rate);
+                let (hidden, known) = group[index];
+                let failing = f64::from(count * (kind.count - hidden - known)) * failure_rate;
+                let mut after = group.clone();
+                if failing > 0.0 {
+                    match self.detection {
+                        Some(_) => after[index].0 += 1,
+                        None => after[index].1 += 1,
+                    }
+                    let covered = failing * self.coverage.get();
+                    let uncovered = failing * (1.0 - self.coverage.get());
+                    if self.group_fails(&groups.kinds, &after) {
+                        found.push((None, failing));
+                    } else {
+                        if covered > 0.0 {
+                            let to = groups.moved(state, number, after);
+                            found.push((Some(to), covered));
+                        }
+                        if uncovered > 0.0 {
+                            found.push((None, uncovered));
+                        }
+                    }
+                }
+                if let (Some(latency), true) = (self.detection, hidden > 0) {
+                    let mut after = group.clone();
+                    after[index] = (hidden - 1, known + 1);
+                    let to = groups.moved(state, number, after);
+                    found.push((Some(to), f64::from(count * hidden) * latency.rate()));
+                }
+                if known > 0 {
+                    let mut after = group.clone();
+                    after[index].1 -= 1;
+                    let to = groups.moved(state, number, after);
+                    found.push((Some(to), f64::from(count * known) * repair_rate * attended));
+                }
+            }
+        }
+    }
+}
+
+struct Groups {
+    kinds: Vec<Kind>,
+    numbers: HashMap<GroupState, u32>,
+    states: Vec<GroupState>,
+}
+
+impl Groups {
+    fn number(&mut self, state: GroupState) -> u32 {
+        let next = self.states.len() as u32;
+        *self.numbers.entry(state).or_insert_with_key(|state| {
+            self.states.push(state.clone());
+            next
+        })
+    }
+
+    /// The system after one group has gone from state `from` to `to`.
+    fn moved(&mut self, system: &SystemState, from: u32, to: GroupState) -> SystemState {
+        let to = self.number(to);
+        let mut after = system.clone();
+        if let Ok(place) = after.binary_search_by_key(&from, |&(number, _)| number) {
+            after[place].1 -= 1;
+            if after[place].1 == 0 {
+                after.remove(place);
+            }
+        }
+        match after.binary_search_by_key(&to, |&(number, _)| number) {
+            Ok(place) => after[place].1 += 1,
+            Err(place) => after.insert(place, (to, 1)),
+        }
+        after
+    }
+
+    /// What is down, such as `2 controllers, 1 understudy`.
+    fn name(&self, state: &SystemState, system: &System) -> String {
+        if self.kinds.len() > 3 || state.len() > 3 {
+            return String::new();
+        }
+        let said = |count: u32, kind: &Kind, what: &str| {
+            let one = match (kind.understudy, system.rule) {
+                (true, _) => "understudy",
+                (false, Rule::AsBuilt) => "controller",
+                (false, Rule::Paper) => "box",
+            };
+            let many = match (kind.understudy, system.rule) {
+                (true, _) => "understudies",
+                (false, Rule::AsBuilt) => "controllers",
+                (false, Rule::Paper) => "boxes",
+            };
+            format!("{count} {} {what}", if count == 1 { one } else { many })
+        };
+        let mut parts = Vec::new();
+        for &(number, count) in state {
+            let mut down = Vec::new();
+            for (kind, &(hidden, known)) in self.kinds.iter().zip(&self.states[number as usize]) {
+                if hidden > 0 {
+                    down.push(said(hidden, kind, "undetected"));
+                }
+                if known > 0 {
+                    down.push(said(known, kind, "down"));
+                }
+            }
+            if !down.is_empty() && system.groups > 1 {
+                parts.push(format!("{count} × ({})", down.join(", ")));
+            } else if !down.is_empty() {
+                parts.push(down.join(", "));
+            }
+        }
+        if parts.is_empty() {
+            "all work".into()
+        } else {
+            parts.join("; ")
+        }
+    }
+}

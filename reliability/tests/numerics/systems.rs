@@ -1,0 +1,332 @@
+use proptest::prelude::*;
+use understudy_reliability::{
+    AfterFailure, CommonCause, CommonCauseConvention, Level, Probability, ReliabilityError, Rule,
+    SharedPart, ThreeState, birth_death_mttf,
+};
+
+use crate::support::{check, check_within, fixture, hours, kind, number, rows, system, whole};
+
+fn groups_of(groups: u32, boxes: u32, mtbf: f64, mttr: f64) -> understudy_reliability::System {
+    let mut system = system(groups * (boxes - 1), 1, Rule::Paper, mtbf, mttr);
+    system.groups = groups;
+    system
+}
+
+#[test]
+fn lumped_groups_to_twelve_digits() {
+    for row in rows(&fixture(), "degraded_groups") {
+        let (lambda, mu) = (number(row, "failure_rate"), number(row, "repair_rate"));
+        let (groups, boxes, crews) = (
+            whole(row, "groups"),
+            whole(row, "boxes"),
+            whole(row, "crews"),
+        );
+        let mut system = groups_of(groups, boxes, 1.0 / lambda, 1.0 / mu);
+        system.crews = Some(crews);
+        let chain = system.chain().expect("a chain");
+        check(
+            chain.mttf().expect("a mean"),
+            number(row, "mttf"),
+            &row.to_string(),
+        );
+        let (n, m) = (f64::from(groups), f64::from(boxes));
+        let direct = birth_death_mttf(groups as usize + 1, |k| Level {
+            up: (n - k as f64) * m * lambda,
+            down: (k as u32).min(crews) as f64 * mu,
+            lethal: k as f64 * (m - 1.0) * lambda,
+        });
+        check(
+            direct.expect("a mean"),
+            number(row, "mttf"),
+            &row.to_string(),
+        );
+    }
+}
+
+#[test]
+fn the_cluster_as_built_to_twelve_digits() {
+    for row in rows(&fixture(), "cluster") {
+        let (lambda, mu) = (number(row, "failure_rate"), number(row, "repair_rate"));
+        let mut system = system(
+            whole(row, "controllers"),
+            whole(row, "spares"),
+            Rule::AsBuilt,
+            1.0 / lambda,
+            1.0 / mu,
+        );
+        system.crews = Some(whole(row, "crews"));
+        let mean = system.chain().expect("a chain").mttf().expect("a mean");
+        check(mean, number(row, "mttf"), &row.to_string());
+    }
+}
+
+#[test]
+fn twenty_controllers_and_one_understudy_are_as_good_as_a_full_duplex() {
+    let mean = |system: understudy_reliability::System| {
+        let found = system.chain().expect("a chain").mttf().expect("a mean");
+        (found, system.boxes())
+    };
+    let (one, boxes) = mean(system(20, 1, Rule::AsBuilt, 10_000.0, 24.0));
+    assert_eq!((one.round(), boxes), (110_906.0, 21));
+    let (duplex, boxes) = mean(groups_of(20, 2, 10_000.0, 24.0));
+    assert_eq!((duplex.round(), boxes), (104_939.0, 40));
+    let (paper, boxes) = mean(system(20, 1, Rule::Paper, 10_000.0, 24.0));
+    assert_eq!((paper.round(), boxes), (10_897.0, 21));
+    let (two, _) = mean(system(20, 2, Rule::AsBuilt, 10_000.0, 24.0));
+    assert!((2.95e7..3.05e7).contains(&two), "{two}");
+    let (none, _) = mean(system(20, 0, Rule::AsBuilt, 10_000.0, 24.0));
+    check(none, 500.0, "without an understudy");
+}
+
+#[test]
+fn a_pair_is_the_same_under_both_rules() {
+    for crews in [None, Some(1)] {
+        let mut paper = system(1, 1, Rule::Paper, 10_000.0, 24.0);
+        let mut built = system(1, 1, Rule::AsBuilt, 10_000.0, 24.0);
+        (paper.crews, built.crews) = (crews, crews);
+        let mean =
+            |system: &understudy_reliability::System| system.chain().unwrap().mttf().unwrap();
+        check(mean(&paper), mean(&built), "one controller, one understudy");
+    }
+}
+
+#[test]
+fn latency_of_detection_adds_to_repair() {
+    let mut slow = system(3, 1, Rule::Paper, 10_000.0, 24.0);
+    slow.detection = Some(hours(6.0));
+    let mean = slow.chain().unwrap().mttf().unwrap();
+    // S1 lasts until it is detected and then repaired: by hand, with both as stages.
+    let (n, l, d, m) = (3.0, 1e-4, 1.0 / 6.0, 1.0 / 24.0);
+    let survive = d / (n * l + d) * (m / (n * l + m));
+    let stay = 1.0 / (n * l + d) + d / (n * l + d) / (n * l + m);
+    check_within(
+        mean,
+        (1.0 / ((n + 1.0) * l) + stay) / (1.0 - survive),
+        1e-11,
+        "stages",
+    );
+}
+
+#[test]
+fn shared_parts_and_common_causes_end_it_from_every_state() {
+    let plain = system(5, 1, Rule::AsBuilt, 10_000.0, 24.0);
+    let mut shared = plain.clone();
+    shared.shared = vec![
+        SharedPart {
+            name: "network".into(),
+            mtbf: hours(50_000.0),
+        },
+        SharedPart {
+            name: "power".into(),
+            mtbf: hours(200_000.0),
+        },
+    ];
+    let reliability = |system: &understudy_reliability::System| {
+        system.chain().unwrap().reliability(1000.0).unwrap()
+    };
+    let both: f64 = 1000.0 * (1.0 / 50_000.0 + 1.0 / 200_000.0);
+    check(
+        reliability(&shared),
+        reliability(&plain) * (-both).exp(),
+        "in series",
+    );
+
+    let mut common = plain.clone();
+    let beta = Probability::new("beta", 0.1).unwrap();
+    common.common_cause = Some(CommonCause {
+        beta,
+        convention: CommonCauseConvention::Additive,
+    });
+    check(
+        reliability(&common),
+        reliability(&plain) * (-0.01_f64).exp(),
+        "additive",
+    );
+    common.common_cause = Some(CommonCause {
+        beta,
+        convention: CommonCauseConvention::Split,
+    });
+    let mut fewer = plain.clone();
+    fewer.controllers[0].mtbf = hours(10_000.0 / 0.9);
+    fewer.understudies.mtbf = hours(10_000.0 / 0.9);
+    check(
+        reliability(&common),
+        reliability(&fewer) * (-0.01_f64).exp(),
+        "split",
+    );
+}
+
+#[test]
+fn splitting_beta_can_raise_the_mean_of_a_large_system() {
+    let mut large = system(1000, 1, Rule::Paper, 10_000.0, 24.0);
+    let mean = |system: &understudy_reliability::System| system.chain().unwrap().mttf().unwrap();
+    let plain = mean(&large);
+    let beta = Probability::new("beta", 0.1).unwrap();
+    large.common_cause = Some(CommonCause {
+        beta,
+        convention: CommonCauseConvention::Split,
+    });
+    assert!(mean(&large) > plain);
+    large.common_cause = Some(CommonCause {
+        beta,
+        convention: CommonCauseConvention::Additive,
+    });
+    assert!(mean(&large) < plain);
+}
+
+#[test]
+fn unequal_boxes_that_are_equal_are_one_kind() {
+    let plain = system(6, 1, Rule::AsBuilt, 8_000.0, 12.0);
+    let mut named = plain.clone();
+    named.controllers = vec![
+        kind("robots", 2, 8_000.0, 12.0),
+        kind("presses", 4, 8_000.0, 12.0),
+    ];
+    let states = |system: &understudy_reliability::System| system.chain().unwrap().states();
+    assert_eq!(states(&plain), states(&named));
+    named.controllers[0].mtbf = hours(8_000.0 * (1.0 + 1e-12));
+    assert!(states(&named) > states(&plain));
+    let mean = |system: &understudy_reliability::System| system.chain().unwrap().mttf().unwrap();
+    check_within(mean(&named), mean(&plain), 1e-11, "nearly equal");
+}
+
+#[test]
+fn eleven_kinds_that_are_nearly_equal_are_eleven_equal_boxes() {
+    // Too many states next to each other for an elimination: the sweeps answer, and to the same digits.
+    let plain = system(11, 1, Rule::AsBuilt, 8_000.0, 12.0);
+    let mut named = plain.clone();
+    named.controllers = (0..11)
+        .map(|k| {
+            kind(
+                &format!("c{k}"),
+                1,
+                8_000.0 * (1.0 + 1e-15 * f64::from(k)),
+                12.0 * (1.0 + 1e-15 * f64::from(k)),
+            )
+        })
+        .collect();
+    let chain = named.chain().unwrap();
+    assert!(chain.states() > 2_000, "{}", chain.states());
+    check(
+        chain.mttf().unwrap(),
+        plain.chain().unwrap().mttf().unwrap(),
+        "nearly equal",
+    );
+}
+
+#[test]
+fn twelve_controllers_in_groups_of_every_size() {
+    let mut last = 0.0;
+    for groups in [1, 2, 3, 4, 6, 12] {
+        let mut system = system(12, 1, Rule::AsBuilt, 10_000.0, 24.0);
+        system.groups = groups;
+        let chain = system.chain().unwrap();
+        let mean = chain.mttf().unwrap();
+        // With a crew each the groups are independent: R(t) is the power of one group's.
+        let mut one = system.clone();
+        one.groups = 1;
+        one.controllers[0].count = 12 / groups;
+        let alone = one.chain().unwrap().reliability(5_000.0).unwrap();
+        check_within(
+            chain.reliability(5_000.0).unwrap(),
+            alone.powi(groups as i32),
+            1e-11,
+            "groups",
+        );
+        assert!(mean > 0.9 * last, "{groups} groups: {mean}");
+        last = mean;
+        system.crews = Some(1);
+        assert!(system.chain().unwrap().mttf().unwrap() < mean);
+    }
+    let mut odd = system(12, 1, Rule::AsBuilt, 10_000.0, 24.0);
+    odd.groups = 5;
+    assert_eq!(
+        odd.chain().expect_err("12 by 5"),
+        [ReliabilityError::Groups {
+            controllers: 12,
+            groups: 5
+        }]
+    );
+}
+
+#[test]
+fn coverage_in_the_chain_is_coverage_in_the_closed_form() {
+    for coverage in [0.0, 0.5, 0.9, 0.999, 1.0] {
+        let coverage = Probability::new("coverage", coverage).unwrap();
+        let mut imperfect = system(7, 1, Rule::Paper, 10_000.0, 24.0);
+        imperfect.coverage = coverage;
+        let closed = ThreeState::with_coverage(7, 1.0 / 10_000.0, 1.0 / 24.0, coverage).unwrap();
+        let chain = imperfect.chain().unwrap();
+        let found = chain.time_to_failure().unwrap();
+        check(found.mean_hours, closed.mttf(), "mean");
+        check_within(
+            found.variance_hours_squared,
+            closed.variance(),
+            1e-10,
+            "variance",
+        );
+        for hours in [1.0, 1_000.0, 100_000.0] {
+            let failed = chain.transient(hours, AfterFailure::Final).unwrap().failed;
+            check_within(failed, closed.unreliability(hours), 1e-11, "transient");
+        }
+    }
+}
+
+#[test]
+fn all_that_is_wrong_is_said_at_once() {
+    let mut wrong = system(12, 1, Rule::AsBuilt, 10_000.0, 24.0);
+    wrong.groups = 7;
+    wrong.crews = Some(0);
+    wrong.controllers.push(kind("valves", 0, 1.0, 1.0));
+    let codes: Vec<_> = wrong
+        .check()
+        .expect_err("wrong")
+        .iter()
+        .map(ReliabilityError::code)
+        .collect();
+    assert_eq!(codes, ["U0704", "U0704", "U0718"]);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, cases: 40, ..ProptestConfig::default() })]
+
+    #[test]
+    fn more_of_what_helps_never_hurts(
+        controllers in 1_u32..9,
+        spares in 0_u32..3,
+        mttr in 1.0..2_000.0_f64,
+        crews in 1_u32..4,
+        coverage in 0.5..1.0_f64,
+    ) {
+        let mut base = system(controllers, spares, Rule::AsBuilt, 10_000.0, mttr);
+        base.crews = Some(crews);
+        let mean = |system: &understudy_reliability::System| system.chain().unwrap().mttf().unwrap();
+        let now = mean(&base) * (1.0 - 1e-12);
+        let mut faster = base.clone();
+        faster.controllers[0].mttr = hours(mttr / 2.0);
+        faster.understudies.mttr = hours(mttr / 2.0);
+        prop_assert!(mean(&faster) >= now);
+        let mut staffed = base.clone();
+        staffed.crews = Some(crews + 1);
+        prop_assert!(mean(&staffed) >= now);
+        let mut spared = base.clone();
+        spared.understudies.count += 1;
+        prop_assert!(mean(&spared) >= now);
+        let mut detected = base.clone();
+        detected.detection = Some(hours(10.0));
+        prop_assert!(mean(&detected) * (1.0 - 1e-12) <= mean(&base));
+        let mut covered = base.clone();
+        covered.coverage = Probability::new("c", coverage).unwrap();
+        prop_assert!(mean(&covered) * (1.0 - 1e-12) <= mean(&base));
+    }
+}
+
+#[test]
+fn without_coverage_another_spare_is_another_box_that_may_end_it() {
+    let mean = |spares| {
+        let mut system = system(1, spares, Rule::AsBuilt, 10_000.0, 24.0);
+        system.coverage = Probability::new("c", 0.5).unwrap();
+        system.chain().unwrap().mttf().unwrap()
+    };
+    assert!(mean(1) > mean(2) && mean(2) > mean(3));
+}

@@ -1,0 +1,164 @@
+//! The history of one program as its remote I/O has made it: the truth about u(i), and so about x(i).
+//!
+//! Invariant *The plant decides history*: only this remote I/O samples u(i), so only it can extend the chain of lineages
+//!
+//! ```text
+//!   base ──u──► L ──u──► L ──u──► head          at most `capacity` samples, all of them in every Sample frame
+//!            ▲
+//!            └ the newest that a living station has said to hold
+//! ```
+//!
+//! When the window is full and no living station has come past the base, nobody could ever follow: the samples that
+//! nobody heard are void, and the program goes on from the base.
+
+use std::collections::VecDeque;
+
+use smallvec::SmallVec;
+use understudy_wire::{Image, Lineage, Moment, ProgramHash};
+
+/// The last samples of a program and their lineages.
+#[derive(Debug, Clone)]
+pub(crate) struct History {
+    born: Moment,
+    base: Lineage,
+    samples: VecDeque<(Image, Lineage)>,
+    /// Samples from the base up to the newest lineage that any station ever said to hold.
+    confirmed: usize,
+    capacity: usize,
+}
+
+impl History {
+    /// A program that starts from its initial state at `born`.
+    pub(crate) fn genesis(program: ProgramHash, born: Moment, capacity: usize) -> Self {
+        Self::from(born, Lineage::genesis(program, born), capacity)
+    }
+
+    /// A program that goes on from a lineage that a station holds.
+    pub(crate) fn from(born: Moment, base: Lineage, capacity: usize) -> Self {
+        Self {
+            born,
+            base,
+            samples: VecDeque::with_capacity(capacity),
+            confirmed: 0,
+            capacity,
+        }
+    }
+
+    pub(crate) fn born(&self) -> Moment {
+        self.born
+    }
+
+    pub(crate) fn base(&self) -> Lineage {
+        self.base
+    }
+
+    /// L(i)(t+1): after the newest sample.
+    pub(crate) fn head(&self) -> Lineage {
+        self.samples.back().map_or(self.base, |(_, after)| *after)
+    }
+
+    /// L(i)(t): before the newest sample.
+    pub(crate) fn before(&self) -> Lineage {
+        let last = self.samples.len().saturating_sub(1);
+        self.lineage_after(last)
+    }
+
+    /// u(i)(t).
+    pub(crate) fn newest(&self) -> Option<&Image> {
+        self.samples.back().map(|(inputs, _)| inputs)
+    }
+
+    pub(crate) fn samples(&self) -> SmallVec<[Image; 2]> {
+        self.samples
+            .iter()
+            .map(|(inputs, _)| inputs.clone())
+            .collect()
+    }
+
+    /// How many samples from the base lead to `lineage`; none where it is not of this history.
+    pub(crate) fn place(&self, lineage: Lineage) -> Option<usize> {
+        (0..=self.samples.len())
+            .rev()
+            .find(|&place| self.lineage_after(place) == lineage)
+    }
+
+    /// A station holds the state at `place`.
+    pub(crate) fn confirm(&mut self, place: usize) {
+        self.confirmed = self.confirmed.max(place);
+    }
+
+    /// Appends this cycle's sample; answers with how many older ones became void by it.
+    ///
+    /// `living` is the newest place that a living station holds, where one does.
+    pub(crate) fn push(&mut self, inputs: &Image, living: Option<usize>) -> usize {
+        let mut void = 0;
+        if self.samples.len() == self.capacity {
+            if living.unwrap_or(self.confirmed) == 0 {
+                void = self.samples.len();
+                self.samples.clear();
+            } else if let Some((_, after)) = self.samples.pop_front() {
+                self.base = after;
+                self.confirmed = self.confirmed.saturating_sub(1);
+            }
+        }
+        let after = self.head().after(inputs);
+        self.samples.push_back((inputs.clone(), after));
+        void
+    }
+
+    fn lineage_after(&self, samples: usize) -> Lineage {
+        match samples.checked_sub(1) {
+            None => self.base,
+            Some(last) => self.samples[last].1,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn input(word: u64) -> Image {
+        Image::from_words(8, &[word]).expect("eight bits")
+    }
+
+    fn history(capacity: usize) -> History {
+        History::genesis(ProgramHash(1), Moment::default(), capacity)
+    }
+
+    #[test]
+    fn a_followed_history_slides() {
+        let mut history = history(3);
+        let mut lineages = vec![history.head()];
+        for cycle in 0..10 {
+            let living = history.place(lineages[cycle]);
+            history.confirm(living.expect("the last head is known"));
+            assert_eq!(history.push(&input(cycle as u64), living), 0);
+            lineages.push(history.head());
+            assert_eq!(history.before(), lineages[cycle]);
+            assert_eq!(history.base(), lineages[(cycle + 1).saturating_sub(3)]);
+        }
+    }
+
+    /// Whichever sample was the last that anybody followed, an isolated history comes back to it and never loses it.
+    #[test]
+    fn what_nobody_heard_is_void() {
+        for followed in 0..6 {
+            let mut history = history(3);
+            let mut last = history.head();
+            for cycle in 0..followed {
+                let living = history.place(last);
+                history.push(&input(cycle), living);
+                last = history.head();
+                history.confirm(history.place(last).expect("the head"));
+            }
+            for cycle in 0..20 {
+                history.push(&input(cycle), None);
+                assert!(
+                    history.place(last).is_some(),
+                    "{followed} followed, then {cycle} alone"
+                );
+            }
+        }
+    }
+}

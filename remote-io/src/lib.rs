@@ -1,0 +1,15 @@
+//! The plant's side: samples, selects or reconstructs, holds, and falls safe.
+//!
+//! [`RemoteIo`] is the only source of u(i) and the only place where y(i) is applied, and so the arbiter of program i: no
+//! agreement among the others is needed to mask a failure, and no two masters can drive one actuator.
+
+mod event;
+mod history;
+mod remote_io;
+mod selection;
+mod settings;
+mod witnesses;
+
+pub use event::{Event, Missing};
+pub use remote_io::RemoteIo;
+pub use settings::{Release, Settings};

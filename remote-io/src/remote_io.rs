@@ -1,0 +1,280 @@
+//! The remote I/O of one program, the arbiter of its history.
+//!
+//! ```text
+//!   cycle starts ──► samples u(i), says it ──► hears turns ──► deadline: selects, drives y(i) ──► rest
+//!                                                              (or holds, then falls safe)
+//! ```
+//!
+//! It drives at every deadline, also when no cycle was started: then it holds, and falls safe after `hold_cycles`. Its phases:
+//!
+//! ```text
+//!   Listening ── a living station holds a state ──► Running from its lineage
+//!      ▲    └─── nobody holds one ────────────────► Running from the initial state (cold start)
+//!      └──────── living stations, none of them on this history, for `listen_cycles` ── Running
+//! ```
+
+mod deadline;
+mod sampling;
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use understudy_wire::{
+    Admission, Applied, Arrival, Attendance, Body, Change, Copies, CycleClock, Frame, Header,
+    Holding, Image, Input, Machine, Moment, Output, Party, Reception, StationId, Time,
+};
+
+use crate::event::{Event, Missing};
+use crate::history::History;
+use crate::selection::Selection;
+use crate::settings::Settings;
+use crate::witnesses::Witnesses;
+
+/// One remote I/O. See [`Machine`] for how it is driven.
+#[derive(Debug)]
+pub struct RemoteIo {
+    settings: Settings,
+    reception: Reception,
+    clock: CycleClock,
+    attendance: Attendance,
+    witnesses: Witnesses,
+    phase: Phase,
+    field: Image,
+    released: bool,
+    /// The turns of this cycle, by rank.
+    turns: Vec<Option<Arc<Frame>>>,
+    /// Whether this cycle's deadline is over.
+    decided: bool,
+    /// Deadlines that passed without a cycle since the last one that was started.
+    idle: u32,
+    /// Deadlines in a row at which nothing true was there.
+    missed: u32,
+    applied: Option<Applied>,
+    /// When it wants to be woken, as of its last input.
+    asked: Time,
+    /// What it had asked for when it last reported a stall.
+    stalled: Time,
+    last_true: Option<Image>,
+    copies: Copies,
+    outbox: VecDeque<Output<Event>>,
+}
+
+#[derive(Debug)]
+enum Phase {
+    /// The history is not known: cycles listened for so far.
+    Listening { cycles: u32 },
+    /// The history, whether it has this cycle's sample, and the cycles for which no living station was on it.
+    Running {
+        history: History,
+        sampled: bool,
+        unfollowed: u32,
+    },
+}
+
+impl RemoteIo {
+    /// A remote I/O that has just started: it listens first, and drives the fail-safe values until it knows better.
+    pub fn new(now: Time, settings: Settings) -> Self {
+        let agreement = &settings.agreement;
+        let schedule = &agreement.schedule;
+        let stations = schedule.stations();
+        let mut clock = CycleClock::default();
+        clock.start(now);
+        let mut remote_io = Self {
+            reception: Reception::new(Party::RemoteIo(settings.program), agreement),
+            clock,
+            attendance: Attendance::new(stations, agreement.flag_after),
+            witnesses: Witnesses::new(
+                settings.program,
+                schedule.controllers(),
+                stations,
+                agreement.flag_after,
+            ),
+            phase: Phase::Listening { cycles: 0 },
+            field: Image::zero(settings.inputs),
+            released: true,
+            turns: vec![None; stations],
+            decided: false,
+            idle: 0,
+            missed: 0,
+            applied: None,
+            asked: now,
+            stalled: now,
+            last_true: None,
+            copies: Copies::default(),
+            outbox: VecDeque::new(),
+            settings,
+        };
+        remote_io.asked = remote_io.next_wakeup();
+        remote_io
+    }
+
+    fn moment(&self) -> Moment {
+        self.clock.moment().unwrap_or_default()
+    }
+
+    fn report(&mut self, event: Event) {
+        self.outbox.push_back(Output::Report(event));
+    }
+
+    fn receive(&mut self, now: Time, frame: &Arc<Frame>) {
+        let Party::Station(station) = frame.header.sender else {
+            return;
+        };
+        match self.reception.admit(&frame.header) {
+            Admission::Admitted => {}
+            Admission::Foreign => return,
+            Admission::Refused { theirs, first } => {
+                if first {
+                    self.report(Event::Refused {
+                        party: frame.header.sender,
+                        theirs,
+                        ours: self.settings.agreement.configuration,
+                    });
+                }
+                return;
+            }
+        }
+        match self
+            .clock
+            .arrival(now, frame, self.settings.agreement.schedule.period())
+        {
+            Arrival::Stale => return,
+            Arrival::Present => {}
+            Arrival::Begins(anchor) => self.begin_cycle(now, frame.header.moment, anchor),
+        }
+        match &frame.body {
+            Body::Turn(turn) if self.attendance.heard(station) => {
+                self.note(station, &turn.holdings);
+                self.turns[station.index()] = Some(Arc::clone(frame));
+            }
+            Body::Join(join) => self.note(station, &join.holdings),
+            _ => {}
+        }
+    }
+
+    fn note(&mut self, station: StationId, holdings: &[Holding]) {
+        let own = holdings
+            .iter()
+            .find(|holding| holding.program == self.settings.program);
+        self.witnesses.note(station, own);
+        if let (Phase::Running { history, .. }, Some(holding)) = (&mut self.phase, own)
+            && let Some(place) = history.place(holding.lineage)
+        {
+            history.confirm(place);
+        }
+    }
+
+    fn begin_cycle(&mut self, now: Time, moment: Moment, anchor: Time) {
+        if self.clock.moment().is_some() {
+            if !self.decided {
+                self.decide(now);
+            }
+            self.close_cycle();
+        }
+        self.clock.begin(now, moment, anchor);
+        self.decided = false;
+        self.idle = 0;
+        self.turns.fill(None);
+        self.find_history(moment);
+        self.sample(now);
+    }
+
+    fn close_cycle(&mut self) {
+        let moment = self.moment();
+        let outbox = &mut self.outbox;
+        self.attendance.close_cycle(|change| {
+            outbox.push_back(Output::Report(match change {
+                Change::Flagged(station) => Event::Flagged { moment, station },
+                Change::Cleared(station) => Event::Cleared { moment, station },
+            }));
+        });
+        self.witnesses.close_cycle();
+        self.copies.clear();
+        if let Phase::Running { sampled, .. } = &mut self.phase {
+            *sampled = false;
+        }
+    }
+
+    fn frame(&self, body: Body) -> Frame {
+        let agreement = &self.settings.agreement;
+        Frame {
+            header: Header {
+                cluster: agreement.cluster,
+                configuration: agreement.configuration,
+                moment: self.moment(),
+                sender: Party::RemoteIo(self.settings.program),
+                alone: self.clock.alone(),
+            },
+            body,
+        }
+    }
+
+    fn next_wakeup(&self) -> Time {
+        let decides_at = self.decides_at();
+        let copy = self.copies.wakeup();
+        copy.map_or(decides_at, |copy| copy.min(decides_at))
+    }
+
+    /// Reports once that it was not woken at a time that it had asked for, whatever woke it.
+    fn notice_stall(&mut self, now: Time) {
+        let due = self.asked;
+        let late = now.since(due);
+        if late > self.settings.agreement.schedule.period() / 5 && due != self.stalled {
+            self.stalled = due;
+            let moment = self.moment();
+            self.report(Event::Stalled { moment, late });
+        }
+    }
+
+    fn wake(&mut self, now: Time) {
+        while let Some(frame) = self.copies.take_due(now, &self.settings.agreement.schedule) {
+            self.outbox.push_back(Output::Send(frame));
+        }
+        if self.decides_at() > now {
+            return;
+        }
+        if !self.decided && self.clock.moment().is_some() {
+            self.decide(now);
+            return;
+        }
+        self.apply(Selection::Missing(Missing::NoCycle), None);
+        // One that was stopped for long does not make up for every deadline that it slept through.
+        let period = self.settings.agreement.schedule.period();
+        let passed = now.since(self.decides_at()).as_nanos() / period.as_nanos();
+        let passed = u32::try_from(passed).unwrap_or(u32::MAX);
+        self.idle = self.idle.saturating_add(1).saturating_add(passed);
+    }
+}
+
+impl Machine for RemoteIo {
+    type Event = Event;
+
+    fn handle_input(&mut self, now: Time, input: Input<'_>) {
+        self.notice_stall(now);
+        match input {
+            Input::Wakeup => self.wake(now),
+            Input::Frame(frame) => self.receive(now, frame),
+            Input::Field(sensors) => {
+                if sensors.width() == self.settings.inputs {
+                    self.field.clone_from(sensors);
+                }
+            }
+            Input::Release => {
+                if !self.released {
+                    self.released = true;
+                    let moment = self.moment();
+                    self.report(Event::Released { moment });
+                }
+            }
+        }
+        self.asked = self.next_wakeup();
+    }
+
+    fn poll_output(&mut self) -> Option<Output<Event>> {
+        self.outbox.pop_front()
+    }
+
+    fn wakeup(&self) -> Time {
+        self.asked
+    }
+}

@@ -1,0 +1,119 @@
+//! The deadline: something is driven at every one, and only what is true, held, or fail-safe.
+
+use understudy_wire::{Applied, Image, Output, Source, Time};
+
+use super::{Phase, RemoteIo};
+use crate::event::{Event, Missing};
+use crate::history::History;
+use crate::selection::{Heard, Selection};
+
+impl RemoteIo {
+    /// The deadline of a cycle that was started. What was heard is worth nothing when it comes a period late.
+    pub(super) fn decide(&mut self, now: Time) {
+        let late = now.since(self.decides_at()) > self.settings.agreement.schedule.period();
+        self.decided = true;
+        let heard = Heard {
+            turns: &self.turns,
+            controllers: self.settings.agreement.schedule.controllers(),
+            mode: self.settings.agreement.mode,
+        };
+        let width = self.settings.fail_safe.width();
+        let (selection, sampled) = match &self.phase {
+            Phase::Listening { .. } => (Selection::Missing(Missing::NoHistory), None),
+            Phase::Running { sampled: false, .. } => (Selection::Missing(Missing::NoCycle), None),
+            Phase::Running { history, .. } if late => {
+                let sampled = self.field_sampled(history);
+                (Selection::Missing(Missing::TooLate), Some(sampled))
+            }
+            Phase::Running { history, .. } => {
+                let selection = if self.released {
+                    heard.select(self.settings.program, history.head(), width)
+                } else {
+                    Selection::Missing(Missing::NotReleased)
+                };
+                (selection, Some(self.field_sampled(history)))
+            }
+        };
+        let moment = self.moment();
+        for (syndrome, accused) in heard.syndromes() {
+            self.outbox.push_back(Output::Report(Event::Syndrome {
+                moment,
+                syndrome,
+                accused,
+            }));
+        }
+        for (program, accused) in heard.digest_differences() {
+            self.outbox.push_back(Output::Report(Event::DigestDiffers {
+                moment,
+                program,
+                accused,
+            }));
+        }
+        self.apply(selection, sampled);
+    }
+
+    /// u(i)(t), which the sensors may have left since.
+    pub(super) fn field_sampled(&self, history: &History) -> Image {
+        history
+            .newest()
+            .cloned()
+            .unwrap_or_else(|| self.field.clone())
+    }
+
+    pub(super) fn apply(&mut self, selection: Selection, sampled: Option<Image>) {
+        let (outputs, source, word_of, missing) = match selection {
+            Selection::Direct(outputs) => (outputs, Source::Direct, None, None),
+            Selection::Reconstructed(outputs, understudy) => {
+                (outputs, Source::Reconstructed, Some(understudy), None)
+            }
+            Selection::Missing(missing) => {
+                self.missed = self.missed.saturating_add(1);
+                let held = self.last_true.clone();
+                match held.filter(|_| self.missed <= self.settings.hold_cycles) {
+                    Some(outputs) => (outputs, Source::Held, None, Some(missing)),
+                    None => {
+                        self.last_true = None;
+                        (
+                            self.settings.fail_safe.clone(),
+                            Source::FailSafe,
+                            None,
+                            Some(missing),
+                        )
+                    }
+                }
+            }
+        };
+        if missing.is_none() {
+            self.missed = 0;
+            self.last_true = Some(outputs.clone());
+        }
+        let moment = self.moment();
+        self.applied = Some(Applied {
+            moment,
+            source,
+            outputs: outputs.clone(),
+        });
+        self.outbox.push_back(Output::Drive(outputs.clone()));
+        self.report(Event::Applied {
+            moment,
+            sampled,
+            outputs,
+            source,
+            word_of,
+            missing,
+            heard: self.attendance.spoke(),
+        });
+    }
+
+    /// The next deadline: of this cycle, or of one that nobody has started in time.
+    pub(super) fn decides_at(&self) -> Time {
+        let schedule = &self.settings.agreement.schedule;
+        let deadline = self.clock.anchor() + schedule.deadline();
+        if !self.decided && self.clock.moment().is_some() {
+            return deadline;
+        }
+        // Whoever is to take over the pace from silent stations gets the time for it.
+        let grace = (schedule.guard() * schedule.stations() as u32).min(schedule.period());
+        deadline + schedule.period() * (self.idle + 1) + grace
+    }
+}

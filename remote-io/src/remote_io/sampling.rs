@@ -1,0 +1,120 @@
+//! The arbiter's side: from which history the program goes on, and what is added to it in each cycle.
+
+use std::sync::Arc;
+
+use understudy_wire::{Body, Moment, Output, Sample, Time};
+
+use super::{Phase, RemoteIo};
+use crate::event::Event;
+use crate::history::History;
+use crate::settings::Release;
+
+impl RemoteIo {
+    /// Listens until it is known who holds which state; notices when nobody is on this history any more.
+    pub(super) fn find_history(&mut self, moment: Moment) {
+        let listen_cycles = self.settings.agreement.listen_cycles;
+        match &mut self.phase {
+            Phase::Running {
+                history,
+                unfollowed,
+                ..
+            } => {
+                let mut holdings = self.witnesses.holdings();
+                let followed =
+                    holdings.any(|(_, holding)| history.place(holding.lineage).is_some());
+                *unfollowed = if followed || !self.witnesses.anybody() {
+                    0
+                } else {
+                    *unfollowed + 1
+                };
+                if *unfollowed > listen_cycles {
+                    self.phase = Phase::Listening { cycles: 0 };
+                }
+            }
+            Phase::Listening { cycles } => {
+                *cycles += u32::from(self.witnesses.anybody());
+                // One who could hold the state and is not there gets longer: it may be the only one that does.
+                let patience = if self.witnesses.everybody() { 1 } else { 5 };
+                if *cycles >= listen_cycles * patience {
+                    self.start(moment);
+                }
+            }
+        }
+    }
+
+    /// Starts to sample: from the newest state that lives, or cold.
+    pub(super) fn start(&mut self, moment: Moment) {
+        let capacity = self.settings.agreement.history;
+        let newest = self
+            .witnesses
+            .newest()
+            .map(|(station, holding)| (station, *holding));
+        let history = match newest {
+            Some((from, holding)) => {
+                let lineage = holding.lineage;
+                self.report(Event::AdoptedLineage {
+                    moment,
+                    lineage,
+                    from,
+                });
+                History::from(holding.born, lineage, capacity)
+            }
+            None => {
+                let awaits_release = self.settings.release == Release::Operator;
+                self.released = !awaits_release;
+                self.last_true = None;
+                self.report(Event::StartedCold {
+                    born: moment,
+                    awaits_release,
+                });
+                History::genesis(self.settings.hash, moment, capacity)
+            }
+        };
+        self.phase = Phase::Running {
+            history,
+            sampled: false,
+            unfollowed: 0,
+        };
+    }
+
+    /// Takes u(i)(t) and says it.
+    pub(super) fn sample(&mut self, now: Time) {
+        let moment = self.moment();
+        let Phase::Running {
+            history, sampled, ..
+        } = &mut self.phase
+        else {
+            return;
+        };
+        let living = self
+            .witnesses
+            .holdings()
+            .filter_map(|(_, holding)| history.place(holding.lineage))
+            .max();
+        let void = history.push(&self.field, living);
+        *sampled = true;
+        let base = history.base();
+        let body = Body::Sample(Sample {
+            born: history.born(),
+            base,
+            before: history.before(),
+            history: history.samples(),
+            applied: self.applied.clone(),
+        });
+        if void > 0 {
+            self.report(Event::Voided {
+                moment,
+                samples: void,
+                lineage: base,
+            });
+        }
+        self.report(Event::Sampled {
+            moment,
+            inputs: self.field.clone(),
+        });
+        let frame = Arc::new(self.frame(body));
+        self.outbox.push_back(Output::Send(Arc::clone(&frame)));
+        self.copies
+            .sent(now, &frame, &self.settings.agreement.schedule);
+    }
+}

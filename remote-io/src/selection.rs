@@ -1,0 +1,370 @@
+//! Which output a remote I/O may apply in one cycle.
+//!
+//! Invariant *No guess*: a value is applied only if it is provably h(x(t), u(t)) of the one true history of this program,
+//! the history that this remote I/O itself has sampled. Proof is by lineage: a lineage names the initial state and every input
+//! since, so equal lineages mean equal states. (Fujimoto and Sekiguchi, Theorem 2; they assume a perfect failure flag,
+//! which lineage replaces.)
+//!
+//! ```text
+//!   own frame, own lineage ──────────────────────────► Direct
+//!   word over a mask with me, my lineage,
+//!   and every other member's frame agrees with it ───► Reconstructed
+//!   neither ─────────────────────────────────────────► Missing (the caller holds, then falls safe)
+//! ```
+
+use std::sync::Arc;
+
+use understudy_wire::{
+    Body, Frame, Holding, Image, Lineage, Mode, ProgramId, ProgramSet, StationId, StationSet, Turn,
+    Word,
+};
+
+use crate::event::Missing;
+
+/// Where an applied output comes from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Selection {
+    Direct(Image),
+    Reconstructed(Image, StationId),
+    Missing(Missing),
+}
+
+/// What was heard in this cycle.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Heard<'a> {
+    /// The frame of each station's turn, by rank.
+    pub(crate) turns: &'a [Option<Arc<Frame>>],
+    /// N.
+    pub(crate) controllers: usize,
+    /// How many failures are masked.
+    pub(crate) mode: Mode,
+}
+
+impl<'a> Heard<'a> {
+    /// Selects the `width` outputs of program `me`, whose true lineage after this cycle's sample is `truth`.
+    ///
+    /// At most (words heard) × N steps, each over the holdings of one turn.
+    pub(crate) fn select(&self, me: ProgramId, truth: Lineage, width: usize) -> Selection {
+        if self.mode == Mode::Paper && self.silent().len() > 1 {
+            return Selection::Missing(Missing::SecondFailure);
+        }
+        if let Some((word, holding)) = self.own_word(me)
+            && holding.lineage == truth
+            && word.sum.width() == width
+        {
+            return Selection::Direct(word.sum.clone());
+        }
+        let mut missing = Missing::NobodyInStep;
+        for understudy in self.understudies() {
+            let Some(turn) = self.turn_of(understudy) else {
+                continue;
+            };
+            if holding_of(turn, me).is_none_or(|holding| holding.lineage != truth) {
+                continue;
+            }
+            for word in turn.words.iter().filter(|word| word.members.contains(me)) {
+                match self
+                    .reconstruct(me, turn, word)
+                    .and_then(|sum| sum.narrowed(width))
+                {
+                    Some(outputs) => return Selection::Reconstructed(outputs, understudy),
+                    None => missing = Missing::TwoErasures,
+                }
+            }
+        }
+        Selection::Missing(missing)
+    }
+
+    /// Equation (12) for one word: the sum of the word and of all its other members, or `None` where one of them is not
+    /// proved to be of the same history and of the same state as the word.
+    fn reconstruct(&self, me: ProgramId, turn: &Turn, word: &Word) -> Option<Image> {
+        let mut sum = word.sum.clone();
+        for other in word.members.without(ProgramSet::only(me)).iter() {
+            let (outputs, theirs) = self.own_word(other)?;
+            let ours = holding_of(turn, other)?;
+            if ours.lineage != theirs.lineage || ours.digest != theirs.digest {
+                return None;
+            }
+            sum.add(&outputs.sum);
+        }
+        Some(sum)
+    }
+
+    /// Equation (10) for every word of which all members are heard: the words whose sum is not 0, with those who can be wrong.
+    pub(crate) fn syndromes(self) -> impl Iterator<Item = (Image, StationSet)> {
+        let words = self.understudies().filter_map(move |understudy| {
+            let turn = self.turn_of(understudy)?;
+            Some(turn.words.iter().map(move |word| (understudy, turn, word)))
+        });
+        words.flatten().filter_map(move |(understudy, turn, word)| {
+            let me = word.members.iter().next()?;
+            let (outputs, theirs) = self.own_word(me)?;
+            let ours = holding_of(turn, me)?;
+            let mut syndrome = self.reconstruct(me, turn, word)?;
+            if ours.lineage != theirs.lineage || ours.digest != theirs.digest {
+                return None;
+            }
+            syndrome.add(&outputs.sum);
+            let accused = word.members.iter().map(|program| StationId(program.0));
+            let accused = accused.chain([understudy]).collect();
+            (!syndrome.is_zero()).then_some((syndrome, accused))
+        })
+    }
+
+    /// Equal lineages and unequal digests: a state was corrupted, here or there.
+    pub(crate) fn digest_differences(self) -> impl Iterator<Item = (ProgramId, StationSet)> {
+        let programs = (0..self.controllers as u8).map(ProgramId);
+        programs.flat_map(move |program| {
+            let holdings = (0..self.turns.len() as u8).filter_map(move |rank| {
+                let holding = holding_of(self.turn_of(StationId(rank))?, program)?;
+                Some((StationId(rank), holding))
+            });
+            let first = holdings.clone().next();
+            holdings.skip(1).filter_map(move |(station, holding)| {
+                let (first_station, first) = first?;
+                let differs = first.lineage == holding.lineage && first.digest != holding.digest;
+                differs.then(|| (program, [first_station, station].into_iter().collect()))
+            })
+        })
+    }
+
+    fn turn_of(&self, station: StationId) -> Option<&'a Turn> {
+        match &self.turns.get(station.index())?.as_ref()?.body {
+            Body::Turn(turn) => Some(turn),
+            _ => None,
+        }
+    }
+
+    /// Stations that said no output in this cycle.
+    fn silent(&self) -> StationSet {
+        let all = (0..self.turns.len() as u8).map(StationId);
+        all.filter(|&station| {
+            self.turn_of(station)
+                .is_none_or(|turn| turn.words.is_empty())
+        })
+        .collect()
+    }
+
+    fn understudies(&self) -> impl Iterator<Item = StationId> + use<'a> {
+        (self.controllers as u8..self.turns.len() as u8).map(StationId)
+    }
+
+    /// The output that a controller says of its own program, with the state that it rests on.
+    fn own_word(&self, program: ProgramId) -> Option<(&'a Word, &'a Holding)> {
+        let turn = self.turn_of(StationId(program.0))?;
+        let own = ProgramSet::only(program);
+        let word = turn.words.iter().find(|word| word.members == own)?;
+        Some((word, holding_of(turn, program)?))
+    }
+}
+
+fn holding_of(turn: &Turn, program: ProgramId) -> Option<&Holding> {
+    turn.holdings
+        .iter()
+        .find(|holding| holding.program == program)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use understudy_wire::{ClusterHash, ConfigurationHash, Digest, Header, Moment, Party};
+
+    const WIDTHS: [usize; 3] = [3, 2, 3];
+    const OUTPUTS: [u64; 3] = [0b101, 0b11, 0b110];
+    const TRUE: Lineage = Lineage(7);
+
+    /// What one controller does in the cycle.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    enum Controller {
+        Silent,
+        True,
+        /// It speaks from another history, and so says something else.
+        Stale,
+        /// Its lineage is the true one, and its state was corrupted.
+        Corrupted,
+    }
+
+    const CASES: [Controller; 4] = [
+        Controller::Silent,
+        Controller::True,
+        Controller::Stale,
+        Controller::Corrupted,
+    ];
+
+    fn image(program: usize, flipped: bool) -> Image {
+        let word = OUTPUTS[program] ^ u64::from(flipped);
+        Image::from_words(WIDTHS[program], &[word]).expect("it fits")
+    }
+
+    fn holding(program: usize, lineage: Lineage, digest: u64) -> Holding {
+        Holding {
+            program: ProgramId(program as u8),
+            born: Moment::default(),
+            lineage,
+            stepped: Moment::default(),
+            digest: Digest(digest),
+        }
+    }
+
+    fn frame(rank: usize, holdings: &[Holding], words: &[Word]) -> Arc<Frame> {
+        Arc::new(Frame {
+            header: Header {
+                cluster: ClusterHash(1),
+                configuration: ConfigurationHash(1),
+                moment: Moment::default(),
+                sender: Party::Station(StationId(rank as u8)),
+                alone: false,
+            },
+            body: Body::Turn(Turn {
+                heard: StationSet::EMPTY,
+                holdings: holdings.iter().copied().collect(),
+                words: words.iter().cloned().collect(),
+            }),
+        })
+    }
+
+    fn controller(program: usize, case: Controller) -> Option<Arc<Frame>> {
+        let (lineage, digest) = match case {
+            Controller::Silent => return None,
+            Controller::True => (TRUE, 1),
+            Controller::Stale => (Lineage(6), 1),
+            Controller::Corrupted => (TRUE, 2),
+        };
+        let word = Word {
+            members: ProgramSet::only(ProgramId(program as u8)),
+            sum: image(program, case != Controller::True),
+        };
+        Some(frame(
+            program,
+            &[holding(program, lineage, digest)],
+            &[word],
+        ))
+    }
+
+    /// An understudy that is right, with one word over `mask` and one for each other program of `alone`.
+    fn understudy(mask: u64, alone: u64) -> Arc<Frame> {
+        let holdings: Vec<Holding> = (0..3).map(|program| holding(program, TRUE, 1)).collect();
+        let word = |members: ProgramSet| {
+            let mut sum = Image::default();
+            for program in members.iter() {
+                sum.add(&image(program.index(), false));
+            }
+            Word { members, sum }
+        };
+        let together = ProgramSet::from_bits(mask);
+        let words: Vec<Word> = [together]
+            .into_iter()
+            .chain(
+                ProgramSet::from_bits(alone)
+                    .without(together)
+                    .iter()
+                    .map(ProgramSet::only),
+            )
+            .filter(|members| !members.is_empty())
+            .map(word)
+            .collect();
+        frame(3, &holdings, &words)
+    }
+
+    /// Every controller in every case, with every word of one understudy, and without it: a true output is found where one can
+    /// be proved, and nothing else is ever applied but what the controller itself says of the true history.
+    #[test]
+    fn what_is_applied_is_proved() {
+        for cases in (0..64).map(|case| [case % 4, case / 4 % 4, case / 16]) {
+            let cases = cases.map(|case| CASES[case]);
+            for (mask, alone) in (0..8).flat_map(|mask| (0..8).map(move |alone| (mask, alone))) {
+                for with_understudy in [false, true] {
+                    check(cases, mask, alone, with_understudy);
+                }
+            }
+        }
+    }
+
+    fn check(cases: [Controller; 3], mask: u64, alone: u64, with_understudy: bool) {
+        let mut turns: Vec<Option<Arc<Frame>>> = (0..3)
+            .map(|program| controller(program, cases[program]))
+            .collect();
+        turns.push(with_understudy.then(|| understudy(mask, alone)));
+        let heard = Heard {
+            turns: &turns,
+            controllers: 3,
+            mode: Mode::Full,
+        };
+        for me in 0..3 {
+            let selection = heard.select(ProgramId(me as u8), TRUE, WIDTHS[me]);
+            let others = (0..3).filter(|&other| other != me && mask >> other & 1 == 1);
+            let provable = with_understudy
+                && if mask >> me & 1 == 1 {
+                    others.clone().all(|other| cases[other] == Controller::True)
+                } else {
+                    alone >> me & 1 == 1
+                };
+            match cases[me] {
+                // A value fault of a controller that is alone cannot be seen in its own frame; it is reported, below.
+                Controller::Corrupted => assert_eq!(selection, Selection::Direct(image(me, true))),
+                Controller::True => assert_eq!(selection, Selection::Direct(image(me, false))),
+                _ if provable => {
+                    let restored = Selection::Reconstructed(image(me, false), StationId(3));
+                    assert_eq!(selection, restored, "{cases:?} {mask:03b} {alone:03b}");
+                }
+                _ => assert!(matches!(selection, Selection::Missing(_))),
+            }
+        }
+        let corrupted = cases
+            .iter()
+            .filter(|&&case| case == Controller::Corrupted)
+            .count();
+        let differences = heard.digest_differences().count();
+        assert_eq!(differences, if with_understudy { corrupted } else { 0 });
+        assert_eq!(heard.syndromes().count(), 0);
+    }
+
+    /// An output that is corrupted on its way out of a sound state leaves a syndrome, (10), and accuses all who can be wrong.
+    #[test]
+    fn a_corrupted_output_leaves_a_syndrome() {
+        for program in 0..3 {
+            let mut turns: Vec<Option<Arc<Frame>>> = (0..3)
+                .map(|program| controller(program, Controller::True))
+                .collect();
+            let word = Word {
+                members: ProgramSet::only(ProgramId(program as u8)),
+                sum: image(program, true),
+            };
+            turns[program] = Some(frame(program, &[holding(program, TRUE, 1)], &[word]));
+            turns.push(Some(understudy(0b111, 0)));
+            let heard = Heard {
+                turns: &turns,
+                controllers: 3,
+                mode: Mode::Full,
+            };
+            let syndromes: Vec<_> = heard.syndromes().collect();
+            assert_eq!(syndromes.len(), 1);
+            assert_eq!(syndromes[0].0.words(), [1]);
+            assert_eq!(syndromes[0].1, StationSet::first(4));
+        }
+    }
+
+    /// The paper's S2: with two stations silent nothing is applied, not even what is there.
+    #[test]
+    fn the_paper_fails_with_the_second_station() {
+        for silent in (0..16_u64).map(StationSet::from_bits) {
+            let turns: Vec<Option<Arc<Frame>>> = (0..4)
+                .map(|rank| match rank {
+                    _ if silent.contains(StationId(rank as u8)) => None,
+                    3 => Some(understudy(0b111, 0)),
+                    _ => controller(rank, Controller::True),
+                })
+                .collect();
+            let heard = Heard {
+                turns: &turns,
+                controllers: 3,
+                mode: Mode::Paper,
+            };
+            for (me, width) in (0..).zip(WIDTHS) {
+                let selection = heard.select(ProgramId(me), TRUE, width);
+                let missing = matches!(selection, Selection::Missing(_));
+                assert_eq!(missing, silent.len() > 1, "{silent:?}");
+            }
+        }
+    }
+}

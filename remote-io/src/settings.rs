@@ -1,0 +1,36 @@
+//! What a remote I/O is told when it starts.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use understudy_wire::{Agreement, Image, ProgramHash, ProgramId};
+
+/// A remote I/O's own settings.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// The program whose plant it serves.
+    pub program: ProgramId,
+    /// What all agreed on.
+    pub agreement: Arc<Agreement>,
+    /// Of the program's circuit.
+    pub hash: ProgramHash,
+    /// Width of u(i) in bits.
+    pub inputs: usize,
+    /// Cycles for which the last true outputs are kept when nothing true is there.
+    pub hold_cycles: u32,
+    /// y(i) after that; its width is that of the outputs.
+    pub fail_safe: Image,
+    /// Who releases the outputs after a cold start.
+    pub release: Release,
+}
+
+/// Who releases the outputs after a program has started cold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Release {
+    /// Nobody has to: they are driven as soon as they are true.
+    #[default]
+    Automatic,
+    /// The operator, by a command; fail-safe until then.
+    Operator,
+}

@@ -1,0 +1,427 @@
+//! What a run came to, from its records alone, as they come.
+//!
+//! One account for both worlds: it numbers the cycles, finds the origin, asks a [`Referee`] for each remote I/O whether what was
+//! applied is true, and keeps what the summary, the table and the figure show. Its memory is bounded: cycles are
+//! closed in order, [`LAG_CYCLES`] behind the newest, when every party has surely said what it had to say about them.
+
+mod closing;
+mod numbering;
+mod presence;
+mod service;
+mod stalls;
+mod traces;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Duration;
+
+use understudy_node::Event as StationEvent;
+use understudy_remote_io::{Event as RemoteIoEvent, Missing};
+use understudy_simulator::{Action, Referee, Violation};
+use understudy_wire::{
+    Agreement, Moment, Party, ProgramId, ProgramSet, Source, StationId, StationSet,
+};
+
+use crate::figure::Signals;
+use crate::parties::Parties;
+use crate::record::{Happening, Record, RunEvent, moment};
+use crate::scenario::{During, Scenario};
+
+pub use presence::{Interval, Presence};
+pub use service::{Counts, Service};
+pub use stalls::Stall;
+pub(crate) use traces::{PlantTrace, TRACED_CYCLES, Trace, Traces};
+
+use numbering::Numbering;
+use presence::Presences;
+use service::{Outcome, ServiceTrack};
+use stalls::Stalls;
+
+/// How far behind the newest cycle one is closed.
+const LAG_CYCLES: usize = 64;
+
+/// Violations that are listed, at most; all are counted.
+const MAXIMUM_VIOLATIONS: usize = 100;
+
+/// What an account has to know of a cluster.
+#[derive(Debug, Clone)]
+pub struct Terms {
+    /// Who is who.
+    pub parties: Parties,
+    /// What all agreed on.
+    pub agreement: Arc<Agreement>,
+    /// One for each program, with the circuit and the remote I/O's settings.
+    pub referees: Vec<Referee>,
+    /// Of each program, for the figure.
+    pub signals: Vec<Signals>,
+}
+
+/// Who says where the origin is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OriginRule {
+    /// The records: the first cycle in which everybody was in step.
+    Found,
+    /// Whoever runs the scenario.
+    Told,
+}
+
+/// A step of the scenario as it was done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct DoneStep {
+    pub(crate) action: Action,
+    pub(crate) party: Party,
+    pub(crate) asked: u64,
+    /// The first cycle whose deadline came after it.
+    pub(crate) measured: u64,
+}
+
+/// How a range of the expectation fared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct RangeFinding {
+    /// Cycles with another source.
+    pub(crate) missed: u64,
+    /// The first of them, and what was applied.
+    pub(crate) first: Option<(u64, Option<Source>)>,
+}
+
+/// A cycle that is not closed yet.
+#[derive(Debug, Clone, Default)]
+struct OpenCycle {
+    outcomes: BTreeMap<ProgramId, Outcome>,
+    heard: StationSet,
+    /// Remote I/Os that drove directly and heard everybody.
+    content: ProgramSet,
+    /// Understudies that spoke for all programs.
+    covering: StationSet,
+}
+
+/// The account of one run.
+#[derive(Debug)]
+pub struct Account {
+    pub(crate) terms: Terms,
+    pub(crate) cycles: u64,
+    numbering: Numbering,
+    open: BTreeMap<i64, OpenCycle>,
+    closed_up_to: Option<i64>,
+    origin: Option<(Moment, i64)>,
+    origin_rule: OriginRule,
+    presences: Presences,
+    pub(crate) services: Vec<ServiceTrack>,
+    stalls: Stalls,
+    pub(crate) traces: Traces,
+    pub(crate) steps: Vec<DoneStep>,
+    pub(crate) violations: Vec<(u64, ProgramId, Violation)>,
+    pub(crate) violation_count: u64,
+    pub(crate) during: Vec<(During, RangeFinding)>,
+    pub(crate) refused: Vec<(String, String)>,
+    pub(crate) interrupted: bool,
+    pub(crate) records: u64,
+}
+
+impl Account {
+    /// An account of a run of `scenario` that has not begun.
+    pub fn new(terms: Terms, scenario: &Scenario, origin_rule: OriginRule) -> Self {
+        let schedule = &terms.agreement.schedule;
+        let programs = schedule.controllers();
+        let stations = schedule.stations();
+        Self {
+            cycles: scenario.cycles,
+            numbering: Numbering::default(),
+            open: BTreeMap::new(),
+            closed_up_to: None,
+            origin: None,
+            origin_rule,
+            presences: Presences::new(stations, terms.agreement.flag_after),
+            services: vec![ServiceTrack::default(); programs],
+            stalls: Stalls::default(),
+            traces: Traces {
+                plants: vec![PlantTrace::default(); programs],
+                stations: vec![Trace::default(); stations],
+            },
+            steps: Vec::new(),
+            violations: Vec::new(),
+            violation_count: 0,
+            during: scenario
+                .expect
+                .during
+                .iter()
+                .map(|during| (during.clone(), RangeFinding::default()))
+                .collect(),
+            refused: Vec::new(),
+            interrupted: false,
+            records: 0,
+            terms,
+        }
+    }
+
+    /// The moment of the origin, once there is one.
+    pub fn origin(&self) -> Option<Moment> {
+        self.origin.map(|(moment, _)| moment)
+    }
+
+    /// The newest cycle that was decided, counted from the origin; none before it.
+    pub fn cycle(&self) -> Option<u64> {
+        let (_, origin) = self.origin?;
+        u64::try_from(self.numbering.latest()? - origin).ok()
+    }
+
+    /// Remote I/Os that do not drive directly yet, and understudies that do not speak for all programs: why there is no origin.
+    pub fn awaited(&self) -> Vec<Party> {
+        let schedule = &self.terms.agreement.schedule;
+        let newest = self.open.iter().next_back().map(|(_, cycle)| cycle);
+        let before = self.open.iter().rev().nth(1).map(|(_, cycle)| cycle);
+        let in_either =
+            |test: &dyn Fn(&OpenCycle) -> bool| [newest, before].into_iter().flatten().any(test);
+        let remote_ios = (0..schedule.controllers() as u8)
+            .map(ProgramId)
+            .filter(|&program| !in_either(&|cycle| cycle.content.contains(program)))
+            .map(Party::RemoteIo);
+        let stations = (0..schedule.stations() as u8)
+            .map(StationId)
+            .filter(|&station| {
+                let test = |cycle: &OpenCycle| {
+                    if schedule.is_understudy(station) {
+                        cycle.covering.contains(station)
+                    } else {
+                        cycle.heard.contains(station)
+                    }
+                };
+                !in_either(&test)
+            })
+            .map(Party::Station);
+        stations.chain(remote_ios).collect()
+    }
+
+    /// The simulator knows better than the records where the origin is: `moment` is cycle `cycle` from it.
+    pub(crate) fn origin_is(&mut self, moment: Moment, cycle: u64) {
+        if let (None, Some(number)) = (self.origin, self.numbering.of(moment)) {
+            let cycle = i64::try_from(cycle).unwrap_or(i64::MAX / 2);
+            self.origin = Some((moment, number - cycle));
+        }
+    }
+
+    /// Takes the next record.
+    pub fn observe(&mut self, record: &Record) {
+        self.records += 1;
+        match (&record.event, record.party) {
+            (Happening::Station(event), Some(Party::Station(station))) => {
+                self.station(station, event);
+            }
+            (Happening::RemoteIo(event), Some(Party::RemoteIo(program))) => {
+                self.remote_io(program, event);
+            }
+            (Happening::Plant(event), Some(Party::Plant(program))) => self.plant(program, event),
+            (Happening::Run(event), _) => self.run(event),
+            _ => {}
+        }
+        if let Some((late, party)) = stall_of(record) {
+            let number = moment(&record.event)
+                .and_then(|moment| self.numbering.of(moment))
+                .or_else(|| self.numbering.latest());
+            if let Some(number) = number {
+                let period = self.terms.agreement.schedule.period();
+                self.stalls.stalled(number, party, late, period);
+            }
+        }
+    }
+
+    fn station(&mut self, station: StationId, event: &StationEvent) {
+        match event {
+            StationEvent::Spoke { moment, words } => {
+                let widest = words.iter().max_by_key(|word| word.members.len());
+                let (Some(word), Some(number)) = (widest, self.numbering.of(*moment)) else {
+                    return;
+                };
+                let programs = self.terms.agreement.schedule.controllers();
+                if word.members == ProgramSet::first(programs)
+                    && self.terms.agreement.schedule.is_understudy(station)
+                    && let Some(cycle) = self.open_cycle(number)
+                {
+                    cycle.covering.insert(station);
+                    self.look_for_origin(number, *moment);
+                }
+                if let (Some(at), Some(trace)) = (
+                    self.since_origin(number),
+                    self.traces.stations.get_mut(station.index()),
+                ) {
+                    let mut sum = word.sum.clone();
+                    let others = words.iter().filter(|other| other.members != word.members);
+                    others.for_each(|other| sum.add(&other.sum));
+                    trace.push(at, &sum);
+                }
+            }
+            StationEvent::Refused {
+                party,
+                theirs,
+                ours,
+            } => {
+                self.refuse(*party, theirs.to_string(), ours.to_string());
+            }
+            _ => {}
+        }
+    }
+
+    fn remote_io(&mut self, program: ProgramId, event: &RemoteIoEvent) {
+        let violation = self
+            .terms
+            .referees
+            .get_mut(program.index())
+            .and_then(|referee| referee.observe(event).err());
+        let RemoteIoEvent::Applied {
+            moment,
+            source,
+            missing,
+            heard,
+            ..
+        } = event
+        else {
+            if let RemoteIoEvent::Refused {
+                party,
+                theirs,
+                ours,
+            } = event
+            {
+                self.refuse(*party, theirs.to_string(), ours.to_string());
+            }
+            if let Some(violation) = violation {
+                self.violate(program, self.numbering.latest(), violation);
+            }
+            return;
+        };
+        let idle = *missing == Some(Missing::NoCycle);
+        let number = self.numbering.deadline(program, *moment, idle);
+        let outcome = Outcome {
+            source: *source,
+            wrong: violation.is_some(),
+        };
+        if let Some(violation) = violation {
+            self.violate(program, Some(number), violation);
+        }
+        let stations = self.terms.agreement.schedule.stations();
+        let Some(cycle) = self.open_cycle(number) else {
+            return;
+        };
+        cycle.outcomes.insert(program, outcome);
+        if !idle {
+            cycle.heard = cycle.heard.or(*heard);
+            if *source == Source::Direct && *heard == StationSet::first(stations) {
+                cycle.content.insert(program);
+            }
+        }
+        self.look_for_origin(number, *moment);
+        while self.open.len() > LAG_CYCLES {
+            self.close_oldest();
+        }
+    }
+
+    fn plant(&mut self, program: ProgramId, event: &understudy_plant::Event) {
+        let understudy_plant::Event::Stepped { moment, field, .. } = event else {
+            return;
+        };
+        let at = self
+            .numbering
+            .of(*moment)
+            .and_then(|number| self.since_origin(number));
+        let within = at.is_some_and(|at| at < self.cycles);
+        if let Some(service) = self.services.get_mut(program.index())
+            && (at.is_none() || within)
+        {
+            service.field(field, within);
+        }
+        if let (Some(at), Some(trace)) = (at, self.traces.plants.get_mut(program.index()))
+            && within
+        {
+            trace.push(at, field);
+        }
+    }
+
+    fn run(&mut self, event: &RunEvent) {
+        match event {
+            RunEvent::Fault {
+                action,
+                party,
+                asked,
+            } => {
+                let number = self.numbering.latest().unwrap_or(0) + 1;
+                self.stalls.step(number, *party, *action);
+                let measured = self.since_origin(number).unwrap_or(0);
+                self.presences.step(measured, *party, *action);
+                self.steps.push(DoneStep {
+                    action: *action,
+                    party: *party,
+                    asked: *asked,
+                    measured,
+                });
+            }
+            RunEvent::Interrupted => self.interrupted = true,
+            RunEvent::Started { .. } | RunEvent::Ended { .. } | RunEvent::Finished => {}
+        }
+    }
+
+    fn refuse(&mut self, party: Party, theirs: String, ours: String) {
+        let name = self.terms.parties.name(party).to_owned();
+        let text = format!("it runs configuration {theirs}, the others {ours}");
+        if !self.refused.iter().any(|(known, _)| *known == name) {
+            self.refused.push((name, text));
+        }
+    }
+
+    fn violate(&mut self, program: ProgramId, number: Option<i64>, violation: Violation) {
+        let at = number.and_then(|number| self.since_origin(number));
+        self.violation_count += 1;
+        if self.violations.len() < MAXIMUM_VIOLATIONS {
+            self.violations.push((at.unwrap_or(0), program, violation));
+        }
+    }
+
+    fn since_origin(&self, number: i64) -> Option<u64> {
+        let (_, origin) = self.origin?;
+        u64::try_from(number - origin).ok()
+    }
+
+    /// None for a cycle that is closed.
+    fn open_cycle(&mut self, number: i64) -> Option<&mut OpenCycle> {
+        if self.closed_up_to.is_some_and(|closed| number <= closed) {
+            return None;
+        }
+        Some(self.open.entry(number).or_default())
+    }
+
+    fn look_for_origin(&mut self, number: i64, moment: Moment) {
+        if self.origin.is_some() || self.origin_rule == OriginRule::Told {
+            return;
+        }
+        let schedule = &self.terms.agreement.schedule;
+        let understudies = StationSet::first(schedule.stations())
+            .without(StationSet::first(schedule.controllers()));
+        let everybody = self.open.get(&number).is_some_and(|cycle| {
+            cycle.content == ProgramSet::first(schedule.controllers())
+                && cycle.covering == understudies
+        });
+        if everybody {
+            self.origin = Some((moment, number));
+        }
+    }
+
+    /// Closes the oldest open cycle, and those before it that no record had.
+    fn close_oldest(&mut self) {
+        let Some((number, cycle)) = self.open.pop_first() else {
+            return;
+        };
+        // A number that no record had is a cycle that nobody decided.
+        let first = self.closed_up_to.map_or(number, |closed| closed + 1);
+        for missing in first..number {
+            self.close(missing, &OpenCycle::default());
+        }
+        self.close(number, &cycle);
+        self.closed_up_to = Some(number);
+    }
+}
+
+fn stall_of(record: &Record) -> Option<(Duration, Party)> {
+    match &record.event {
+        Happening::Station(StationEvent::Stalled { late, .. })
+        | Happening::RemoteIo(RemoteIoEvent::Stalled { late, .. }) => Some((*late, record.party?)),
+        _ => None,
+    }
+}

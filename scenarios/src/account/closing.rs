@@ -1,0 +1,67 @@
+//! The end of a cycle, and of a run: what was open is counted.
+
+use understudy_wire::ProgramId;
+
+use super::presence::{Interval, Presence, Presences};
+use super::stalls::Stall;
+use super::{Account, OpenCycle};
+
+impl Account {
+    pub(super) fn close(&mut self, number: i64, cycle: &OpenCycle) {
+        let Some(at) = self.since_origin(number).filter(|&at| at < self.cycles) else {
+            return;
+        };
+        self.presences.close_cycle(at, cycle.heard);
+        let stalled = self.stalls.explains(number);
+        for (program, service) in self.services.iter_mut().enumerate() {
+            let outcome = cycle.outcomes.get(&ProgramId(program as u8)).copied();
+            service.close_cycle(at, outcome, stalled);
+        }
+        for (during, finding) in &mut self.during {
+            if !(during.from..during.to).contains(&at) {
+                continue;
+            }
+            let source = cycle
+                .outcomes
+                .get(&during.remote_io)
+                .map(|outcome| outcome.source);
+            if !source.is_some_and(|source| during.sources.contains(&source)) {
+                finding.missed += 1;
+                finding.first.get_or_insert((at, source));
+            }
+        }
+    }
+
+    /// Closes every cycle. Answers with how many there were from the origin on, the presences by rank, and the stalls.
+    pub(crate) fn finish(&mut self) -> Finished {
+        while !self.open.is_empty() {
+            self.close_oldest();
+        }
+        let cycles_run = self.services.first().map_or(0, |service| {
+            service.intervals.last().map_or(0, |last| last.to)
+        });
+        let stations = self.terms.agreement.schedule.stations();
+        let presences = std::mem::replace(&mut self.presences, Presences::new(stations, 1));
+        let stalls = std::mem::take(&mut self.stalls);
+        let listed = stalls.listed.iter().filter_map(|(number, party, late)| {
+            Some(Stall {
+                cycle: self.since_origin(*number)?,
+                name: self.terms.parties.name(*party).to_owned(),
+                late_us: u64::try_from(late.as_micros()).unwrap_or(u64::MAX),
+            })
+        });
+        let listed: Vec<Stall> = listed.filter(|stall| stall.cycle < self.cycles).collect();
+        Finished {
+            cycles_run,
+            presences: presences.finish(cycles_run),
+            stalls: listed,
+        }
+    }
+}
+
+/// See [`Account::finish`].
+pub(crate) struct Finished {
+    pub(crate) cycles_run: u64,
+    pub(crate) presences: Vec<(Vec<Interval<Presence>>, u64)>,
+    pub(crate) stalls: Vec<Stall>,
+}

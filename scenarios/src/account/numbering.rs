@@ -1,0 +1,202 @@
+//! One count of cycles for a whole run, over all epochs.
+//!
+//! A cluster numbers the cycles of each epoch anew, and a remote I/O passes *idle* deadlines where nobody starts a cycle. Here
+//! every deadline gets a number that only grows: an epoch goes on where the last one ended, and idle deadlines count where
+//! every remote I/O passed them (one that is cut off alone does not move the others). The last epoch is not the greatest one: a
+//! later founder whom nobody joins gives its epoch up for an earlier one.
+
+use std::collections::BTreeMap;
+
+use understudy_wire::{Epoch, Moment, ProgramId};
+
+/// Gives numbers to moments.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Numbering {
+    /// For each epoch: what has to be added to its cycles.
+    offsets: BTreeMap<Epoch, i64>,
+    /// The newest cycle that was started.
+    newest: Option<(Moment, i64)>,
+    remote_ios: BTreeMap<ProgramId, Last>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Last {
+    moment: Moment,
+    number: i64,
+    /// Deadlines since, without a cycle.
+    idle: i64,
+}
+
+impl Numbering {
+    /// The number of a deadline that a remote I/O reports. `idle` says that no cycle was started for it.
+    pub(crate) fn deadline(&mut self, remote_io: ProgramId, moment: Moment, idle: bool) -> i64 {
+        if idle
+            && let Some(last) = self.remote_ios.get_mut(&remote_io)
+            && last.moment == moment
+        {
+            last.idle += 1;
+            return last.number + last.idle;
+        }
+        let number = self.start(remote_io, moment);
+        let last = Last {
+            moment,
+            number,
+            idle: 0,
+        };
+        self.remote_ios.insert(remote_io, last);
+        number
+    }
+
+    /// The number of a moment that others speak of; none for an epoch that no remote I/O has seen.
+    pub(crate) fn of(&self, moment: Moment) -> Option<i64> {
+        let offset = self.offsets.get(&moment.epoch)?;
+        Some(cycle(moment) + offset)
+    }
+
+    /// The last number that was given.
+    pub(crate) fn latest(&self) -> Option<i64> {
+        self.remote_ios
+            .values()
+            .map(|last| last.number + last.idle)
+            .max()
+    }
+
+    fn start(&mut self, remote_io: ProgramId, moment: Moment) -> i64 {
+        let Some((newest, newest_number)) = self.newest else {
+            self.offsets.insert(moment.epoch, 0);
+            self.newest = Some((moment, cycle(moment)));
+            return cycle(moment);
+        };
+        if moment.epoch == newest.epoch {
+            if moment > newest {
+                let idle = self.idle_of_all(newest_number);
+                let skipped = cycle(moment) - cycle(newest) - 1;
+                *self.offsets.entry(moment.epoch).or_default() += (idle - skipped).max(0);
+            }
+        } else {
+            let next = newest_number + self.idle_of_all(newest_number) + 1;
+            let offset = self
+                .offsets
+                .entry(moment.epoch)
+                .or_insert(next - cycle(moment));
+            // One that comes back to an epoch goes on counting from where it was.
+            let own = self.remote_ios.get(&remote_io).map(|last| last.number);
+            if own.is_some_and(|own| cycle(moment) + *offset <= own) {
+                *offset = next - cycle(moment);
+            }
+        }
+        let number = self.of(moment).unwrap_or(newest_number);
+        if number > newest_number {
+            self.newest = Some((moment, number));
+        }
+        number
+    }
+
+    /// Idle deadlines that every remote I/O has passed which was there in the newest cycle.
+    fn idle_of_all(&self, newest_number: i64) -> i64 {
+        self.remote_ios
+            .values()
+            .filter(|last| last.number >= newest_number)
+            .map(|last| last.idle)
+            .min()
+            .unwrap_or(0)
+    }
+}
+
+fn cycle(moment: Moment) -> i64 {
+    i64::try_from(moment.cycle.0).unwrap_or(i64::MAX / 2)
+}
+
+#[cfg(test)]
+mod tests {
+    use understudy_wire::Cycle;
+
+    use super::*;
+
+    /// Rows of remote I/O, epoch, cycle, idle and the number that must come out.
+    fn check(rows: &[(u8, u64, u64, bool, i64)]) {
+        let mut numbering = Numbering::default();
+        for &(remote_io, epoch, cycle, idle, expected) in rows {
+            let moment = Moment {
+                epoch: Epoch(epoch),
+                cycle: Cycle(cycle),
+            };
+            let number = numbering.deadline(ProgramId(remote_io), moment, idle);
+            assert_eq!(number, expected, "{remote_io} at {moment} in {rows:?}");
+        }
+    }
+
+    #[test]
+    fn cycles_keep_their_numbers() {
+        check(&[
+            (0, 1, 5, false, 5),
+            (1, 1, 5, false, 5),
+            (0, 1, 6, false, 6),
+            (1, 1, 7, false, 7),
+        ]);
+    }
+
+    #[test]
+    fn an_epoch_goes_on_where_the_last_one_ended() {
+        check(&[
+            (0, 1, 5, false, 5),
+            (0, 2, 0, false, 6),
+            (1, 2, 0, false, 6),
+            (1, 2, 1, false, 7),
+        ]);
+    }
+
+    #[test]
+    fn the_last_epoch_is_not_the_greatest_one() {
+        check(&[
+            (0, 9, 0, false, 0),
+            (1, 4, 3, false, 1),
+            (0, 4, 4, false, 2),
+            (1, 4, 4, false, 2),
+            (0, 4, 5, false, 3),
+        ]);
+    }
+
+    #[test]
+    fn one_that_comes_back_to_an_epoch_goes_on_counting() {
+        check(&[
+            (0, 4, 0, false, 0),
+            (0, 9, 0, false, 1),
+            (0, 9, 1, false, 2),
+            (0, 4, 1, false, 3),
+            (0, 4, 2, false, 4),
+        ]);
+    }
+
+    #[test]
+    fn idle_deadlines_of_all_count() {
+        check(&[
+            (0, 1, 5, false, 5),
+            (1, 1, 5, false, 5),
+            (0, 1, 5, true, 6),
+            (1, 1, 5, true, 6),
+            (0, 1, 5, true, 7),
+            (1, 1, 5, true, 7),
+            (0, 1, 6, false, 8),
+            (1, 1, 6, false, 8),
+        ]);
+    }
+
+    #[test]
+    fn idle_deadlines_of_one_do_not_move_the_others() {
+        check(&[
+            (0, 1, 5, false, 5),
+            (1, 1, 5, false, 5),
+            (0, 1, 5, true, 6),
+            (1, 1, 6, false, 6),
+            (0, 1, 5, true, 7),
+            (1, 1, 7, false, 7),
+            (0, 1, 8, false, 8),
+        ]);
+    }
+
+    #[test]
+    fn skipped_cycles_are_idle_deadlines_already() {
+        check(&[(0, 1, 5, false, 5), (0, 1, 5, true, 6), (0, 1, 7, false, 7)]);
+    }
+}

@@ -1,0 +1,341 @@
+//! `figure10.svg`: the run as figure 10 shows it. A panel for each plant, each controller and each understudy, cycles to the right,
+//! every signal a line that is high or low; cycles in which a station was off or joining are shaded.
+//!
+//! Colours are few and fixed, so that a style sheet at the head of the file can turn them for a dark page.
+
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+use understudy_wire::Image;
+
+use crate::account::{Account, Interval, Presence, Service, TRACED_CYCLES, Trace};
+use crate::summary::Summary;
+
+/// Names of a program's signals.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Signals {
+    /// u, in order.
+    pub inputs: Vec<String>,
+    /// y, in order.
+    pub outputs: Vec<String>,
+}
+
+const WIDTH: u32 = 1100;
+const LABELS_WIDTH: i32 = 150;
+const LANE_HEIGHT: u32 = 17;
+const PANEL_MARGIN: u32 = 58;
+
+/// Lanes of one panel, at most.
+const MAXIMUM_LANES: usize = 24;
+
+const INK: RGBColor = RGBColor(0x1a, 0x20, 0x2c);
+const GRID: RGBColor = RGBColor(0xd5, 0xda, 0xe1);
+const SIGNAL: RGBColor = RGBColor(0x1f, 0x5f, 0xa8);
+const POSITION: RGBColor = RGBColor(0x2e, 0x7d, 0x4f);
+const OFF: RGBColor = RGBColor(0xf3, 0xc6, 0xc1);
+const JOINING: RGBColor = RGBColor(0xf9, 0xe3, 0xb4);
+
+/// Turns the colours above for a dark page; they are written in capitals by the backend.
+const STYLE: &str = "<style>\
+text{font-family:system-ui,sans-serif}\
+@media (prefers-color-scheme:dark){\
+[fill=\"#1A202C\"]{fill:#e2e8f0}[stroke=\"#1A202C\"]{stroke:#e2e8f0}\
+[stroke=\"#D5DAE1\"]{stroke:#3a4452}\
+[stroke=\"#1F5FA8\"]{stroke:#7db4f0}[stroke=\"#2E7D4F\"]{stroke:#7fcf9f}\
+[fill=\"#F3C6C1\"]{fill:#6b2f2a}[fill=\"#F9E3B4\"]{fill:#5c4a1c}\
+}</style>";
+
+/// The figure could not be drawn.
+#[derive(Debug, thiserror::Error)]
+#[error("the figure could not be drawn: {0}")]
+pub struct FigureError(String);
+
+/// A step of a lane: from cycle, to cycle, height from 0 to 1 at the end of it.
+type Step = (u64, u64, f64);
+
+struct Lane {
+    name: String,
+    colour: RGBColor,
+    steps: Vec<Step>,
+}
+
+struct Panel {
+    title: String,
+    lanes: Vec<Lane>,
+    shades: Vec<(u64, u64, RGBColor)>,
+}
+
+impl Panel {
+    fn height(&self) -> u32 {
+        PANEL_MARGIN + LANE_HEIGHT * self.lanes.len().max(1) as u32
+    }
+}
+
+/// Draws the figure of a run.
+///
+/// # Errors
+/// [`FigureError`] where the plotting library refuses.
+pub fn figure(account: &Account, summary: &Summary) -> Result<String, FigureError> {
+    let panels = panels(account, summary);
+    let end = summary.cycles_run.clamp(1, TRACED_CYCLES);
+    let mut svg = String::new();
+    draw(&mut svg, &panels, end).map_err(|error| FigureError(error.to_string()))?;
+    // The style sheet belongs behind the opening tag.
+    let place = svg
+        .find("<svg")
+        .and_then(|tag| Some(tag + svg[tag..].find('>')? + 1));
+    if let Some(place) = place {
+        svg.insert_str(place, STYLE);
+    }
+    Ok(svg)
+}
+
+fn draw(
+    svg: &mut String,
+    panels: &[Panel],
+    end: u64,
+) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {
+    let height = panels.iter().map(Panel::height).sum::<u32>() + 12;
+    let backend = SVGBackend::with_string(svg, (WIDTH, height));
+    let mut rest = backend.into_drawing_area();
+    for panel in panels {
+        let (area, below) = rest.split_vertically(panel.height());
+        draw_panel(&area, panel, end)?;
+        rest = below;
+    }
+    rest.present()
+}
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
+
+fn draw_panel(
+    area: &Area<'_>,
+    panel: &Panel,
+    end: u64,
+) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {
+    let lanes = panel.lanes.len().max(1);
+    let mut chart = ChartBuilder::on(area)
+        .caption(&panel.title, ("sans-serif", 15, &INK))
+        .margin_right(16)
+        .x_label_area_size(24)
+        .y_label_area_size(LABELS_WIDTH)
+        .build_cartesian_2d(0.0..end as f64, 0.0..lanes as f64)?;
+    chart
+        .configure_mesh()
+        .disable_y_mesh()
+        .disable_y_axis()
+        .y_labels(0)
+        .x_labels(11)
+        .x_label_formatter(&|cycle| format!("{cycle:.0}"))
+        .label_style(("sans-serif", 11, &INK))
+        .bold_line_style(GRID)
+        .light_line_style(TRANSPARENT)
+        .axis_style(INK)
+        .draw()?;
+    let shades = panel.shades.iter().map(|(from, to, colour)| {
+        let corners = [(*from as f64, 0.0), ((*to).min(end) as f64, lanes as f64)];
+        Rectangle::new(corners, colour.filled())
+    });
+    chart.draw_series(shades)?;
+    let (left, top) = area.get_base_pixel();
+    for (index, lane) in panel.lanes.iter().enumerate() {
+        let base = (lanes - 1 - index) as f64;
+        draw_lane(&mut chart, lane, base)?;
+        let (_, y) = chart.backend_coord(&(0.0, base + 0.42));
+        let style = TextStyle::from(("sans-serif", 11).into_font())
+            .color(&INK)
+            .pos(plotters::style::text_anchor::Pos::new(
+                plotters::style::text_anchor::HPos::Right,
+                plotters::style::text_anchor::VPos::Center,
+            ));
+        let place = (LABELS_WIDTH - 8 - left + left, y - top);
+        area.draw_text(&lane.name, &style, place)?;
+    }
+    Ok(())
+}
+
+fn draw_lane<'a>(
+    chart: &mut ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>,
+    lane: &Lane,
+    base: f64,
+) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {
+    let mut line: Vec<(f64, f64)> = Vec::new();
+    let mut known_up_to = None;
+    let mut lines = Vec::new();
+    for &(from, to, height) in &lane.steps {
+        if known_up_to != Some(from) {
+            lines.push(std::mem::take(&mut line));
+        }
+        let y = base + 0.12 + 0.66 * height;
+        line.extend([(from as f64, y), (to as f64, y)]);
+        known_up_to = Some(to);
+    }
+    lines.push(line);
+    let style = lane.colour.stroke_width(1);
+    chart.draw_series(
+        lines
+            .into_iter()
+            .filter(|line| !line.is_empty())
+            .map(|line| PathElement::new(line, style)),
+    )?;
+    Ok(())
+}
+
+// ── what is in the panels ────────────────────────────────────────────────────────────────────────────────────────────
+
+fn panels(account: &Account, summary: &Summary) -> Vec<Panel> {
+    let terms = &account.terms;
+    let mut panels = Vec::new();
+    let letters = (0..).map(|index: usize| {
+        // a to z, then by number.
+        u8::try_from(index)
+            .ok()
+            .filter(|index| *index < 26)
+            .map_or_else(
+                || (index + 1).to_string(),
+                |index| char::from(b'a' + index).to_string(),
+            )
+    });
+    let mut letters = letters;
+    let mut letter = || letters.next().unwrap_or_default();
+    for (program, plant_name) in terms.parties.plants() {
+        let trace = &account.traces.plants[program.index()];
+        let names = terms
+            .signals
+            .get(program.index())
+            .map(|signals| &signals.inputs[..]);
+        let mut lanes = position_lanes(&trace.positions);
+        lanes.extend(bit_lanes(&trace.sensors, names.unwrap_or_default()));
+        let summary = summary.plants.iter().find(|plant| plant.name == plant_name);
+        panels.push(Panel {
+            title: format!("({}) plant {plant_name}: positions and sensors", letter()),
+            lanes: bounded(lanes),
+            shades: summary.map_or_else(Vec::new, |plant| service_shades(&plant.intervals)),
+        });
+    }
+    for (station, name) in terms.parties.stations() {
+        let trace = &account.traces.stations[station.index()];
+        let understudy = terms.agreement.schedule.is_understudy(station);
+        let width = trace.spans().map(|(_, _, image)| image.width()).max();
+        let parity: Vec<String>;
+        let names = if understudy {
+            parity = (1..=width.unwrap_or(0))
+                .map(|bit| format!("parity {bit}"))
+                .collect();
+            &parity[..]
+        } else {
+            terms
+                .signals
+                .get(station.index())
+                .map_or(&[][..], |signals| &signals.outputs)
+        };
+        let kind = if understudy {
+            "understudy"
+        } else {
+            "controller"
+        };
+        let what = if understudy {
+            "parity outputs"
+        } else {
+            "outputs"
+        };
+        panels.push(Panel {
+            title: if name == kind {
+                format!("({}) {name}: {what}", letter())
+            } else {
+                format!("({}) {kind} {name}: {what}", letter())
+            },
+            lanes: bounded(bit_lanes(trace, names)),
+            shades: summary
+                .stations
+                .get(station.index())
+                .map_or_else(Vec::new, |station| presence_shades(&station.intervals)),
+        });
+    }
+    panels
+}
+
+/// A panel stays readable: the lanes past the bound are left out, and the last one says how many.
+fn bounded(mut lanes: Vec<Lane>) -> Vec<Lane> {
+    if lanes.len() > MAXIMUM_LANES {
+        let left_out = lanes.len() - MAXIMUM_LANES + 1;
+        lanes.truncate(MAXIMUM_LANES - 1);
+        lanes.push(Lane {
+            name: format!("({left_out} more)"),
+            colour: SIGNAL,
+            steps: Vec::new(),
+        });
+    }
+    lanes
+}
+
+fn bit_lanes(trace: &Trace<Image>, names: &[String]) -> Vec<Lane> {
+    names
+        .iter()
+        .enumerate()
+        .map(|(bit, name)| Lane {
+            name: name.clone(),
+            colour: SIGNAL,
+            steps: joined(
+                trace
+                    .spans()
+                    .map(|(from, to, image)| (from, to, if image.get(bit) { 1.0 } else { 0.0 })),
+            ),
+        })
+        .collect()
+}
+
+fn position_lanes(trace: &Trace<Vec<u16>>) -> Vec<Lane> {
+    let count = trace.spans().map(|(_, _, positions)| positions.len()).max();
+    (0..count.unwrap_or(0))
+        .map(|index| Lane {
+            name: format!("position {}", index + 1),
+            colour: POSITION,
+            steps: joined(trace.spans().map(|(from, to, positions)| {
+                let position = positions.get(index).copied().unwrap_or_default();
+                (from, to, f64::from(position) / 1000.0)
+            })),
+        })
+        .collect()
+}
+
+/// Neighbours of equal height become one step.
+fn joined(steps: impl Iterator<Item = Step>) -> Vec<Step> {
+    let mut joined: Vec<Step> = Vec::new();
+    for (from, to, height) in steps {
+        match joined.last_mut() {
+            Some((_, end, last)) if *end == from && (*last - height).abs() < f64::EPSILON => {
+                *end = to
+            }
+            _ => joined.push((from, to, height)),
+        }
+    }
+    joined
+}
+
+fn presence_shades(intervals: &[Interval<Presence>]) -> Vec<(u64, u64, RGBColor)> {
+    intervals
+        .iter()
+        .filter_map(|interval| {
+            let colour = match interval.state {
+                Presence::On => return None,
+                Presence::Off => OFF,
+                Presence::Joining => JOINING,
+            };
+            Some((interval.from, interval.to, colour))
+        })
+        .collect()
+}
+
+fn service_shades(intervals: &[Interval<Service>]) -> Vec<(u64, u64, RGBColor)> {
+    intervals
+        .iter()
+        .filter_map(|interval| {
+            let colour = match interval.state {
+                Service::Functional => return None,
+                Service::Held => JOINING,
+                Service::FailSafe | Service::Wrong | Service::Unserved => OFF,
+            };
+            Some((interval.from, interval.to, colour))
+        })
+        .collect()
+}

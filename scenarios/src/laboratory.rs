@@ -1,0 +1,433 @@
+//! A scenario on real processes: one for each party, over a real network, on real clocks.
+//!
+//! The laboratory starts them, reads what they report, does the steps of the scenario when the cycles come that they are meant
+//! for, and ends everything that it started, whatever happens. It decides nothing about the cycle.
+
+mod error;
+mod patience;
+mod ports;
+mod process;
+mod steps;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use nix::time::{ClockId, clock_gettime};
+use tokio::process::Command;
+use tokio::signal::unix::{SignalKind, signal};
+use tokio::sync::mpsc::{Receiver, Sender, channel};
+use understudy_bus::{HostEvent, Peer, ZENOH_RUNTIME};
+use understudy_cluster::Cluster;
+use understudy_simulator::{Action, Fault};
+use understudy_wire::Party;
+
+use crate::account::{Account, OriginRule, Terms};
+use crate::journal::{Journal, JournalState};
+use crate::record::{Happening, Record, RunEvent};
+use crate::run_directory::RunDirectory;
+use crate::scenario::{Scenario, action_word};
+
+pub use error::LaboratoryError;
+
+use patience::Waits;
+use process::{Process, Said, Saying};
+use steps::Steps;
+
+/// What the parties say and nobody has read yet, at most; then they wait, and lose records rather than cycles.
+const UNREAD_LINES: usize = 16_384;
+
+const END_PATIENCE: Duration = Duration::from_secs(3);
+
+/// How often the clock is looked at when nobody says anything.
+const TICK: Duration = Duration::from_millis(50);
+
+/// What a laboratory is told besides its cluster and its scenario.
+#[derive(Debug, Clone)]
+pub struct LaboratorySettings {
+    /// The program whose commands `node`, `remote-io` and `plant` run a party.
+    pub program: PathBuf,
+    /// The cluster file that they read.
+    pub cluster_file: PathBuf,
+    /// What they are told besides, such as `--period 5ms`: all the same.
+    pub arguments: Vec<String>,
+}
+
+/// How far a run is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Progress {
+    /// Processes come up.
+    Starting {
+        /// So many are ready.
+        ready: usize,
+        /// Of so many.
+        parties: usize,
+    },
+    /// The processes are there, and the cluster is not in step yet.
+    ComingIntoStep {
+        /// Who is not.
+        names: Vec<String>,
+    },
+    /// Cycles are run.
+    Cycle {
+        /// The newest one.
+        cycle: u64,
+        /// Of so many.
+        cycles: u64,
+    },
+    /// A step of the scenario was done.
+    Step {
+        /// In this cycle.
+        cycle: u64,
+        /// What and to whom.
+        what: String,
+    },
+    /// What was started is stopped.
+    Ending,
+}
+
+/// What a run left.
+#[derive(Debug)]
+pub struct LaboratoryRun {
+    /// What came of it, up to a failure.
+    pub account: Account,
+    /// How the journal fared.
+    pub journal: JournalState,
+    /// Rights that the processes lack, and similar things that a reader should know.
+    pub machine: Vec<String>,
+    /// Why it ended early, where nobody asked it to.
+    pub failure: Option<LaboratoryError>,
+}
+
+/// Runs `scenario` on processes of its own; the journal and the list of addresses go to `directory`.
+///
+/// To be called from the main thread: its processes end when the thread ends that started them. SIGINT and SIGTERM end the
+/// run in order.
+///
+/// # Errors
+/// [`LaboratoryError`] where nothing could be started; later failures are in [`LaboratoryRun::failure`].
+pub fn run_laboratory(
+    cluster: &Cluster,
+    scenario: &Scenario,
+    settings: LaboratorySettings,
+    directory: &RunDirectory,
+    watch: &mut dyn FnMut(Progress),
+) -> Result<LaboratoryRun, LaboratoryError> {
+    if scenario.network.is_some() {
+        return Err(LaboratoryError::Network);
+    }
+    let system = |what| move |source| LaboratoryError::System { what, source };
+    let endpoints = directory.file("endpoints.json");
+    let peers = addresses(cluster).map_err(system("free ports of the loopback interface"))?;
+    let text = serde_json::to_string_pretty(&peers).map_err(io::Error::from);
+    text.and_then(|text| std::fs::write(&endpoints, text + "\n"))
+        .map_err(system("to write endpoints.json"))?;
+    let journal = Journal::create(&directory.file("journal.jsonl"))
+        .map_err(system("to write journal.jsonl"))?;
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(system("a runtime"))?;
+    let (sender, receiver) = channel(UNREAD_LINES);
+    let laboratory = Laboratory {
+        settings,
+        endpoints,
+        account: Account::new(Terms::of(cluster), scenario, OriginRule::Found),
+        journal: Some(journal),
+        processes: BTreeMap::new(),
+        lives: BTreeMap::new(),
+        ready: BTreeSet::new(),
+        machine: BTreeSet::new(),
+        steps: Steps::new(scenario, cluster.agreement().schedule.period()),
+        sender,
+        watch,
+    };
+    Ok(runtime.block_on(laboratory.run(receiver)))
+}
+
+/// From the cluster file, or free ones of the loopback interface.
+fn addresses(cluster: &Cluster) -> io::Result<Vec<Peer>> {
+    let parties: Vec<Party> = cluster.parties().collect();
+    let known: Vec<Option<SocketAddr>> = parties
+        .iter()
+        .map(|&party| cluster.address(party))
+        .collect();
+    let lacking = known.iter().filter(|address| address.is_none()).count();
+    let mut free = ports::free_addresses(lacking)?.into_iter();
+    Ok(parties
+        .into_iter()
+        .zip(known)
+        .filter_map(|(party, known)| {
+            Some(Peer {
+                party,
+                name: cluster.party_name(party)?.to_owned(),
+                address: known.or_else(|| free.next())?,
+            })
+        })
+        .collect())
+}
+
+struct Laboratory<'w> {
+    settings: LaboratorySettings,
+    endpoints: PathBuf,
+    account: Account,
+    journal: Option<Journal>,
+    processes: BTreeMap<Party, Process>,
+    lives: BTreeMap<Party, u32>,
+    /// Parties that have said that they listen.
+    ready: BTreeSet<Party>,
+    machine: BTreeSet<String>,
+    steps: Steps,
+    sender: Sender<Said>,
+    watch: &'w mut dyn FnMut(Progress),
+}
+
+impl Laboratory<'_> {
+    async fn run(mut self, mut receiver: Receiver<Said>) -> LaboratoryRun {
+        let failure = self.work(&mut receiver).await.err();
+        (self.watch)(Progress::Ending);
+        self.end(&mut receiver).await;
+        self.note(RunEvent::Finished);
+        LaboratoryRun {
+            account: self.account,
+            journal: self.journal.take().map(Journal::finish).unwrap_or_default(),
+            machine: self.machine.into_iter().collect(),
+            failure,
+        }
+    }
+
+    async fn work(&mut self, receiver: &mut Receiver<Said>) -> Result<(), LaboratoryError> {
+        let system = |what| move |source| LaboratoryError::System { what, source };
+        let mut interrupt = signal(SignalKind::interrupt()).map_err(system("to hear SIGINT"))?;
+        let mut terminate = signal(SignalKind::terminate()).map_err(system("to hear SIGTERM"))?;
+        let parties: Vec<Party> = self
+            .account
+            .terms
+            .parties
+            .iter()
+            .map(|(party, _)| party)
+            .collect();
+        for party in parties {
+            self.start(party)?;
+        }
+        let mut waits = Waits::new();
+        let mut tick = tokio::time::interval(TICK);
+        loop {
+            let due = self.steps.next_due();
+            let sleep =
+                tokio::time::sleep_until(due.unwrap_or_else(|| Instant::now() + TICK).into());
+            tokio::select! {
+                biased;
+                _ = interrupt.recv() => return self.interrupted(),
+                _ = terminate.recv() => return self.interrupted(),
+                () = sleep, if due.is_some() => {}
+                said = receiver.recv() => {
+                    if let Some(said) = said {
+                        self.hear(said).await?;
+                    }
+                }
+                _ = tick.tick() => {}
+            }
+            let now = Instant::now();
+            self.steps.follow(self.account.cycle(), now);
+            while let Some(step) = self.steps.take_due(now) {
+                self.do_step(&step).await?;
+            }
+            self.show_progress(&mut waits);
+            // One cycle more, so that all remote I/Os have surely told of the last one.
+            if self
+                .account
+                .cycle()
+                .is_some_and(|cycle| cycle > self.account.cycles)
+            {
+                return Ok(());
+            }
+            self.check_patience(&mut waits, now)?;
+        }
+    }
+
+    fn interrupted(&mut self) -> Result<(), LaboratoryError> {
+        self.note(RunEvent::Interrupted);
+        Ok(())
+    }
+
+    fn name(&self, party: Party) -> String {
+        self.account.terms.parties.name(party).to_owned()
+    }
+
+    fn names(&self, parties: impl IntoIterator<Item = Party>) -> Vec<String> {
+        parties.into_iter().map(|party| self.name(party)).collect()
+    }
+
+    /// A record of the laboratory's own.
+    fn note(&mut self, event: RunEvent) {
+        let record = Record::of_run(monotonic_ns(), event);
+        self.take(&record);
+    }
+
+    fn take(&mut self, record: &Record) {
+        if let Some(journal) = &mut self.journal {
+            journal.write(record);
+        }
+        self.account.observe(record);
+    }
+
+    // ── processes ───────────────────────────────────────────────────────────────────────────────────────────────────
+
+    fn start(&mut self, party: Party) -> Result<(), LaboratoryError> {
+        let name = self.name(party);
+        let mut command = Command::new(&self.settings.program);
+        command
+            .arg(match party {
+                Party::Station(_) => "node",
+                Party::RemoteIo(_) => "remote-io",
+                Party::Plant(_) => "plant",
+            })
+            .arg(&self.settings.cluster_file)
+            .args(["--name", &name])
+            .arg("--endpoints")
+            .arg(&self.endpoints)
+            .arg("--in-laboratory")
+            .args(&self.settings.arguments)
+            .env(ZENOH_RUNTIME.0, ZENOH_RUNTIME.1);
+        let life = self
+            .lives
+            .entry(party)
+            .and_modify(|life| *life += 1)
+            .or_insert(1);
+        let process = Process::start(party, *life, command, self.sender.clone());
+        let process = process.map_err(|source| LaboratoryError::Start {
+            name,
+            program: self.settings.program.clone(),
+            source,
+        })?;
+        self.processes.insert(party, process);
+        self.note(RunEvent::Started { party });
+        Ok(())
+    }
+
+    async fn hear(&mut self, said: Said) -> Result<(), LaboratoryError> {
+        let Said { party, life, what } = said;
+        match what {
+            Saying::Line(line) => self.read(party, &line),
+            Saying::End(lines) => {
+                let Some(process) = self.processes.get_mut(&party) else {
+                    return Ok(());
+                };
+                if process.life() != life || process.may_end {
+                    return Ok(());
+                }
+                let status = process.end(END_PATIENCE).await;
+                let how = status.map_or("by no status".to_owned(), |status| status.to_string());
+                self.note(RunEvent::Ended {
+                    party,
+                    how: how.clone(),
+                });
+                Err(LaboratoryError::Ended {
+                    name: self.name(party),
+                    how,
+                    lines,
+                })
+            }
+        }
+    }
+
+    fn read(&mut self, party: Party, line: &str) -> Result<(), LaboratoryError> {
+        let Ok(record) = serde_json::from_str::<Record>(line) else {
+            return Err(LaboratoryError::Record {
+                name: self.name(party),
+                line: line.chars().take(200).collect(),
+            });
+        };
+        if let Happening::Host(HostEvent::Ready { rights, .. }) = &record.event {
+            self.ready.insert(party);
+            self.machine.extend(rights.lacking.iter().cloned());
+        }
+        self.take(&record);
+        Ok(())
+    }
+
+    async fn do_step(&mut self, step: &Fault) -> Result<(), LaboratoryError> {
+        let name = self.name(step.party);
+        let Some(process) = self.processes.get_mut(&step.party) else {
+            return Ok(());
+        };
+        let done = match step.action {
+            Action::Crash => process.crash().await,
+            Action::Restart => return self.restarted(step, &name),
+            Action::Stop => process.stop(),
+            Action::Continue => process.go_on(),
+            Action::Release => process.command("release").await,
+        };
+        done.map_err(|source| LaboratoryError::Step {
+            action: action_word(step.action),
+            name: name.clone(),
+            source,
+        })?;
+        self.step_done(step, &name);
+        Ok(())
+    }
+
+    fn restarted(&mut self, step: &Fault, name: &str) -> Result<(), LaboratoryError> {
+        self.start(step.party)?;
+        self.step_done(step, name);
+        Ok(())
+    }
+
+    fn step_done(&mut self, step: &Fault, name: &str) {
+        self.note(RunEvent::Fault {
+            action: step.action,
+            party: step.party,
+            asked: step.at_cycle,
+        });
+        (self.watch)(Progress::Step {
+            cycle: step.at_cycle,
+            what: format!("{} {name}", action_word(step.action)),
+        });
+    }
+
+    /// Everybody ends: asked first, then made to.
+    async fn end(&mut self, receiver: &mut Receiver<Said>) {
+        for process in self.processes.values_mut() {
+            process.ask_to_end().await;
+        }
+        let deadline = tokio::time::Instant::now() + END_PATIENCE;
+        let mut living: BTreeSet<(Party, u32)> = self
+            .processes
+            .values()
+            .map(|process| (process.party(), process.life()))
+            .collect();
+        // What they still say belongs to the journal, and they only end when somebody listens.
+        while !living.is_empty() {
+            match tokio::time::timeout_at(deadline, receiver.recv()).await {
+                Ok(Some(said)) => match said.what {
+                    Saying::Line(line) => {
+                        // The run is over; a last line that is cut is none of its failures.
+                        let _ = self.read(said.party, &line);
+                    }
+                    Saying::End(_) => {
+                        living.remove(&(said.party, said.life));
+                    }
+                },
+                Ok(None) | Err(_) => break,
+            }
+        }
+        for (_, mut process) in std::mem::take(&mut self.processes) {
+            process.end(Duration::from_millis(100)).await;
+        }
+    }
+}
+
+/// The clock of the parties' records.
+fn monotonic_ns() -> u64 {
+    // It exists on every Linux; a journal without times is still a journal.
+    clock_gettime(ClockId::CLOCK_MONOTONIC).map_or(0, |now| {
+        let nanoseconds = Duration::new(
+            u64::try_from(now.tv_sec()).unwrap_or(0),
+            u32::try_from(now.tv_nsec()).unwrap_or(0),
+        );
+        u64::try_from(nanoseconds.as_nanos()).unwrap_or(u64::MAX)
+    })
+}

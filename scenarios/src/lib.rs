@@ -1,0 +1,44 @@
+//! Scenario files, the laboratory that runs them, the journal, figures and reports.
+
+mod account;
+mod campaign;
+mod fields;
+mod figure;
+mod journal;
+mod laboratory;
+mod parties;
+mod read;
+mod record;
+mod report;
+mod run_directory;
+mod scenario;
+mod schema;
+mod simulation;
+mod summary;
+mod table;
+mod terms;
+
+pub use account::{Account, Counts, Interval, OriginRule, Presence, Service, Stall, Terms};
+pub use campaign::{CampaignError, CampaignPlan, Measured, run_campaign};
+pub use figure::{FigureError, Signals, figure};
+pub use journal::{Journal, JournalError, JournalState, records};
+pub use laboratory::{
+    LaboratoryError, LaboratoryRun, LaboratorySettings, Progress, run_laboratory,
+};
+pub use parties::Parties;
+pub use read::{MAXIMUM_CYCLES, MAXIMUM_STEPS, ReadScenario, looks_like_a_scenario, read};
+pub use record::{Happening, LABORATORY, Record, RunEvent};
+pub use report::{ReportError, report};
+pub use run_directory::{RunDirectory, RunDirectoryError, time_name};
+pub use scenario::{
+    ACTIONS, During, Expectation, SOURCES, Scenario, TABLE_TWO, action_word, source_word,
+};
+pub use schema::scenario_schema;
+pub use simulation::{NotInStep, simulate};
+pub use summary::{
+    Circumstances, ExpectationSummary, PlantSummary, RefusedSummary, RemoteIoSummary,
+    StationSummary, StepSummary, Summary, ViolationSummary, World,
+};
+pub use table::{Cell, Row, Table};
+pub use terms::parts;
+pub use understudy_simulator::{Action, Fault, Network};

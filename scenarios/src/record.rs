@@ -1,0 +1,176 @@
+//! What the journal holds: one record a line, of every party and of whoever runs the scenario.
+//!
+//! The same records come from the laboratory's processes and from the simulator, so that one account judges both.
+
+use serde::de::{self, DeserializeOwned};
+use serde::{Deserialize, Deserializer, Serialize};
+use understudy_bus::{HostEvent, Noted};
+use understudy_simulator::Action;
+use understudy_wire::{Moment, Party};
+
+use crate::parties::Parties;
+
+/// One line of `journal.jsonl`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Record {
+    /// Nanoseconds, on the clock of the host that the party runs on (CLOCK_MONOTONIC); virtual in the simulator.
+    pub at_ns: u64,
+    /// The party's name; `laboratory` for whoever runs the scenario.
+    pub name: String,
+    /// Nothing for whoever runs the scenario.
+    pub party: Option<Party>,
+    /// What happened.
+    pub event: Happening,
+}
+
+/// What happened, in the words of the party that says it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Happening {
+    /// To a controller or an understudy.
+    Station(understudy_node::Event),
+    /// To a remote I/O.
+    RemoteIo(understudy_remote_io::Event),
+    /// To a plant.
+    Plant(understudy_plant::Event),
+    /// To the process that carries a party; never to a simulated one.
+    Host(HostEvent),
+    /// To the run as a whole.
+    Run(RunEvent),
+}
+
+/// What whoever runs the scenario does and sees.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "event", rename_all = "kebab-case")]
+pub enum RunEvent {
+    /// A party was started, for the first time or again.
+    Started {
+        /// Who.
+        party: Party,
+    },
+    /// A step of the scenario was done.
+    Fault {
+        /// What.
+        action: Action,
+        /// To whom.
+        party: Party,
+        /// The first cycle that was to feel it, counted from the origin.
+        asked: u64,
+    },
+    /// A party's process ended; asked for or not.
+    Ended {
+        /// Who.
+        party: Party,
+        /// How, in words.
+        how: String,
+    },
+    /// The run was asked to end early.
+    Interrupted,
+    /// The last record.
+    Finished,
+}
+
+/// The name of whoever runs the scenario.
+pub const LABORATORY: &str = "laboratory";
+
+impl Record {
+    /// Of whoever runs the scenario.
+    pub fn of_run(at_ns: u64, event: RunEvent) -> Self {
+        Self {
+            at_ns,
+            name: LABORATORY.to_owned(),
+            party: None,
+            event: Happening::Run(event),
+        }
+    }
+
+    /// Of a party.
+    pub fn of_party(at_ns: u64, party: Party, parties: &Parties, event: Happening) -> Self {
+        Self {
+            at_ns,
+            name: parties.name(party).to_owned(),
+            party: Some(party),
+            event,
+        }
+    }
+}
+
+/// Moment of an event, where it has one.
+pub(crate) fn moment(event: &Happening) -> Option<Moment> {
+    use understudy_node::Event as Station;
+    use understudy_remote_io::Event as RemoteIo;
+    match event {
+        Happening::Station(event) => match event {
+            Station::Spoke { moment, .. }
+            | Station::Paces { moment }
+            | Station::Flagged { moment, .. }
+            | Station::Cleared { moment, .. }
+            | Station::Joins { moment, .. }
+            | Station::Adopted { moment, .. }
+            | Station::InStep { moment, .. }
+            | Station::DigestDiffers { moment, .. }
+            | Station::Stalled { moment, .. } => Some(*moment),
+            Station::Refused { .. } => None,
+        },
+        Happening::RemoteIo(event) => match event {
+            RemoteIo::Sampled { moment, .. }
+            | RemoteIo::Applied { moment, .. }
+            | RemoteIo::AdoptedLineage { moment, .. }
+            | RemoteIo::Voided { moment, .. }
+            | RemoteIo::Released { moment }
+            | RemoteIo::Flagged { moment, .. }
+            | RemoteIo::Cleared { moment, .. }
+            | RemoteIo::Syndrome { moment, .. }
+            | RemoteIo::DigestDiffers { moment, .. }
+            | RemoteIo::Stalled { moment, .. } => Some(*moment),
+            RemoteIo::StartedCold { born, .. } => Some(*born),
+            RemoteIo::Refused { .. } => None,
+        },
+        Happening::Plant(understudy_plant::Event::Stepped { moment, .. }) => Some(*moment),
+        Happening::Plant(_) | Happening::Host(_) | Happening::Run(_) => None,
+    }
+}
+
+/// As it stands in a line, before the party has decided of which kind the event is.
+#[derive(Deserialize)]
+struct Line {
+    at_ns: u64,
+    name: String,
+    party: Option<Party>,
+    event: serde_json::Value,
+}
+
+impl<'de> Deserialize<'de> for Record {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let line = Line::deserialize(deserializer)?;
+        let event = happening(line.party, line.event).map_err(de::Error::custom)?;
+        Ok(Self {
+            at_ns: line.at_ns,
+            name: line.name,
+            party: line.party,
+            event,
+        })
+    }
+}
+
+fn happening(
+    party: Option<Party>,
+    event: serde_json::Value,
+) -> Result<Happening, serde_json::Error> {
+    match party {
+        None => serde_json::from_value(event).map(Happening::Run),
+        Some(Party::Station(_)) => noted(event, Happening::Station),
+        Some(Party::RemoteIo(_)) => noted(event, Happening::RemoteIo),
+        Some(Party::Plant(_)) => noted(event, Happening::Plant),
+    }
+}
+
+fn noted<E: DeserializeOwned>(
+    event: serde_json::Value,
+    of_party: fn(E) -> Happening,
+) -> Result<Happening, serde_json::Error> {
+    serde_json::from_value(event).map(|noted| match noted {
+        Noted::Host(event) => Happening::Host(event),
+        Noted::Party(event) => of_party(event),
+    })
+}

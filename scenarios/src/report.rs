@@ -1,0 +1,49 @@
+//! `report.html`: the whole run in one file, for reading, printing and keeping.
+
+use minijinja::value::Serde;
+use minijinja::{Environment, Value, context};
+
+use crate::account::Counts;
+use crate::summary::Summary;
+use crate::table::Table;
+
+const TEMPLATE: &str = include_str!("report.html");
+
+/// The report could not be made.
+#[derive(Debug, thiserror::Error)]
+#[error("the report could not be made: {0}")]
+pub struct ReportError(#[from] minijinja::Error);
+
+/// Makes the report of a run; `figure` is an SVG.
+///
+/// # Errors
+/// [`ReportError`] where the template and the summary do not fit each other.
+pub fn report(summary: &Summary, figure: &str) -> Result<String, ReportError> {
+    let mut environment = Environment::new();
+    environment.add_template("report.html", TEMPLATE)?;
+    let template = environment.get_template("report.html")?;
+    let count = |counts: &Counts| {
+        [
+            counts.direct,
+            counts.reconstructed,
+            counts.held,
+            counts.held_by_stall,
+            counts.fail_safe + counts.fail_safe_by_stall,
+            counts.unserved,
+            counts.wrong,
+        ]
+    };
+    let counts: Vec<_> = summary
+        .remote_ios
+        .iter()
+        .map(|remote_io| (remote_io.name.clone(), count(&remote_io.counts)))
+        .collect();
+    Ok(template.render(context! {
+        summary => Value::from(Serde(summary)),
+        table => Value::from(Serde(Table::new(summary))),
+        counts => counts,
+        period_ms => summary.circumstances.period_us as f64 / 1000.0,
+        // The figure is this program's own and must not be escaped.
+        figure => Value::from_safe_string(figure.to_owned()),
+    })?)
+}

@@ -1,0 +1,173 @@
+//! Where a run leaves what it came to: `runs/<time>/`, and `runs/latest` beside it.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use crate::account::Account;
+use crate::figure::{FigureError, figure};
+use crate::report::{ReportError, report};
+use crate::summary::Summary;
+
+/// Directories with one name and a number, at most; then something is wrong.
+const MAXIMUM_TRIES: u32 = 1000;
+
+/// The directory of one run.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunDirectory {
+    path: PathBuf,
+}
+
+/// Something could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum RunDirectoryError {
+    /// A file or directory.
+    #[error("{} cannot be written: {source}", path.display())]
+    Write {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The figure.
+    #[error(transparent)]
+    Figure(#[from] FigureError),
+    /// The report.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    /// The summary.
+    #[error("the summary cannot be written as JSON: {0}")]
+    Summary(#[from] serde_json::Error),
+}
+
+impl RunDirectory {
+    /// A new directory below `runs`, named by the time, with `latest` pointing to it.
+    ///
+    /// # Errors
+    /// [`RunDirectoryError::Write`].
+    pub fn create(runs: &Path, now: SystemTime) -> Result<Self, RunDirectoryError> {
+        let at = |path: &Path| {
+            let path = path.to_owned();
+            move |source| RunDirectoryError::Write { path, source }
+        };
+        fs::create_dir_all(runs).map_err(at(runs))?;
+        let name = time_name(now);
+        for number in 1..=MAXIMUM_TRIES {
+            let name = match number {
+                1 => name.clone(),
+                _ => format!("{name}-{number}"),
+            };
+            let path = runs.join(&name);
+            match fs::create_dir(&path) {
+                Ok(()) => {
+                    point_latest(runs, &name).map_err(at(&runs.join("latest")))?;
+                    return Ok(Self { path });
+                }
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(at(&path)(error)),
+            }
+        }
+        Err(at(runs)(io::ErrorKind::AlreadyExists.into()))
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// A file in it.
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+
+    /// Writes a file in it.
+    ///
+    /// # Errors
+    /// [`RunDirectoryError::Write`].
+    pub fn write(&self, name: &str, text: &str) -> Result<(), RunDirectoryError> {
+        let path = self.file(name);
+        let parent = path.parent().unwrap_or(&self.path);
+        fs::create_dir_all(parent)
+            .and_then(|()| fs::write(&path, text))
+            .map_err(|source| RunDirectoryError::Write { path, source })
+    }
+
+    /// Writes the summary, the figure and the report.
+    ///
+    /// # Errors
+    /// The first that failed; the others are tried all the same.
+    pub fn write_results(
+        &self,
+        summary: &Summary,
+        account: &Account,
+    ) -> Result<(), RunDirectoryError> {
+        let json = serde_json::to_string_pretty(summary)? + "\n";
+        let summary_written = self.write("summary.json", &json);
+        let figure = figure(account, summary)?;
+        let figure_written = self.write("figure10.svg", &figure);
+        let report_written = self.write("report.html", &report(summary, &figure)?);
+        summary_written.and(figure_written).and(report_written)
+    }
+}
+
+/// Replaces the link `latest`, so that it never points to nothing.
+fn point_latest(runs: &Path, name: &str) -> io::Result<()> {
+    let new = runs.join(format!(".latest-{}", std::process::id()));
+    match fs::remove_file(&new) {
+        Ok(()) => {}
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+        Err(error) => return Err(error),
+    }
+    std::os::unix::fs::symlink(name, &new)?;
+    fs::rename(&new, runs.join("latest"))
+}
+
+/// `2026-11-21T02-30-00Z`: sorts by time, and is a file name everywhere.
+pub fn time_name(now: SystemTime) -> String {
+    let seconds = now
+        .duration_since(SystemTime::UNIX_EPOCH)
+        .map_or(0, |since| since.as_secs());
+    let (year, month, day) = date(seconds / 86_400);
+    let of_day = seconds % 86_400;
+    format!(
+        "{year:04}-{month:02}-{day:02}T{:02}-{:02}-{:02}Z",
+        of_day / 3600,
+        of_day / 60 % 60,
+        of_day % 60
+    )
+}
+
+/// Year, month and day of the Gregorian calendar, `days` after 1970-01-01.
+fn date(days: u64) -> (u64, u64, u64) {
+    // Counted in eras of 400 years that begin on a 1 March, so that the leap day is the last of its year.
+    let days = days + 719_468;
+    let of_era = days % 146_097;
+    let year_of_era = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
+    let of_year = of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let month_from_march = (5 * of_year + 2) / 153;
+    let day = of_year - (153 * month_from_march + 2) / 5 + 1;
+    let month = (month_from_march + 2) % 12 + 1;
+    let year = days / 146_097 * 400 + year_of_era + u64::from(month <= 2);
+    (year, month, day)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn names_are_times() {
+        let check = |seconds, expected: &str| {
+            let time = SystemTime::UNIX_EPOCH + Duration::from_secs(seconds);
+            assert_eq!(time_name(time), expected);
+        };
+        check(0, "1970-01-01T00-00-00Z");
+        check(951_782_400, "2000-02-29T00-00-00Z");
+        check(1_709_164_799, "2024-02-28T23-59-59Z");
+        check(4_107_542_399, "2100-02-28T23-59-59Z");
+        check(4_107_542_400, "2100-03-01T00-00-00Z");
+    }
+}

@@ -1,0 +1,119 @@
+//! What a scenario says: the faults, when they strike, and what must come of it.
+//!
+//! Cycles are counted from the *origin*: the first cycle in which every plant is driven directly, every station is heard and
+//! every understudy speaks for all programs. So the same file means the same on a slow host, a fast one and in the simulator.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use understudy_simulator::{Action, Fault, Network};
+use understudy_wire::{ProgramId, Source};
+
+/// A scenario whose names belong to a cluster.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Scenario {
+    /// For people.
+    pub title: String,
+    /// How many cycles are run and judged from the origin on.
+    pub cycles: u64,
+    /// What is done to whom, in the order of its times.
+    pub steps: Vec<Fault>,
+    /// Faults of the network; only the simulator has them.
+    pub network: Option<Network>,
+    /// What must come of it.
+    pub expect: Expectation,
+}
+
+/// The experiment of section V.B, `table-two.toml`.
+pub const TABLE_TWO: &str = include_str!("../table-two.toml");
+
+impl Scenario {
+    /// The same with `cycles` cycles in place of its own; steps and expectations that they do not reach are left out, and so
+    /// are counts of finished parts, which belong to the whole.
+    #[must_use]
+    pub fn shortened(mut self, cycles: Option<u64>) -> Self {
+        let Some(cycles) = cycles else {
+            return self;
+        };
+        if cycles < self.cycles {
+            self.steps.retain(|step| step.at_cycle < cycles);
+            self.expect.during.retain(|during| during.from < cycles);
+            for during in &mut self.expect.during {
+                during.to = during.to.min(cycles);
+            }
+            self.expect.finished.clear();
+        }
+        self.cycles = cycles;
+        self
+    }
+}
+
+/// Every action, in the order in which they are explained.
+pub const ACTIONS: [Action; 5] = [
+    Action::Crash,
+    Action::Restart,
+    Action::Stop,
+    Action::Continue,
+    Action::Release,
+];
+
+/// An action as scenario files write it.
+pub fn action_word(action: Action) -> &'static str {
+    match action {
+        Action::Crash => "crash",
+        Action::Restart => "restart",
+        Action::Stop => "stop",
+        Action::Continue => "continue",
+        Action::Release => "release",
+    }
+}
+
+/// What must come of a run. Counts are over all remote I/Os, from the origin to the last cycle.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Expectation {
+    /// Wrong outputs applied, at most; 0 where the file says nothing.
+    pub wrong: u64,
+    /// Cycles with held outputs, at most. Those that a stall of the host explains are counted apart.
+    pub held: Option<u64>,
+    /// Cycles with fail-safe outputs, at most.
+    pub fail_safe: Option<u64>,
+    /// Mishaps of all plants, at most.
+    pub mishaps: Option<u64>,
+    /// Plants that must stay functional throughout.
+    pub functional: Vec<ProgramId>,
+    /// Parts that a plant must have finished, at least.
+    pub finished: BTreeMap<ProgramId, u64>,
+    /// What must be applied in a range of cycles.
+    pub during: Vec<During>,
+}
+
+/// What a remote I/O must apply in every cycle of a range.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct During {
+    /// The first cycle of the range.
+    pub from: u64,
+    /// The first cycle after the range.
+    pub to: u64,
+    /// Whose outputs.
+    pub remote_io: ProgramId,
+    /// Any of these.
+    pub sources: Vec<Source>,
+}
+
+/// All sources, in the order of their worth.
+pub const SOURCES: [Source; 4] = [
+    Source::Direct,
+    Source::Reconstructed,
+    Source::Held,
+    Source::FailSafe,
+];
+
+/// A source as files and tables write it.
+pub fn source_word(source: Source) -> &'static str {
+    match source {
+        Source::Direct => "direct",
+        Source::Reconstructed => "reconstructed",
+        Source::Held => "held",
+        Source::FailSafe => "fail-safe",
+    }
+}

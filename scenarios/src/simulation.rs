@@ -1,0 +1,103 @@
+//! A scenario in virtual time: the same account as in the laboratory, from a seed.
+
+use understudy_cluster::Cluster;
+use understudy_plant::{Event as PlantEvent, Pace};
+use understudy_remote_io::Event as RemoteIoEvent;
+use understudy_simulator::{NotReady, Record as Simulated, Simulation};
+use understudy_wire::{Field, Image, Moment, Party};
+
+use crate::account::{Account, OriginRule, Terms};
+use crate::record::{Happening, Record, RunEvent};
+use crate::scenario::Scenario;
+use crate::terms::parts;
+
+/// Cycles that the cluster gets to come into step.
+const PATIENCE_CYCLES: u64 = 10_000;
+
+/// The cluster did not come into step in virtual time.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct NotInStep(#[from] NotReady);
+
+/// Runs `scenario` from `seed`; every record goes to `journal` as it is made.
+///
+/// # Errors
+/// [`NotInStep`] where the cluster never comes into step; the account holds what happened until then.
+pub fn simulate(
+    cluster: &Cluster,
+    scenario: &Scenario,
+    seed: u64,
+    journal: &mut dyn FnMut(&Record),
+) -> Result<Account, NotInStep> {
+    let terms = Terms::of(cluster);
+    let parties = terms.parties.clone();
+    let mut account = Account::new(terms, scenario, OriginRule::Told);
+    let network = scenario.network.unwrap_or_default();
+    let mut simulation = Simulation::new(parts(cluster), network, seed);
+    for fault in &scenario.steps {
+        simulation.schedule(*fault);
+    }
+    // What a plant shows is told just before the deadline that drives it is.
+    let mut fields: Vec<Option<Field>> = vec![None; cluster.controllers().len()];
+    let mut take = |record: &Record, origin: Option<(Moment, u64)>| {
+        journal(record);
+        account.observe(record);
+        if let Some((moment, cycle)) = origin {
+            account.origin_is(moment, cycle);
+        }
+    };
+    let ran = simulation.run(
+        scenario.cycles,
+        PATIENCE_CYCLES,
+        &mut |now, cycle, party, record| {
+            let happening = match record {
+                Simulated::Station(event) => Happening::Station(event.clone()),
+                Simulated::RemoteIo(event) => Happening::RemoteIo(event.clone()),
+                Simulated::Fault(fault) => Happening::Run(RunEvent::Fault {
+                    action: fault.action,
+                    party,
+                    asked: fault.at_cycle,
+                }),
+                Simulated::Plant(field) => {
+                    if let Party::Plant(program) = party {
+                        fields[program.index()] = Some(field.clone());
+                    }
+                    return;
+                }
+                // The account has referees of its own.
+                Simulated::Violation(_) => return,
+            };
+            let applied = applied(&happening);
+            let record = match happening {
+                Happening::Run(event) => Record::of_run(now.0, event),
+                happening => Record::of_party(now.0, party, &parties, happening),
+            };
+            let moment = applied.as_ref().map(|(moment, _)| *moment);
+            take(&record, moment.zip(cycle));
+            let (Some((moment, outputs)), Party::RemoteIo(program)) = (applied, party) else {
+                return;
+            };
+            if let Some(field) = fields[program.index()].take() {
+                let event = Happening::Plant(PlantEvent::Stepped {
+                    moment,
+                    pace: Pace::Driven,
+                    outputs,
+                    field,
+                });
+                let plant = Party::Plant(program);
+                take(&Record::of_party(now.0, plant, &parties, event), None);
+            }
+        },
+    );
+    ran?;
+    Ok(account)
+}
+
+fn applied(happening: &Happening) -> Option<(Moment, Image)> {
+    match happening {
+        Happening::RemoteIo(RemoteIoEvent::Applied {
+            moment, outputs, ..
+        }) => Some((*moment, outputs.clone())),
+        _ => None,
+    }
+}

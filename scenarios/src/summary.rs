@@ -1,0 +1,371 @@
+//! `summary.json`: what a run came to, for machines; the table, the report and the command line read nothing else.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use understudy_wire::{Party, ProgramId, Source};
+
+use crate::account::{Account, Counts, Interval, Presence, RangeFinding, Service, Stall};
+use crate::journal::JournalState;
+use crate::scenario::{During, Scenario, action_word, source_word};
+
+/// The whole of `summary.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Summary {
+    /// Of this format: 1.
+    pub format: u32,
+    /// Whether the run was complete and every expectation was met.
+    pub passed: bool,
+    /// The scenario's title.
+    pub title: String,
+    /// Where and how it was run.
+    pub circumstances: Circumstances,
+    /// Cycles that the scenario asked for, from the origin on.
+    pub cycles_asked: u64,
+    /// Cycles that were run.
+    pub cycles_run: u64,
+    /// The cluster's own epoch and cycle of cycle 0, as `epoch:cycle`; nothing where the cluster never was in step.
+    pub origin: Option<String>,
+    /// Whether it was asked to end early.
+    pub interrupted: bool,
+    /// By rank.
+    pub stations: Vec<StationSummary>,
+    /// By program.
+    pub remote_ios: Vec<RemoteIoSummary>,
+    /// By program.
+    pub plants: Vec<PlantSummary>,
+    /// What was done to whom, in order.
+    pub steps: Vec<StepSummary>,
+    /// What must never happen and did, at most 100 of them.
+    pub violations: Vec<ViolationSummary>,
+    /// How many there were.
+    pub violation_count: u64,
+    /// Parties that run another configuration.
+    pub refused: Vec<RefusedSummary>,
+    /// Wake-ups of the host that came too late, at most 200 of them.
+    pub stalls: Vec<Stall>,
+    /// What the scenario expects and what was found.
+    pub expectations: Vec<ExpectationSummary>,
+    /// How the journal fared.
+    pub journal: JournalState,
+}
+
+/// Where and how a run was made.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Circumstances {
+    /// `laboratory` or `simulator`.
+    pub world: World,
+    /// The simulator's seed.
+    pub seed: Option<u64>,
+    /// The cluster's name.
+    pub cluster: String,
+    /// Hash of all programs, roles and timings.
+    pub configuration: String,
+    /// `full` or `paper`.
+    pub mode: String,
+    /// Of one cycle, in microseconds.
+    pub period_us: u64,
+    /// What carried the frames.
+    pub link: String,
+    /// Of this program.
+    pub version: String,
+    /// The machine: system, processors, rights.
+    pub machine: Vec<String>,
+    /// The command that repeats it.
+    pub repeat: String,
+}
+
+/// Where a run was made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum World {
+    /// Real processes, clocks and networks.
+    Laboratory,
+    /// One process and virtual time.
+    Simulator,
+}
+
+/// A controller or an understudy.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct StationSummary {
+    /// Its name.
+    pub name: String,
+    /// What it was when.
+    pub intervals: Vec<Interval<Presence>>,
+    /// Cycles in which nobody heard its turn.
+    pub silent_cycles: u64,
+}
+
+/// A remote I/O.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct RemoteIoSummary {
+    /// Its name.
+    pub name: String,
+    /// What it applied.
+    pub counts: Counts,
+}
+
+/// A plant.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct PlantSummary {
+    /// Its name.
+    pub name: String,
+    /// Whether it was served by true or held outputs throughout, and nothing happened to it that must not.
+    pub functional: bool,
+    /// Parts that it finished.
+    pub finished: u64,
+    /// Things that must not happen to it and did.
+    pub mishaps: u64,
+    /// How it was served when.
+    pub intervals: Vec<Interval<Service>>,
+}
+
+/// A step of the scenario as it was done.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct StepSummary {
+    /// What.
+    pub action: String,
+    /// To whom.
+    pub name: String,
+    /// The cycle that the scenario names.
+    pub asked: u64,
+    /// The first cycle whose deadline came after it.
+    pub measured: u64,
+}
+
+/// Something that must never happen.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct ViolationSummary {
+    /// The cycle.
+    pub cycle: u64,
+    /// Of which remote I/O.
+    pub name: String,
+    /// What.
+    pub what: String,
+}
+
+/// A party with another configuration.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct RefusedSummary {
+    /// Who.
+    pub name: String,
+    /// Both hashes.
+    pub why: String,
+}
+
+/// One expectation.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct ExpectationSummary {
+    /// What was expected.
+    pub expected: String,
+    /// What was found.
+    pub found: String,
+    /// Whether that is what was expected.
+    pub met: bool,
+}
+
+impl Summary {
+    /// Closes the account of a run.
+    pub fn new(
+        mut account: Account,
+        scenario: &Scenario,
+        circumstances: Circumstances,
+        journal: JournalState,
+    ) -> (Self, Account) {
+        let finished = account.finish();
+        let parties = &account.terms.parties;
+        let name = |party| parties.name(party).to_owned();
+        let stations = parties.stations().zip(finished.presences).map(
+            |((_, name), (intervals, silent_cycles))| StationSummary {
+                name: name.to_owned(),
+                intervals,
+                silent_cycles,
+            },
+        );
+        let services = account.services.iter().enumerate();
+        let remote_ios = services.clone().map(|(program, service)| RemoteIoSummary {
+            name: name(Party::RemoteIo(ProgramId(program as u8))),
+            counts: service.counts,
+        });
+        let plants = services.filter_map(|(program, service)| {
+            let plant = Party::Plant(ProgramId(program as u8));
+            let (_, name) = parties.iter().find(|(party, _)| *party == plant)?;
+            Some(PlantSummary {
+                name: name.to_owned(),
+                functional: service.functional(),
+                finished: service.finished(),
+                mishaps: service.mishaps(),
+                intervals: service.intervals.clone(),
+            })
+        });
+        let steps = account.steps.iter().map(|step| StepSummary {
+            action: action_word(step.action).to_owned(),
+            name: name(step.party),
+            asked: step.asked,
+            measured: step.measured,
+        });
+        let violations = account.violations.iter();
+        let mut summary = Self {
+            format: 1,
+            passed: false,
+            title: scenario.title.clone(),
+            circumstances,
+            cycles_asked: scenario.cycles,
+            cycles_run: finished.cycles_run,
+            origin: account.origin().map(|origin| origin.to_string()),
+            interrupted: account.interrupted,
+            stations: stations.collect(),
+            remote_ios: remote_ios.collect(),
+            plants: plants.collect(),
+            steps: steps.collect(),
+            violations: violations
+                .map(|(cycle, program, violation)| ViolationSummary {
+                    cycle: *cycle,
+                    name: name(Party::RemoteIo(*program)),
+                    what: violation.to_string(),
+                })
+                .collect(),
+            violation_count: account.violation_count,
+            refused: account
+                .refused
+                .iter()
+                .map(|(name, why)| RefusedSummary {
+                    name: name.clone(),
+                    why: why.clone(),
+                })
+                .collect(),
+            stalls: finished.stalls,
+            expectations: Vec::new(),
+            journal,
+        };
+        summary.expectations = expectations(&summary, &account, scenario);
+        let complete = summary.cycles_run == summary.cycles_asked && !summary.interrupted;
+        summary.passed = complete
+            && summary
+                .expectations
+                .iter()
+                .all(|expectation| expectation.met);
+        (summary, account)
+    }
+
+    /// Counts over all remote I/Os.
+    pub fn total(&self) -> Counts {
+        let mut total = Counts::default();
+        for remote_io in &self.remote_ios {
+            let counts = &remote_io.counts;
+            total.direct += counts.direct;
+            total.reconstructed += counts.reconstructed;
+            total.held += counts.held;
+            total.held_by_stall += counts.held_by_stall;
+            total.fail_safe += counts.fail_safe;
+            total.fail_safe_by_stall += counts.fail_safe_by_stall;
+            total.unserved += counts.unserved;
+            total.wrong += counts.wrong;
+        }
+        total
+    }
+}
+
+fn expectations(
+    summary: &Summary,
+    account: &Account,
+    scenario: &Scenario,
+) -> Vec<ExpectationSummary> {
+    let expect = &scenario.expect;
+    let total = summary.total();
+    let mishaps = summary.plants.iter().map(|plant| plant.mishaps).sum();
+    let mut list = vec![at_most(
+        "wrong outputs",
+        expect.wrong,
+        summary.violation_count,
+        0,
+    )];
+    if let Some(held) = expect.held {
+        list.push(at_most(
+            "cycles held",
+            held,
+            total.held,
+            total.held_by_stall,
+        ));
+    }
+    if let Some(fail_safe) = expect.fail_safe {
+        let by_stall = total.fail_safe_by_stall;
+        list.push(at_most(
+            "cycles fail-safe",
+            fail_safe,
+            total.fail_safe,
+            by_stall,
+        ));
+    }
+    if let Some(allowed) = expect.mishaps {
+        list.push(at_most("mishaps", allowed, mishaps, 0));
+    }
+    let plant_name = |program| account.terms.parties.name(Party::Plant(program));
+    let plant = |program| {
+        let name = plant_name(program);
+        summary.plants.iter().find(|plant| plant.name == name)
+    };
+    for &program in &expect.functional {
+        let met = plant(program).is_some_and(|plant| plant.functional);
+        list.push(ExpectationSummary {
+            expected: format!("{} functional", plant_name(program)),
+            found: if met { "functional" } else { "not functional" }.to_owned(),
+            met,
+        });
+    }
+    for (&program, &least) in &expect.finished {
+        let finished = plant(program).map_or(0, |plant| plant.finished);
+        list.push(ExpectationSummary {
+            expected: format!("{} finishes at least {least} parts", plant_name(program)),
+            found: finished.to_string(),
+            met: finished >= least,
+        });
+    }
+    let ranges = account.during.iter();
+    list.extend(ranges.map(|(during, finding)| {
+        let remote_io = account
+            .terms
+            .parties
+            .name(Party::RemoteIo(during.remote_io));
+        range(remote_io, during, *finding)
+    }));
+    list
+}
+
+fn at_most(what: &str, allowed: u64, found: u64, by_stall: u64) -> ExpectationSummary {
+    let expected = match allowed {
+        0 => format!("no {what}"),
+        _ => format!("at most {allowed} {what}"),
+    };
+    let apart = match by_stall {
+        0 => String::new(),
+        _ => format!(" (and {by_stall} while the host stood still)"),
+    };
+    ExpectationSummary {
+        expected,
+        found: format!("{found}{apart}"),
+        met: found <= allowed,
+    }
+}
+
+fn range(remote_io: &str, during: &During, finding: RangeFinding) -> ExpectationSummary {
+    let words: Vec<&str> = during.sources.iter().copied().map(source_word).collect();
+    let word = |source: Option<Source>| source.map_or("nothing", source_word);
+    ExpectationSummary {
+        expected: format!(
+            "{remote_io} {} in cycles {}-{}",
+            words.join(" or "),
+            during.from,
+            during.to - 1
+        ),
+        found: finding
+            .first
+            .map_or("as expected".to_owned(), |(cycle, source)| {
+                format!(
+                    "not in {} cycles, first in cycle {cycle}: {}",
+                    finding.missed,
+                    word(source)
+                )
+            }),
+        met: finding.missed == 0,
+    }
+}

@@ -1,0 +1,68 @@
+//! What an account and the two worlds need of a cluster.
+
+use understudy_cluster::Cluster;
+use understudy_simulator::{Parts, Referee};
+use understudy_wire::{Epoch, ProgramId, StationId};
+
+use crate::account::Terms;
+use crate::figure::Signals;
+use crate::parties::Parties;
+
+impl Parties {
+    /// All parties of a cluster.
+    pub fn of(cluster: &Cluster) -> Self {
+        let name = |party| cluster.party_name(party).unwrap_or_default().to_owned();
+        Self::new(cluster.parties().map(|party| (party, name(party))))
+    }
+}
+
+impl Terms {
+    /// Of a cluster.
+    pub fn of(cluster: &Cluster) -> Self {
+        let programs = (0..cluster.controllers().len()).map(|index| ProgramId(index as u8));
+        let referees = programs.filter_map(|program| {
+            let settings = cluster.remote_io_settings(program)?;
+            let scan = cluster.programs()[program.index()].scan.clone();
+            Some(Referee::new(&settings, scan))
+        });
+        let signals = cluster.controllers().iter().map(|controller| Signals {
+            inputs: controller.circuit.inputs().to_vec(),
+            outputs: controller
+                .circuit
+                .outputs()
+                .iter()
+                .map(|output| output.name.clone())
+                .collect(),
+        });
+        Self {
+            parties: Parties::of(cluster),
+            agreement: cluster.agreement().clone(),
+            referees: referees.collect(),
+            signals: signals.collect(),
+        }
+    }
+}
+
+/// The parties of a cluster for the simulator, which gives each station its own epoch.
+pub fn parts(cluster: &Cluster) -> Parts {
+    let stations = 0..cluster.agreement().schedule.stations();
+    let programs = (0..cluster.controllers().len()).map(|index| ProgramId(index as u8));
+    Parts {
+        stations: stations
+            .filter_map(|rank| cluster.station_settings(StationId(rank as u8), Epoch::default()))
+            .collect(),
+        remote_ios: programs
+            .filter_map(|program| cluster.remote_io_settings(program))
+            .collect(),
+        plants: cluster
+            .plants()
+            .iter()
+            .map(|place| place.as_ref().map(|place| place.plant.clone()))
+            .collect(),
+        fed_by: cluster
+            .plants()
+            .iter()
+            .map(|place| place.as_ref().and_then(|place| place.fed_by))
+            .collect(),
+    }
+}

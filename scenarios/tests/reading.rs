@@ -1,0 +1,165 @@
+//! What is wrong with a scenario file is all found in one run, with its place and the way out.
+
+use std::fmt::Write as _;
+
+use insta::assert_snapshot;
+use understudy_scenarios::{Parties, looks_like_a_scenario, read};
+use understudy_wire::{Party, ProgramId, StationId};
+
+fn parties() -> Parties {
+    Parties::new([
+        (Party::Station(StationId(0)), "robot".to_owned()),
+        (Party::Station(StationId(1)), "press".to_owned()),
+        (Party::Station(StationId(2)), "understudy".to_owned()),
+        (Party::RemoteIo(ProgramId(0)), "robot-io".to_owned()),
+        (Party::RemoteIo(ProgramId(1)), "press-io".to_owned()),
+        (Party::Plant(ProgramId(0)), "arm".to_owned()),
+        (Party::Plant(ProgramId(1)), "ram".to_owned()),
+    ])
+}
+
+/// One line for each finding.
+fn check(text: &str) -> String {
+    let found = read("scenario.toml", text, Some(&parties()));
+    let mut lines = String::new();
+    for diagnostic in &found.report.diagnostics {
+        let place = found.report.line_and_column(diagnostic.span.start);
+        let _ = write!(lines, "{place} {} {}", diagnostic.code, diagnostic.message);
+        if let Some(label) = &diagnostic.label {
+            let _ = write!(lines, " [{label}]");
+        }
+        if let Some(help) = &diagnostic.help {
+            let _ = write!(lines, " ({help})");
+        }
+        lines.push('\n');
+    }
+    assert_eq!(found.scenario.is_none(), !lines.is_empty(), "{lines}");
+    lines
+}
+
+#[test]
+fn names_and_keys_that_do_not_exist() {
+    assert_snapshot!(check(
+        r#"
+title = "Misspelt"
+cycles = 100
+cicles = 100
+[[step]]
+at = 10
+action = "crush"
+station = "robott"
+wen = 3
+[expect]
+functional = ["rom", "robot-io"]
+finished = { arms = 3 }
+[[expect.during]]
+from = 0
+to = 10
+remote_io = "press"
+source = "dirct"
+"#
+    ));
+}
+
+#[test]
+fn values_of_wrong_types_and_out_of_bounds() {
+    assert_snapshot!(check(
+        r#"
+title = 3
+cycles = 0
+[network]
+loss = 1.5
+jitter = "3 parsecs"
+[[step]]
+at = -1
+action = "crash"
+station = ["robot"]
+[[step]]
+at = 5
+phase = 1
+action = "crash"
+station = "robot"
+[expect]
+held = "none"
+finished = 3
+"#
+    ));
+}
+
+#[test]
+fn what_is_missing() {
+    assert_snapshot!(check("[[step]]\n[[expect.during]]\n"));
+}
+
+#[test]
+fn steps_that_cannot_be_done() {
+    assert_snapshot!(check(
+        r#"
+title = "Impossible"
+cycles = 100
+step = [
+    { at = 10, action = "restart", station = "robot" },
+    { at = 20, action = "crash", station = "press" },
+    { at = 30, action = "crash", station = "press" },
+    { at = 40, action = "stop", station = "arm" },
+    { at = 50, action = "restart", station = "arm" },
+    { at = 60, action = "release", station = "press" },
+    { at = 100, action = "crash", station = "understudy" },
+]
+[[expect.during]]
+from = 20
+to = 20
+remote_io = "robot-io"
+source = "direct"
+"#
+    ));
+}
+
+#[test]
+fn a_text_that_is_no_toml() {
+    assert_snapshot!(check("title = \"open\ncycles = = 3\n[expect\n"));
+}
+
+#[test]
+fn steps_come_in_the_order_of_their_times() {
+    let text = r#"
+title = "Order"
+cycles = 100
+step = [
+    { at = 30, action = "restart", station = "robot" },
+    { at = 10, phase = 0.5, action = "crash", station = "robot" },
+    { at = 10, phase = 0.25, action = "stop", station = "press" },
+]
+"#;
+    let found = read("scenario.toml", text, Some(&parties()));
+    let scenario = found.scenario.expect("it is right");
+    let steps = scenario.steps.iter();
+    let order: Vec<(u64, f64)> = steps.map(|step| (step.at_cycle, step.phase)).collect();
+    assert_eq!(order, [(10, 0.25), (10, 0.5), (30, 0.0)]);
+}
+
+#[test]
+fn any_text_is_answered() {
+    use std::collections::hash_map::DefaultHasher;
+    use std::hash::{Hash, Hasher};
+    // Every prefix of a file that is right, and every file that lacks one of its characters.
+    let text = include_str!("../kill-each.toml");
+    let mut seen = DefaultHasher::new();
+    for (place, letter) in text.char_indices() {
+        let without = format!("{}{}", &text[..place], &text[place + letter.len_utf8()..]);
+        for text in [&text[..place], &without] {
+            let found = read("scenario.toml", text, Some(&parties()));
+            found.report.diagnostics.len().hash(&mut seen);
+            for diagnostic in &found.report.diagnostics {
+                assert!(diagnostic.span.end <= text.len(), "{diagnostic:?}");
+            }
+        }
+    }
+    assert_ne!(seen.finish(), DefaultHasher::new().finish());
+}
+
+#[test]
+fn scenarios_are_told_from_clusters() {
+    assert!(looks_like_a_scenario(include_str!("../table-two.toml")));
+    assert!(!looks_like_a_scenario("[cluster]\nname = \"a\"\n"));
+}

@@ -1,0 +1,232 @@
+//! Every scenario file that comes with the project, in virtual time.
+
+use understudy_cluster::{Cluster, Overrides, press_cell};
+use understudy_scenarios::{
+    Account, Circumstances, Journal, JournalState, OriginRule, Parties, Record, RunEvent, Scenario,
+    Summary, Table, Terms, World, figure, read, records, report, simulate,
+};
+use understudy_wire::Mode;
+
+fn cluster(mode: Mode) -> Cluster {
+    let files = press_cell();
+    let overrides = Overrides {
+        mode: Some(mode),
+        ..Overrides::default()
+    };
+    let loaded =
+        understudy_cluster::read_with(files[0].name, files[0].text, overrides, &mut |name| {
+            let file = files.iter().find(|file| file.name == name);
+            file.map(|file| file.text.to_owned())
+                .ok_or_else(|| "no such file".to_owned())
+        });
+    loaded.cluster.expect("the press cell is right")
+}
+
+fn scenario(cluster: &Cluster, text: &str) -> Scenario {
+    let found = read("scenario.toml", text, Some(&Parties::of(cluster)));
+    assert_eq!(found.report.diagnostics, []);
+    found.scenario.expect("no diagnostics")
+}
+
+fn circumstances() -> Circumstances {
+    Circumstances {
+        world: World::Simulator,
+        seed: Some(1),
+        cluster: "press-cell".into(),
+        configuration: "0".into(),
+        mode: "full".into(),
+        period_us: 10_000,
+        link: "simulated".into(),
+        version: "0".into(),
+        machine: Vec::new(),
+        repeat: "understudy simulate <cluster> & more".into(),
+    }
+}
+
+/// Runs from a seed; the journal's bytes, and what it came to.
+fn run(mode: Mode, text: &str, seed: u64) -> (Vec<u8>, Summary, Account) {
+    let cluster = cluster(mode);
+    let scenario = scenario(&cluster, text);
+    let mut bytes = Vec::new();
+    let mut journal = Journal::new(&mut bytes);
+    let account = simulate(&cluster, &scenario, seed, &mut |record| {
+        journal.write(record)
+    });
+    let account = account.expect("the cluster comes into step");
+    let state = journal.finish();
+    let (summary, account) = Summary::new(account, &scenario, circumstances(), state);
+    (bytes, summary, account)
+}
+
+#[track_caller]
+fn check(mode: Mode, text: &str) -> Summary {
+    let (_, summary, _) = run(mode, text, 1);
+    assert!(summary.passed, "{}\n{summary:#?}", Table::new(&summary));
+    summary
+}
+
+#[test]
+fn table_two() {
+    let summary = check(Mode::Full, include_str!("../table-two.toml"));
+    insta::assert_snapshot!(Table::new(&summary));
+}
+
+#[test]
+fn kill_each() {
+    check(Mode::Full, include_str!("../kill-each.toml"));
+}
+
+#[test]
+fn double_kill() {
+    check(Mode::Full, include_str!("../double-kill.toml"));
+}
+
+#[test]
+fn paper_double_kill() {
+    let text = include_str!("../paper-double-kill.toml");
+    check(Mode::Paper, text);
+    let (_, summary, _) = run(Mode::Full, text, 1);
+    assert!(!summary.passed, "the other mode masks the second failure");
+}
+
+#[test]
+fn stop_and_continue() {
+    check(Mode::Full, include_str!("../stop-and-continue.toml"));
+}
+
+#[test]
+fn remote_io_restart() {
+    check(Mode::Full, include_str!("../remote-io-restart.toml"));
+}
+
+#[test]
+fn lossy() {
+    let summary = check(Mode::Full, include_str!("../lossy.toml"));
+    assert!(summary.total().held > 0, "loss costs something");
+}
+
+/// The summary says so where a scenario does not come out as it expects.
+#[test]
+fn what_is_not_met_is_said() {
+    let text = r#"
+title = "Too much is expected"
+cycles = 100
+step = [{ at = 50, action = "crash", station = "robot" }]
+[expect]
+finished = { ram = 1000 }
+during = [{ from = 40, to = 60, remote_io = "robot-io", source = "direct" }]
+"#;
+    let (_, summary, _) = run(Mode::Full, text, 1);
+    assert!(!summary.passed);
+    let lines: Vec<String> = summary
+        .expectations
+        .iter()
+        .map(|expectation| {
+            let met = if expectation.met { "met" } else { "NOT MET" };
+            format!(
+                "{met}: {}; found {}",
+                expectation.expected, expectation.found
+            )
+        })
+        .collect();
+    insta::assert_snapshot!(lines.join("\n"), @r"
+    met: no wrong outputs; found 0
+    NOT MET: ram finishes at least 1000 parts; found 2
+    NOT MET: robot-io direct in cycles 40-59; found not in 10 cycles, first in cycle 50: reconstructed
+    ");
+}
+
+/// The journal alone holds all that the account was made of.
+#[test]
+fn the_account_can_be_made_again_from_the_journal() {
+    let text = include_str!("../kill-each.toml");
+    let (bytes, summary, _) = run(Mode::Full, text, 3);
+    let again = account_of(&bytes, text, Some);
+    assert_eq!(again.remote_ios, summary.remote_ios);
+    assert_eq!(again.violation_count, 0);
+    // Found by the records, the origin may lie a cycle before the one that the simulator tells.
+    assert_eq!(again.cycles_run, summary.cycles_run);
+}
+
+/// A referee that cannot fail would be none.
+#[test]
+fn an_output_that_was_changed_is_found() {
+    use understudy_remote_io::Event;
+    use understudy_scenarios::Happening;
+    use understudy_wire::Source;
+
+    let text = include_str!("../kill-each.toml");
+    let (bytes, ..) = run(Mode::Full, text, 3);
+    let mut deadlines = 0;
+    let changed = account_of(&bytes, text, |mut record| {
+        if let Happening::RemoteIo(Event::Applied {
+            outputs,
+            source: Source::Direct,
+            ..
+        }) = &mut record.event
+        {
+            deadlines += 1;
+            if deadlines == 150 {
+                outputs.set(0, !outputs.get(0));
+            }
+        }
+        Some(record)
+    });
+    assert_eq!(changed.violation_count, 1);
+    assert_eq!(changed.total().wrong, 1);
+    assert!(!changed.passed);
+    // A sample that is missing in the journal makes the state unknown or wrong, never silently right.
+    let mut samples = 0;
+    let lacking = account_of(&bytes, text, |record| {
+        let sampled = matches!(record.event, Happening::RemoteIo(Event::Sampled { .. }));
+        samples += usize::from(sampled);
+        (!(sampled && samples == 150)).then_some(record)
+    });
+    assert!(lacking.violation_count > 0);
+    assert!(!lacking.passed);
+}
+
+/// The summary of a journal whose records went through `change`.
+fn account_of(
+    bytes: &[u8],
+    text: &str,
+    mut change: impl FnMut(Record) -> Option<Record>,
+) -> Summary {
+    let cluster = cluster(Mode::Full);
+    let scenario = scenario(&cluster, text);
+    let mut account = Account::new(Terms::of(&cluster), &scenario, OriginRule::Found);
+    for record in records(bytes) {
+        if let Some(record) = change(record.expect("a record")) {
+            account.observe(&record);
+        }
+    }
+    account.observe(&Record::of_run(0, RunEvent::Finished));
+    Summary::new(account, &scenario, circumstances(), JournalState::default()).0
+}
+
+#[test]
+fn the_report_and_the_figure_show_the_run() {
+    let (_, summary, account) = run(Mode::Full, include_str!("../kill-each.toml"), 1);
+    let figure = figure(&account, &summary).expect("a figure");
+    for expected in [
+        "(a) plant arm",
+        "(b) plant ram",
+        "(c) controller robot",
+        "(d) controller press",
+        "(e) understudy: parity",
+        "part_present",
+        "#F3C6C1",
+    ] {
+        assert!(figure.contains(expected), "{expected}");
+    }
+    let report = report(&summary, &figure).expect("a report");
+    assert!(report.contains(&figure), "in one file");
+    assert!(
+        report.contains("understudy simulate &lt;cluster&gt; &amp; more"),
+        "escaped"
+    );
+    assert!(
+        !report.contains("http://") || !report.contains("<link"),
+        "alone"
+    );
+}

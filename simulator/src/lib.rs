@@ -1,0 +1,23 @@
+//! A whole cluster in one process, in virtual time, with seeded faults.
+//!
+//! The very state machines of `node` and `remote-io` run here, beside the plants' models, over a network that loses,
+//! duplicates, delays and reorders as its seed says. Equal parts, faults and seed give equal runs, bit for bit. A
+//! [`Referee`] for each remote I/O recomputes what was true from the samples alone.
+
+mod fault;
+mod field;
+mod network;
+mod pace;
+mod parts;
+mod queue;
+mod referee;
+mod simulation;
+mod slot;
+mod tally;
+
+pub use fault::{Action, Fault};
+pub use network::Network;
+pub use parts::Parts;
+pub use referee::{Referee, Violation};
+pub use simulation::{NotReady, Observe, Record, Simulation};
+pub use tally::Tally;

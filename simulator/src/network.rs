@@ -1,0 +1,51 @@
+//! What the network does to a frame on its way to one receiver.
+
+use std::time::Duration;
+
+use rand::RngExt;
+use rand_pcg::Pcg64Mcg;
+use serde::{Deserialize, Serialize};
+
+/// The same for every pair of parties.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Network {
+    /// The least time that a frame is on its way.
+    pub latency: Duration,
+    /// Drawn evenly from 0 to this and added, for each receiver: frames overtake each other.
+    pub jitter: Duration,
+    /// Share of frames that do not arrive, from 0 to 1, for each receiver.
+    pub loss: f64,
+    /// Share of frames that arrive twice, from 0 to 1, for each receiver.
+    pub duplicate: f64,
+}
+
+impl Default for Network {
+    /// A quiet local network: 100 µs, and nothing is lost.
+    fn default() -> Self {
+        Self {
+            latency: Duration::from_micros(100),
+            jitter: Duration::ZERO,
+            loss: 0.0,
+            duplicate: 0.0,
+        }
+    }
+}
+
+impl Network {
+    /// Whether all receivers hear a frame at the same time, and surely.
+    pub(crate) fn is_even(&self) -> bool {
+        self.jitter.is_zero() && self.loss <= 0.0 && self.duplicate <= 0.0
+    }
+
+    /// The delays with which a frame reaches one receiver: none if it is lost, two if it is duplicated.
+    pub(crate) fn arrivals(&self, random: &mut Pcg64Mcg) -> impl Iterator<Item = Duration> + use<> {
+        let mut arrival = |share: f64| {
+            let arrives = random.random::<f64>() < share;
+            let jitter = self.jitter.mul_f64(random.random::<f64>());
+            arrives.then(|| self.latency + jitter)
+        };
+        let first = arrival(1.0 - self.loss);
+        let second = arrival(self.duplicate).filter(|_| first.is_some());
+        first.into_iter().chain(second)
+    }
+}

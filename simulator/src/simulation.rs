@@ -1,0 +1,491 @@
+//! The run itself: virtual time goes from one event to the next.
+//!
+//! Three kinds of events: a frame arrives, a party wakes, a fault is due. At equal times frames come first, then wake-ups by
+//! party, then faults, so that a run is a function of its parts, faults and seed.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+use serde::Serialize;
+use understudy_node::Station;
+use understudy_remote_io::RemoteIo;
+use understudy_wire::{
+    Body, Epoch, Field, Frame, Input, Machine, Output, Party, ProgramId, ProgramSet, Source,
+    StationId, StationSet, Time,
+};
+
+use crate::fault::{Action, Fault};
+use crate::field::Plants;
+use crate::network::Network;
+use crate::pace::Pace;
+use crate::parts::Parts;
+use crate::queue::{Delivery, Queue};
+use crate::referee::{Referee, Violation};
+use crate::slot::Slot;
+use crate::tally::Tally;
+
+/// Something for the journal.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Record<'a> {
+    /// Of a controller or an understudy.
+    Station(&'a understudy_node::Event),
+    /// Of a remote I/O.
+    RemoteIo(&'a understudy_remote_io::Event),
+    /// A plant moved.
+    Plant(&'a Field),
+    /// A fault was done.
+    Fault(&'a Fault),
+    /// Something that must never happen.
+    Violation(&'a Violation),
+}
+
+/// Takes the records of a run: when in virtual time, in which cycle of the scenario (none before its cycle 0), who.
+pub type Observe<'a> = dyn FnMut(Time, Option<u64>, Party, Record<'_>) + 'a;
+
+/// The cluster did not come to a cycle in which everybody was in step.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "after {cycles} cycles not everybody was in step; remote I/Os that were not driving directly: {waiting:?}"
+)]
+pub struct NotReady {
+    /// How long it was waited for.
+    pub cycles: u64,
+    /// Programs whose remote I/O was not there yet.
+    pub waiting: Vec<u8>,
+}
+
+/// A cluster in virtual time.
+pub struct Simulation {
+    parts: Parts,
+    network: Network,
+    random: Pcg64Mcg,
+    now: Time,
+    stations: Vec<Slot<Station>>,
+    remote_ios: Vec<Slot<RemoteIo>>,
+    plants: Plants,
+    referees: Vec<Referee>,
+    tallies: Vec<Tally>,
+    /// For each remote I/O, whether its last deadline was direct and everybody spoke.
+    ready: ProgramSet,
+    violations: Vec<Violation>,
+    queue: Queue,
+    faults: Vec<Fault>,
+    pace: Pace,
+    founded: u64,
+}
+
+impl Simulation {
+    /// All parties start at time 0.
+    ///
+    /// # Panics
+    /// If the parts have no station or not one remote I/O and plant place a program.
+    pub fn new(parts: Parts, network: Network, seed: u64) -> Self {
+        let programs = &parts.stations[0].programs;
+        assert_eq!(parts.remote_ios.len(), programs.len());
+        assert_eq!(parts.plants.len(), programs.len());
+        let now = Time::default();
+        let referees = parts
+            .remote_ios
+            .iter()
+            .map(|settings| Referee::new(settings, programs[settings.program.index()].scan.clone()))
+            .collect();
+        let stations = parts.stations.iter().enumerate().map(|(rank, settings)| {
+            let mut settings = settings.clone();
+            settings.epoch = Epoch(1 + rank as u64);
+            Slot::new(Station::new(now, settings))
+        });
+        let remote_ios = parts.remote_ios.iter();
+        let mut simulation = Self {
+            network,
+            random: Pcg64Mcg::seed_from_u64(seed),
+            now,
+            stations: stations.collect(),
+            remote_ios: remote_ios
+                .map(|settings| Slot::new(RemoteIo::new(now, settings.clone())))
+                .collect(),
+            plants: Plants::new(&parts),
+            referees,
+            tallies: vec![Tally::default(); parts.remote_ios.len()],
+            ready: ProgramSet::EMPTY,
+            violations: Vec::new(),
+            queue: Queue::default(),
+            faults: Vec::new(),
+            pace: Pace::new(parts.stations[0].agreement.schedule.period()),
+            founded: parts.stations.len() as u64,
+            parts,
+        };
+        for program in 0..simulation.remote_ios.len() {
+            simulation.show_field(ProgramId(program as u8));
+        }
+        simulation
+    }
+
+    /// Adds a fault; one whose cycle is over is done at once.
+    pub fn schedule(&mut self, fault: Fault) {
+        let key = |fault: &Fault| fault.at_cycle as f64 + fault.phase;
+        let place = self
+            .faults
+            .partition_point(|other| key(other) > key(&fault));
+        self.faults.insert(place, fault);
+    }
+
+    /// Runs until everybody is in step, and from there `cycles` cycles more.
+    ///
+    /// # Errors
+    /// [`NotReady`] where that state is not reached in `patience` cycles.
+    pub fn run(
+        &mut self,
+        cycles: u64,
+        patience: u64,
+        observe: &mut Observe<'_>,
+    ) -> Result<(), NotReady> {
+        self.wait_until_ready(patience, observe)?;
+        for tally in &mut self.tallies {
+            *tally = Tally::default();
+        }
+        self.pace.set_origin();
+        while self.pace.cycle().is_none_or(|cycle| cycle < cycles) {
+            self.advance(observe);
+        }
+        Ok(())
+    }
+
+    /// Goes on after [`Self::run`] until `cycle` has begun, or until `over` says so after an event; true where it said so.
+    pub fn go_on(
+        &mut self,
+        cycle: u64,
+        observe: &mut Observe<'_>,
+        over: &mut dyn FnMut() -> bool,
+    ) -> bool {
+        while self.pace.cycle().is_none_or(|now| now < cycle) {
+            self.advance(observe);
+            if over() {
+                return true;
+            }
+        }
+        false
+    }
+
+    fn wait_until_ready(
+        &mut self,
+        patience: u64,
+        observe: &mut Observe<'_>,
+    ) -> Result<(), NotReady> {
+        let all = ProgramSet::first(self.remote_ios.len());
+        let give_up = self.now + self.period() * u32::try_from(patience).unwrap_or(u32::MAX);
+        while self.ready != all {
+            if self.now >= give_up {
+                let waiting = all.without(self.ready);
+                return Err(NotReady {
+                    cycles: patience,
+                    waiting: waiting.iter().map(|program| program.0).collect(),
+                });
+            }
+            self.advance(observe);
+        }
+        Ok(())
+    }
+
+    /// Virtual time since the start.
+    pub fn now(&self) -> Time {
+        self.now
+    }
+
+    /// Cycles of the scenario so far, with the part of this one that is over; none before its cycle 0.
+    pub fn cycle_time(&self) -> Option<f64> {
+        let within = (self.now.0 - self.pace.started().0) as f64 / self.period().as_nanos() as f64;
+        Some(self.pace.cycle()? as f64 + within)
+    }
+
+    /// What each remote I/O did since everybody was in step, by program.
+    pub fn tallies(&self) -> &[Tally] {
+        &self.tallies
+    }
+
+    /// Everything that must never happen and did.
+    pub fn violations(&self) -> &[Violation] {
+        &self.violations
+    }
+
+    /// What the plant of a program shows now.
+    pub fn field(&self, program: ProgramId) -> Option<&Field> {
+        self.plants.field(program)
+    }
+
+    fn period(&self) -> Duration {
+        self.parts.stations[0].agreement.schedule.period()
+    }
+
+    // ── one event ───────────────────────────────────────────────────────────────────────────────────────────────────
+
+    fn advance(&mut self, observe: &mut Observe<'_>) {
+        let arrival = self.queue.next_at();
+        let (wakeup, sleeper) = self.next_wakeup();
+        let fault = self.next_fault_at();
+        let overdue = self.pace.overdue_at();
+        let next = [arrival, Some(wakeup), fault, Some(overdue)]
+            .into_iter()
+            .flatten()
+            .min();
+        let next = next.unwrap_or(overdue);
+        self.now = self.now.max(next);
+        if arrival == Some(next) {
+            if let Some(delivery) = self.queue.pop() {
+                self.deliver(&delivery, observe);
+            }
+        } else if wakeup == next {
+            self.give(sleeper, Input::Wakeup, observe);
+        } else if fault == Some(next) {
+            if let Some(fault) = self.faults.pop() {
+                self.apply(&fault, observe);
+            }
+        } else {
+            self.pace.count_overdue();
+        }
+    }
+
+    fn next_wakeup(&self) -> (Time, Party) {
+        let mut next = (Time(u64::MAX), Party::Station(StationId(0)));
+        for (rank, slot) in self.stations.iter().enumerate() {
+            if let Some(at) = slot.wakeup().filter(|&at| at < next.0) {
+                next = (at, Party::Station(StationId(rank as u8)));
+            }
+        }
+        for (program, slot) in self.remote_ios.iter().enumerate() {
+            if let Some(at) = slot.wakeup().filter(|&at| at < next.0) {
+                next = (at, Party::RemoteIo(ProgramId(program as u8)));
+            }
+        }
+        next
+    }
+
+    fn next_fault_at(&self) -> Option<Time> {
+        let fault = self.faults.last()?;
+        let cycle = self.pace.cycle()?;
+        (fault.at_cycle <= cycle).then(|| {
+            self.now
+                .max(self.pace.started() + self.period().mul_f64(fault.phase))
+        })
+    }
+
+    fn deliver(&mut self, delivery: &Delivery, observe: &mut Observe<'_>) {
+        for station in delivery.stations.iter() {
+            self.give(
+                Party::Station(station),
+                Input::Frame(&delivery.frame),
+                observe,
+            );
+        }
+        for program in delivery.remote_ios.iter() {
+            self.give(
+                Party::RemoteIo(program),
+                Input::Frame(&delivery.frame),
+                observe,
+            );
+        }
+    }
+
+    fn give(&mut self, party: Party, input: Input<'_>, observe: &mut Observe<'_>) {
+        match party {
+            Party::Station(station) => {
+                if self.stations[station.index()].give(self.now, input) {
+                    self.drain_station(station, observe);
+                }
+            }
+            Party::RemoteIo(program) => {
+                if self.remote_ios[program.index()].give(self.now, input) {
+                    self.drain_remote_io(program, observe);
+                }
+            }
+            Party::Plant(_) => {}
+        }
+    }
+
+    fn drain_station(&mut self, station: StationId, observe: &mut Observe<'_>) {
+        let party = Party::Station(station);
+        while let Some(output) = self.poll_station(station) {
+            match output {
+                Output::Send(frame) => self.send(frame),
+                Output::Report(event) => {
+                    observe(self.now, self.pace.cycle(), party, Record::Station(&event));
+                }
+                Output::Drive(_) => {}
+            }
+        }
+        self.stations[station.index()].settle();
+    }
+
+    fn poll_station(&mut self, station: StationId) -> Option<Output<understudy_node::Event>> {
+        self.stations[station.index()].machine()?.poll_output()
+    }
+
+    fn drain_remote_io(&mut self, program: ProgramId, observe: &mut Observe<'_>) {
+        let party = Party::RemoteIo(program);
+        while let Some(output) = self.poll_remote_io(program) {
+            match output {
+                Output::Send(frame) => self.send(frame),
+                Output::Drive(outputs) => {
+                    self.plants.drive(program, &outputs);
+                    if let Some(field) = self.plants.field(program) {
+                        let plant = Party::Plant(program);
+                        observe(self.now, self.pace.cycle(), plant, Record::Plant(field));
+                    }
+                    self.show_field(program);
+                }
+                Output::Report(event) => {
+                    self.judge(program, &event, observe);
+                    observe(self.now, self.pace.cycle(), party, Record::RemoteIo(&event));
+                }
+            }
+        }
+        self.remote_ios[program.index()].settle();
+    }
+
+    fn poll_remote_io(
+        &mut self,
+        program: ProgramId,
+    ) -> Option<Output<understudy_remote_io::Event>> {
+        self.remote_ios[program.index()].machine()?.poll_output()
+    }
+
+    fn show_field(&mut self, program: ProgramId) {
+        if let Some(field) = self.plants.field(program) {
+            self.remote_ios[program.index()].give(self.now, Input::Field(&field.sensors));
+        }
+    }
+
+    fn judge(
+        &mut self,
+        program: ProgramId,
+        event: &understudy_remote_io::Event,
+        observe: &mut Observe<'_>,
+    ) {
+        if let Err(violation) = self.referees[program.index()].observe(event) {
+            let party = Party::RemoteIo(program);
+            observe(
+                self.now,
+                self.pace.cycle(),
+                party,
+                Record::Violation(&violation),
+            );
+            self.violations.push(violation);
+        }
+        if let understudy_remote_io::Event::Applied { source, heard, .. } = event {
+            if *source == Source::Direct && heard.len() == self.stations.len() {
+                self.ready.insert(program);
+            } else {
+                self.ready.remove(program);
+            }
+        }
+        self.tallies[program.index()].count(event);
+    }
+
+    // ── the network ─────────────────────────────────────────────────────────────────────────────────────────────────
+
+    fn send(&mut self, frame: Arc<Frame>) {
+        self.pace.saw(self.now, frame.header.moment);
+        let mut stations = StationSet::first(self.stations.len());
+        let mut remote_ios = ProgramSet::first(self.remote_ios.len());
+        if let Party::Station(sender) = frame.header.sender {
+            stations.remove(sender);
+        }
+        match &frame.body {
+            Body::Sample(_) => remote_ios = ProgramSet::EMPTY,
+            Body::Transfer(transfer) => {
+                stations = StationSet::only(transfer.to);
+                remote_ios = ProgramSet::EMPTY;
+            }
+            _ => {}
+        }
+        if self.network.is_even() {
+            let at = self.now + self.network.latency;
+            self.queue.push(at, frame, stations, remote_ios);
+            return;
+        }
+        for station in stations.iter() {
+            for delay in self.network.arrivals(&mut self.random) {
+                let at = self.now + delay;
+                let only = StationSet::only(station);
+                self.queue
+                    .push(at, Arc::clone(&frame), only, ProgramSet::EMPTY);
+            }
+        }
+        for program in remote_ios.iter() {
+            for delay in self.network.arrivals(&mut self.random) {
+                let at = self.now + delay;
+                let only = ProgramSet::only(program);
+                self.queue
+                    .push(at, Arc::clone(&frame), StationSet::EMPTY, only);
+            }
+        }
+    }
+
+    // ── faults ──────────────────────────────────────────────────────────────────────────────────────────────────────
+
+    fn apply(&mut self, fault: &Fault, observe: &mut Observe<'_>) {
+        observe(
+            self.now,
+            self.pace.cycle(),
+            fault.party,
+            Record::Fault(fault),
+        );
+        match fault.party {
+            Party::Station(station) => {
+                let Some(slot) = self.stations.get_mut(station.index()) else {
+                    return;
+                };
+                if fault.action == Action::Restart {
+                    self.founded += 1;
+                    let mut settings = self.parts.stations[station.index()].clone();
+                    settings.epoch = Epoch(self.founded);
+                    slot.restart(Station::new(self.now, settings));
+                    return;
+                }
+                let waiting = disturb(slot, fault.action);
+                for frame in waiting {
+                    self.give(fault.party, Input::Frame(&frame), observe);
+                }
+            }
+            Party::RemoteIo(program) => {
+                let Some(slot) = self.remote_ios.get_mut(program.index()) else {
+                    return;
+                };
+                if fault.action == Action::Restart {
+                    let settings = self.parts.remote_ios[program.index()].clone();
+                    slot.restart(RemoteIo::new(self.now, settings));
+                    self.show_field(program);
+                    return;
+                }
+                if fault.action == Action::Release {
+                    self.give(fault.party, Input::Release, observe);
+                    return;
+                }
+                let waiting = disturb(slot, fault.action);
+                for frame in waiting {
+                    self.give(fault.party, Input::Frame(&frame), observe);
+                }
+            }
+            Party::Plant(program) => match fault.action {
+                Action::Crash => self.plants.crash(program),
+                Action::Restart => self.plants.restart(program),
+                Action::Stop | Action::Continue | Action::Release => {}
+            },
+        }
+    }
+}
+
+fn disturb<M: Machine>(
+    slot: &mut Slot<M>,
+    action: Action,
+) -> impl IntoIterator<Item = Arc<Frame>> + use<M> {
+    match action {
+        Action::Crash => slot.crash(),
+        Action::Stop => slot.stop(),
+        Action::Continue => return slot.go_on(),
+        Action::Restart | Action::Release => {}
+    }
+    Default::default()
+}

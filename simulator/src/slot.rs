@@ -1,0 +1,81 @@
+//! The place of one party: running, stopped, or crashed.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use understudy_wire::{Frame, Input, Machine, Time};
+
+/// Frames that wait for a stopped party, at most, as in a socket's buffer; later ones are lost.
+const WAITING_FRAMES: usize = 256;
+
+#[derive(Debug)]
+pub(crate) struct Slot<M> {
+    machine: Option<M>,
+    stopped: bool,
+    waiting: VecDeque<Arc<Frame>>,
+    wakeup: Time,
+}
+
+impl<M: Machine> Slot<M> {
+    pub(crate) fn new(machine: M) -> Self {
+        Self {
+            wakeup: machine.wakeup(),
+            machine: Some(machine),
+            stopped: false,
+            waiting: VecDeque::new(),
+        }
+    }
+
+    /// When it wants to be woken; never while it is stopped or crashed.
+    pub(crate) fn wakeup(&self) -> Option<Time> {
+        (self.machine.is_some() && !self.stopped).then_some(self.wakeup)
+    }
+
+    /// Gives an input to a running party. True if it took it.
+    pub(crate) fn give(&mut self, now: Time, input: Input<'_>) -> bool {
+        if self.stopped {
+            if let Input::Frame(frame) = input
+                && self.waiting.len() < WAITING_FRAMES
+            {
+                self.waiting.push_back(Arc::clone(frame));
+            }
+            return false;
+        }
+        let Some(machine) = &mut self.machine else {
+            return false;
+        };
+        machine.handle_input(now, input);
+        true
+    }
+
+    pub(crate) fn machine(&mut self) -> Option<&mut M> {
+        self.machine.as_mut()
+    }
+
+    /// Notes the time that it wants next, once its outputs are drained.
+    pub(crate) fn settle(&mut self) {
+        if let Some(machine) = &self.machine {
+            self.wakeup = machine.wakeup();
+        }
+    }
+
+    pub(crate) fn crash(&mut self) {
+        self.machine = None;
+        self.stopped = false;
+        self.waiting.clear();
+    }
+
+    pub(crate) fn restart(&mut self, machine: M) {
+        *self = Self::new(machine);
+    }
+
+    pub(crate) fn stop(&mut self) {
+        self.stopped = self.machine.is_some();
+    }
+
+    /// Goes on; answers with the frames that waited.
+    pub(crate) fn go_on(&mut self) -> VecDeque<Arc<Frame>> {
+        self.stopped = false;
+        std::mem::take(&mut self.waiting)
+    }
+}

@@ -1,0 +1,80 @@
+//! The press cell of section V as parts of a simulation, from the ladders that the demo runs.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use understudy_ladder::parse;
+use understudy_logic::{Circuit, Scan};
+use understudy_plant::{ModelKind, Plant, PressParameters, RobotParameters, Signals};
+use understudy_simulator::Parts;
+use understudy_wire::{
+    Agreement, ClusterHash, ConfigurationHash, Epoch, Image, Mode, ProgramHash, ProgramId,
+    Schedule, StationId,
+};
+
+pub(crate) const PERIOD: Duration = Duration::from_millis(10);
+pub(crate) const HOLD_CYCLES: u32 = 3;
+
+/// Two programs, `understudies` understudies, two copies of each frame.
+pub(crate) fn parts(mode: Mode, understudies: usize) -> Parts {
+    let circuits = [
+        circuit(include_str!("../../../examples/press-cell/robot.ladder")),
+        circuit(include_str!("../../../examples/press-cell/press.ladder")),
+    ];
+    let agreement = Arc::new(Agreement {
+        cluster: ClusterHash(1),
+        configuration: ConfigurationHash(2),
+        schedule: Schedule::new(PERIOD, circuits.len(), understudies, 2).expect("within bounds"),
+        mode,
+        history: 8,
+        flag_after: 3,
+        shadow_cycles: 3,
+        listen_cycles: 4,
+    });
+    let programs: Arc<[understudy_node::Program]> = circuits
+        .iter()
+        .zip(1..)
+        .map(|(circuit, hash)| understudy_node::Program {
+            hash: ProgramHash(hash),
+            scan: Scan::new(circuit),
+        })
+        .collect();
+    let stations = (0..circuits.len() + understudies).map(|rank| understudy_node::Settings {
+        station: StationId(rank as u8),
+        agreement: Arc::clone(&agreement),
+        programs: Arc::clone(&programs),
+        epoch: Epoch(0),
+    });
+    let remote_ios =
+        programs
+            .iter()
+            .zip(0..)
+            .map(|(program, index)| understudy_remote_io::Settings {
+                program: ProgramId(index),
+                agreement: Arc::clone(&agreement),
+                hash: program.hash,
+                inputs: program.scan.input_count(),
+                hold_cycles: HOLD_CYCLES,
+                fail_safe: Image::zero(program.scan.output_count()),
+                release: understudy_remote_io::Release::Automatic,
+            });
+    let kinds = [
+        ModelKind::Robot(RobotParameters::default()),
+        ModelKind::Press(PressParameters::default()),
+    ];
+    let plants = circuits.iter().zip(&kinds).zip([false, true]);
+    let plants =
+        plants.map(|((circuit, kind), fed)| Plant::new(kind, circuit, &Signals::new(), fed).0);
+    Parts {
+        stations: stations.collect(),
+        remote_ios: remote_ios.collect(),
+        plants: plants.collect(),
+        fed_by: vec![None, Some(ProgramId(0))],
+    }
+}
+
+fn circuit(text: &str) -> Circuit {
+    let parsed = parse(text);
+    let program = parsed.into_result().expect("a ladder without errors").0;
+    program.lower(PERIOD).expect("it lowers")
+}

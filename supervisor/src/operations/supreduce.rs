@@ -1,0 +1,349 @@
+//! Supervisor reduction, after R. Su and W. M. Wonham, *Supervisor reduction for discrete-event systems* (2004).
+//!
+//! Two states of a supervisor may become one when neither enables what the other disables, when they agree on marking wherever the
+//! plant leaves it to them, and when the same holds for all that follows. Finding the fewest states is NP-hard; merging greedily
+//! is not, and what comes out depends on the order in which pairs are tried. A few orders are tried and the smallest result is kept.
+//! Whether the result has the same effect is not taken on trust: [`control_equivalent`] decides it.
+
+use std::collections::VecDeque;
+
+use super::isomorph::enabled_difference;
+use crate::alphabet::Label;
+use crate::automaton::{Automaton, Edge, State};
+use crate::explicit::{Bounds, Joint, Product, TooLarge};
+
+/// `supreduce`: a supervisor with no more states than `supervisor` and the same effect on `plant`; usually with far fewer, for it forgets
+/// what the plant knows by itself. Its states have no names.
+///
+/// # Errors
+/// The product of the two passes the bounds.
+pub fn supreduce(
+    plant: &Automaton,
+    supervisor: &Automaton,
+    bounds: Bounds,
+) -> Result<Automaton, TooLarge> {
+    if supervisor.is_empty() {
+        return Ok(supervisor.clone());
+    }
+    let demands = Demands::new(plant, supervisor, bounds)?;
+    let orders = [ascending(supervisor), depth_first(supervisor)];
+    let reductions = orders.iter().map(|order| {
+        let mut cells = Cells::new(supervisor, &demands);
+        cells.merge_greedily(order);
+        cells.reduced(supervisor)
+    });
+    let smallest =
+        reductions.min_by_key(|reduced| (reduced.state_count(), reduced.transition_count()));
+    Ok(smallest.unwrap_or_else(|| supervisor.clone()))
+}
+
+fn ascending(supervisor: &Automaton) -> Vec<State> {
+    supervisor.states().collect()
+}
+
+fn depth_first(supervisor: &Automaton) -> Vec<State> {
+    let mut seen = vec![false; supervisor.state_count()];
+    let mut order = Vec::with_capacity(seen.len());
+    let mut pending: Vec<State> = supervisor.initial().into_iter().collect();
+    while let Some(state) = pending.pop() {
+        if std::mem::replace(&mut seen[state.index()], true) {
+            continue;
+        }
+        order.push(state);
+        pending.extend(supervisor.edges(state).iter().rev().map(|edge| edge.target));
+    }
+    order.extend(supervisor.states().filter(|state| !seen[state.index()]));
+    order
+}
+
+/// What each state of a supervisor asks for, as bit sets over its alphabet and one bit more for marking: E(x) and D(x) of the
+/// paper. A state that marks where the plant does enables the marking; one that does not where the plant does disables it.
+struct Demands {
+    words: usize,
+    enabled: Vec<u64>,
+    disabled: Vec<u64>,
+}
+
+impl Demands {
+    fn new(plant: &Automaton, supervisor: &Automaton, bounds: Bounds) -> Result<Self, TooLarge> {
+        let product = Product::explore(&[plant, supervisor], &[], Joint::Meet, bounds)?;
+        let alphabet = supervisor.alphabet();
+        let marking = alphabet.len();
+        let words = (marking + 1).div_ceil(64);
+        let mut demands = Self {
+            words,
+            enabled: vec![0; supervisor.state_count() * words],
+            disabled: vec![0; supervisor.state_count() * words],
+        };
+        for number in 0..product.state_count() {
+            let of_plant = product.component_state(number, 0);
+            let state = product.component_state(number, 1);
+            for edge in plant.edges(of_plant) {
+                if let Some(event) = alphabet.place(plant.label(*edge)) {
+                    let allowed = supervisor.successor(state, event).is_some();
+                    demands.set(state, event as usize, allowed);
+                }
+            }
+            if plant.is_marked(of_plant) {
+                demands.set(state, marking, supervisor.is_marked(state));
+            }
+        }
+        for state in supervisor.states() {
+            for edge in supervisor.edges(state) {
+                demands.set(state, edge.event as usize, true);
+            }
+        }
+        Ok(demands)
+    }
+
+    fn set(&mut self, state: State, bit: usize, enabled: bool) {
+        let sets = if enabled {
+            &mut self.enabled
+        } else {
+            &mut self.disabled
+        };
+        sets[state.index() * self.words + bit / 64] |= 1 << (bit % 64);
+    }
+}
+
+const NONE: u32 = u32::MAX;
+
+/// A partition of the states into cells whose members agree, with what a cell asks for and where its events lead. A step that
+/// turns out wrong is taken back.
+struct Cells {
+    words: usize,
+    events: usize,
+    parent: Vec<u32>,
+    /// Bigger states come later in the order that is tried; the root of a cell is its first.
+    enabled: Vec<u64>,
+    disabled: Vec<u64>,
+    /// For each state and event a target, [`NONE`] where there is none.
+    targets: Vec<u32>,
+    /// What a tentative merge changed.
+    undo: Vec<Change>,
+    pending: Vec<(u32, u32)>,
+}
+
+enum Change {
+    Parent(u32),
+    Enabled(usize, u64),
+    Disabled(usize, u64),
+    Target(usize),
+}
+
+impl Cells {
+    fn new(supervisor: &Automaton, demands: &Demands) -> Self {
+        let events = supervisor.alphabet().len();
+        let mut targets = vec![NONE; supervisor.state_count() * events];
+        for state in supervisor.states() {
+            for edge in supervisor.edges(state) {
+                targets[state.index() * events + edge.event as usize] = edge.target.number();
+            }
+        }
+        Self {
+            words: demands.words,
+            events,
+            parent: (0..supervisor.state_count() as u32).collect(),
+            enabled: demands.enabled.clone(),
+            disabled: demands.disabled.clone(),
+            targets,
+            undo: Vec::new(),
+            pending: Vec::new(),
+        }
+    }
+
+    fn root(&self, mut state: u32) -> u32 {
+        while self.parent[state as usize] != state {
+            state = self.parent[state as usize];
+        }
+        state
+    }
+
+    fn is_root(&self, state: State) -> bool {
+        self.parent[state.index()] == state.number()
+    }
+
+    fn merge_greedily(&mut self, order: &[State]) {
+        for (place, &state) in order.iter().enumerate() {
+            if !self.is_root(state) {
+                continue;
+            }
+            for &other in &order[place + 1..] {
+                if self.is_root(other) && self.agree(self.root(state.number()), other.number()) {
+                    self.try_merge(state.number(), other.number());
+                }
+            }
+        }
+    }
+
+    /// Whether neither of two cells enables what the other disables.
+    fn agree(&self, left: u32, right: u32) -> bool {
+        let (left, right) = (left as usize * self.words, right as usize * self.words);
+        (0..self.words).all(|word| {
+            let clash = self.enabled[left + word] & self.disabled[right + word]
+                | self.disabled[left + word] & self.enabled[right + word];
+            clash == 0
+        })
+    }
+
+    /// Merges two cells and all that must then be merged; or takes everything back.
+    fn try_merge(&mut self, left: u32, right: u32) {
+        self.pending.clear();
+        self.pending.push((left, right));
+        while let Some((left, right)) = self.pending.pop() {
+            let (left, right) = (self.root(left), self.root(right));
+            if left == right {
+                continue;
+            }
+            if !self.agree(left, right) {
+                self.take_back();
+                return;
+            }
+            self.join(left, right);
+        }
+        self.undo.clear();
+    }
+
+    fn join(&mut self, left: u32, right: u32) {
+        let (kept, joined) = (left.min(right), left.max(right));
+        self.parent[joined as usize] = kept;
+        self.undo.push(Change::Parent(joined));
+        for word in 0..self.words {
+            let (to, from) = (
+                kept as usize * self.words + word,
+                joined as usize * self.words + word,
+            );
+            let (enabled, disabled) = (self.enabled[to], self.disabled[to]);
+            if self.enabled[from] & !enabled != 0 {
+                self.undo.push(Change::Enabled(to, enabled));
+                self.enabled[to] |= self.enabled[from];
+            }
+            if self.disabled[from] & !disabled != 0 {
+                self.undo.push(Change::Disabled(to, disabled));
+                self.disabled[to] |= self.disabled[from];
+            }
+        }
+        for event in 0..self.events {
+            let other = self.targets[joined as usize * self.events + event];
+            if other == NONE {
+                continue;
+            }
+            let place = kept as usize * self.events + event;
+            if self.targets[place] == NONE {
+                self.targets[place] = other;
+                self.undo.push(Change::Target(place));
+            } else {
+                self.pending.push((self.targets[place], other));
+            }
+        }
+    }
+
+    fn take_back(&mut self) {
+        while let Some(change) = self.undo.pop() {
+            match change {
+                Change::Parent(state) => self.parent[state as usize] = state,
+                Change::Enabled(place, set) => self.enabled[place] = set,
+                Change::Disabled(place, set) => self.disabled[place] = set,
+                Change::Target(place) => self.targets[place] = NONE,
+            }
+        }
+    }
+
+    fn reduced(&self, supervisor: &Automaton) -> Automaton {
+        let mut numbers = vec![NONE; supervisor.state_count()];
+        let mut roots = Vec::new();
+        // The initial state is 0, so its cell has the root 0.
+        for state in supervisor.states() {
+            if self.is_root(state) {
+                numbers[state.index()] = roots.len() as u32;
+                roots.push(state);
+            }
+        }
+        let mut marked = vec![false; roots.len()];
+        for state in supervisor.marked() {
+            marked[numbers[self.root(state.number()) as usize] as usize] = true;
+        }
+        let mut first = vec![0];
+        let mut edges = Vec::new();
+        for root in &roots {
+            for event in 0..self.events {
+                let target = self.targets[root.index() * self.events + event];
+                if target != NONE {
+                    let target = State::new(numbers[self.root(target) as usize]);
+                    edges.push(Edge {
+                        event: event as u32,
+                        target,
+                    });
+                }
+            }
+            first.push(edges.len() as u32);
+        }
+        let alphabet = supervisor.alphabet().clone();
+        // A cell stands for many states, and the name of one of them would mislead.
+        Automaton::from_parts("SIMSUP".to_owned(), alphabet, marked, first, edges)
+    }
+}
+
+/// Where two supervisors have a different effect on one plant.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Inequivalent {
+    /// A shortest sequence of events that leads there.
+    pub word: Vec<Label>,
+    /// The event that one allows and the other does not; none where they differ in marking.
+    pub event: Option<Label>,
+}
+
+/// Whether `plant` under `left` and under `right` does and marks the same: L(G) ∩ L(S) and Lm(G) ∩ Lm(S) for both.
+///
+/// # Errors
+/// A product with the plant passes the bounds.
+pub fn control_equivalent(
+    plant: &Automaton,
+    left: &Automaton,
+    right: &Automaton,
+    bounds: Bounds,
+) -> Result<Option<Inequivalent>, TooLarge> {
+    let under = |supervisor| {
+        let product = Product::explore(&[plant, supervisor], &[], Joint::Meet, bounds)?;
+        Ok(product.into_automaton(String::new()))
+    };
+    Ok(language_difference(&under(left)?, &under(right)?))
+}
+
+/// A shortest word after which two automata do not enable or mark the same.
+fn language_difference(left: &Automaton, right: &Automaton) -> Option<Inequivalent> {
+    let (one, two) = match (left.initial(), right.initial()) {
+        (None, None) => return None,
+        (Some(one), Some(two)) => (one, two),
+        _ => {
+            return Some(Inequivalent {
+                word: Vec::new(),
+                event: None,
+            });
+        }
+    };
+    let mut arrived = std::collections::HashMap::from([((one, two), None)]);
+    let mut pending = VecDeque::from([(one, two)]);
+    while let Some(pair) = pending.pop_front() {
+        let (one, two) = pair;
+        let event = enabled_difference(left, one, right, two);
+        if event.is_some() || left.is_marked(one) != right.is_marked(two) {
+            let mut word = Vec::new();
+            let mut at = pair;
+            while let Some(Some((before, label))) = arrived.get(&at).copied() {
+                word.push(label);
+                at = before;
+            }
+            word.reverse();
+            return Some(Inequivalent { word, event });
+        }
+        for (edge, other) in left.edges(one).iter().zip(right.edges(two)) {
+            let next = (edge.target, other.target);
+            arrived.entry(next).or_insert_with(|| {
+                pending.push_back(next);
+                Some((pair, left.label(*edge)))
+            });
+        }
+    }
+    None
+}

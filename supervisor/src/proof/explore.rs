@@ -1,0 +1,433 @@
+//! Ladder and automata side by side, scan by scan, through everything that they can reach together.
+
+use std::collections::{HashMap, HashSet};
+use std::time::Duration;
+
+use understudy_ladder::{Name, Program};
+use understudy_logic::{Circuit, Scan, Scratch};
+
+use super::environment::Environment;
+use super::reference::{Allowed, Happening, Joint, Reference};
+use super::timers::free_timers;
+use super::verdict::{Counterexample, Deviation, Proof, ProofError, ScanRecord, Verdict};
+use super::view::{Bit, Seen, View};
+use crate::ladder::{Correspondence, InputOutputMap, Mode, Modules, Partition};
+use crate::{Label, State};
+
+/// How far a proof looks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ProofSettings {
+    /// The mode that the ladder was generated for.
+    pub mode: Mode,
+    /// At most so many inputs change in one scan.
+    pub simultaneous: usize,
+    /// Past so many states of ladder and inputs the proof is given up.
+    pub maximum_states: usize,
+}
+
+impl Default for ProofSettings {
+    fn default() -> Self {
+        Self {
+            mode: Mode::Automatic,
+            simultaneous: 2,
+            maximum_states: 2_000_000,
+        }
+    }
+}
+
+/// Holds `program` to the automata of `modules`, from its first scan through all that it can reach.
+///
+/// In each scan up to [`ProofSettings::simultaneous`] inputs change; a rising, falling, high or low signal keeps its value as
+/// long as it likes, and any input may change at any time, whether the plant's model expects that or not. Breadth first, so
+/// that a counterexample is as short as any.
+///
+/// # Errors
+/// A map that does not fit, a ladder that is none or lacks the bits, or more states than the limit.
+pub fn prove(
+    program: &Program,
+    modules: &Modules,
+    map: &InputOutputMap,
+    correspondence: &Correspondence,
+    settings: ProofSettings,
+) -> Result<Verdict, ProofError> {
+    let partition = Partition::new(map, modules).map_err(ProofError::Partition)?;
+    let (freed, timers) = free_timers(program);
+    let circuit = freed.lower(Duration::from_millis(1))?;
+    let reference = Reference::new(modules, map, &partition, settings.mode);
+    let environment = Environment::new(
+        circuit.inputs(),
+        map,
+        &partition,
+        correspondence,
+        &timers,
+        settings.simultaneous,
+    );
+    let view = View::new(&circuit, program, map, correspondence)?;
+    let mut exploration = Exploration {
+        scan: Scan::new(&circuit),
+        circuit: &circuit,
+        reference,
+        environment,
+        view,
+        settings,
+        nodes: Vec::new(),
+        known: HashSet::new(),
+        cache: HashMap::new(),
+        joint: HashSet::new(),
+        used: HashSet::new(),
+        scans: 0,
+    };
+    exploration.run()
+}
+
+/// A reached state, and how.
+struct Node {
+    registers: Box<[u64]>,
+    kept: Vec<bool>,
+    state: Joint,
+    positions: Box<[u8]>,
+    parent: Option<(usize, Vec<bool>)>,
+}
+
+type Question = (Joint, Box<[u8]>, Vec<Label>, Vec<Label>, bool);
+
+struct Exploration<'a> {
+    scan: Scan,
+    circuit: &'a Circuit,
+    reference: Reference<'a>,
+    environment: Environment,
+    view: View,
+    settings: ProofSettings,
+    nodes: Vec<Node>,
+    known: HashSet<(Box<[u64]>, Vec<bool>)>,
+    cache: HashMap<Question, Vec<Allowed>>,
+    joint: HashSet<Box<[State]>>,
+    used: HashSet<Label>,
+    scans: u64,
+}
+
+impl Exploration<'_> {
+    fn run(&mut self) -> Result<Verdict, ProofError> {
+        let registers: Box<[u64]> = self.scan.initial().into();
+        let seen = self.see(&registers, &[]);
+        let state = seen
+            .states
+            .iter()
+            .map(|states| states.first().copied())
+            .collect();
+        self.nodes.push(Node {
+            registers: registers.clone(),
+            kept: vec![false; self.circuit.inputs().len()],
+            state,
+            positions: vec![0; self.reference.switch_count()].into(),
+            parent: None,
+        });
+        self.known.insert((registers, self.nodes[0].kept.clone()));
+        let mut scratch = Scratch::default();
+        let mut next = 0;
+        while next < self.nodes.len() {
+            if let Some(state) = &self.nodes[next].state {
+                self.joint.insert(state.clone());
+            }
+            if let Some(counterexample) = self.expand(next, &mut scratch)? {
+                return Ok(Verdict::Refuted(Box::new(counterexample)));
+            }
+            next += 1;
+        }
+        let mut events: Vec<Label> = self.used.iter().copied().collect();
+        events.sort_unstable();
+        Ok(Verdict::Proved(Proof {
+            states: self.nodes.len(),
+            scans: self.scans,
+            joint_states: self.joint.len(),
+            events,
+        }))
+    }
+
+    fn expand(
+        &mut self,
+        index: usize,
+        scratch: &mut Scratch,
+    ) -> Result<Option<Counterexample>, ProofError> {
+        let node = &self.nodes[index];
+        let is_on = |name: &Name| {
+            let place = self.view.register_of.get(name.as_str());
+            place.is_some_and(|&place| bit(&node.registers, place))
+        };
+        let images = self.environment.following(&node.kept, is_on);
+        let register_count = self.circuit.registers().len();
+        let broadcast: Vec<u64> = (0..register_count)
+            .map(|place| {
+                if bit(&node.registers, place) {
+                    u64::MAX
+                } else {
+                    0
+                }
+            })
+            .collect();
+        for images in images.chunks(64) {
+            let mut state = broadcast.clone();
+            let mut outputs = vec![0; self.circuit.outputs().len()];
+            let mut inputs = vec![0_u64; self.circuit.inputs().len()];
+            for (lane, image) in images.iter().enumerate() {
+                for (word, &value) in inputs.iter_mut().zip(image) {
+                    *word |= u64::from(value) << lane;
+                }
+            }
+            self.scan
+                .step_lanes(scratch, &mut state, &inputs, &mut outputs);
+            for (lane, image) in images.iter().enumerate() {
+                self.scans += 1;
+                let registers = pack(&state, lane);
+                let outputs = pack(&outputs, lane);
+                if let Some(found) = self.judge(index, image, registers, &outputs) {
+                    return Ok(Some(found));
+                }
+            }
+        }
+        if self.nodes.len() > self.settings.maximum_states {
+            return Err(ProofError::TooLarge {
+                limit: self.settings.maximum_states,
+            });
+        }
+        Ok(None)
+    }
+
+    /// Compares one scan with what is allowed, and keeps where it leads.
+    fn judge(
+        &mut self,
+        index: usize,
+        image: &[bool],
+        registers: Box<[u64]>,
+        outputs: &[u64],
+    ) -> Option<Counterexample> {
+        let node = &self.nodes[index];
+        let happening = self.environment.happening(&node.kept, image);
+        if let Some(state) = &node.state {
+            for &event in &happening.events {
+                if let Some(supervisor) = self.reference.forbids(state, event) {
+                    let automaton = self.reference.automata()[supervisor];
+                    let deviation = Deviation::Uncontrollable {
+                        automaton: automaton.name().to_owned(),
+                        event: automaton.alphabet().name(event),
+                    };
+                    let seen = self.see(&registers, outputs);
+                    return Some(self.refute(index, image, &seen, deviation, &[]));
+                }
+            }
+        }
+        let question = (
+            node.state.clone(),
+            node.positions.clone(),
+            happening.events.clone(),
+            happening.requests.clone(),
+            happening.start,
+        );
+        if !self.cache.contains_key(&question) {
+            let allowed = self
+                .reference
+                .scan(&node.state, &node.positions, &happening);
+            self.cache.insert(question.clone(), allowed);
+        }
+        let seen = self.see(&registers, outputs);
+        let found = self.cache[&question]
+            .iter()
+            .find(|allowed| seen.is(allowed));
+        let Some(found) = found else {
+            let deviation = self.deviation(&seen, &question);
+            let allowed = self.cache[&question].clone();
+            return Some(self.refute(index, image, &seen, deviation, &allowed));
+        };
+        self.used.extend(found.word.iter().copied());
+        let kept = self.environment.kept(image);
+        if self.known.insert((registers.clone(), kept.clone())) {
+            self.nodes.push(Node {
+                registers,
+                kept,
+                state: found.state.clone(),
+                positions: found.positions.clone(),
+                parent: Some((index, image.to_vec())),
+            });
+        }
+        None
+    }
+
+    fn see(&self, registers: &[u64], outputs: &[u64]) -> Seen {
+        let mut seen = Seen {
+            states: vec![Vec::new(); self.reference.automata().len()],
+            positions: vec![Vec::new(); self.reference.switch_count()],
+            pulses: Vec::new(),
+        };
+        for &(automaton, state) in &self.view.constant {
+            seen.states[automaton].push(state);
+        }
+        for (image, bits) in [
+            (registers, &self.view.registers),
+            (outputs, &self.view.outputs),
+        ] {
+            for (place, &word) in image.iter().enumerate() {
+                let mut word = word;
+                while word != 0 {
+                    let number = place * 64 + word.trailing_zeros() as usize;
+                    word &= word - 1;
+                    match bits[number] {
+                        Bit::Other => {}
+                        Bit::State { automaton, state } => seen.states[automaton].push(state),
+                        Bit::Switch { switch, position } => seen.positions[switch].push(position),
+                        Bit::Pulse(pulse) => seen.pulses.push(pulse),
+                    }
+                }
+            }
+        }
+        seen
+    }
+
+    fn deviation(&self, seen: &Seen, question: &Question) -> Deviation {
+        let automata = self.reference.automata();
+        let is_started = question.0.is_some() || question.4;
+        let name = |index: usize| automata[index].name().to_owned();
+        if let Some(index) = seen.states.iter().position(|states| states.len() > 1) {
+            return Deviation::StateDoubled {
+                automaton: name(index),
+            };
+        }
+        if let Some(index) = seen.states.iter().position(Vec::is_empty)
+            && is_started
+        {
+            return Deviation::StateLost {
+                automaton: name(index),
+            };
+        }
+        if let Some(switch) = seen.positions.iter().position(|on| on.len() > 1) {
+            let signals = seen.positions[switch].iter();
+            return Deviation::SwitchDoubled {
+                signals: signals
+                    .filter_map(|&position| self.signal(switch, position))
+                    .collect(),
+            };
+        }
+        Deviation::NotAllowed
+    }
+
+    fn signal(&self, switch: usize, position: u8) -> Option<String> {
+        let is = |bit: &Bit| matches!(bit, Bit::Switch { switch: s, position: p } if *s == switch && *p == position);
+        let output = self.view.outputs.iter().position(is);
+        let register = self.view.registers.iter().position(is);
+        output
+            .map(|place| self.circuit.outputs()[place].name.clone())
+            .or_else(|| register.map(|place| self.circuit.registers()[place].name.clone()))
+    }
+
+    fn refute(
+        &self,
+        index: usize,
+        image: &[bool],
+        seen: &Seen,
+        deviation: Deviation,
+        allowed: &[Allowed],
+    ) -> Counterexample {
+        let mut scans = Vec::new();
+        let mut at = index;
+        while let Some((parent, image)) = &self.nodes[at].parent {
+            let node = &self.nodes[at];
+            let seen = Seen {
+                states: match &node.state {
+                    Some(states) => states.iter().map(|&state| vec![state]).collect(),
+                    None => Vec::new(),
+                },
+                positions: node
+                    .positions
+                    .iter()
+                    .map(|&position| vec![position])
+                    .collect(),
+                pulses: Vec::new(),
+            };
+            scans.push(self.record(&self.nodes[*parent].kept, image, &seen));
+            at = *parent;
+        }
+        scans.reverse();
+        let states = |allowed: &Allowed| match &allowed.state {
+            Some(states) => self.state_names(states.iter().map(std::slice::from_ref)),
+            None => Vec::new(),
+        };
+        let last = self.record(&self.nodes[index].kept, image, seen);
+        Counterexample {
+            scans,
+            last,
+            deviation,
+            allowed: allowed
+                .iter()
+                .map(|end| {
+                    (
+                        end.word.iter().map(|&label| self.name(label)).collect(),
+                        states(end),
+                    )
+                })
+                .collect(),
+        }
+    }
+
+    fn name(&self, label: Label) -> String {
+        let mut alphabets = self
+            .reference
+            .automata()
+            .iter()
+            .map(|automaton| automaton.alphabet());
+        let known = alphabets.find(|alphabet| alphabet.contains(label));
+        known.map_or_else(|| label.to_string(), |alphabet| alphabet.name(label))
+    }
+
+    fn state_names<'s>(&self, states: impl Iterator<Item = &'s [State]>) -> Vec<String> {
+        let automata = self.reference.automata();
+        let names = automata.iter().zip(states).flat_map(|(automaton, on)| {
+            let name = |state: &State| match automata.len() {
+                1 => automaton.state_name(*state).into_owned(),
+                _ => format!("{}:{}", automaton.name(), automaton.state_name(*state)),
+            };
+            on.iter().map(name).collect::<Vec<_>>()
+        });
+        names.collect()
+    }
+
+    fn record(&self, last: &[bool], image: &[bool], seen: &Seen) -> ScanRecord {
+        let Happening { events, .. } = self.environment.happening(last, image);
+        let inputs = self.circuit.inputs().iter().zip(image);
+        let mut outputs: Vec<String> = Vec::new();
+        for (switch, positions) in seen.positions.iter().enumerate() {
+            outputs.extend(
+                positions
+                    .iter()
+                    .filter_map(|&position| self.signal(switch, position)),
+            );
+        }
+        for &pulse in &seen.pulses {
+            let is = |bit: &Bit| matches!(bit, Bit::Pulse(number) if *number == pulse);
+            let place = self.view.outputs.iter().position(is);
+            outputs.extend(place.map(|place| self.circuit.outputs()[place].name.clone()));
+        }
+        ScanRecord {
+            inputs: inputs
+                .filter(|(_, value)| **value)
+                .map(|(name, _)| name.clone())
+                .collect(),
+            events: events.into_iter().map(|label| self.name(label)).collect(),
+            outputs,
+            states: self.state_names(seen.states.iter().map(Vec::as_slice)),
+        }
+    }
+}
+
+fn bit(words: &[u64], place: usize) -> bool {
+    words[place / 64] >> (place % 64) & 1 == 1
+}
+
+/// One lane of words that hold a bit of 64 runs each.
+fn pack(lanes: &[u64], lane: usize) -> Box<[u64]> {
+    let words = lanes.chunks(64).map(|chunk| {
+        let bits = chunk.iter().enumerate();
+        bits.fold(0, |word, (place, value)| {
+            word | (value >> lane & 1) << place
+        })
+    });
+    words.collect()
+}

@@ -1,0 +1,130 @@
+//! Every figure that TCT, libFAUDES, the literature and two independent programs found for the models of `tests/data`.
+
+use crate::models::{MODELS, Model, counts};
+use understudy_supervisor::operations::{
+    condat, control_equivalent, isomorph, lift, meet, minstate, nonconflict, supcon, supreduce,
+    sync,
+};
+use understudy_supervisor::{Alphabet, Automaton, Bounds, synthesise};
+
+struct Made {
+    plant: Automaton,
+    specification: Automaton,
+    supervisor: Automaton,
+}
+
+fn make(model: &Model) -> Made {
+    let bounds = Bounds::default();
+    let plant = sync(&model.plants(), bounds).expect("it fits");
+    let specification = match model.specifications().as_slice() {
+        [] => understudy_supervisor::operations::allevents(plant.alphabet()),
+        several => {
+            let joined = sync(several, bounds).expect("it fits");
+            lift(&joined, plant.alphabet())
+        }
+    };
+    let result = supcon(&plant, &specification, bounds).expect("it fits");
+    assert_eq!(result.not_lifted, []);
+    assert_eq!(result.explanation, None);
+    Made {
+        plant,
+        specification,
+        supervisor: result.supervisor,
+    }
+}
+
+fn check(name: &str) {
+    let bounds = Bounds::default();
+    let model = Model::read(name);
+    let made = make(&model);
+    let expect = |key: &str, automaton: &Automaton| {
+        let expected = model
+            .counts(key)
+            .unwrap_or_else(|| panic!("{name} has no {key}"));
+        assert_eq!(counts(automaton), expected, "{name}: {key}");
+    };
+    expect("plant", &made.plant);
+    expect("spec_lifted", &made.specification);
+    let both = meet(&[&made.plant, &made.specification], bounds).expect("it fits");
+    expect("product_plant_x_specs", &both);
+    expect("super", &made.supervisor);
+    expect("minstate_of_super", &minstate(&made.supervisor));
+
+    let of_tct = model.file("_SUPER.ADS");
+    assert_eq!(
+        isomorph(&made.supervisor, &of_tct).err(),
+        None,
+        "{name}: TCT's supervisor"
+    );
+    let at_once = synthesise(&model.plants(), &model.specifications(), bounds).expect("it fits");
+    assert_eq!(
+        isomorph(&at_once.supervisor, &of_tct).err(),
+        None,
+        "{name}: at once"
+    );
+    assert_eq!(
+        nonconflict(&[&made.plant, &made.supervisor], bounds),
+        Ok(None),
+        "{name}"
+    );
+
+    let data = condat(&made.plant, &of_tct, bounds).expect("it fits");
+    let expected = &model.expected["condat"];
+    assert_eq!(
+        expected["states_with_disablement"],
+        data.states_with_disablement(),
+        "{name}"
+    );
+    assert_eq!(expected["pairs"], data.pairs(), "{name}");
+    assert_eq!(data.uncontrollable, []);
+    if let Some(table) = model.expected["condat_table"].as_object() {
+        let rows = data.table.iter().map(|(state, events)| {
+            let events: Vec<u32> = events.iter().map(|event| event.number()).collect();
+            (state.to_string(), events.into())
+        });
+        assert_eq!(
+            &rows.collect::<serde_json::Map<_, _>>(),
+            table,
+            "{name}: condat"
+        );
+    }
+
+    let of_tct = model.file("_SIMSUP.ADS");
+    for supervisor in [&made.supervisor, &model.file("_SUPER.ADS")] {
+        let reduced = supreduce(&made.plant, supervisor, bounds).expect("it fits");
+        assert!(
+            reduced.state_count() <= of_tct.state_count(),
+            "{name}: {:?}",
+            counts(&reduced)
+        );
+        let difference = control_equivalent(&made.plant, &reduced, supervisor, bounds);
+        assert_eq!(difference, Ok(None), "{name}: the reduced supervisor");
+        let difference = control_equivalent(&made.plant, &reduced, &of_tct, bounds);
+        assert_eq!(difference, Ok(None), "{name}: TCT's reduced supervisor");
+    }
+}
+
+#[test]
+fn small_models() {
+    for name in MODELS.into_iter().filter(|&name| name != "agv") {
+        check(name);
+    }
+}
+
+#[test]
+fn guided_vehicles() {
+    check("agv");
+}
+
+#[test]
+fn sizes_of_the_papers_examples() {
+    for name in ["uzam_test_ads", "uzam_fig4", "uzam_fig6"] {
+        let model = Model::read(name);
+        assert_eq!(
+            Some(counts(&model.plants[0])),
+            model.counts("size"),
+            "{name}"
+        );
+        assert_ne!(model.plants[0].alphabet(), &Alphabet::new([]));
+    }
+}

@@ -1,0 +1,106 @@
+//! Automata and synthesis as a person meets them.
+
+use insta::assert_snapshot;
+use serde_json::{Value, json};
+
+use crate::{Answer, empty_folder, understudy};
+
+const FACTORY: &str = "supervisor/tests/data/small_factory";
+const MODEL: &str = "examples/small-factory/model.toml";
+
+fn des(arguments: &[&str]) -> Answer {
+    let all: Vec<&str> = ["des", "--json"].iter().chain(arguments).copied().collect();
+    understudy(&all)
+}
+
+fn counts(answer: &Answer) -> (u64, u64) {
+    let result = &answer.json()["result"];
+    let number = |value: &Value| value.as_u64().expect("a number");
+    (number(&result["states"]), number(&result["transitions"]))
+}
+
+#[test]
+fn from_machines_to_a_reduced_supervisor_as_in_tct() {
+    let folder = empty_folder("des");
+    let file = |name: &str| folder.join(name).display().to_string();
+    let given = |name: &str| format!("{FACTORY}/{name}.ADS");
+    let (plant, specification) = (file("PLANT.ADS"), file("SPEC.ADS"));
+    let (supervisor, reduced) = (file("SUPER.ADS"), file("SIMSUP.toml"));
+    let made = des(&["sync", &given("MACH1"), &given("MACH2"), "-o", &plant]);
+    assert_eq!(counts(&made), (9, 24));
+    des(&[
+        "sync",
+        &given("BUFSPEC"),
+        &given("BRSPEC"),
+        "-o",
+        &specification,
+    ]);
+    let made = des(&[
+        "supcon",
+        &plant,
+        &specification,
+        "--lift",
+        "-o",
+        &supervisor,
+    ]);
+    assert_eq!(counts(&made), (12, 24));
+    assert_eq!(made.json()["result"]["marked"], json!([0]));
+    let same = des(&["isomorph", &supervisor, &given("_SUPER")]);
+    assert_eq!(
+        (same.status, &same.json()["result"]["isomorphic"]),
+        (0, &json!(true))
+    );
+    let other = des(&["isomorph", &supervisor, &plant]);
+    assert_eq!(other.status, 1);
+    let made = des(&["supreduce", &plant, &supervisor, "-o", &reduced]);
+    assert_eq!(counts(&made), (3, 14));
+    let data = des(&["condat", &plant, &given("_SUPER")]).json();
+    assert_eq!(
+        (
+            &data["result"]["states_with_disablement"],
+            &data["result"]["pairs"]
+        ),
+        (&json!(7), &json!(7))
+    );
+    assert_eq!(data["result"]["table"]["10"], json!([13]));
+    // A model is an input like TCT's files.
+    assert_eq!(counts(&des(&["minstate", &reduced])), (3, 14));
+    let drawn = des(&["convert", &supervisor, "-o", &file("SUPER.svg")]);
+    assert_eq!(drawn.status, 0);
+}
+
+#[test]
+fn the_events_of_the_avalanche_effect() {
+    let answer = des(&["avalanche", "supervisor/tests/data/uzam_test_ads/TEST.ADS"]).json();
+    assert_eq!(answer["result"]["events"], json!([1, 2, 3]));
+}
+
+#[test]
+fn what_is_forgotten_or_wrong_is_said() {
+    let specification = format!("{FACTORY}/BUFSPEC.ADS");
+    let machine = format!("{FACTORY}/MACH1.ADS");
+    let not_lifted = understudy(&["des", "supcon", &machine, &specification]);
+    assert_snapshot!(not_lifted.shown());
+    let wrong = understudy(&["des", "check", "Cargo.toml", "absent.ADS", "README.md"]);
+    assert_eq!(wrong.status, 2);
+    for code in ["U0821", "U0601"] {
+        assert!(wrong.errors.contains(code), "{code}: {}", wrong.errors);
+    }
+}
+
+#[test]
+fn every_engine_synthesises_the_small_factory() {
+    assert_snapshot!(understudy(&["synth", MODEL]).shown());
+    assert_snapshot!(understudy(&["synth", MODEL, "--engine", "modular", "--reduce"]).shown());
+    let symbolic = understudy(&["synth", MODEL, "--engine", "symbolic", "--json"]);
+    assert_eq!(counts(&symbolic), (12, 24));
+    let reduced = understudy(&["synth", MODEL, "--reduce", "--json"]);
+    assert_eq!(counts(&reduced), (3, 14));
+    let bounded = understudy(&["synth", MODEL, "--memory", "0"]);
+    assert_eq!(bounded.status, 1);
+    assert!(
+        bounded.errors.contains("--engine symbolic"),
+        "{}",
+        bounded.errors
+    );
+}

@@ -1,0 +1,319 @@
+//! Real processes: what the laboratory promises of them. Over plain UDP, so that an unoptimised build keeps its times too.
+
+#![allow(
+    clippy::disallowed_methods,
+    reason = "what is waited for has a deadline on the real clock"
+)]
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::{BufRead, BufReader, Read};
+use std::net::UdpSocket;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use serde_json::Value;
+
+/// Two clusters at once on two processors would measure each other.
+static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+
+const PRESS_CELL: &str = "examples/press-cell/cluster.toml";
+/// Long beside the delays of a busy machine.
+const PERIOD: &str = "20ms";
+const DEADLINE: Duration = Duration::from_secs(60);
+
+fn empty_folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("laboratory")
+        .join(name);
+    if folder.exists() {
+        fs::remove_dir_all(&folder).expect("an old run's folder goes");
+    }
+    fs::create_dir_all(&folder).expect("a folder");
+    folder
+}
+
+fn understudy(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_understudy"));
+    command
+        .args(arguments)
+        .current_dir(env!("CARGO_MANIFEST_DIR"));
+    command
+}
+
+/// Runs to the end: the exit status, the answer, and what was said on standard error.
+fn answer(arguments: &[&str]) -> (i32, Value, String) {
+    let output = understudy(arguments)
+        .arg("--json")
+        .output()
+        .expect("the binary is built");
+    let document = serde_json::from_slice(&output.stdout).expect("one JSON document");
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    (
+        output.status.code().expect("an exit status"),
+        document,
+        errors,
+    )
+}
+
+/// No process of a run is left: each of them has the run's list of addresses among its arguments.
+fn no_orphan(out: &Path) {
+    let deadline = Instant::now() + DEADLINE;
+    let out = out.to_str().expect("text");
+    loop {
+        let left: Vec<String> = processes()
+            .into_iter()
+            .filter(|line| line.contains(out))
+            .collect();
+        if left.is_empty() {
+            return;
+        }
+        assert!(Instant::now() < deadline, "left behind: {left:#?}");
+        std::thread::yield_now();
+    }
+}
+
+/// The command lines of this machine's living processes.
+fn processes() -> BTreeSet<String> {
+    let folders = fs::read_dir("/proc")
+        .expect("a Linux")
+        .filter_map(Result::ok);
+    folders
+        .filter_map(|folder| fs::read(folder.path().join("cmdline")).ok())
+        .map(|line| String::from_utf8_lossy(&line).replace('\0', " "))
+        .filter(|line| line.contains("--in-laboratory"))
+        .collect()
+}
+
+/// What a run over plain UDP came to. Cycles in which a machine that other programs share stood still are counted apart.
+fn check(name: &str, scenario: &str, more: &[&str]) -> Value {
+    let _one = ONE_AT_A_TIME
+        .lock()
+        .unwrap_or_else(|poisoned| poisoned.into_inner());
+    let out = empty_folder(name);
+    let arguments = [
+        "lab",
+        PRESS_CELL,
+        "--scenario",
+        scenario,
+        "--link",
+        "udp",
+        "--period",
+        PERIOD,
+    ];
+    let out_argument = ["--out", out.to_str().expect("text")];
+    let (_, document, errors) = answer(&[&arguments[..], &out_argument, more].concat());
+    no_orphan(&out);
+    let summary = document["result"]["summary"].clone();
+    assert_eq!(summary["violation_count"], 0, "{document:#}\n{errors}");
+    assert_eq!(
+        summary["cycles_run"], summary["cycles_asked"],
+        "{document:#}\n{errors}"
+    );
+    summary
+}
+
+fn count(summary: &Value, remote_io: usize, source: &str) -> u64 {
+    summary["remote_ios"][remote_io]["counts"][source]
+        .as_u64()
+        .expect("a count")
+}
+
+#[test]
+fn each_station_is_killed_and_nothing_is_seen_of_it() {
+    let summary = check("kill_each", "scenarios/kill-each.toml", &[]);
+    assert_eq!(summary["passed"], true, "{summary:#}");
+    assert_eq!(summary["steps"].as_array().map(Vec::len), Some(6));
+    assert!(count(&summary, 0, "reconstructed") >= 30);
+}
+
+#[test]
+fn both_controllers_are_killed_and_the_understudy_carries_both() {
+    let summary = check("double_kill", "scenarios/double-kill.toml", &[]);
+    assert_eq!(summary["passed"], true, "{summary:#}");
+}
+
+#[test]
+fn the_second_failure_in_the_papers_mode_is_fail_safe() {
+    let scenario = "scenarios/paper-double-kill.toml";
+    let summary = check("paper_double_kill", scenario, &["--mode", "paper"]);
+    assert_eq!(summary["passed"], true, "{summary:#}");
+    assert!(count(&summary, 0, "fail_safe") > 40 && count(&summary, 1, "fail_safe") > 40);
+}
+
+#[test]
+fn stations_that_stand_still_do_not_speak_from_a_stale_state() {
+    let summary = check("stop_and_continue", "scenarios/stop-and-continue.toml", &[]);
+    assert_eq!(summary["passed"], true, "{summary:#}");
+}
+
+#[test]
+fn a_remote_io_that_is_started_again_adopts_its_history() {
+    let summary = check("remote_io_restart", "scenarios/remote-io-restart.toml", &[]);
+    assert_eq!(summary["passed"], true, "{summary:#}");
+}
+
+#[test]
+fn the_demo_at_a_shorter_length() {
+    let _one = ONE_AT_A_TIME
+        .lock()
+        .unwrap_or_else(|poisoned| poisoned.into_inner());
+    let out = empty_folder("demo");
+    let arguments = [
+        "demo", "--cycles", "250", "--link", "udp", "--period", PERIOD, "--out",
+    ];
+    let (status, document, errors) =
+        answer(&[&arguments[..], &[out.to_str().expect("text")]].concat());
+    assert_eq!(status, 0, "{document:#}\n{errors}");
+    no_orphan(&out);
+    for name in [
+        "journal.jsonl",
+        "summary.json",
+        "figure10.svg",
+        "report.html",
+        "endpoints.json",
+    ] {
+        assert!(out.join("latest").join(name).exists(), "{name}");
+    }
+}
+
+/// Starts a laboratory and waits until its cycles run.
+fn running(out: &Path) -> (Child, BufReader<std::process::ChildStderr>) {
+    let mut child = understudy(&[
+        "lab", PRESS_CELL, "--link", "udp", "--period", PERIOD, "--cycles", "100000", "--out",
+    ])
+    .arg(out)
+    .stdout(Stdio::piped())
+    .stderr(Stdio::piped())
+    .spawn()
+    .expect("the binary is built");
+    let mut errors = BufReader::new(child.stderr.take().expect("piped"));
+    let mut line = String::new();
+    while !line.contains("in step: ") {
+        line.clear();
+        let length = errors.read_line(&mut line).expect("text");
+        assert_ne!(length, 0, "it ended before it was in step");
+    }
+    (child, errors)
+}
+
+fn signal(process: u32, signal: Signal) {
+    let id = i32::try_from(process).expect("a process id");
+    kill(Pid::from_raw(id), signal).expect("it lives");
+}
+
+#[test]
+fn an_interrupted_run_leaves_its_results_and_no_orphan() {
+    let _one = ONE_AT_A_TIME
+        .lock()
+        .unwrap_or_else(|poisoned| poisoned.into_inner());
+    let out = empty_folder("interrupted");
+    let (mut child, _errors) = running(&out);
+    signal(child.id(), Signal::SIGINT);
+    let mut text = String::new();
+    child
+        .stdout
+        .take()
+        .expect("piped")
+        .read_to_string(&mut text)
+        .expect("text");
+    assert_eq!(child.wait().expect("it ends").code(), Some(1));
+    assert!(text.contains("interrupted after"), "{text}");
+    no_orphan(&out);
+    assert!(out.join("latest/report.html").exists());
+}
+
+#[test]
+fn a_killed_laboratory_leaves_no_orphan() {
+    let _one = ONE_AT_A_TIME
+        .lock()
+        .unwrap_or_else(|poisoned| poisoned.into_inner());
+    let out = empty_folder("killed");
+    let (mut child, _errors) = running(&out);
+    child.kill().expect("it lives");
+    child.wait().expect("it ends");
+    no_orphan(&out);
+}
+
+#[test]
+fn a_party_that_dies_unasked_ends_the_run_and_is_named() {
+    let _one = ONE_AT_A_TIME
+        .lock()
+        .unwrap_or_else(|poisoned| poisoned.into_inner());
+    let out = empty_folder("dies");
+    let (mut child, mut errors) = running(&out);
+    signal(process_of(&out, "press"), Signal::SIGKILL);
+    let mut said = String::new();
+    errors.read_to_string(&mut said).expect("text");
+    assert_eq!(child.wait().expect("it ends").code(), Some(1));
+    assert!(
+        said.contains("error[U0522]: press ended by itself"),
+        "{said}"
+    );
+    no_orphan(&out);
+}
+
+/// The process id that a party of a running laboratory has told in its journal's first record.
+fn process_of(out: &Path, name: &str) -> u32 {
+    let out = out.to_str().expect("text");
+    let folders = fs::read_dir("/proc")
+        .expect("a Linux")
+        .filter_map(Result::ok);
+    let mut found = folders.filter(|folder| {
+        let line = fs::read(folder.path().join("cmdline")).unwrap_or_default();
+        let line = String::from_utf8_lossy(&line).replace('\0', " ");
+        line.contains(out) && line.contains(&format!("--name {name} "))
+    });
+    let folder = found.next().expect("it runs");
+    folder
+        .file_name()
+        .to_string_lossy()
+        .parse()
+        .expect("a number")
+}
+
+#[test]
+fn a_port_in_use_is_said_plainly_and_everything_is_stopped() {
+    let _one = ONE_AT_A_TIME
+        .lock()
+        .unwrap_or_else(|poisoned| poisoned.into_inner());
+    let out = empty_folder("port");
+    let taken = UdpSocket::bind("127.0.0.1:0").expect("a free port");
+    let port = taken.local_addr().expect("an address").port();
+    for name in ["robot.ladder", "press.ladder"] {
+        fs::copy(
+            format!("{}/examples/press-cell/{name}", env!("CARGO_MANIFEST_DIR")),
+            out.join(name),
+        )
+        .expect("copied");
+    }
+    let cluster =
+        fs::read_to_string(format!("{}/{PRESS_CELL}", env!("CARGO_MANIFEST_DIR"))).expect("text");
+    let line = "name = \"robot\"\nladder";
+    let addressed = format!("name = \"robot\"\naddress = \"127.0.0.1:{port}\"\nladder");
+    assert!(cluster.contains(line));
+    fs::write(out.join("cluster.toml"), cluster.replace(line, &addressed)).expect("written");
+    let (file, runs) = (out.join("cluster.toml"), out.join("runs"));
+    let arguments = [
+        "lab",
+        file.to_str().expect("text"),
+        "--link",
+        "udp",
+        "--out",
+        runs.to_str().expect("text"),
+    ];
+    let (status, document, _) = answer(&arguments);
+    assert_eq!(status, 1, "{document:#}");
+    let failure = &document["failures"][0];
+    assert_eq!(failure["code"], "U0501", "{document:#}");
+    assert!(
+        failure["message"]
+            .as_str()
+            .is_some_and(|text| text.contains(&format!("port {port}")))
+    );
+    no_orphan(&out);
+}

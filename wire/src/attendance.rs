@@ -1,0 +1,114 @@
+//! Who spoke in this cycle, and who has been silent for too long: the paper's failure flags θ.
+//!
+//! Detection is by turns alone. Each party keeps its own view; nothing is decided on it but whose slot is closed, whom the
+//! pacemaker's successor waits for, and which stations count as living.
+
+use crate::identifier::StationId;
+use crate::set::StationSet;
+
+/// One party's view of all stations.
+#[derive(Debug, Clone)]
+pub struct Attendance {
+    flag_after: u32,
+    /// Cycles of silence in a row, by rank; at `flag_after` a station is flagged, and the count stays there.
+    silent: Vec<u32>,
+    flagged: StationSet,
+    spoke: StationSet,
+}
+
+/// What became of a flag.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Change {
+    /// θ became 1.
+    Flagged(StationId),
+    /// θ became 0.
+    Cleared(StationId),
+}
+
+impl Attendance {
+    /// Nobody has spoken yet, so all `stations` are flagged.
+    pub fn new(stations: usize, flag_after: u32) -> Self {
+        Self {
+            flag_after,
+            silent: vec![flag_after; stations],
+            flagged: StationSet::first(stations),
+            spoke: StationSet::EMPTY,
+        }
+    }
+
+    /// A turn of this cycle was heard. True for the first of a station in a cycle.
+    pub fn heard(&mut self, station: StationId) -> bool {
+        let first = station.index() < self.silent.len() && !self.spoke.contains(station);
+        if first {
+            self.spoke.insert(station);
+        }
+        first
+    }
+
+    /// Who spoke in this cycle.
+    pub fn spoke(&self) -> StationSet {
+        self.spoke
+    }
+
+    /// θ: who was silent for too long, up to the last cycle, and has not spoken in this one.
+    pub fn flagged(&self) -> StationSet {
+        self.flagged.without(self.spoke)
+    }
+
+    /// Ends a cycle that this party took part in; `change` is told of every flag that changes.
+    pub fn close_cycle(&mut self, mut change: impl FnMut(Change)) {
+        for (rank, silent) in self.silent.iter_mut().enumerate() {
+            let station = StationId(rank as u8);
+            if self.spoke.contains(station) {
+                *silent = 0;
+                if self.flagged.contains(station) {
+                    self.flagged.remove(station);
+                    change(Change::Cleared(station));
+                }
+            } else if *silent < self.flag_after {
+                *silent += 1;
+                if *silent == self.flag_after {
+                    self.flagged.insert(station);
+                    change(Change::Flagged(station));
+                }
+            }
+        }
+        self.spoke = StationSet::EMPTY;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every pattern of eight cycles of one station against counting by hand.
+    #[test]
+    fn a_flag_is_the_last_so_many_cycles_of_silence() {
+        for flag_after in 1..=4_u32 {
+            for pattern in 0..1_u32 << 8 {
+                let mut attendance = Attendance::new(1, flag_after);
+                let mut silence = flag_after;
+                for cycle in 0..8 {
+                    if pattern >> cycle & 1 == 1 {
+                        assert!(attendance.heard(StationId(0)));
+                        assert!(!attendance.heard(StationId(0)));
+                        silence = 0;
+                    } else {
+                        silence += 1;
+                    }
+                    let before = attendance.flagged.is_empty();
+                    let mut changes = 0;
+                    attendance.close_cycle(|_| changes += 1);
+                    let after = silence < flag_after;
+                    assert_eq!(attendance.flagged().is_empty(), after);
+                    assert_eq!(changes, i32::from(before != after));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_station_that_is_not_in_the_cluster_is_not_counted() {
+        assert!(!Attendance::new(2, 3).heard(StationId(2)));
+    }
+}

@@ -1,0 +1,218 @@
+//! The bytes of a frame.
+//!
+//! ```text
+//! offset  size  what
+//!      0     4  magic "UNDR"
+//!      4     1  version of this layout, 1
+//!      5     n  header and body, bincode 2 "standard": little-endian, integers as varints, enums by their index
+//!    5+n     4  CRC-32 (IEEE) of everything before it, little-endian
+//! ```
+//!
+//! Two stages: any bytes may arrive; [`decode`] answers with a frame only where every bound and every promise of
+//! [`crate::frame`] holds, so that the cores never see another. What the sender promises is asserted in [`encode`].
+
+use bincode::config::{Configuration, Limit};
+
+use crate::frame::{Body, Frame, Holding, MAXIMUM_HISTORY, Word};
+use crate::identifier::{MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, Party};
+use crate::set::ProgramSet;
+
+/// A frame is never longer; one UDP datagram can carry it.
+pub const MAXIMUM_FRAME_BYTES: usize = 32 * 1024;
+
+const MAGIC: [u8; 4] = *b"UNDR";
+const VERSION: u8 = 1;
+const PREFIX_BYTES: usize = 5;
+const CHECKSUM_BYTES: usize = 4;
+/// Positions that a plant may show, at most.
+const MAXIMUM_POSITIONS: usize = 16;
+
+type Layout = Configuration<
+    bincode::config::LittleEndian,
+    bincode::config::Varint,
+    Limit<MAXIMUM_FRAME_BYTES>,
+>;
+
+fn layout() -> Layout {
+    bincode::config::standard().with_limit::<MAXIMUM_FRAME_BYTES>()
+}
+
+/// Why bytes are no frame.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum FrameError {
+    /// Too short for any frame, or longer than [`MAXIMUM_FRAME_BYTES`].
+    #[error("{bytes} bytes are no frame (at most {MAXIMUM_FRAME_BYTES})")]
+    Length {
+        /// How many came.
+        bytes: usize,
+    },
+    /// Something else than a frame of ours.
+    #[error("the bytes do not start with the magic of a frame")]
+    Magic,
+    /// A frame of another version of this layout.
+    #[error("a frame of version {found}; this program speaks version {VERSION}")]
+    Version {
+        /// The version that came.
+        found: u8,
+    },
+    /// Changed on its way.
+    #[error("checksum {found:08x} where {computed:08x} was computed")]
+    Checksum {
+        /// The checksum that came.
+        found: u32,
+        /// The checksum of the bytes that came.
+        computed: u32,
+    },
+    /// The checksum is right and the bytes are no header and body.
+    #[error("the bytes are no header and body: {0}")]
+    Layout(String),
+    /// It can be read and breaks a promise of the layout.
+    #[error("a frame that breaks a promise: {0}")]
+    Promise(&'static str),
+}
+
+/// Appends the bytes of `frame` to `bytes`.
+///
+/// # Errors
+/// [`FrameError::Promise`] or [`FrameError::Length`] where the frame breaks a bound; nothing is appended then.
+pub fn encode(frame: &Frame, bytes: &mut Vec<u8>) -> Result<(), FrameError> {
+    keeps_promises(frame)?;
+    let start = bytes.len();
+    bytes.extend_from_slice(&MAGIC);
+    bytes.push(VERSION);
+    let written = bincode::serde::encode_into_std_write(frame, bytes, layout());
+    if let Err(error) = written {
+        bytes.truncate(start);
+        return Err(FrameError::Layout(error.to_string()));
+    }
+    let length = bytes.len() - start + CHECKSUM_BYTES;
+    if length > MAXIMUM_FRAME_BYTES {
+        bytes.truncate(start);
+        return Err(FrameError::Length { bytes: length });
+    }
+    let checksum = crc32fast::hash(&bytes[start..]);
+    bytes.extend_from_slice(&checksum.to_le_bytes());
+    Ok(())
+}
+
+/// Reads one frame from exactly `bytes`.
+///
+/// # Errors
+/// Every other [`FrameError`]; never panics, and never allocates more than [`MAXIMUM_FRAME_BYTES`] allow.
+pub fn decode(bytes: &[u8]) -> Result<Frame, FrameError> {
+    let length = bytes.len();
+    if !(PREFIX_BYTES + CHECKSUM_BYTES..=MAXIMUM_FRAME_BYTES).contains(&length) {
+        return Err(FrameError::Length { bytes: length });
+    }
+    if bytes[..MAGIC.len()] != MAGIC {
+        return Err(FrameError::Magic);
+    }
+    if bytes[MAGIC.len()] != VERSION {
+        return Err(FrameError::Version {
+            found: bytes[MAGIC.len()],
+        });
+    }
+    let (before, checksum) = bytes.split_at(length - CHECKSUM_BYTES);
+    let found = u32::from_le_bytes(checksum.try_into().expect("four bytes"));
+    let computed = crc32fast::hash(before);
+    if found != computed {
+        return Err(FrameError::Checksum { found, computed });
+    }
+    let payload = &before[PREFIX_BYTES..];
+    let (frame, read) = bincode::serde::decode_from_slice::<Frame, _>(payload, layout())
+        .map_err(|error| FrameError::Layout(error.to_string()))?;
+    if read != payload.len() {
+        return Err(FrameError::Promise("bytes are left after the body"));
+    }
+    keeps_promises(&frame)?;
+    Ok(frame)
+}
+
+/// The promises that types alone cannot keep.
+fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
+    let kept = |holds: bool, promise: &'static str| {
+        if holds {
+            Ok(())
+        } else {
+            Err(FrameError::Promise(promise))
+        }
+    };
+    let sender = frame.header.sender;
+    kept(
+        match sender {
+            Party::Station(station) => station.index() < MAXIMUM_STATIONS,
+            Party::RemoteIo(program) | Party::Plant(program) => program.index() < MAXIMUM_PROGRAMS,
+        },
+        "the sender's index is below 64",
+    )?;
+    let station = matches!(sender, Party::Station(_));
+    match &frame.body {
+        Body::Sync => kept(station, "only a station paces"),
+        Body::Sample(sample) => {
+            kept(
+                matches!(sender, Party::RemoteIo(_)),
+                "only a remote I/O samples",
+            )?;
+            kept(
+                (1..=MAXIMUM_HISTORY).contains(&sample.history.len()),
+                "a sample carries 1 to 32 cycles",
+            )?;
+            let width = sample.history[0].width();
+            kept(
+                sample.history.iter().all(|image| image.width() == width),
+                "all samples of a program are of one width",
+            )
+        }
+        Body::Turn(turn) => {
+            kept(station, "only a station takes turns")?;
+            let held = kept_holdings(&turn.holdings)?;
+            kept(
+                turn.words.len() <= MAXIMUM_PROGRAMS + 1,
+                "a turn has at most 65 words",
+            )?;
+            let covered =
+                |word: &Word| !word.members.is_empty() && word.members.without(held).is_empty();
+            kept(
+                turn.words.iter().all(covered),
+                "a word is over states that are held",
+            )
+        }
+        Body::Join(join) => {
+            kept(station, "only a station joins")?;
+            kept_holdings(&join.holdings).map(|_| ())
+        }
+        Body::Transfer(transfer) => {
+            kept(station, "only a station gives a state")?;
+            kept(
+                transfer.to.index() < MAXIMUM_STATIONS
+                    && transfer.program.index() < MAXIMUM_PROGRAMS,
+                "the indices of a transfer are below 64",
+            )
+        }
+        Body::Field(field) => {
+            kept(
+                matches!(sender, Party::Plant(_)),
+                "only a plant has a field",
+            )?;
+            kept(
+                field.positions.len() <= MAXIMUM_POSITIONS,
+                "a plant shows at most 16 positions",
+            )
+        }
+        Body::Actuation(_) => kept(
+            matches!(sender, Party::RemoteIo(_)),
+            "only a remote I/O drives",
+        ),
+    }
+}
+
+fn kept_holdings(holdings: &[Holding]) -> Result<ProgramSet, FrameError> {
+    let held: ProgramSet = holdings.iter().map(|holding| holding.program).collect();
+    if held.len() == holdings.len() {
+        Ok(held)
+    } else {
+        Err(FrameError::Promise(
+            "a program is held once, with an index below 64",
+        ))
+    }
+}

@@ -1,0 +1,135 @@
+//! In which cycle a party is, and when that cycle started on its own clock.
+//!
+//! Any frame of a later cycle starts that cycle, so a lost Sync costs nothing. A party never goes back, with one exception:
+//! one that has heard nobody in its epoch for a few periods gives that epoch up for any that has company. So a
+//! restarted station whose link comes up late does not renumber the cluster's cycles, and nobody waits for ever in an epoch that
+//! its founder has left.
+
+use std::time::Duration;
+
+use crate::frame::{Body, Frame};
+use crate::identifier::{Epoch, Moment};
+use crate::time::Time;
+
+/// The current cycle of one party.
+#[derive(Debug, Clone, Default)]
+pub struct CycleClock {
+    moment: Option<Moment>,
+    anchor: Time,
+    /// When somebody else was last heard in this epoch.
+    company: Option<Time>,
+    alone: bool,
+    /// Whether this party started the current cycle itself.
+    founder: bool,
+}
+
+/// Periods of silence after which an epoch binds no more.
+const LONELY_PERIODS: u32 = 4;
+
+/// What a frame's moment means to this party.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Arrival {
+    /// Of a cycle that is over, or of an epoch that binds nobody.
+    Stale,
+    /// Of the current cycle.
+    Present,
+    /// Its cycle starts with it, and started on this party's clock at the time given; [`CycleClock::begin`] makes it so.
+    Begins(Time),
+}
+
+impl CycleClock {
+    /// The current cycle; none before the first frame.
+    pub fn moment(&self) -> Option<Moment> {
+        self.moment
+    }
+
+    /// When the current cycle started.
+    pub fn anchor(&self) -> Time {
+        self.anchor
+    }
+
+    /// Whether nobody else has been heard in this epoch for some periods.
+    pub fn alone(&self) -> bool {
+        self.alone
+    }
+
+    /// Counts from `now`, until there is a cycle.
+    pub fn start(&mut self, now: Time) {
+        self.anchor = now;
+    }
+
+    /// What an admitted frame that comes at `now` means.
+    pub fn arrival(&mut self, now: Time, frame: &Frame, period: Duration) -> Arrival {
+        let header = &frame.header;
+        let Some(moment) = self.moment else {
+            return Arrival::Begins(now);
+        };
+        if header.moment.epoch == moment.epoch {
+            self.company = Some(now);
+            self.alone = false;
+            return match header.moment.cycle.cmp(&moment.cycle) {
+                std::cmp::Ordering::Less => Arrival::Stale,
+                std::cmp::Ordering::Equal => Arrival::Present,
+                std::cmp::Ordering::Greater => {
+                    Arrival::Begins(self.estimated_anchor(now, frame, moment, period))
+                }
+            };
+        }
+        self.look_around(now, period);
+        let binds = match (self.alone, header.alone) {
+            (true, false) => true,
+            (false, true) => false,
+            // Nobody will follow one who does not pace, so it has to follow.
+            (true, true) if !self.founder => true,
+            (true, true) | (false, false) => header.moment.epoch > moment.epoch,
+        };
+        if binds {
+            Arrival::Begins(now)
+        } else {
+            Arrival::Stale
+        }
+    }
+
+    /// Goes to a cycle that a frame has started, which came at `now`.
+    pub fn begin(&mut self, now: Time, moment: Moment, anchor: Time) {
+        self.moment = Some(moment);
+        self.anchor = anchor;
+        self.company = Some(now);
+        self.alone = false;
+        self.founder = false;
+    }
+
+    /// Starts the next cycle of the epoch at `now`, or a new epoch where there is none yet, as the pacemaker does.
+    pub fn pace(&mut self, now: Time, founded: Epoch, anchor: Time, period: Duration) -> Moment {
+        let next = match self.moment {
+            Some(moment) => moment.plus(1),
+            None => Moment {
+                epoch: founded,
+                ..Moment::default()
+            },
+        };
+        self.look_around(now, period);
+        self.moment = Some(next);
+        self.anchor = anchor;
+        self.founder = true;
+        next
+    }
+
+    fn look_around(&mut self, now: Time, period: Duration) {
+        let patience = period * LONELY_PERIODS;
+        self.alone = self.company.is_none_or(|heard| now.since(heard) > patience);
+    }
+
+    /// A Sync starts its cycle now. Another frame that comes first means that the Sync was lost: the cycle started
+    /// one period after the last, if that fits.
+    fn estimated_anchor(&self, now: Time, frame: &Frame, moment: Moment, period: Duration) -> Time {
+        let expected = self.anchor + period;
+        let consecutive = frame.header.moment == moment.plus(1);
+        let fits = consecutive && expected <= now && now.since(expected) < period / 2;
+        if fits && frame.body != Body::Sync {
+            expected
+        } else {
+            now
+        }
+    }
+}

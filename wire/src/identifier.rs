@@ -1,0 +1,120 @@
+//! Who, and when.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// Programs in one cluster, at most: a [`crate::ProgramSet`] is one 64-bit word.
+pub const MAXIMUM_PROGRAMS: usize = 64;
+
+/// Stations in one cluster, at most: a [`crate::StationSet`] is one 64-bit word.
+pub const MAXIMUM_STATIONS: usize = 64;
+
+/// A program's 0-based index in the cluster; the paper's i is `index + 1`. Controller i, remote I/O i and plant i share it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct ProgramId(pub u8);
+
+impl ProgramId {
+    /// For indexing.
+    pub fn index(self) -> usize {
+        usize::from(self.0)
+    }
+}
+
+/// A station's 0-based rank: controllers 0..N in the order of their programs, then the understudies N..N+S.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct StationId(pub u8);
+
+impl StationId {
+    /// For indexing.
+    pub fn index(self) -> usize {
+        usize::from(self.0)
+    }
+}
+
+/// Who speaks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Party {
+    /// A controller or an understudy, by rank.
+    Station(StationId),
+    /// The remote I/O of a program.
+    RemoteIo(ProgramId),
+    /// The simulated plant behind the remote I/O of a program.
+    Plant(ProgramId),
+}
+
+/// One life of the cluster from a common start; raised by a cold start.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize,
+)]
+#[serde(transparent)]
+pub struct Epoch(pub u64);
+
+/// One sample, one turn of every station, one actuation; numbered, never repeated within an epoch.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize,
+)]
+#[serde(transparent)]
+pub struct Cycle(pub u64);
+
+/// A cycle of an epoch, the cluster's own notion of when. Later epochs are later, whatever their cycles.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize,
+)]
+pub struct Moment {
+    /// The life of the cluster.
+    pub epoch: Epoch,
+    /// The cycle in it.
+    pub cycle: Cycle,
+}
+
+impl Moment {
+    /// The moment `cycles` later in the same epoch; stays at the last cycle there is.
+    #[must_use]
+    pub fn plus(self, cycles: u64) -> Self {
+        Self {
+            epoch: self.epoch,
+            cycle: Cycle(self.cycle.0.saturating_add(cycles)),
+        }
+    }
+}
+
+impl fmt::Display for Moment {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{}:{}", self.epoch.0, self.cycle.0)
+    }
+}
+
+macro_rules! hashes {
+    ($($(#[$documentation:meta])* $name:ident;)*) => {$(
+        $(#[$documentation])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
+        #[serde(transparent)]
+        pub struct $name(pub u64);
+
+        impl $name {
+            /// The hash of the canonical text of what it stands for.
+            pub fn of(text: &[u8]) -> Self {
+                Self(xxhash_rust::xxh3::xxh3_64(text))
+            }
+        }
+
+        impl fmt::Display for $name {
+            fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+                write!(formatter, "{:016x}", self.0)
+            }
+        }
+    )*};
+}
+
+hashes! {
+    /// Names a cluster; frames of other clusters on the same network are foreign.
+    ClusterHash;
+    /// Names all programs, roles and timings of a cluster; a station that has another one is refused.
+    ConfigurationHash;
+    /// Names one program's circuit.
+    ProgramHash;
+}

@@ -1,0 +1,40 @@
+//! What travels between the parties of a cluster: identifiers, images, lineages and frames.
+//!
+//! Everything that two parties must agree on is here and nowhere else: who they are ([`Party`]), when who speaks
+//! ([`Schedule`]), which states are the same ([`Lineage`]), and the bytes of a [`Frame`] ([`encode`], [`decode`]).
+
+mod agreement;
+mod attendance;
+mod codec;
+mod copies;
+mod cycle_clock;
+mod frame;
+mod identifier;
+mod image;
+mod lineage;
+mod machine;
+mod reception;
+mod schedule;
+mod set;
+mod time;
+
+pub use agreement::{Agreement, Mode};
+pub use attendance::{Attendance, Change};
+pub use codec::{FrameError, MAXIMUM_FRAME_BYTES, decode, encode};
+pub use copies::Copies;
+pub use cycle_clock::{Arrival, CycleClock};
+pub use frame::{
+    Actuation, Applied, Body, Field, Frame, Header, Holding, Join, MAXIMUM_HISTORY, Sample, Source,
+    Transfer, Turn, Word,
+};
+pub use identifier::{
+    ClusterHash, ConfigurationHash, Cycle, Epoch, MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, Moment,
+    Party, ProgramHash, ProgramId, StationId,
+};
+pub use image::{Image, ImageError, MAXIMUM_IMAGE_BITS};
+pub use lineage::{Digest, Lineage};
+pub use machine::{Input, Machine, Output};
+pub use reception::{Admission, Reception};
+pub use schedule::{Schedule, ScheduleError};
+pub use set::{Member, ProgramSet, Set, StationSet};
+pub use time::Time;

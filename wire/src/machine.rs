@@ -1,0 +1,50 @@
+//! The shape of every party: a pure state machine with time as an argument.
+//!
+//! Feed it with [`Machine::handle_input`], then drain it with [`Machine::poll_output`] until it has nothing more to say, then
+//! wait until [`Machine::wakeup`] or the next input. The same machine runs on real clocks and networks, in the simulator
+//! and under a model checker.
+
+use std::sync::Arc;
+
+use crate::frame::Frame;
+use crate::image::Image;
+use crate::time::Time;
+
+/// What a party is told.
+#[derive(Debug, Clone, Copy)]
+pub enum Input<'a> {
+    /// The time that it asked for has come.
+    Wakeup,
+    /// A frame that was decoded; duplicates, late ones and those of other clusters included.
+    Frame(&'a Arc<Frame>),
+    /// What the sensors of a remote I/O see now; ignored by everybody else.
+    Field(&'a Image),
+    /// The operator releases the outputs of a program that was started cold; ignored by all but its remote I/O.
+    Release,
+}
+
+/// What a party says.
+#[derive(Debug, Clone)]
+pub enum Output<Event> {
+    /// A frame for all who are concerned by its kind.
+    Send(Arc<Frame>),
+    /// What a remote I/O drives now.
+    Drive(Image),
+    /// Something for the journal.
+    Report(Event),
+}
+
+/// A party.
+pub trait Machine {
+    /// What it reports.
+    type Event;
+
+    /// Takes one input at `now`, which never runs backwards.
+    fn handle_input(&mut self, now: Time, input: Input<'_>);
+
+    /// The next thing that it says; `None` when it waits.
+    fn poll_output(&mut self) -> Option<Output<Self::Event>>;
+
+    /// When it wants [`Input::Wakeup`] at the latest.
+    fn wakeup(&self) -> Time;
+}

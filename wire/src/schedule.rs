@@ -1,0 +1,213 @@
+//! When who speaks in a cycle of period T: the slots that every party computes for itself from the same configuration.
+//!
+//! ```text
+//! 0        0.12 T                    0.45 T        0.55 T     0.65 T    0.70 T        T
+//! ├ Sync, Samples ┼ slots of controllers ┼ understudies ┼ copies ┼ deadline ┼ rest ────┤
+//!                                                      last call
+//! ```
+//!
+//! When its slot starts, a station waits for nobody any more; it speaks earlier when its predecessor has spoken. One that does not
+//! know its outputs by then, because a sample is late, waits for that until the last call. Copies of a frame follow it
+//! `copy_spacing` apart, and the last copy of the last turn leaves before the deadline.
+
+use std::time::Duration;
+
+use crate::identifier::{MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, StationId};
+
+/// The timing of a cluster. All offsets are from the start of a cycle.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Schedule {
+    period: Duration,
+    controllers: usize,
+    understudies: usize,
+    copies: u32,
+    /// By rank. Computed once, because every frame asks for them.
+    slots: Vec<Duration>,
+    last_call: Duration,
+    copy_spacing: Duration,
+    deadline: Duration,
+    rest: Duration,
+    guard: Duration,
+}
+
+/// Why there is no such schedule.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ScheduleError {
+    /// The period is out of bounds.
+    #[error("a period of {period:?} is outside 200us to 10s")]
+    Period {
+        /// As asked for.
+        period: Duration,
+    },
+    /// Too many or too few stations.
+    #[error(
+        "{controllers} controllers and {understudies} understudies: there must be 1 to {MAXIMUM_PROGRAMS} controllers, \
+         and at most {MAXIMUM_STATIONS} stations"
+    )]
+    Stations {
+        /// N.
+        controllers: usize,
+        /// S.
+        understudies: usize,
+    },
+    /// Too many copies.
+    #[error("{copies} copies of each frame: there must be 1 to 4")]
+    Copies {
+        /// As asked for.
+        copies: u32,
+    },
+}
+
+const FIRST_SLOT_PER_MILLE: u32 = 120;
+const UNDERSTUDIES_PER_MILLE: u32 = 450;
+const TURNS_END_PER_MILLE: u32 = 550;
+const DEADLINE_PER_MILLE: u32 = 650;
+const REST_PER_MILLE: u32 = 700;
+const GUARD_PER_MILLE: u32 = 100;
+const COPIES_SPAN_PER_MILLE: u32 = 75;
+
+impl Schedule {
+    /// Checks the bounds: 200 µs to 10 s, 1 to 64 controllers, at most 64 stations, 1 to 4 copies.
+    pub fn new(
+        period: Duration,
+        controllers: usize,
+        understudies: usize,
+        copies: u32,
+    ) -> Result<Self, ScheduleError> {
+        if !(Duration::from_micros(200)..=Duration::from_secs(10)).contains(&period) {
+            return Err(ScheduleError::Period { period });
+        }
+        if !(1..=MAXIMUM_PROGRAMS).contains(&controllers)
+            || controllers + understudies > MAXIMUM_STATIONS
+        {
+            return Err(ScheduleError::Stations {
+                controllers,
+                understudies,
+            });
+        }
+        if !(1..=4).contains(&copies) {
+            return Err(ScheduleError::Copies { copies });
+        }
+        let share = |per_mille: u32| period * per_mille / 1000;
+        let slots = (0..controllers).map(|rank| {
+            let span = share(UNDERSTUDIES_PER_MILLE - FIRST_SLOT_PER_MILLE);
+            share(FIRST_SLOT_PER_MILLE) + span * rank as u32 / controllers as u32
+        });
+        let last_slots = (0..understudies).map(|rank| {
+            let span = share(TURNS_END_PER_MILLE - UNDERSTUDIES_PER_MILLE);
+            share(UNDERSTUDIES_PER_MILLE) + span * rank as u32 / understudies as u32
+        });
+        Ok(Self {
+            period,
+            controllers,
+            understudies,
+            copies,
+            slots: slots.chain(last_slots).collect(),
+            last_call: share(TURNS_END_PER_MILLE),
+            copy_spacing: share(COPIES_SPAN_PER_MILLE) / (copies - 1).max(1),
+            deadline: share(DEADLINE_PER_MILLE),
+            rest: share(REST_PER_MILLE),
+            guard: share(GUARD_PER_MILLE),
+        })
+    }
+
+    /// T.
+    pub fn period(&self) -> Duration {
+        self.period
+    }
+
+    /// N.
+    pub fn controllers(&self) -> usize {
+        self.controllers
+    }
+
+    /// S.
+    pub fn understudies(&self) -> usize {
+        self.understudies
+    }
+
+    /// N + S.
+    pub fn stations(&self) -> usize {
+        self.controllers + self.understudies
+    }
+
+    /// Whether a station is one of the understudies.
+    pub fn is_understudy(&self, station: StationId) -> bool {
+        station.index() >= self.controllers
+    }
+
+    /// How often each cyclic frame is sent.
+    pub fn copies(&self) -> u32 {
+        self.copies
+    }
+
+    /// When `station` waits for its predecessors no more.
+    ///
+    /// # Panics
+    /// If it is not in the cluster; [`crate::Reception`] lets nobody else in.
+    pub fn slot(&self, station: StationId) -> Duration {
+        self.slots[station.index()]
+    }
+
+    /// When a station speaks whatever it knows.
+    pub fn last_call(&self) -> Duration {
+        self.last_call
+    }
+
+    /// Between a frame and its copy, and between copies.
+    pub fn copy_spacing(&self) -> Duration {
+        self.copy_spacing
+    }
+
+    /// When a remote I/O decides and drives.
+    pub fn deadline(&self) -> Duration {
+        self.deadline
+    }
+
+    /// When those who lack a state ask for it.
+    pub fn rest(&self) -> Duration {
+        self.rest
+    }
+
+    /// How long the next rank waits for a silent pacemaker.
+    pub fn guard(&self) -> Duration {
+        self.guard
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every cluster that is allowed: slots ascend by rank, and the last copy leaves before the deadline.
+    #[test]
+    fn slots_ascend_and_copies_leave_in_time() {
+        for controllers in 1..=MAXIMUM_PROGRAMS {
+            for understudies in 0..=(MAXIMUM_STATIONS - controllers).min(4) {
+                for copies in 1..=4 {
+                    let period = Duration::from_millis(10);
+                    let schedule = Schedule::new(period, controllers, understudies, copies)
+                        .expect("within the bounds");
+                    let slots: Vec<Duration> = (0..schedule.stations())
+                        .map(|rank| schedule.slot(StationId(rank as u8)))
+                        .collect();
+                    assert!(slots.is_sorted_by(|earlier, later| earlier < later));
+                    let last = schedule.last_call();
+                    assert!(slots.iter().all(|slot| *slot < last));
+                    assert!(last + schedule.copy_spacing() * (copies - 1) < schedule.deadline());
+                    assert!(schedule.deadline() < schedule.rest() && schedule.rest() < period);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_out_of_bounds_is_refused() {
+        let period = Duration::from_millis(10);
+        assert!(Schedule::new(Duration::from_micros(1), 1, 1, 1).is_err());
+        assert!(Schedule::new(period, 0, 1, 1).is_err());
+        assert!(Schedule::new(period, 64, 1, 1).is_err());
+        assert!(Schedule::new(period, 2, 1, 0).is_err());
+        assert!(Schedule::new(period, 2, 1, 5).is_err());
+    }
+}

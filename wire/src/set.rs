@@ -1,0 +1,199 @@
+//! Sets of programs and of stations, one 64-bit word each.
+
+use std::fmt;
+use std::marker::PhantomData;
+
+use serde::{Deserialize, Serialize};
+
+use crate::identifier::{ProgramId, StationId};
+
+/// What a [`Set`] may hold: an index below 64.
+pub trait Member: Copy {
+    /// From an index below 64.
+    fn from_index(index: u8) -> Self;
+    /// Its index; a member at 64 or above is in no set.
+    fn to_index(self) -> u8;
+}
+
+impl Member for ProgramId {
+    fn from_index(index: u8) -> Self {
+        Self(index)
+    }
+    fn to_index(self) -> u8 {
+        self.0
+    }
+}
+
+impl Member for StationId {
+    fn from_index(index: u8) -> Self {
+        Self(index)
+    }
+    fn to_index(self) -> u8 {
+        self.0
+    }
+}
+
+/// A set of members, bit k being the member with index k.
+#[derive(Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Set<M>(u64, #[serde(skip)] PhantomData<M>);
+
+/// Which programs, such as the mask of a parity word.
+pub type ProgramSet = Set<ProgramId>;
+
+/// Which stations, such as those heard in a cycle.
+pub type StationSet = Set<StationId>;
+
+impl<M: Member> Set<M> {
+    /// No member.
+    pub const EMPTY: Self = Self(0, PhantomData);
+
+    /// The members of a bit mask.
+    pub fn from_bits(bits: u64) -> Self {
+        Self(bits, PhantomData)
+    }
+
+    /// The members as a bit mask.
+    pub fn bits(self) -> u64 {
+        self.0
+    }
+
+    /// The members with an index below `count`.
+    pub fn first(count: usize) -> Self {
+        Self::from_bits(if count >= 64 {
+            u64::MAX
+        } else {
+            (1 << count) - 1
+        })
+    }
+
+    /// One member.
+    pub fn only(member: M) -> Self {
+        Self::from_bits(bit(member))
+    }
+
+    /// Whether it holds `member`.
+    pub fn contains(self, member: M) -> bool {
+        self.0 & bit(member) != 0
+    }
+
+    /// Adds a member.
+    pub fn insert(&mut self, member: M) {
+        self.0 |= bit(member);
+    }
+
+    /// Takes a member out.
+    pub fn remove(&mut self, member: M) {
+        self.0 &= !bit(member);
+    }
+
+    /// Those of this set that are not in `other`.
+    #[must_use]
+    pub fn without(self, other: Self) -> Self {
+        Self::from_bits(self.0 & !other.0)
+    }
+
+    /// Those in both.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self::from_bits(self.0 & other.0)
+    }
+
+    /// Those in either.
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        Self::from_bits(self.0 | other.0)
+    }
+
+    /// How many.
+    pub fn len(self) -> usize {
+        self.0.count_ones() as usize
+    }
+
+    /// None.
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// In ascending order.
+    pub fn iter(self) -> impl Iterator<Item = M> {
+        let mut rest = self.0;
+        std::iter::from_fn(move || {
+            (rest != 0).then(|| {
+                let index = rest.trailing_zeros();
+                rest &= rest - 1;
+                M::from_index(index as u8)
+            })
+        })
+    }
+}
+
+fn bit<M: Member>(member: M) -> u64 {
+    1_u64.checked_shl(u32::from(member.to_index())).unwrap_or(0)
+}
+
+impl<M: Member> FromIterator<M> for Set<M> {
+    fn from_iter<T: IntoIterator<Item = M>>(members: T) -> Self {
+        let mut set = Self::EMPTY;
+        for member in members {
+            set.insert(member);
+        }
+        set
+    }
+}
+
+// Written out, because a derive would ask the same of `M`, which is only a marker.
+impl<M> Clone for Set<M> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<M> Copy for Set<M> {}
+
+impl<M> PartialEq for Set<M> {
+    fn eq(&self, other: &Self) -> bool {
+        self.0 == other.0
+    }
+}
+
+impl<M> Eq for Set<M> {}
+
+impl<M> Default for Set<M> {
+    fn default() -> Self {
+        Self(0, PhantomData)
+    }
+}
+
+impl<M: Member + fmt::Debug> fmt::Debug for Set<M> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_set().entries(self.iter()).finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_set_holds_what_was_put_in_in_order() {
+        let set: ProgramSet = [ProgramId(63), ProgramId(0), ProgramId(5)]
+            .into_iter()
+            .collect();
+        assert_eq!(
+            set.iter().map(|program| program.0).collect::<Vec<_>>(),
+            [0, 5, 63]
+        );
+        assert_eq!(set.without(ProgramSet::only(ProgramId(5))).len(), 2);
+        assert_eq!(ProgramSet::first(64).len(), 64);
+        assert_eq!(ProgramSet::first(0), ProgramSet::EMPTY);
+    }
+
+    #[test]
+    fn a_member_past_the_bound_is_in_no_set() {
+        let mut set = StationSet::EMPTY;
+        set.insert(StationId(64));
+        assert!(set.is_empty());
+        assert!(!StationSet::first(64).contains(StationId(200)));
+    }
+}

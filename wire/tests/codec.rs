@@ -1,0 +1,237 @@
+//! The bytes on the wire: fixed by golden vectors, read back, and never a panic for any others.
+
+use proptest::prelude::*;
+use smallvec::smallvec;
+use understudy_wire::{
+    Actuation, Applied, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Field, Frame,
+    FrameError, Header, Holding, Image, Join, Lineage, MAXIMUM_FRAME_BYTES, Moment, Party,
+    ProgramHash, ProgramId, ProgramSet, Sample, Source, StationId, StationSet, Transfer, Turn,
+    Word, decode, encode,
+};
+
+fn moment(epoch: u64, cycle: u64) -> Moment {
+    Moment {
+        epoch: Epoch(epoch),
+        cycle: Cycle(cycle),
+    }
+}
+
+fn image(width: usize, word: u64) -> Image {
+    Image::from_words(width, &[word]).expect("it fits")
+}
+
+fn frame(sender: Party, body: Body) -> Frame {
+    Frame {
+        header: Header {
+            cluster: ClusterHash(1),
+            configuration: ConfigurationHash(2),
+            moment: moment(3, 4),
+            sender,
+            alone: false,
+        },
+        body,
+    }
+}
+
+fn holding(program: u8) -> Holding {
+    Holding {
+        program: ProgramId(program),
+        born: moment(1, 2),
+        lineage: Lineage(0x0102_0304_0506_0708),
+        stepped: moment(3, 4),
+        digest: Digest(9),
+    }
+}
+
+/// One frame of every kind.
+fn every_kind() -> Vec<(&'static str, Frame)> {
+    let station = Party::Station(StationId(2));
+    let remote_io = Party::RemoteIo(ProgramId(1));
+    let plant = Party::Plant(ProgramId(0));
+    let applied = Applied {
+        moment: moment(3, 3),
+        source: Source::Reconstructed,
+        outputs: image(2, 0b10),
+    };
+    let sample = Sample {
+        born: moment(1, 2),
+        base: Lineage(5),
+        before: Lineage(6),
+        history: smallvec![image(4, 0b0011), image(4, 0b1010)],
+        applied: Some(applied),
+    };
+    let turn = Turn {
+        heard: StationSet::from_bits(0b11),
+        holdings: smallvec![holding(0), holding(1)],
+        words: smallvec![Word {
+            members: ProgramSet::from_bits(0b11),
+            sum: image(5, 0b10101),
+        }],
+    };
+    let join = Join {
+        wants: ProgramSet::from_bits(0b01),
+        holdings: smallvec![holding(1)],
+    };
+    let transfer = Transfer {
+        to: StationId(0),
+        program: ProgramId(0),
+        hash: ProgramHash(7),
+        born: moment(1, 2),
+        lineage: Lineage(8),
+        stepped: moment(3, 4),
+        digest: Digest(9),
+        state: image(7, 0b1001001),
+    };
+    let field = Field {
+        sensors: image(6, 0b1010),
+        handed_over: 1,
+        finished: 2,
+        mishaps: 0,
+        positions: smallvec![0, 500, 1000],
+    };
+    let actuation = Actuation {
+        outputs: image(5, 0b1),
+    };
+    vec![
+        ("sync", frame(station, Body::Sync)),
+        ("sample", frame(remote_io, Body::Sample(sample))),
+        ("turn", frame(station, Body::Turn(turn))),
+        ("join", frame(station, Body::Join(join))),
+        ("transfer", frame(station, Body::Transfer(transfer))),
+        ("field", frame(plant, Body::Field(field))),
+        ("actuation", frame(remote_io, Body::Actuation(actuation))),
+    ]
+}
+
+fn bytes_of(frame: &Frame) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    encode(frame, &mut bytes).expect("a sensible frame");
+    bytes
+}
+
+/// Two programs of different builds understand each other only while these bytes stay as they are.
+#[test]
+fn golden_vectors() {
+    let text: String = every_kind()
+        .iter()
+        .map(|(kind, frame)| {
+            let hexadecimal: String = bytes_of(frame)
+                .iter()
+                .map(|byte| format!("{byte:02x}"))
+                .collect();
+            format!("{kind} {hexadecimal}\n")
+        })
+        .collect();
+    insta::assert_snapshot!(text);
+}
+
+#[test]
+fn every_kind_is_read_back() {
+    for (kind, frame) in every_kind() {
+        assert_eq!(decode(&bytes_of(&frame)), Ok(frame), "{kind}");
+    }
+}
+
+/// CRC-32 finds every change of one bit, wherever it is.
+#[test]
+fn no_flipped_bit_goes_unseen() {
+    for (kind, frame) in every_kind() {
+        let bytes = bytes_of(&frame);
+        for bit in 0..bytes.len() * 8 {
+            let mut flipped = bytes.clone();
+            flipped[bit / 8] ^= 1 << (bit % 8);
+            assert!(decode(&flipped).is_err(), "{kind}, bit {bit}");
+        }
+        for length in 0..bytes.len() {
+            assert!(decode(&bytes[..length]).is_err(), "{kind}, {length} bytes");
+        }
+    }
+}
+
+fn check_refused(sender: Party, body: Body) {
+    let frame = frame(sender, body);
+    let mut bytes = Vec::new();
+    let refused = encode(&frame, &mut bytes);
+    assert!(
+        matches!(refused, Err(FrameError::Promise(_))),
+        "{refused:?}"
+    );
+    assert!(bytes.is_empty());
+}
+
+#[test]
+fn a_frame_that_breaks_a_promise_never_leaves() {
+    let station = Party::Station(StationId(2));
+    let remote_io = Party::RemoteIo(ProgramId(0));
+    check_refused(remote_io, Body::Sync);
+    check_refused(Party::Station(StationId(64)), Body::Sync);
+    let empty = Sample {
+        born: Moment::default(),
+        base: Lineage(0),
+        before: Lineage(0),
+        history: smallvec![],
+        applied: None,
+    };
+    check_refused(remote_io, Body::Sample(empty.clone()));
+    let uneven = Sample {
+        history: smallvec![image(1, 0), image(2, 0)],
+        ..empty
+    };
+    check_refused(remote_io, Body::Sample(uneven));
+    let word = |members| Word {
+        members: ProgramSet::from_bits(members),
+        sum: Image::default(),
+    };
+    let turn = |members, programs: &[u8]| Turn {
+        heard: StationSet::EMPTY,
+        holdings: programs.iter().map(|&program| holding(program)).collect(),
+        words: smallvec![word(members)],
+    };
+    check_refused(station, Body::Turn(turn(0, &[0])));
+    check_refused(station, Body::Turn(turn(0b10, &[0])));
+    check_refused(station, Body::Turn(turn(0b1, &[0, 0])));
+}
+
+#[test]
+fn a_frame_past_the_bound_never_leaves() {
+    let transfer = Transfer {
+        to: StationId(0),
+        program: ProgramId(0),
+        hash: ProgramHash(0),
+        born: Moment::default(),
+        lineage: Lineage(0),
+        stepped: Moment::default(),
+        digest: Digest(0),
+        state: Image::from_bits((0..understudy_wire::MAXIMUM_IMAGE_BITS).map(|_| true)),
+    };
+    let widest = frame(Party::Station(StationId(0)), Body::Transfer(transfer));
+    let bytes = bytes_of(&widest);
+    assert!(bytes.len() <= MAXIMUM_FRAME_BYTES);
+    assert_eq!(decode(&bytes), Ok(widest));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_bytes_may_arrive(bytes in prop::collection::vec(any::<u8>(), 0..600)) {
+        prop_assert!(decode(&bytes).is_err());
+    }
+
+    /// Bytes with a right magic, version and checksum, and anything in between: read or refused, and what is read can be written.
+    #[test]
+    fn any_payload_may_arrive(kind in 0..7_usize, cut in 0..400_usize, noise in prop::collection::vec(any::<u8>(), 0..40)) {
+        let (_, frame) = every_kind().swap_remove(kind);
+        let mut bytes = bytes_of(&frame);
+        bytes.truncate(bytes.len() - 4);
+        bytes.truncate(cut.max(5));
+        bytes.extend(noise);
+        let checksum = crc32fast::hash(&bytes);
+        bytes.extend(checksum.to_le_bytes());
+        if let Ok(read) = decode(&bytes) {
+            let mut again = Vec::new();
+            prop_assert_eq!(encode(&read, &mut again), Ok(()));
+            prop_assert_eq!(decode(&again), Ok(read));
+        }
+    }
+}
