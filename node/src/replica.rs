@@ -264,6 +264,16 @@ impl Replica {
         }
     }
 
+    /// A value fault: one bit of the state is another from now on.
+    pub(crate) fn flip_state(&mut self, bit: usize) {
+        if let Some(copy) = &mut self.copy
+            && let Some(bit) = bit.checked_rem(copy.state.bits.width())
+        {
+            let value = copy.state.bits.get(bit);
+            copy.state.bits.set(bit, !value);
+        }
+    }
+
     /// Throws the copy away: it computes otherwise than its twin.
     pub(crate) fn discard(&mut self) {
         self.copy = None;

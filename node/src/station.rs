@@ -95,6 +95,13 @@ impl Station {
         station
     }
 
+    /// Flips one bit of x(i), counted round its width, as a fault of the memory does. Nothing where it holds no x(i).
+    pub fn flip_state(&mut self, program: ProgramId, bit: usize) {
+        if let Some(replica) = self.replicas.iter_mut().find(|it| it.id() == program) {
+            replica.flip_state(bit);
+        }
+    }
+
     fn own(&self) -> StationId {
         self.settings.station
     }

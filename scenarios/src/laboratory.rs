@@ -360,6 +360,7 @@ impl Laboratory<'_> {
             Action::Stop => process.stop(),
             Action::Continue => process.go_on(),
             Action::Release => process.command("release").await,
+            _ => Err(std::io::Error::other("only a simulation can do this")),
         };
         done.map_err(|source| LaboratoryError::Step {
             action: action_word(step.action),

@@ -248,6 +248,7 @@ impl Reader<'_> {
             jitter: jitter.map_or(usual.jitter, |(jitter, _)| jitter),
             loss: loss.map_or(usual.loss, |(loss, _)| loss),
             duplicate: duplicate.map_or(usual.duplicate, |(duplicate, _)| duplicate),
+            ..usual
         };
         fields.finish(found);
         network

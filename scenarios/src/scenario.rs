@@ -59,13 +59,7 @@ pub const ACTIONS: [Action; 5] = [
 
 /// An action as scenario files write it.
 pub fn action_word(action: Action) -> &'static str {
-    match action {
-        Action::Crash => "crash",
-        Action::Restart => "restart",
-        Action::Stop => "stop",
-        Action::Continue => "continue",
-        Action::Release => "release",
-    }
+    action.word()
 }
 
 /// What must come of a run. Counts are over all remote I/Os, from the origin to the last cycle.

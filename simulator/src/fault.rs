@@ -1,7 +1,9 @@
 //! What is done to a party, and when.
 
+use std::time::Duration;
+
 use serde::{Deserialize, Serialize};
-use understudy_wire::Party;
+use understudy_wire::{Party, ProgramId};
 
 /// One thing done to one party.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -16,7 +18,7 @@ pub struct Fault {
     pub action: Action,
 }
 
-/// What can be done to a party.
+/// What can be done to a party. What does not concern a party (a state that it does not hold) does nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Action {
@@ -24,10 +26,81 @@ pub enum Action {
     Crash,
     /// It starts again, knowing nothing.
     Restart,
+    /// It starts again with another configuration, as after a wrong download: it and the others refuse each other.
+    RestartMisconfigured,
     /// It stands still, and frames wait for it (SIGSTOP).
     Stop,
     /// It goes on (SIGCONT).
     Continue,
-    /// The operator releases the outputs of a remote I/O after a cold start.
+    /// Whatever it is told, and every time that it asked for, reaches it so much later from now on; zero ends this.
+    Slow {
+        /// At most a second.
+        by: Duration,
+    },
+    /// The operator releases the outputs of a remote I/O after a cold start or a value fault, and the stations that it
+    /// has excluded.
     Release,
+    /// Its frames reach one other party no more. A full cut is one each way; a partition is one for each pair.
+    Cut {
+        /// Who hears it no more.
+        to: Party,
+    },
+    /// Its frames reach that party again.
+    Heal {
+        /// Who hears it again.
+        to: Party,
+    },
+    /// Bits of its next frames flip on their way.
+    Corrupt {
+        /// So many frames.
+        frames: u16,
+    },
+    /// A frame that it sent earlier comes to everybody once more.
+    Replay {
+        /// So many frames ago; 1 is its last one.
+        age: u16,
+    },
+    /// One bit of x(i) flips in the memory of a station.
+    FlipState {
+        /// i.
+        program: ProgramId,
+        /// Counted round the width of x(i).
+        bit: u16,
+    },
+    /// One bit of u(i) flips: in what a remote I/O sends, behind its own back, or in what one station takes in.
+    FlipSample {
+        /// Counted round the width of u(i).
+        bit: u16,
+        /// In so many frames, copies counted.
+        frames: u16,
+    },
+    /// One bit of the first word that a station says flips on its way out of a sound state.
+    FlipWord {
+        /// Counted round the width of the word.
+        bit: u16,
+        /// In so many frames, copies counted.
+        frames: u16,
+    },
+}
+
+impl Action {
+    /// Its kind in one word, as journals and scenario files write it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Crash => "crash",
+            Self::Restart => "restart",
+            Self::RestartMisconfigured => "restart-misconfigured",
+            Self::Stop => "stop",
+            Self::Continue => "continue",
+            Self::Slow { .. } => "slow",
+            Self::Release => "release",
+            Self::Cut { .. } => "cut",
+            Self::Heal { .. } => "heal",
+            Self::Corrupt { .. } => "corrupt",
+            Self::Replay { .. } => "replay",
+            Self::FlipState { .. } => "flip-state",
+            Self::FlipSample { .. } => "flip-sample",
+            Self::FlipWord { .. } => "flip-word",
+        }
+    }
 }

@@ -6,6 +6,7 @@
 
 mod fault;
 mod field;
+mod links;
 mod network;
 mod pace;
 mod parts;

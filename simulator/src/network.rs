@@ -17,6 +17,9 @@ pub struct Network {
     pub loss: f64,
     /// Share of frames that arrive twice, from 0 to 1, for each receiver.
     pub duplicate: f64,
+    /// Share of arriving frames of which a bit has flipped on their way, from 0 to 1, for each receiver.
+    #[serde(default)]
+    pub corruption: f64,
 }
 
 impl Default for Network {
@@ -27,6 +30,7 @@ impl Default for Network {
             jitter: Duration::ZERO,
             loss: 0.0,
             duplicate: 0.0,
+            corruption: 0.0,
         }
     }
 }
@@ -34,7 +38,8 @@ impl Default for Network {
 impl Network {
     /// Whether all receivers hear a frame at the same time, and surely.
     pub(crate) fn is_even(&self) -> bool {
-        self.jitter.is_zero() && self.loss <= 0.0 && self.duplicate <= 0.0
+        let shares = [self.loss, self.duplicate, self.corruption];
+        self.jitter.is_zero() && shares.iter().all(|&share| share <= 0.0)
     }
 
     /// The delays with which a frame reaches one receiver: none if it is lost, two if it is duplicated.

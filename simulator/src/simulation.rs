@@ -3,25 +3,26 @@
 //! Three kinds of events: a frame arrives, a party wakes, a fault is due. At equal times frames come first, then wake-ups by
 //! party, then faults, so that a run is a function of its parts, faults and seed.
 
+mod disturbance;
+
 use std::sync::Arc;
 use std::time::Duration;
 
-use rand::SeedableRng;
-use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
 use understudy_wire::{
-    Body, Epoch, Field, Frame, Input, Machine, Output, Party, ProgramId, ProgramSet, Source,
-    StationId, StationSet, Time,
+    Epoch, Field, Frame, Input, Machine, Output, Party, ProgramId, ProgramSet, Source, StationId,
+    Time,
 };
 
-use crate::fault::{Action, Fault};
+use crate::fault::Fault;
 use crate::field::Plants;
+use crate::links::Links;
 use crate::network::Network;
 use crate::pace::Pace;
 use crate::parts::Parts;
-use crate::queue::{Delivery, Queue};
+use crate::queue::Delivery;
 use crate::referee::{Referee, Violation};
 use crate::slot::Slot;
 use crate::tally::Tally;
@@ -60,8 +61,7 @@ pub struct NotReady {
 /// A cluster in virtual time.
 pub struct Simulation {
     parts: Parts,
-    network: Network,
-    random: Pcg64Mcg,
+    links: Links,
     now: Time,
     stations: Vec<Slot<Station>>,
     remote_ios: Vec<Slot<RemoteIo>>,
@@ -71,7 +71,6 @@ pub struct Simulation {
     /// For each remote I/O, whether its last deadline was direct and everybody spoke.
     ready: ProgramSet,
     violations: Vec<Violation>,
-    queue: Queue,
     faults: Vec<Fault>,
     pace: Pace,
     founded: u64,
@@ -99,8 +98,7 @@ impl Simulation {
         });
         let remote_ios = parts.remote_ios.iter();
         let mut simulation = Self {
-            network,
-            random: Pcg64Mcg::seed_from_u64(seed),
+            links: Links::new(parts.stations.len(), remote_ios.len(), network, seed),
             now,
             stations: stations.collect(),
             remote_ios: remote_ios
@@ -111,7 +109,6 @@ impl Simulation {
             tallies: vec![Tally::default(); parts.remote_ios.len()],
             ready: ProgramSet::EMPTY,
             violations: Vec::new(),
-            queue: Queue::default(),
             faults: Vec::new(),
             pace: Pace::new(parts.stations[0].agreement.schedule.period()),
             founded: parts.stations.len() as u64,
@@ -125,6 +122,7 @@ impl Simulation {
 
     /// Adds a fault; one whose cycle is over is done at once.
     pub fn schedule(&mut self, fault: Fault) {
+        self.links.expect(fault.action);
         let key = |fault: &Fault| fault.at_cycle as f64 + fault.phase;
         let place = self
             .faults
@@ -210,6 +208,11 @@ impl Simulation {
         &self.violations
     }
 
+    /// Frames that were changed on their way, and that their receivers refused for it.
+    pub fn refused_frames(&self) -> u64 {
+        self.links.refused()
+    }
+
     /// What the plant of a program shows now.
     pub fn field(&self, program: ProgramId) -> Option<&Field> {
         self.plants.field(program)
@@ -222,7 +225,7 @@ impl Simulation {
     // ── one event ───────────────────────────────────────────────────────────────────────────────────────────────────
 
     fn advance(&mut self, observe: &mut Observe<'_>) {
-        let arrival = self.queue.next_at();
+        let arrival = self.links.next_at();
         let (wakeup, sleeper) = self.next_wakeup();
         let fault = self.next_fault_at();
         let overdue = self.pace.overdue_at();
@@ -233,7 +236,7 @@ impl Simulation {
         let next = next.unwrap_or(overdue);
         self.now = self.now.max(next);
         if arrival == Some(next) {
-            if let Some(delivery) = self.queue.pop() {
+            if let Some(delivery) = self.links.pop() {
                 self.deliver(&delivery, observe);
             }
         } else if wakeup == next {
@@ -273,11 +276,8 @@ impl Simulation {
 
     fn deliver(&mut self, delivery: &Delivery, observe: &mut Observe<'_>) {
         for station in delivery.stations.iter() {
-            self.give(
-                Party::Station(station),
-                Input::Frame(&delivery.frame),
-                observe,
-            );
+            let frame = self.links.take_in(station, &delivery.frame);
+            self.give(Party::Station(station), Input::Frame(&frame), observe);
         }
         for program in delivery.remote_ios.iter() {
             self.give(
@@ -383,109 +383,11 @@ impl Simulation {
         self.tallies[program.index()].count(event);
     }
 
-    // ── the network ─────────────────────────────────────────────────────────────────────────────────────────────────
-
     fn send(&mut self, frame: Arc<Frame>) {
-        self.pace.saw(self.now, frame.header.moment);
-        let mut stations = StationSet::first(self.stations.len());
-        let mut remote_ios = ProgramSet::first(self.remote_ios.len());
-        if let Party::Station(sender) = frame.header.sender {
-            stations.remove(sender);
+        let configuration = self.parts.stations[0].agreement.configuration;
+        if frame.header.configuration == configuration {
+            self.pace.saw(self.now, frame.header.moment);
         }
-        match &frame.body {
-            Body::Sample(_) => remote_ios = ProgramSet::EMPTY,
-            Body::Transfer(transfer) => {
-                stations = StationSet::only(transfer.to);
-                remote_ios = ProgramSet::EMPTY;
-            }
-            _ => {}
-        }
-        if self.network.is_even() {
-            let at = self.now + self.network.latency;
-            self.queue.push(at, frame, stations, remote_ios);
-            return;
-        }
-        for station in stations.iter() {
-            for delay in self.network.arrivals(&mut self.random) {
-                let at = self.now + delay;
-                let only = StationSet::only(station);
-                self.queue
-                    .push(at, Arc::clone(&frame), only, ProgramSet::EMPTY);
-            }
-        }
-        for program in remote_ios.iter() {
-            for delay in self.network.arrivals(&mut self.random) {
-                let at = self.now + delay;
-                let only = ProgramSet::only(program);
-                self.queue
-                    .push(at, Arc::clone(&frame), StationSet::EMPTY, only);
-            }
-        }
+        self.links.send(self.now, frame);
     }
-
-    // ── faults ──────────────────────────────────────────────────────────────────────────────────────────────────────
-
-    fn apply(&mut self, fault: &Fault, observe: &mut Observe<'_>) {
-        observe(
-            self.now,
-            self.pace.cycle(),
-            fault.party,
-            Record::Fault(fault),
-        );
-        match fault.party {
-            Party::Station(station) => {
-                let Some(slot) = self.stations.get_mut(station.index()) else {
-                    return;
-                };
-                if fault.action == Action::Restart {
-                    self.founded += 1;
-                    let mut settings = self.parts.stations[station.index()].clone();
-                    settings.epoch = Epoch(self.founded);
-                    slot.restart(Station::new(self.now, settings));
-                    return;
-                }
-                let waiting = disturb(slot, fault.action);
-                for frame in waiting {
-                    self.give(fault.party, Input::Frame(&frame), observe);
-                }
-            }
-            Party::RemoteIo(program) => {
-                let Some(slot) = self.remote_ios.get_mut(program.index()) else {
-                    return;
-                };
-                if fault.action == Action::Restart {
-                    let settings = self.parts.remote_ios[program.index()].clone();
-                    slot.restart(RemoteIo::new(self.now, settings));
-                    self.show_field(program);
-                    return;
-                }
-                if fault.action == Action::Release {
-                    self.give(fault.party, Input::Release, observe);
-                    return;
-                }
-                let waiting = disturb(slot, fault.action);
-                for frame in waiting {
-                    self.give(fault.party, Input::Frame(&frame), observe);
-                }
-            }
-            Party::Plant(program) => match fault.action {
-                Action::Crash => self.plants.crash(program),
-                Action::Restart => self.plants.restart(program),
-                Action::Stop | Action::Continue | Action::Release => {}
-            },
-        }
-    }
-}
-
-fn disturb<M: Machine>(
-    slot: &mut Slot<M>,
-    action: Action,
-) -> impl IntoIterator<Item = Arc<Frame>> + use<M> {
-    match action {
-        Action::Crash => slot.crash(),
-        Action::Stop => slot.stop(),
-        Action::Continue => return slot.go_on(),
-        Action::Restart | Action::Release => {}
-    }
-    Default::default()
 }

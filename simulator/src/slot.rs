@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::time::Duration;
 
 use understudy_wire::{Frame, Input, Machine, Time};
 
@@ -14,6 +15,7 @@ pub(crate) struct Slot<M> {
     stopped: bool,
     waiting: VecDeque<Arc<Frame>>,
     wakeup: Time,
+    slow: Duration,
 }
 
 impl<M: Machine> Slot<M> {
@@ -23,12 +25,13 @@ impl<M: Machine> Slot<M> {
             machine: Some(machine),
             stopped: false,
             waiting: VecDeque::new(),
+            slow: Duration::ZERO,
         }
     }
 
     /// When it wants to be woken; never while it is stopped or crashed.
     pub(crate) fn wakeup(&self) -> Option<Time> {
-        (self.machine.is_some() && !self.stopped).then_some(self.wakeup)
+        (self.machine.is_some() && !self.stopped).then(|| self.wakeup + self.slow)
     }
 
     /// Gives an input to a running party. True if it took it.
@@ -65,8 +68,16 @@ impl<M: Machine> Slot<M> {
         self.waiting.clear();
     }
 
+    /// Starts again; one on a slow host stays slow.
     pub(crate) fn restart(&mut self, machine: M) {
+        let slow = self.slow;
         *self = Self::new(machine);
+        self.slow = slow;
+    }
+
+    /// From now on it is woken so much later than it asks for.
+    pub(crate) fn slow_down(&mut self, by: Duration) {
+        self.slow = by;
     }
 
     pub(crate) fn stop(&mut self) {

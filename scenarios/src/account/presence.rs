@@ -96,7 +96,7 @@ impl Presences {
         match action {
             Action::Crash | Action::Stop => self.changes.push((at, station, true)),
             Action::Restart | Action::Continue => self.changes.push((at, station, false)),
-            Action::Release => {}
+            _ => {}
         }
     }
 

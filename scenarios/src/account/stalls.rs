@@ -51,7 +51,7 @@ impl Stalls {
                 self.disturbed
                     .insert(party, Some(number + OWN_DOING_CYCLES));
             }
-            Action::Release => {}
+            _ => {}
         }
     }
 

@@ -1,0 +1,282 @@
+//! The way of every frame from its sender to all who are concerned: lost, late, twice, changed, cut off, or said again.
+//!
+//! A frame that was changed on its way travels as its bytes, through [`encode`] and [`decode`], so that it is the very
+//! checksum that refuses it. What flips before a checksum is made, or after it was read, arrives: that is a value fault.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::Duration;
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use understudy_wire::{
+    Body, Frame, Image, Party, ProgramSet, StationId, StationSet, Time, decode, encode,
+};
+
+use crate::fault::Action;
+use crate::network::Network;
+use crate::queue::{Delivery, Queue};
+
+/// Frames of each party that can be said again, at most; older ones are forgotten.
+const REMEMBERED: usize = 1024;
+
+/// All links of a cluster.
+#[derive(Debug)]
+pub(crate) struct Links {
+    network: Network,
+    random: Pcg64Mcg,
+    queue: Queue,
+    stations: StationSet,
+    remote_ios: ProgramSet,
+    /// By place of the sender.
+    senders: Vec<Sender>,
+    /// By rank: what flips in the next samples that a station takes in.
+    intakes: Vec<Flips>,
+    /// By place: how much later a party hears.
+    late: Vec<Duration>,
+    anybody_late: bool,
+    remembers: bool,
+    refused: u64,
+}
+
+#[derive(Debug, Clone, Default)]
+struct Sender {
+    /// Who does not hear it.
+    deaf_stations: StationSet,
+    deaf_remote_ios: ProgramSet,
+    corrupt: u16,
+    samples: Flips,
+    words: Flips,
+    sent: VecDeque<Arc<Frame>>,
+}
+
+/// One bit, in so many frames more.
+#[derive(Debug, Clone, Copy, Default)]
+struct Flips {
+    bit: u16,
+    frames: u16,
+}
+
+impl Flips {
+    fn flip(&mut self, image: &mut Image) {
+        if self.frames == 0 || image.width() == 0 {
+            return;
+        }
+        self.frames -= 1;
+        let bit = usize::from(self.bit) % image.width();
+        image.set(bit, !image.get(bit));
+    }
+}
+
+impl Links {
+    pub(crate) fn new(stations: usize, remote_ios: usize, network: Network, seed: u64) -> Self {
+        Self {
+            network,
+            random: Pcg64Mcg::seed_from_u64(seed),
+            queue: Queue::default(),
+            stations: StationSet::first(stations),
+            remote_ios: ProgramSet::first(remote_ios),
+            senders: vec![Sender::default(); stations + remote_ios],
+            intakes: vec![Flips::default(); stations],
+            late: vec![Duration::ZERO; stations + remote_ios],
+            anybody_late: false,
+            remembers: false,
+            refused: 0,
+        }
+    }
+
+    /// Frames that were changed on their way and refused for it.
+    pub(crate) fn refused(&self) -> u64 {
+        self.refused
+    }
+
+    pub(crate) fn next_at(&self) -> Option<Time> {
+        self.queue.next_at()
+    }
+
+    pub(crate) fn pop(&mut self) -> Option<Delivery> {
+        self.queue.pop()
+    }
+
+    /// A fault of this kind is to come: frames have to be remembered for it from now on.
+    pub(crate) fn expect(&mut self, action: Action) {
+        self.remembers |= matches!(action, Action::Replay { .. });
+    }
+
+    /// Does what concerns the links of `party`.
+    pub(crate) fn disturb(&mut self, now: Time, party: Party, action: Action) {
+        let Some(place) = self.place(party) else {
+            return;
+        };
+        match action {
+            Action::Cut { to } | Action::Heal { to } => {
+                let sender = &mut self.senders[place];
+                let cut = matches!(action, Action::Cut { .. });
+                match to {
+                    Party::Station(station) if cut => sender.deaf_stations.insert(station),
+                    Party::Station(station) => sender.deaf_stations.remove(station),
+                    Party::RemoteIo(program) if cut => sender.deaf_remote_ios.insert(program),
+                    Party::RemoteIo(program) => sender.deaf_remote_ios.remove(program),
+                    Party::Plant(_) => {}
+                }
+            }
+            Action::Corrupt { frames } => self.senders[place].corrupt = frames,
+            Action::FlipSample { bit, frames } => {
+                let flips = Flips { bit, frames };
+                match party {
+                    Party::Station(station) => self.intakes[station.index()] = flips,
+                    _ => self.senders[place].samples = flips,
+                }
+            }
+            Action::FlipWord { bit, frames } => self.senders[place].words = Flips { bit, frames },
+            Action::Slow { by } => {
+                self.late[place] = by;
+                self.anybody_late = self.late.iter().any(|late| !late.is_zero());
+            }
+            Action::Replay { age } => {
+                let sent = &self.senders[place].sent;
+                let nth = sent.len().checked_sub(usize::from(age.max(1)));
+                if let Some(frame) = nth.and_then(|nth| sent.get(nth)).cloned() {
+                    self.carry(now, place, frame);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Sends a frame to all whom its kind concerns.
+    pub(crate) fn send(&mut self, now: Time, frame: Arc<Frame>) {
+        let Some(place) = self.place(frame.header.sender) else {
+            return;
+        };
+        let Some(frame) = self.leave(place, frame) else {
+            return;
+        };
+        if self.remembers {
+            let sent = &mut self.senders[place].sent;
+            if sent.len() == REMEMBERED {
+                sent.pop_front();
+            }
+            sent.push_back(Arc::clone(&frame));
+        }
+        self.carry(now, place, frame);
+    }
+
+    /// What a station takes in where this frame comes to it.
+    pub(crate) fn take_in(&mut self, station: StationId, frame: &Arc<Frame>) -> Arc<Frame> {
+        let flips = &mut self.intakes[station.index()];
+        if flips.frames > 0
+            && let Body::Sample(_) = &frame.body
+        {
+            return flipped(frame, flips);
+        }
+        Arc::clone(frame)
+    }
+
+    fn place(&self, party: Party) -> Option<usize> {
+        let place = match party {
+            Party::Station(station) => station.index(),
+            Party::RemoteIo(program) => self.stations.len() + program.index(),
+            Party::Plant(_) => return None,
+        };
+        (place < self.senders.len()).then_some(place)
+    }
+
+    /// The frame as it leaves its sender; nothing where every receiver refuses it.
+    fn leave(&mut self, place: usize, frame: Arc<Frame>) -> Option<Arc<Frame>> {
+        let sender = &mut self.senders[place];
+        let frame = match &frame.body {
+            Body::Sample(_) if sender.samples.frames > 0 => flipped(&frame, &mut sender.samples),
+            Body::Turn(_) if sender.words.frames > 0 => flipped(&frame, &mut sender.words),
+            _ => frame,
+        };
+        if sender.corrupt > 0 {
+            sender.corrupt -= 1;
+            return self.corrupted(&frame);
+        }
+        Some(frame)
+    }
+
+    /// Up to four flipped bits of its bytes. Nothing where the receiver's checksum refuses them.
+    fn corrupted(&mut self, frame: &Frame) -> Option<Arc<Frame>> {
+        let mut bytes = Vec::new();
+        if encode(frame, &mut bytes).is_ok() {
+            for _ in 0..self.random.random_range(1..=4) {
+                let place = self.random.random_range(0..bytes.len());
+                bytes[place] ^= 1 << self.random.random_range(0..8);
+            }
+        }
+        let arrived = decode(&bytes).ok().map(Arc::new);
+        self.refused += u64::from(arrived.is_none());
+        arrived
+    }
+
+    fn carry(&mut self, now: Time, place: usize, frame: Arc<Frame>) {
+        let sender = &self.senders[place];
+        let mut stations = self.stations.without(sender.deaf_stations);
+        let mut remote_ios = self.remote_ios.without(sender.deaf_remote_ios);
+        match frame.header.sender {
+            Party::Station(sender) => stations.remove(sender),
+            Party::RemoteIo(program) => remote_ios.remove(program),
+            Party::Plant(_) => {}
+        }
+        match &frame.body {
+            Body::Sample(_) => remote_ios = ProgramSet::EMPTY,
+            Body::Transfer(transfer) => {
+                stations = stations.and(StationSet::only(transfer.to));
+                remote_ios = ProgramSet::EMPTY;
+            }
+            _ => {}
+        }
+        if self.network.is_even() && !self.anybody_late {
+            let at = now + self.network.latency;
+            self.queue.push(at, frame, stations, remote_ios);
+            return;
+        }
+        for station in stations.iter() {
+            let (only, none) = (StationSet::only(station), ProgramSet::EMPTY);
+            self.carry_to(now, station.index(), &frame, only, none);
+        }
+        for program in remote_ios.iter() {
+            let (only, none) = (ProgramSet::only(program), StationSet::EMPTY);
+            let place = self.stations.len() + program.index();
+            self.carry_to(now, place, &frame, none, only);
+        }
+    }
+
+    fn carry_to(
+        &mut self,
+        now: Time,
+        receiver: usize,
+        frame: &Arc<Frame>,
+        stations: StationSet,
+        remote_ios: ProgramSet,
+    ) {
+        for delay in self.network.arrivals(&mut self.random) {
+            let share = self.network.corruption;
+            let frame = if share > 0.0 && self.random.random::<f64>() < share {
+                self.corrupted(frame)
+            } else {
+                Some(Arc::clone(frame))
+            };
+            if let Some(frame) = frame {
+                let at = now + delay + self.late[receiver];
+                self.queue.push(at, frame, stations, remote_ios);
+            }
+        }
+    }
+}
+
+/// The newest sample, or the first word, with a bit flipped.
+fn flipped(frame: &Arc<Frame>, flips: &mut Flips) -> Arc<Frame> {
+    let mut changed = Frame::clone(frame);
+    let image = match &mut changed.body {
+        Body::Sample(sample) => sample.history.last_mut(),
+        Body::Turn(turn) => turn.words.first_mut().map(|word| &mut word.sum),
+        _ => None,
+    };
+    if let Some(image) = image {
+        flips.flip(image);
+    }
+    Arc::new(changed)
+}
