@@ -24,10 +24,14 @@ const FLOORS: &[&[&str]] = &[
         "understudy-remote-io",
         "understudy-supervisor",
     ],
-    &["understudy-cluster", "understudy-verification"],
+    &[
+        "understudy-cluster",
+        "understudy-reconfiguration",
+        "understudy-verification",
+    ],
     &["understudy-bus", "understudy-simulator"],
     &["understudy-scenarios"],
-    &["understudy"],
+    &["understudy", "understudy-fuzz"],
 ];
 
 /// The first floor that may know the outside.

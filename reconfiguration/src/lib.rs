@@ -1,0 +1,1 @@
+//! Ladders that go on under failed input channels.
