@@ -17,6 +17,7 @@ const FLOORS: &[&[&str]] = &[
         "understudy-ladder",
         "understudy-parity",
         "understudy-reliability",
+        "understudy-seal",
     ],
     &[
         "understudy-node",

@@ -1,0 +1,103 @@
+//! What stands before and behind a frame in its datagram; drawn in the documentation of the crate.
+
+use understudy_wire::{Party, ProgramId, StationId};
+
+pub(crate) const MAGIC: [u8; 4] = *b"UNDS";
+/// With which a frame begins that nobody has sealed.
+pub(crate) const UNSEALED_MAGIC: [u8; 4] = *b"UNDR";
+pub(crate) const VERSION: u8 = 1;
+pub(crate) const HEADER_BYTES: usize = 20;
+pub(crate) const AUTHENTICATOR_BYTES: usize = 16;
+pub(crate) const TAG_BYTES: usize = 16;
+const EVERYBODY: u8 = 255;
+
+/// A sealed frame is longer than the frame by so many bytes at most.
+pub const OVERHEAD_BYTES: usize = HEADER_BYTES + TAG_BYTES + AUTHENTICATOR_BYTES;
+
+/// The readable part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Envelope {
+    pub(crate) sender: Party,
+    /// Nobody in particular, or the station for whom alone the frame is.
+    pub(crate) to: Option<StationId>,
+    pub(crate) life: u32,
+    pub(crate) number: u64,
+}
+
+impl Envelope {
+    pub(crate) fn to_bytes(self) -> [u8; HEADER_BYTES] {
+        let (kind, index) = match self.sender {
+            Party::Station(station) => (0, station.0),
+            Party::RemoteIo(program) => (1, program.0),
+            Party::Plant(program) => (2, program.0),
+        };
+        let mut bytes = [0; HEADER_BYTES];
+        bytes[..4].copy_from_slice(&MAGIC);
+        bytes[4] = VERSION;
+        bytes[5] = kind;
+        bytes[6] = index;
+        bytes[7] = self.to.map_or(EVERYBODY, |station| station.0);
+        bytes[8..12].copy_from_slice(&self.life.to_le_bytes());
+        bytes[12..].copy_from_slice(&self.number.to_le_bytes());
+        bytes
+    }
+
+    /// Nothing where there is no such kind of sender, magic or version.
+    pub(crate) fn read(bytes: &[u8; HEADER_BYTES]) -> Option<Self> {
+        if bytes[..4] != MAGIC || bytes[4] != VERSION {
+            return None;
+        }
+        let sender = match bytes[5] {
+            0 => Party::Station(StationId(bytes[6])),
+            1 => Party::RemoteIo(ProgramId(bytes[6])),
+            2 => Party::Plant(ProgramId(bytes[6])),
+            _ => return None,
+        };
+        let field = |from: usize, to: usize| &bytes[from..to];
+        Some(Self {
+            sender,
+            to: (bytes[7] != EVERYBODY).then_some(StationId(bytes[7])),
+            life: u32::from_le_bytes(field(8, 12).try_into().ok()?),
+            number: u64::from_le_bytes(field(12, 20).try_into().ok()?),
+        })
+    }
+
+    /// Of the cipher: unique for a key as long as no life and number is used twice.
+    pub(crate) fn nonce(self) -> [u8; 12] {
+        let mut nonce = [0; 12];
+        nonce[..4].copy_from_slice(&self.life.to_le_bytes());
+        nonce[4..].copy_from_slice(&self.number.to_le_bytes());
+        nonce
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_envelope_is_read_back() {
+        let senders = [
+            Party::Station(StationId(63)),
+            Party::RemoteIo(ProgramId(0)),
+            Party::Plant(ProgramId(7)),
+        ];
+        for sender in senders {
+            for to in [None, Some(StationId(0)), Some(StationId(63))] {
+                let envelope = Envelope {
+                    sender,
+                    to,
+                    life: 0x0102_0304,
+                    number: 0x0506_0708_090a_0b0c,
+                };
+                assert_eq!(Envelope::read(&envelope.to_bytes()), Some(envelope));
+            }
+        }
+        let mut strange = [0; HEADER_BYTES];
+        assert_eq!(Envelope::read(&strange), None);
+        strange[..4].copy_from_slice(&MAGIC);
+        strange[4] = VERSION;
+        strange[5] = 3;
+        assert_eq!(Envelope::read(&strange), None);
+    }
+}

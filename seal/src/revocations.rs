@@ -1,0 +1,47 @@
+//! Whose keys no longer count.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use understudy_wire::Party;
+
+/// A set of parties that another thread may change while frames are opened.
+#[derive(Debug, Default)]
+pub struct Revocations {
+    stations: AtomicU64,
+    remote_ios: AtomicU64,
+    plants: AtomicU64,
+}
+
+impl Revocations {
+    /// From now on exactly these are revoked.
+    pub fn set(&self, revoked: impl IntoIterator<Item = Party>) {
+        let mut masks = [0_u64; 3];
+        for party in revoked {
+            let (kind, bit) = place(party);
+            masks[kind] |= bit;
+        }
+        for (word, mask) in self.words().into_iter().zip(masks) {
+            word.store(mask, Ordering::Relaxed);
+        }
+    }
+
+    /// Whether a party's keys no longer count.
+    pub fn holds(&self, party: Party) -> bool {
+        let (kind, bit) = place(party);
+        self.words()[kind].load(Ordering::Relaxed) & bit != 0
+    }
+
+    fn words(&self) -> [&AtomicU64; 3] {
+        [&self.stations, &self.remote_ios, &self.plants]
+    }
+}
+
+/// The kind of a party and its bit; no bit where its index is past every bound.
+fn place(party: Party) -> (usize, u64) {
+    let (kind, index) = match party {
+        Party::Station(station) => (0, station.0),
+        Party::RemoteIo(program) => (1, program.0),
+        Party::Plant(program) => (2, program.0),
+    };
+    (kind, 1_u64.checked_shl(u32::from(index)).unwrap_or(0))
+}

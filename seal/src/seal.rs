@@ -1,0 +1,120 @@
+//! The sender's side.
+
+use std::collections::BTreeMap;
+
+use ring::aead::{Aad, LessSafeKey, Nonce};
+use understudy_wire::{Body, Frame, Party, StationId};
+
+use crate::envelope::{AUTHENTICATOR_BYTES, Envelope, HEADER_BYTES};
+use crate::key::{FrameKey, TransferKey};
+
+/// Why a frame cannot be sealed.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum SealError {
+    /// A state for a station that this one shares no key with.
+    #[error("there is no key for states to station {}", to.0)]
+    NoKey {
+        /// Who asked.
+        to: StationId,
+    },
+    /// A frame of somebody else: a mistake in this program.
+    #[error("a frame of {sender:?} cannot be sealed by {own:?}")]
+    NotOwn {
+        /// Who seals.
+        own: Party,
+        /// Whose it is.
+        sender: Party,
+    },
+}
+
+/// Seals the frames of one party in one life.
+pub struct Seal {
+    own: Party,
+    key: FrameKey,
+    transfers: BTreeMap<StationId, LessSafeKey>,
+    life: u32,
+    number: u64,
+}
+
+impl Seal {
+    /// `life` must be one that this party never had; `transfers` are the keys of the states that it gives, by who asks.
+    pub fn new(
+        own: Party,
+        key: FrameKey,
+        life: u32,
+        transfers: impl IntoIterator<Item = (StationId, TransferKey)>,
+    ) -> Self {
+        let ciphers = transfers.into_iter().map(|(to, key)| (to, key.cipher()));
+        Self {
+            own,
+            key,
+            transfers: ciphers.collect(),
+            life,
+            number: 0,
+        }
+    }
+
+    /// Puts the datagram of `frame`, which `encoded` are the bytes of, in place of what is in `datagram`. A copy of a frame is sealed
+    /// anew: it has a number of its own.
+    ///
+    /// # Errors
+    /// [`SealError`]; there is no datagram then.
+    pub fn seal(
+        &mut self,
+        frame: &Frame,
+        encoded: &[u8],
+        datagram: &mut Vec<u8>,
+    ) -> Result<(), SealError> {
+        datagram.clear();
+        let sender = frame.header.sender;
+        if sender != self.own {
+            return Err(SealError::NotOwn {
+                own: self.own,
+                sender,
+            });
+        }
+        let to = match &frame.body {
+            Body::Transfer(transfer) => Some(transfer.to),
+            _ => None,
+        };
+        let cipher = match to {
+            Some(to) => {
+                let found = self.transfers.get(&to);
+                Some(found.ok_or(SealError::NoKey { to })?)
+            }
+            None => None,
+        };
+        self.number += 1;
+        let envelope = Envelope {
+            sender,
+            to,
+            life: self.life,
+            number: self.number,
+        };
+        let header = envelope.to_bytes();
+        datagram.extend_from_slice(&header);
+        datagram.extend_from_slice(encoded);
+        if let Some(cipher) = cipher {
+            let nonce = Nonce::assume_unique_for_key(envelope.nonce());
+            let text = &mut datagram[HEADER_BYTES..];
+            let tag = cipher
+                .seal_in_place_separate_tag(nonce, Aad::from(header), text)
+                .expect("a frame is shorter than what the cipher takes");
+            datagram.extend_from_slice(tag.as_ref());
+        }
+        let authenticator = blake3::keyed_hash(self.key.bytes(), datagram);
+        datagram.extend_from_slice(&authenticator.as_bytes()[..AUTHENTICATOR_BYTES]);
+        Ok(())
+    }
+}
+
+impl std::fmt::Debug for Seal {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter
+            .debug_struct("Seal")
+            .field("own", &self.own)
+            .field("life", &self.life)
+            .field("number", &self.number)
+            .finish_non_exhaustive()
+    }
+}
