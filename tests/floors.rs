@@ -30,7 +30,7 @@ const FLOORS: &[&[&str]] = &[
         "understudy-reconfiguration",
         "understudy-verification",
     ],
-    &["understudy-bus", "understudy-simulator"],
+    &["understudy-bus", "understudy-network", "understudy-simulator"],
     &["understudy-scenarios"],
     &["understudy", "understudy-fuzz"],
 ];

@@ -1,0 +1,272 @@
+//! Hosts without machines: one network namespace for each, joined by a bridge in a namespace of its own.
+//!
+//! ```text
+//!   host 0            switch             host 1
+//!   eth0 10.87.0.2 ── h0 ┐ bridge ┌ h1 ── eth0 10.87.0.3
+//!                        └ 10.87.0.1
+//! ```
+//!
+//! Invariant: nothing is left behind, however the run ends. The namespaces have no names: this process holds them by file
+//! descriptors, the processes in them by being there, and when the last of those is gone the kernel removes the namespace with its
+//! interfaces and rules. The machine's own network is never touched.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
+use std::fs::File;
+use std::io;
+use std::net::Ipv4Addr;
+use std::os::fd::{AsRawFd, OwnedFd};
+use std::path::PathBuf;
+
+use nix::errno::Errno;
+use nix::sched::{CloneFlags, setns, unshare};
+
+use crate::error::NetworkError;
+use crate::impairment::Share;
+use crate::tools::{IP, NFT, run};
+
+/// Hosts of one network, at most.
+const MAXIMUM_HOSTS: usize = 250;
+/// The first two bytes of every address.
+const NETWORK: [u8; 2] = [10, 87];
+/// A share is written as so many of this.
+const PARTS: u64 = 1_000_000;
+
+/// One host.
+#[derive(Debug)]
+pub struct Host {
+    name: String,
+    address: Ipv4Addr,
+    namespace: OwnedFd,
+}
+
+impl Host {
+    /// What it was called by whoever asked for it.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Its address.
+    pub fn address(&self) -> Ipv4Addr {
+        self.address
+    }
+}
+
+/// Hosts and what joins them.
+#[derive(Debug)]
+pub struct Hosts {
+    own: OwnedFd,
+    switch: OwnedFd,
+    hosts: Vec<Host>,
+    nft: PathBuf,
+    /// From where to where nothing passes.
+    cuts: BTreeSet<(usize, usize)>,
+    /// Of what passes from one host to another, by chance.
+    losses: BTreeMap<(usize, usize), Share>,
+}
+
+/// The programs that [`Hosts`] needs and this machine does not have, with the packages that have them.
+pub fn missing_tools() -> Vec<NetworkError> {
+    [IP, NFT]
+        .into_iter()
+        .filter_map(|tool| tool.find().err())
+        .collect()
+}
+
+impl Hosts {
+    /// Where the switch itself has an address, for a proxy between the hosts.
+    pub const SWITCH: Ipv4Addr = Ipv4Addr::new(NETWORK[0], NETWORK[1], 0, 1);
+
+    /// Makes one host for each name.
+    ///
+    /// To be called where the calling thread may change its network namespace: it is the one that it was again afterwards.
+    ///
+    /// # Errors
+    /// [`NetworkError::NotPermitted`], [`NetworkError::NoTool`], or what a tool said. Nothing is left then.
+    pub fn build(names: &[String]) -> Result<Self, NetworkError> {
+        let (ip, nft) = (IP.find()?, NFT.find()?);
+        if names.len() > MAXIMUM_HOSTS {
+            return Err(NetworkError::System {
+                what: "so many hosts",
+                source: io::ErrorKind::InvalidInput.into(),
+            });
+        }
+        let own = current_namespace()?;
+        let switch = new_namespace(&own)?;
+        let hosts = names.iter().enumerate().map(|(place, name)| {
+            Ok(Host {
+                name: name.clone(),
+                address: Ipv4Addr::new(NETWORK[0], NETWORK[1], 0, place as u8 + 2),
+                namespace: new_namespace(&own)?,
+            })
+        });
+        let hosts = Self {
+            hosts: hosts.collect::<Result<_, NetworkError>>()?,
+            own,
+            switch,
+            nft,
+            cuts: BTreeSet::new(),
+            losses: BTreeMap::new(),
+        };
+        let mut bridge = format!(
+            "link set lo up\nlink add br0 type bridge\naddr add {}/16 dev br0\nlink set br0 up\n",
+            Self::SWITCH
+        );
+        for (place, host) in hosts.hosts.iter().enumerate() {
+            let namespace = host.namespace.as_raw_fd();
+            let process = std::process::id();
+            let _ = write!(
+                bridge,
+                "link add h{place} type veth peer name eth0 netns /proc/{process}/fd/{namespace}\n\
+                 link set h{place} master br0\nlink set h{place} up\n"
+            );
+        }
+        hosts.in_switch(|| run(&ip, &["-batch", "-"], &bridge))??;
+        for (place, host) in hosts.hosts.iter().enumerate() {
+            let address = host.address;
+            let lines =
+                format!("link set lo up\naddr add {address}/16 dev eth0\nlink set eth0 up\n");
+            hosts.within(place, || run(&ip, &["-batch", "-"], &lines))??;
+        }
+        hosts.apply_rules()?;
+        Ok(hosts)
+    }
+
+    /// The hosts, in the order of their names.
+    pub fn hosts(&self) -> &[Host] {
+        &self.hosts
+    }
+
+    /// Does something on a host: sockets that it opens, threads and processes that it starts belong to that host.
+    ///
+    /// # Errors
+    /// [`NetworkError::System`] where the thread cannot go there or come back.
+    ///
+    /// # Panics
+    /// Where there is no such host.
+    pub fn within<T>(&self, host: usize, work: impl FnOnce() -> T) -> Result<T, NetworkError> {
+        visit(&self.hosts[host].namespace, &self.own, work)
+    }
+
+    /// As [`Self::within`], on the switch between the hosts.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn in_switch<T>(&self, work: impl FnOnce() -> T) -> Result<T, NetworkError> {
+        visit(&self.switch, &self.own, work)
+    }
+
+    /// Lets nothing more through from one host to another, or everything again.
+    ///
+    /// # Errors
+    /// What `nft` said; everything passes as before then.
+    pub fn cut(&mut self, pairs: &[(usize, usize)], cut: bool) -> Result<(), NetworkError> {
+        let before = self.cuts.clone();
+        for pair in pairs {
+            if cut {
+                self.cuts.insert(*pair);
+            } else {
+                self.cuts.remove(pair);
+            }
+        }
+        self.apply_rules().inspect_err(|_| self.cuts = before)
+    }
+
+    /// Loses a share of what passes from one host to another, by chance.
+    ///
+    /// # Errors
+    /// What `nft` said; everything passes as before then.
+    pub fn lose(&mut self, pairs: &[(usize, usize)], share: Share) -> Result<(), NetworkError> {
+        let before = self.losses.clone();
+        for pair in pairs {
+            self.losses.insert(*pair, share);
+        }
+        self.losses.retain(|_, share| !share.is_never());
+        self.apply_rules().inspect_err(|_| self.losses = before)
+    }
+
+    /// All rules at once: `nft` takes a file as a whole or not at all.
+    fn apply_rules(&self) -> Result<(), NetworkError> {
+        let rules = rules(&self.cuts, &self.losses);
+        self.in_switch(|| run(&self.nft, &["-f", "-"], &rules))?
+    }
+}
+
+/// What `nft` reads. Only packets of IP are touched, so that hosts still find each other.
+fn rules(cuts: &BTreeSet<(usize, usize)>, losses: &BTreeMap<(usize, usize), Share>) -> String {
+    let mut text = String::from(
+        "add table bridge links\n\
+         add chain bridge links pass { type filter hook forward priority 0; policy accept; }\n\
+         flush chain bridge links pass\n",
+    );
+    let mut rule = |(from, to): &(usize, usize), what: &str| {
+        let _ = writeln!(
+            text,
+            "add rule bridge links pass iifname \"h{from}\" oifname \"h{to}\" ether type ip {what}"
+        );
+    };
+    for pair in cuts {
+        rule(pair, "drop");
+    }
+    for (pair, share) in losses {
+        let parts = (share.get() * PARTS as f64).round() as u64;
+        rule(pair, &format!("numgen random mod {PARTS} < {parts} drop"));
+    }
+    text
+}
+
+fn current_namespace() -> Result<OwnedFd, NetworkError> {
+    let file = File::open("/proc/thread-self/ns/net");
+    Ok(file
+        .map_err(NetworkError::system("this thread's own network namespace"))?
+        .into())
+}
+
+/// A new one; the thread is back in `own` afterwards.
+fn new_namespace(own: &OwnedFd) -> Result<OwnedFd, NetworkError> {
+    unshare(CloneFlags::CLONE_NEWNET).map_err(|error| match error {
+        Errno::EPERM => NetworkError::NotPermitted {
+            source: error.into(),
+        },
+        _ => NetworkError::system("a network namespace")(error),
+    })?;
+    let made = current_namespace();
+    come_back(own)?;
+    made
+}
+
+fn visit<T>(there: &OwnedFd, own: &OwnedFd, work: impl FnOnce() -> T) -> Result<T, NetworkError> {
+    setns(there, CloneFlags::CLONE_NEWNET)
+        .map_err(NetworkError::system("to enter a network namespace"))?;
+    let done = work();
+    come_back(own)?;
+    Ok(done)
+}
+
+fn come_back(own: &OwnedFd) -> Result<(), NetworkError> {
+    setns(own, CloneFlags::CLONE_NEWNET).map_err(NetworkError::system(
+        "to come back from a network namespace",
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rules_name_pairs_and_shares() {
+        let share = Share::new(0.1).expect("a share");
+        let text = rules(
+            &BTreeSet::from([(0, 1)]),
+            &BTreeMap::from([((2, 0), share)]),
+        );
+        let rules: Vec<&str> = text.lines().skip(3).collect();
+        assert_eq!(
+            rules,
+            [
+                "add rule bridge links pass iifname \"h0\" oifname \"h1\" ether type ip drop",
+                "add rule bridge links pass iifname \"h2\" oifname \"h0\" ether type ip numgen random mod 1000000 < 100000 drop",
+            ]
+        );
+    }
+}

@@ -1,0 +1,18 @@
+//! Networks that misbehave on purpose.
+//!
+//! [`Proxy`] stands between a party and its peer, over UDP or TCP, and loses, delays, doubles, reorders, changes and slows down
+//! what passes, as an [`Impairment`] says. [`Hosts`] are network namespaces joined by a bridge, one for each host, whose links
+//! `nft` cuts and thins out. Neither knows anything of the cluster.
+
+mod error;
+mod hosts;
+mod impairment;
+mod proxy;
+mod shaper;
+mod tools;
+
+pub use error::NetworkError;
+pub use hosts::{Host, Hosts, missing_tools};
+pub use impairment::{Impairment, Rate, Share, WrittenImpairment};
+pub use proxy::{Direction, Proxy, ProxyCounters, ProxyOrder, Route, Transport};
+pub use shaper::{Passed, Shaper};
