@@ -78,8 +78,10 @@ pub(crate) struct DoneStep {
 /// How a range of the expectation fared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct RangeFinding {
-    /// Cycles with another source.
+    /// Cycles with another source, but for those that a stall of the host explains.
     pub(crate) missed: u64,
+    /// Cycles without a word in time, while the host stood still.
+    pub(crate) missed_by_stall: u64,
     /// The first of them, and what was applied.
     pub(crate) first: Option<(u64, Option<Source>)>,
 }

@@ -336,14 +336,18 @@ fn at_most(what: &str, allowed: u64, found: u64, by_stall: u64) -> ExpectationSu
         0 => format!("no {what}"),
         _ => format!("at most {allowed} {what}"),
     };
-    let apart = match by_stall {
-        0 => String::new(),
-        _ => format!(" (and {by_stall} while the host stood still)"),
-    };
     ExpectationSummary {
         expected,
-        found: format!("{found}{apart}"),
+        found: format!("{found}{}", apart(by_stall)),
         met: found <= allowed,
+    }
+}
+
+/// Cycles that do not count, because the host stood still.
+fn apart(by_stall: u64) -> String {
+    match by_stall {
+        0 => String::new(),
+        _ => format!(" (and {by_stall} while the host stood still)"),
     }
 }
 
@@ -357,15 +361,19 @@ fn range(remote_io: &str, during: &During, finding: RangeFinding) -> Expectation
             during.from,
             during.to - 1
         ),
-        found: finding
-            .first
-            .map_or("as expected".to_owned(), |(cycle, source)| {
-                format!(
-                    "not in {} cycles, first in cycle {cycle}: {}",
-                    finding.missed,
-                    word(source)
-                )
-            }),
+        found: match finding.first {
+            None if finding.missed_by_stall == 0 => "as expected".to_owned(),
+            None => format!(
+                "as expected, but for {} while the host stood still",
+                finding.missed_by_stall
+            ),
+            Some((cycle, source)) => format!(
+                "not in {} cycles{}, first in cycle {cycle}: {}",
+                finding.missed,
+                apart(finding.missed_by_stall),
+                word(source)
+            ),
+        },
         met: finding.missed == 0,
     }
 }

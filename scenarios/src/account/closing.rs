@@ -1,6 +1,6 @@
 //! The end of a cycle, and of a run: what was open is counted.
 
-use understudy_wire::ProgramId;
+use understudy_wire::{ProgramId, Source};
 
 use super::presence::{Interval, Presence, Presences};
 use super::stalls::Stall;
@@ -25,7 +25,14 @@ impl Account {
                 .outcomes
                 .get(&during.remote_io)
                 .map(|outcome| outcome.source);
-            if !source.is_some_and(|source| during.sources.contains(&source)) {
+            if source.is_some_and(|source| during.sources.contains(&source)) {
+                continue;
+            }
+            // What comes from a fresh word is the cluster's own doing; a stall explains only that there was none in time.
+            let without_word = matches!(source, None | Some(Source::Held | Source::FailSafe));
+            if stalled && without_word {
+                finding.missed_by_stall += 1;
+            } else {
                 finding.missed += 1;
                 finding.first.get_or_insert((at, source));
             }
