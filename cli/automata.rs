@@ -151,10 +151,8 @@ pub(crate) fn write(path: &Path, automaton: &Automaton) -> Result<(), Answer> {
         "toml" => write_model(&Model {
             name: automaton.name().to_owned(),
             alphabet: automaton.alphabet().clone(),
-            signals: Vec::new(),
-            plants: Vec::new(),
-            specifications: Vec::new(),
             supervisors: vec![automaton.clone()],
+            ..Model::default()
         }),
         "dot" => draw_dot(automaton),
         "svg" => draw_automaton_svg(automaton)

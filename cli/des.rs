@@ -297,12 +297,10 @@ fn supervisor(
     };
     let result = supcon(plant, &specification, bounds)?;
     let model = Model {
-        name: String::new(),
         alphabet: plant.alphabet().union([specification.alphabet()]),
-        signals: Vec::new(),
         plants: vec![plant.clone()],
         specifications: vec![specification],
-        supervisors: Vec::new(),
+        ..Model::default()
     };
     let findings = synthesis_findings(&model, &result);
     let lines = findings

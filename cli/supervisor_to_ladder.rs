@@ -8,14 +8,15 @@ use serde_json::{Value, json};
 use understudy_diagnostic::{Diagnostic, Report};
 use understudy_ladder::print;
 use understudy_supervisor::ladder::{
-    Conversion, InputOutputMap, Mode, Modules, convert, read_map, table,
+    Conversion, InputOutputMap, Located, Mode, Modules, convert, read_map, table,
 };
 use understudy_supervisor::proof::{
     Finding, FindingSeverity, ProofSettings, Verdict, findings, prove,
 };
-use understudy_supervisor::{Automaton, read_ads, read_model};
+use understudy_supervisor::{Automaton, Model, Signal};
 
 use crate::answer::{Answer, Status};
+use crate::automata::{self, Sources};
 use crate::files;
 
 /// Turn a supervisor into a ladder, and prove that the ladder does what the supervisor allows and nothing else
@@ -32,7 +33,8 @@ pub(crate) struct Arguments {
     /// The supervisor
     #[arg(value_name = "SUPERVISOR")]
     supervisor: PathBuf,
-    /// By which signals events are seen and made; without it, each event has a signal of its own that is 1 for one scan
+    /// By which signals events are seen and made, before what the model says about that; an event without any has a signal of
+    /// its own that is 1 for one scan
     #[arg(long, value_name = "MAP.toml")]
     io: Option<PathBuf>,
     /// Who chooses among commands
@@ -76,12 +78,20 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
 }
 
 fn convert_and_prove(arguments: &Arguments) -> Result<Answer, Answer> {
-    let supervisors = automata(&arguments.supervisor, true)?;
+    let supervisor = source(&arguments.supervisor)?;
     let mut plants = Vec::new();
+    let mut signals = supervisor.model.signals.clone();
     for path in &arguments.plants {
-        plants.extend(automata(path, false)?);
+        let plant = source(path)?.model;
+        signals.extend(plant.signals.into_iter().map(Signal::without_place));
+        plants.extend(some(path, plant.plants, "plant")?);
     }
-    let (map, report) = read_signals(arguments, &supervisors, &plants)?;
+    let supervisors = some(
+        &arguments.supervisor,
+        supervisor.model.supervisors.clone(),
+        "supervisor",
+    )?;
+    let (map, report) = read_signals(arguments, &supervisors, &plants, supervisor, signals)?;
     let name = |automata: Vec<Automaton>| -> Vec<Automaton> {
         automata
             .into_iter()
@@ -113,68 +123,59 @@ fn convert_and_prove(arguments: &Arguments) -> Result<Answer, Answer> {
     Ok(answer(arguments, &modules, &conversion, &found, verdict))
 }
 
-/// The supervisors or the plants of a file.
-fn automata(path: &Path, supervisors: bool) -> Result<Vec<Automaton>, Answer> {
-    let text = files::text(path)?;
-    let name = path.display().to_string();
-    if path
-        .extension()
-        .is_some_and(|extension| extension == "toml")
-    {
-        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        let read = read_model(&text, |file| {
-            std::fs::read_to_string(folder.join(file)).map_err(|error| error.to_string())
-        });
-        let Some(model) = read.model else {
-            let mut reports = vec![Report {
-                name,
-                text,
-                diagnostics: read.diagnostics,
-            }];
-            reports.extend(read.files);
-            return Err(Answer::bad_files(reports));
-        };
-        let found = if supervisors {
-            model.supervisors
-        } else {
-            model.plants
-        };
-        if found.is_empty() {
-            let what = if supervisors { "supervisor" } else { "plant" };
-            let message = format!("{name} has no {what}; `understudy synth` makes supervisors");
-            return Err(Answer::failed(Status::BadInput, "U0651", message));
-        }
-        return Ok(found);
-    }
-    let read = read_ads(&text);
-    match read.automaton {
-        Some(automaton) => Ok(vec![automaton]),
-        None => Err(Answer::bad_files(vec![Report {
-            name,
-            text,
-            diagnostics: read.diagnostics,
-        }])),
-    }
+/// A file that was read: a model, or an automaton of TCT in each of its roles.
+struct Source {
+    model: Model,
+    report: Report,
 }
 
+fn source(path: &Path) -> Result<Source, Answer> {
+    if automata::is_model(path) {
+        let Sources { read, mut reports } = automata::model(path)?;
+        return Ok(Source {
+            model: read,
+            report: reports.swap_remove(0),
+        });
+    }
+    let Sources { read, mut reports } = automata::all(&[&path.to_owned()])?;
+    Ok(Source {
+        model: Model {
+            plants: read.clone(),
+            supervisors: read,
+            ..Model::default()
+        },
+        report: reports.swap_remove(0),
+    })
+}
+
+fn some(path: &Path, automata: Vec<Automaton>, what: &str) -> Result<Vec<Automaton>, Answer> {
+    if automata.is_empty() {
+        let path = path.display();
+        let message = format!("{path} has no {what}; `understudy synth` makes supervisors");
+        return Err(Answer::failed(Status::BadInput, "U0651", message));
+    }
+    Ok(automata)
+}
+
+/// The map, from its file and from the signals that the models name, and the file to which its places belong.
 fn read_signals(
     arguments: &Arguments,
     supervisors: &[Automaton],
     plants: &[Automaton],
+    supervisor: Source,
+    signals: Vec<Signal>,
 ) -> Result<(InputOutputMap, Report), Answer> {
     let modules = Modules {
         supervisors,
         plants,
     };
+    let alphabet = modules.alphabet();
+    let addresses = supervisor.model.addresses;
     let Some(path) = &arguments.io else {
         let program = arguments.supervisor.file_stem().unwrap_or_default();
-        let map = InputOutputMap::direct(&program.to_string_lossy(), &modules.alphabet());
-        let report = Report {
-            name: arguments.supervisor.display().to_string(),
-            text: String::new(),
-            diagnostics: Vec::new(),
-        };
-        return Ok((map, report));
+        let mut map = InputOutputMap::of_signals(&program.to_string_lossy(), &alphabet, &signals);
+        map.addresses = addresses;
+        return Ok((map, supervisor.report));
     };
     let text = files::text(path)?;
     let read = read_map(&text);
@@ -183,10 +184,15 @@ fn read_signals(
         text,
         diagnostics: read.diagnostics,
     };
-    match read.map {
-        Some(map) => Ok((map, report)),
-        None => Err(Answer::bad_files(vec![report])),
-    }
+    let Some(map) = read.map else {
+        return Err(Answer::bad_files(vec![report]));
+    };
+    // Places in the model would be looked for in the map.
+    let signals: Vec<Signal> = signals.into_iter().map(Signal::without_place).collect();
+    let mut map = map.with_signals(&signals, &alphabet);
+    map.addresses
+        .extend(addresses.into_iter().map(Located::without_place));
+    Ok((map, report))
 }
 
 fn bad_map(mut report: Report, diagnostics: Vec<Diagnostic>) -> Answer {

@@ -252,7 +252,8 @@ pub(crate) fn is_name_part(character: char) -> bool {
     character.is_alphanumeric() || character == '_'
 }
 
-fn parse_address(text: &str) -> Option<Address> {
+/// The address of a bit, without its `%`; `None` where it is none.
+pub fn parse_address(text: &str) -> Option<Address> {
     let mut characters = text.chars();
     let area = match characters.next()? {
         'I' => Area::Input,
@@ -283,7 +284,8 @@ pub(crate) const UNITS_MICROSECONDS: [(&str, u64); 6] = [
     ("us", 1),
 ];
 
-fn parse_time(text: &str) -> Option<Duration> {
+/// A time such as `300ms` or `1m30s`, the larger units first; `None` where it is none, or longer than [`MAXIMUM_PRESET_TIME`].
+pub fn parse_time(text: &str) -> Option<Duration> {
     let mut rest = text;
     let mut next_unit = 0;
     let mut total_microseconds: u64 = 0;

@@ -34,13 +34,13 @@ pub use check::check;
 pub use draw::{draw_svg, draw_text};
 pub use from_circuit::from_circuit;
 pub use interpreter::Interpreter;
-pub use lexer::{MAXIMUM_NAME_LENGTH, MAXIMUM_PRESET_TIME};
+pub use lexer::{MAXIMUM_NAME_LENGTH, MAXIMUM_PRESET_TIME, parse_address, parse_time};
 pub use lower::{LowerError, PERIODS};
 pub use parser::{
     KEYWORDS, MAXIMUM_NESTING, MAXIMUM_PRESET_VALUE, MAXIMUM_RUNGS, MAXIMUM_TEXT_BYTES, Parsed,
     parse,
 };
-pub use print::print;
+pub use print::{print, time_text};
 pub use program::{
     Address, Area, Block, BlockKind, Coil, CoilKind, Comparison, Contact, ContactKind, Element,
     Feed, Name, Program, Relation, Rung, Series, Signal, visit,

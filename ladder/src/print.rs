@@ -181,7 +181,7 @@ fn coil_text(coil: &Coil) -> String {
 }
 
 /// A time as the text format writes it, in whole microseconds.
-pub(crate) fn time_text(time: Duration) -> String {
+pub fn time_text(time: Duration) -> String {
     let mut rest = u64::try_from(time.as_micros()).unwrap_or(u64::MAX);
     let mut text = String::new();
     for (unit, microseconds) in UNITS_MICROSECONDS {

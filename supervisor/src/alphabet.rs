@@ -54,7 +54,7 @@ impl Event {
 
 /// The events of an automaton in ascending order of their labels; an event may be in it and on no transition, and is then
 /// forbidden for ever.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Alphabet(Arc<[Event]>);
 
 impl Alphabet {

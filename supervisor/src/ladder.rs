@@ -13,6 +13,7 @@
 //!
 //! Self-loops of events have no rung (assumption 3 of the thesis): they change neither the state nor what is enabled.
 
+mod addresses;
 mod avalanche;
 mod convert;
 mod map;
@@ -24,6 +25,7 @@ mod positions;
 mod read;
 pub(crate) mod rung;
 
+pub use addresses::Located;
 pub use avalanche::{Repetition, avalanche_events, repetitions};
 pub use convert::{Conversion, Correspondence, convert};
 pub use map::{
@@ -34,4 +36,5 @@ pub use omega::{Row, Trigger, omega, table};
 pub use partition::{Meaning, Modules, Partition};
 pub use read::{ReadMap, read_map};
 
+pub(crate) use addresses::{check_signals, read_addresses};
 pub(crate) use names::Names;

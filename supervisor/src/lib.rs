@@ -9,8 +9,10 @@ pub mod ads;
 mod alphabet;
 mod automaton;
 mod drawing;
+mod events;
 mod explicit;
 mod findings;
+mod form;
 pub mod ladder;
 pub mod model;
 mod modular;
@@ -26,7 +28,7 @@ pub use automaton::{Automaton, AutomatonError, Edge, State, Transition};
 pub use drawing::{TooLargeToDraw, draw_automaton_svg, draw_dot};
 pub use explicit::{Bounds, TooLarge};
 pub use findings::{Finding, model_findings, modular_findings, synthesis_findings};
-pub use model::{Model, ReadModel, read_model, write_model};
+pub use model::{Model, ReadModel, Signal, read_model, write_model};
 pub use modular::{
     LocalSupervisor, ModularSupervisor, Together, coordinator, synthesise_modularly,
 };

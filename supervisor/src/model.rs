@@ -23,19 +23,23 @@
 //!
 //! A transition is a state, an event, and the state to which it leads. The initial state is that of the first transition
 //! where `initial` does not say otherwise; `marked = "all"` marks every state. An event without a `label` gets the lowest free one
-//! that fits. `signal` and `when` say by which signal of the PLC an event is seen or made.
+//! that fits. `signal` and `when` say by which signal of the PLC an event is seen or made, `[addresses]` where such a signal is.
 
+mod component;
 mod read;
 mod write;
 
 pub use read::{ReadModel, read_model};
 pub use write::write_model;
 
+use understudy_ladder::Name;
+
 use crate::alphabet::{Alphabet, Label};
 use crate::automaton::Automaton;
+use crate::ladder::{Located, When};
 
 /// Plants, specifications, and the signals of their events.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Model {
     /// Its name.
     pub name: String,
@@ -43,6 +47,8 @@ pub struct Model {
     pub alphabet: Alphabet,
     /// By which signals events are seen and made.
     pub signals: Vec<Signal>,
+    /// Where signals are in the PLC.
+    pub addresses: Vec<Located>,
     /// What is.
     pub plants: Vec<Automaton>,
     /// What is wanted.
@@ -57,9 +63,25 @@ pub struct Signal {
     /// The event.
     pub label: Label,
     /// A signal of the PLC.
-    pub signal: String,
-    /// What of the signal is the event: `rising`, `falling`, `high`, `low` or `pulse`.
-    pub when: Option<String>,
+    pub signal: Name,
+    /// What of the signal is the event, where that is said.
+    pub when: Option<When>,
+}
+
+impl Signal {
+    /// What of the signal is the event.
+    pub fn when(&self) -> When {
+        self.when.unwrap_or_default()
+    }
+
+    /// The same, not read from a text.
+    #[must_use]
+    pub fn without_place(self) -> Self {
+        Self {
+            signal: Name::from(self.signal.as_str()),
+            ..self
+        }
+    }
 }
 
 impl Model {

@@ -8,6 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{Block, BlockKind, Coil, Element, Name, Program, Signal};
 
+use super::addresses::locate;
 use super::map::{Agent, InputOutputMap, Mode, When};
 use super::names::Names;
 use super::omega::{Row, omega};
@@ -44,7 +45,8 @@ pub struct Conversion {
 /// Makes the ladder of `modules`.
 ///
 /// # Errors
-/// What [`Partition::new`] reports.
+/// What [`Partition::new`] reports; U0866 the address of a signal that the ladder does not have, U0867 one of the wrong area or
+/// of two signals.
 pub fn convert(
     modules: &Modules,
     map: &InputOutputMap,
@@ -56,7 +58,9 @@ pub fn convert(
         .map(|automaton| omega(automaton, map, &partition, mode))
         .collect();
     let converter = Converter::new(modules, map, &partition, mode);
-    Ok(converter.finish(rows))
+    let mut conversion = converter.finish(rows);
+    locate(&mut conversion.program, &map.addresses)?;
+    Ok(conversion)
 }
 
 struct Converter<'a> {

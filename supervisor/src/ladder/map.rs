@@ -1,11 +1,15 @@
 //! By which signals of the PLC the events are seen and made: the partition of the alphabet, thesis section 3.4.2.
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::time::Duration;
 
 use understudy_ladder::Name;
 
+use super::addresses::Located;
 use super::names::Names;
+use super::partition::find_event;
+use crate::model::Signal;
 use crate::{Alphabet, Automaton, Event, Label};
 
 /// The partition of a supervisor's events, by name, and their signals; section 3.4.3, "I/O selection".
@@ -27,6 +31,8 @@ pub struct InputOutputMap {
     pub timers: Vec<Timer>,
     /// x^σ: the operator's inputs that ask for a command; `request_` and the event's name where not given.
     pub requests: Vec<Request>,
+    /// Where signals are in the PLC.
+    pub addresses: Vec<Located>,
 }
 
 /// What people call an event.
@@ -39,38 +45,84 @@ pub struct EventName {
 }
 
 impl InputOutputMap {
-    /// The map to begin with: an input that is 1 for one scan for every uncontrollable event of `alphabet`, and an output that
-    /// is 1 for one scan for every controllable one, each under the name of its event.
+    /// The map to begin with: a signal for every event of `alphabet` that is 1 for one scan, under the name of its event; an
+    /// input for an uncontrollable one, an output for a controllable one.
     pub fn direct(program: &str, alphabet: &Alphabet) -> Self {
+        Self::of_signals(program, alphabet, &[])
+    }
+
+    /// The same, where the events that have one of `signals` are seen and made by that.
+    pub fn of_signals(program: &str, alphabet: &Alphabet, signals: &[Signal]) -> Self {
         let mut names = Names::default();
-        let mut map = Self {
-            program: names.fresh(&[program]),
+        let program = names.fresh(&[program]);
+        for signal in signals {
+            names.take(&signal.signal);
+        }
+        let own = alphabet.events().iter().map(|event| {
+            let known = signals.iter().find(|signal| signal.label == event.label);
+            known.cloned().unwrap_or_else(|| {
+                let word = if event.name == event.label.to_string() {
+                    format!("e{}", event.label)
+                } else {
+                    event.name.clone()
+                };
+                Signal {
+                    label: event.label,
+                    signal: names.fresh(&[&word]),
+                    when: Some(When::Pulse),
+                }
+            })
+        });
+        let own: Vec<Signal> = own.collect();
+        let map = Self {
+            program,
             ..Self::default()
         };
+        map.with_signals(&own, alphabet)
+    }
+
+    /// This map, and for the events of `alphabet` that it does not name, the `signals` of a model: an input for an uncontrollable
+    /// event, an output that is 1 for one scan for a controllable one.
+    #[must_use]
+    pub fn with_signals(mut self, signals: &[Signal], alphabet: &Alphabet) -> Self {
+        let named: BTreeSet<Label> = self
+            .event_names()
+            .filter_map(|name| find_event(alphabet, name))
+            .collect();
         for event in alphabet.events() {
-            let word = if event.name == event.label.to_string() {
-                format!("e{}", event.label)
-            } else {
-                event.name.clone()
+            let signal = signals.iter().find(|signal| signal.label == event.label);
+            let Some(signal) = signal.filter(|_| !named.contains(&event.label)) else {
+                continue;
             };
-            let signal = names.fresh(&[&word]);
             let event_name = Name::from(event.name.clone());
             if event.label.is_controllable() {
-                map.pulses.push(Pulse {
+                self.pulses.push(Pulse {
                     event: event_name,
-                    signal,
+                    signal: signal.signal.clone(),
                     memory: false,
                 });
             } else {
-                map.inputs.push(InputEvent {
+                self.inputs.push(InputEvent {
                     event: event_name,
-                    signal,
-                    when: When::Pulse,
+                    signal: signal.signal.clone(),
+                    when: signal.when(),
                     by: Agent::Plant,
                 });
             }
         }
-        map
+        self
+    }
+
+    /// The events to which the map gives a meaning.
+    fn event_names(&self) -> impl Iterator<Item = &Name> {
+        let inputs = self.inputs.iter().map(|input| &input.event);
+        let timers = self.timers.iter().map(|timer| &timer.event);
+        let pulses = self.pulses.iter().map(|pulse| &pulse.event);
+        let switches = self.switches.iter().flat_map(|switch| {
+            let positions = switch.positions.iter().map(|position| &position.event);
+            positions.chain(&switch.off)
+        });
+        inputs.chain(timers).chain(pulses).chain(switches)
     }
 
     /// `automaton` with the names that the map gives to its events.
@@ -122,6 +174,12 @@ impl When {
         ("high", Self::High),
         ("low", Self::Low),
     ];
+
+    /// Its word in a file.
+    pub fn word(self) -> &'static str {
+        let found = Self::WORDS.into_iter().find(|(_, when)| *when == self);
+        found.map_or("", |(word, _)| word)
+    }
 }
 
 /// Who generates an uncontrollable event.

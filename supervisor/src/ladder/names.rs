@@ -43,6 +43,9 @@ impl Names {
     }
 }
 
+/// What a name in a ladder looks like.
+pub(crate) const ILLEGAL_NAME: &str = "letters, digits and `_`, single dots between its parts, a letter or `_` first, no word of the format";
+
 /// Whether `name` can stand in a ladder.
 pub(crate) fn is_legal(name: &str) -> bool {
     let part = |part: &str| {

@@ -6,7 +6,8 @@ use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Name;
 
 use super::map::InputOutputMap;
-use super::names::is_legal;
+use super::names::{ILLEGAL_NAME, is_legal};
+use crate::form::nearest;
 use crate::{Alphabet, Automaton, Event, Label};
 
 /// The most positions that a switch has, besides off.
@@ -202,19 +203,18 @@ impl Resolver<'_> {
             self.give(&timer.event, Meaning::Timer(place), false);
             self.signal(&timer.name, "a timer");
             let positions = map.switches.iter().flat_map(|switch| &switch.positions);
-            let mut signals = positions.map(|position| position.signal.as_str());
+            let signals = positions.map(|position| position.signal.as_str());
             if !signals
                 .clone()
                 .any(|signal| signal == timer.runs_while.as_str())
             {
                 let message = format!("no switch has the signal `{}`", timer.runs_while);
-                let help = nearest(&timer.runs_while, &mut signals);
+                let help = match nearest(&timer.runs_while, signals) {
+                    Some(near) => format!("perhaps \"{near}\" is meant"),
+                    None => "a timer runs while the signal of a switch's position is on".into(),
+                };
                 self.diagnostics.push(
-                    Diagnostic::error("U0857", message, timer.runs_while.span()).with_help(
-                        help.unwrap_or_else(|| {
-                            "a timer runs while the signal of a switch's position is on".into()
-                        }),
-                    ),
+                    Diagnostic::error("U0857", message, timer.runs_while.span()).with_help(help),
                 );
             }
         }
@@ -321,32 +321,23 @@ impl Resolver<'_> {
     }
 
     fn label(&mut self, event: &Name) -> Option<Label> {
-        let events = self.alphabet.events();
-        let number = event.parse().ok().map(Label::new);
-        let found = events
-            .iter()
-            .find(|known| known.name == event.as_str())
-            .or_else(|| events.iter().find(|known| Some(known.label) == number));
+        let found = find_event(self.alphabet, event);
         if found.is_none() {
             let message = format!("there is no event `{event}`");
-            let mut known = events.iter().map(|event| event.name.as_str());
+            let known = self.alphabet.events().iter();
+            let near = nearest(event, known.map(|event| event.name.as_str()));
             let mut diagnostic = Diagnostic::error("U0851", message, event.span());
-            if let Some(help) = nearest(event, &mut known) {
-                diagnostic = diagnostic.with_help(help);
-            }
+            diagnostic.help = near.map(|near| format!("perhaps \"{near}\" is meant"));
             self.diagnostics.push(diagnostic);
         }
-        found.map(|event| event.label)
+        found
     }
 
     fn name(&mut self, name: &Name) {
         if !is_legal(name) {
             let message = format!("{:?} cannot be a name in a ladder", name.as_str());
-            self.diagnostics.push(
-                Diagnostic::error("U0855", message, name.span()).with_help(
-                    "letters, digits and `_`, single dots between its parts, a letter or `_` first, no word of the format",
-                ),
-            );
+            self.diagnostics
+                .push(Diagnostic::error("U0855", message, name.span()).with_help(ILLEGAL_NAME));
         }
     }
 
@@ -365,9 +356,11 @@ impl Resolver<'_> {
     }
 }
 
-/// "did you mean …?", where a known name is near.
-pub(crate) fn nearest(name: &str, known: &mut dyn Iterator<Item = &str>) -> Option<String> {
-    let scored = known.map(|candidate| (strsim::damerau_levenshtein(name, candidate), candidate));
-    let (distance, candidate) = scored.min_by_key(|(distance, _)| *distance)?;
-    (distance <= 2.max(name.len() / 3)).then(|| format!("did you mean `{candidate}`?"))
+/// The event that a map calls `name`: by its name, or by its number.
+pub(crate) fn find_event(alphabet: &Alphabet, name: &str) -> Option<Label> {
+    let events = alphabet.events();
+    let number = name.parse().ok().map(Label::new);
+    let found = events.iter().find(|known| known.name == name);
+    let found = found.or_else(|| events.iter().find(|known| Some(known.label) == number));
+    found.map(|event| event.label)
 }

@@ -21,11 +21,18 @@ pub fn write_model(model: &Model) -> String {
             .find(|signal| signal.label == event.label)
         {
             let _ = write!(text, ", signal = {}", quoted(&signal.signal));
-            if let Some(when) = &signal.when {
-                let _ = write!(text, ", when = {}", quoted(when));
+            if let Some(when) = signal.when {
+                let _ = write!(text, ", when = {}", quoted(when.word()));
             }
         }
         text.push_str(" }\n");
+    }
+    if !model.addresses.is_empty() {
+        text.push_str("\n[addresses]\n");
+        for located in &model.addresses {
+            let (signal, address) = (quoted(&located.signal), located.address.to_string());
+            let _ = writeln!(text, "{signal} = {}", quoted(&address));
+        }
     }
     let roles = [
         ("plant", &model.plants),

@@ -117,10 +117,9 @@ fn reference_models_survive_writing_in_both_formats() {
         let whole = Model {
             name: name.to_owned(),
             alphabet: understudy_supervisor::Alphabet::new([]).union(alphabets),
-            signals: Vec::new(),
             plants: model.plants.clone(),
             specifications: model.specifications.clone(),
-            supervisors: Vec::new(),
+            ..Model::default()
         };
         let text = write_model(&whole);
         let read = read_model(&text, |_| Err("nothing to load".to_owned()));
@@ -208,6 +207,13 @@ start  = { controllable = true, label = 2 }
 finish = { controllable = false, label = 4, when = "risin" }
 again  = { controlable = true, label = 4 }
 "two words" = { controllable = 1 }
+opened = { controllable = false, label = 6, signal = "door", when = "rising" }
+shut   = { controllable = false, label = 8, signal = "door", when = "falling" }
+locked = { controllable = false, label = 10, signal = "door" }
+barred = { controllable = true, label = 11, signal = "the bar" }
+[addresses]
+door = "%IX0.0"
+bar = "QX1"
 [[plant]]
 name = "machine"
 transitions = [
@@ -226,20 +232,23 @@ transitions = 3
     let read = read_model(text, |_| Err("no such file".to_owned()));
     assert!(read.model.is_none());
     assert_snapshot!(places(text, &read.diagnostics), @r#"
-2:1 U0821 a model has no "title" [it has name, events, plant, specification, supervisor]
+2:1 U0821 a model has no "title" [it has name, events, addresses, plant, specification, supervisor]
 4:41 U0827 label 2: odd labels are controllable, even ones are not
-5:52 U0823 "risin" is none of rising, falling, high, low, pulse [perhaps "rising" is meant]
+5:52 U0823 "risin" is none of pulse, rising, falling, high, low [perhaps "rising" is meant]
 6:12 U0821 an event has no "controlable" [perhaps "controllable" is meant]
 6:40 U0827 label 4 stands for two events
 7:1 U0825 the name of an event is one word
 7:32 U0823 true or false is wanted, not integer
-11:11 U0824 there is no event strat [perhaps "start" is meant]
-12:5 U0825 a transition is three words: a state, an event, and the state to which it leads
-14:5 U0826 from state idle event finish leads to state working and to state idle; an automaton must be deterministic
-15:6 U0828 no event leads to state wroking of machine [perhaps "working" is meant]
-17:12 U0828 a marked state is idel, and no transition knows it [perhaps "idle" is meant]
-19:8 U0829 GONE.ADS cannot be read: no such file
-20:1 U0822 an automaton needs "name"
+10:55 U0856 `door` is the signal of two events [one uncontrollable event for `rising` and one for `falling` are possible]
+11:54 U0855 "the bar" cannot be a name in a ladder [letters, digits and `_`, single dots between its parts, a letter or `_` first, no word of the format]
+14:7 U0867 "QX1" is no address of a bit [addresses look like %IX0.3, %QX1.0 or %MX2.7]
+18:11 U0824 there is no event strat [perhaps "start" is meant]
+19:5 U0825 a transition is three words: a state, an event, and the state to which it leads
+21:5 U0826 from state idle event finish leads to state working and to state idle; an automaton must be deterministic
+22:6 U0828 no event leads to state wroking of machine [perhaps "working" is meant]
+24:12 U0828 a marked state is idel, and no transition knows it [perhaps "idle" is meant]
+26:8 U0829 GONE.ADS cannot be read: no such file
+27:1 U0822 an automaton needs "name"
 "#);
     let text = "name = \"a\n[events";
     assert_snapshot!(places(text, &read_model(text, |_| Err(String::new())).diagnostics), @r#"
