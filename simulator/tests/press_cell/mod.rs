@@ -1,4 +1,5 @@
 //! The press cell of section V as parts of a simulation, from the ladders that the demo runs.
+#![allow(dead_code, reason = "each test uses a part of it")]
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -17,10 +18,18 @@ pub(crate) const HOLD_CYCLES: u32 = 3;
 
 /// Two programs, `understudies` understudies, two copies of each frame.
 pub(crate) fn parts(mode: Mode, understudies: usize) -> Parts {
-    let circuits = [
-        circuit(include_str!("../../../examples/press-cell/robot.ladder")),
-        circuit(include_str!("../../../examples/press-cell/press.ladder")),
+    line(2, mode, understudies)
+}
+
+/// A robot, the press that it feeds, a robot, and so on: `programs` in all.
+pub(crate) fn line(programs: usize, mode: Mode, understudies: usize) -> Parts {
+    let ladders = [
+        include_str!("../../../examples/press-cell/robot.ladder"),
+        include_str!("../../../examples/press-cell/press.ladder"),
     ];
+    let circuits: Vec<Circuit> = (0..programs)
+        .map(|program| circuit(ladders[program % 2]))
+        .collect();
     let agreement = Arc::new(Agreement {
         cluster: ClusterHash(1),
         configuration: ConfigurationHash(2),
@@ -62,14 +71,19 @@ pub(crate) fn parts(mode: Mode, understudies: usize) -> Parts {
         ModelKind::Robot(RobotParameters::default()),
         ModelKind::Press(PressParameters::default()),
     ];
-    let plants = circuits.iter().zip(&kinds).zip([false, true]);
-    let plants =
-        plants.map(|((circuit, kind), fed)| Plant::new(kind, circuit, &Signals::new(), fed).0);
+    let plants = circuits.iter().enumerate().map(|(program, circuit)| {
+        let fed = program % 2 == 1;
+        Plant::new(&kinds[program % 2], circuit, &Signals::new(), fed).0
+    });
+    let fed_by = (0..circuits.len() as u8).map(|program| match program % 2 {
+        0 => None,
+        _ => Some(ProgramId(program - 1)),
+    });
     Parts {
         stations: stations.collect(),
         remote_ios: remote_ios.collect(),
         plants: plants.collect(),
-        fed_by: vec![None, Some(ProgramId(0))],
+        fed_by: fed_by.collect(),
     }
 }
 

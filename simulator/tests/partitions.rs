@@ -1,0 +1,137 @@
+//! Every cut of the four-station cluster, one-way and full, from 1 to 1000 cycles, then healed.
+//!
+//! Nothing wrong is driven; a program whose remote I/O and a station that can compute it hear each other loses one cycle at
+//! most, on whichever side of the cut they are; no program starts from its initial state again (it goes on from a state that its plant has seen:
+//! the referee sees to that), and protection comes back without help.
+
+mod press_cell;
+
+use understudy_remote_io::Event;
+use understudy_simulator::{Action, Fault, Network, Record, Simulation};
+use understudy_wire::{Mode, Party, ProgramId, StationId};
+
+const PROGRAMS: usize = 3;
+const STATIONS: usize = 4;
+const PARTIES: usize = STATIONS + PROGRAMS;
+
+/// Within the history of a sample, around it, around every other limit of the protocol, and far beyond all.
+const LENGTHS: [u64; 8] = [1, 2, 3, 5, 8, 13, 30, 100];
+
+/// The longest ones take long; each cut gets one of these.
+const LONGEST: [u64; 4] = [200, 400, 700, 1000];
+
+/// Cycles after which everybody is in step again, at most.
+const RECOVERY: u64 = 100;
+
+fn party(place: usize) -> Party {
+    match place.checked_sub(STATIONS) {
+        None => Party::Station(StationId(place as u8)),
+        Some(program) => Party::RemoteIo(ProgramId(program as u8)),
+    }
+}
+
+/// Which frames do not arrive: from each party, the set of those who do not hear it.
+type Cut = [u8; PARTIES];
+
+/// Both ways between the parties of `side` and all others.
+fn full(side: u8) -> Cut {
+    std::array::from_fn(|place| if side >> place & 1 == 1 { !side } else { side })
+}
+
+/// The parties of `side` are heard by no others, and hear them.
+fn mute(side: u8) -> Cut {
+    std::array::from_fn(|place| if side >> place & 1 == 1 { !side } else { 0 })
+}
+
+/// The links that `before` and `after` do not agree on change at a cycle.
+fn change(simulation: &mut Simulation, at_cycle: u64, before: Cut, after: Cut) {
+    for from in 0..PARTIES {
+        for to in (0..PARTIES).filter(|&to| to != from) {
+            let [was, is] = [before, after].map(|cut| cut[from] >> to & 1 == 1);
+            if was == is {
+                continue;
+            }
+            let to = party(to);
+            simulation.schedule(Fault {
+                at_cycle,
+                // Somewhere else in the cycle for each length.
+                phase: at_cycle as f64 * 0.37 % 1.0,
+                party: party(from),
+                action: if is {
+                    Action::Cut { to }
+                } else {
+                    Action::Heal { to }
+                },
+            });
+        }
+    }
+}
+
+fn check(cut: Cut, seed: u64) {
+    let longest = LONGEST[seed as usize % LONGEST.len()];
+    for length in LENGTHS.into_iter().chain([longest]) {
+        let parts = press_cell::line(PROGRAMS, Mode::Full, STATIONS - PROGRAMS);
+        let mut simulation = Simulation::new(parts, Network::default(), seed);
+        let at = 5 + seed % 7;
+        change(&mut simulation, at, [0; PARTIES], cut);
+        change(&mut simulation, at + length, cut, [0; PARTIES]);
+        let mut cold = 0;
+        let mut observe = |_, cycle: Option<u64>, _, record: Record<'_>| {
+            let starts = matches!(record, Record::RemoteIo(Event::StartedCold { .. }));
+            cold += u64::from(starts && cycle.is_some());
+        };
+        simulation
+            .run(at + length + 1, 100, &mut observe)
+            .expect("the cluster gets ready");
+        let what = format!("cut {cut:x?} for {length} cycles");
+        for program in 0..PROGRAMS {
+            let tally = &simulation.tallies()[program];
+            let untrue = tally.held + tally.fail_safe;
+            if served(&cut, program) {
+                assert!(untrue <= 1, "{what}: program {program}, {tally:?}");
+            } else {
+                assert!(untrue + 1 >= length, "{what}: program {program}, {tally:?}");
+            }
+        }
+        let back = simulation.run(5, RECOVERY, &mut observe);
+        assert_eq!(simulation.violations().first(), None, "{what}");
+        assert_eq!(back, Ok(()), "{what}");
+        assert_eq!(cold, 0, "{what}");
+    }
+}
+
+/// Whether a station that can compute a program and its remote I/O hear each other.
+fn served(cut: &Cut, program: usize) -> bool {
+    let remote_io = STATIONS + program;
+    let hear = |from: usize, to: usize| cut[from] >> to & 1 == 0;
+    let holders = [program].into_iter().chain(PROGRAMS..STATIONS);
+    let mut both_ways = holders.map(|station| hear(station, remote_io) && hear(remote_io, station));
+    both_ways.any(|heard| heard)
+}
+
+#[test]
+fn every_full_partition_heals() {
+    // A side and its complement are one partition.
+    for side in 1..1 << (PARTIES - 1) {
+        check(full(side), u64::from(side));
+    }
+}
+
+#[test]
+fn every_one_way_partition_heals() {
+    for side in 1..(1 << PARTIES) - 1 {
+        check(mute(side), u64::from(side));
+    }
+}
+
+/// One party does not hear one other.
+#[test]
+fn every_single_link_heals() {
+    for from in 0..PARTIES {
+        for to in (0..PARTIES).filter(|&to| to != from) {
+            let mut cut = [0; PARTIES];
+            cut[from] = 1 << to;
+            check(cut, (from * PARTIES + to) as u64);
+        }
+    }
+}
