@@ -27,7 +27,7 @@ pub(crate) enum Standing {
 }
 
 /// A station's copy of one program.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Replica {
     id: ProgramId,
     standing: Standing,
@@ -49,7 +49,7 @@ struct State {
     stepped: Moment,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Copied {
     born: Moment,
     state: State,

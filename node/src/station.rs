@@ -30,7 +30,7 @@ use crate::replica::{Followed, Replica, Standing};
 use crate::settings::Settings;
 
 /// One controller or understudy. See [`Machine`] for how it is driven.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Station {
     settings: Settings,
     reception: Reception,
@@ -54,7 +54,7 @@ pub struct Station {
 }
 
 /// What a station remembers of the current cycle only.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 struct CycleNotes {
     spoken: bool,
     asked: bool,

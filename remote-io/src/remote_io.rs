@@ -31,7 +31,7 @@ use crate::settings::Settings;
 use crate::witnesses::Witnesses;
 
 /// One remote I/O. See [`Machine`] for how it is driven.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct RemoteIo {
     settings: Settings,
     reception: Reception,
@@ -59,7 +59,7 @@ pub struct RemoteIo {
     outbox: VecDeque<Output<Event>>,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 enum Phase {
     /// The history is not known: cycles listened for so far.
     Listening { cycles: u32 },

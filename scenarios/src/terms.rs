@@ -1,8 +1,9 @@
 //! What an account and the two worlds need of a cluster.
 
 use understudy_cluster::Cluster;
-use understudy_simulator::{Parts, Referee};
-use understudy_wire::{Epoch, ProgramId, StationId};
+use understudy_simulator::Referee;
+pub use understudy_simulator::parts;
+use understudy_wire::ProgramId;
 
 use crate::account::Terms;
 use crate::figure::Signals;
@@ -40,29 +41,5 @@ impl Terms {
             referees: referees.collect(),
             signals: signals.collect(),
         }
-    }
-}
-
-/// The parties of a cluster for the simulator, which gives each station its own epoch.
-pub fn parts(cluster: &Cluster) -> Parts {
-    let stations = 0..cluster.agreement().schedule.stations();
-    let programs = (0..cluster.controllers().len()).map(|index| ProgramId(index as u8));
-    Parts {
-        stations: stations
-            .filter_map(|rank| cluster.station_settings(StationId(rank as u8), Epoch::default()))
-            .collect(),
-        remote_ios: programs
-            .filter_map(|program| cluster.remote_io_settings(program))
-            .collect(),
-        plants: cluster
-            .plants()
-            .iter()
-            .map(|place| place.as_ref().map(|place| place.plant.clone()))
-            .collect(),
-        fed_by: cluster
-            .plants()
-            .iter()
-            .map(|place| place.as_ref().and_then(|place| place.fed_by))
-            .collect(),
     }
 }

@@ -6,7 +6,7 @@ use understudy_wire::{Field, Image, ProgramId};
 use crate::parts::Parts;
 
 /// Every plant of a cluster; a wire neither loses nor delays.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Plants {
     initial: Vec<Option<Plant>>,
     running: Vec<Option<Plant>>,

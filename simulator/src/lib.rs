@@ -17,8 +17,8 @@ mod slot;
 mod tally;
 
 pub use fault::{Action, Fault};
-pub use network::Network;
-pub use parts::Parts;
+pub use network::{Disturbance, Network};
+pub use parts::{Parts, parts};
 pub use referee::{Referee, Violation};
 pub use simulation::{NotReady, Observe, Record, Simulation};
 pub use tally::Tally;

@@ -14,15 +14,18 @@ use understudy_wire::{
 };
 
 use crate::fault::Action;
-use crate::network::Network;
+use crate::network::{Disturbance, Network};
 use crate::queue::{Delivery, Queue};
 
 /// Frames of each party that can be said again, at most; older ones are forgotten.
 const REMEMBERED: usize = 1024;
 
 /// All links of a cluster.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Links {
+    usual: Network,
+    disturbance: Option<Disturbance>,
+    /// What frames go over now.
     network: Network,
     random: Pcg64Mcg,
     queue: Queue,
@@ -71,6 +74,8 @@ impl Flips {
 impl Links {
     pub(crate) fn new(stations: usize, remote_ios: usize, network: Network, seed: u64) -> Self {
         Self {
+            usual: network,
+            disturbance: None,
             network,
             random: Pcg64Mcg::seed_from_u64(seed),
             queue: Queue::default(),
@@ -101,6 +106,16 @@ impl Links {
     /// A fault of this kind is to come: frames have to be remembered for it from now on.
     pub(crate) fn expect(&mut self, action: Action) {
         self.remembers |= matches!(action, Action::Replay { .. });
+    }
+
+    /// From here on all chance comes from `seed`.
+    pub(crate) fn reseed(&mut self, seed: u64) {
+        self.random = Pcg64Mcg::seed_from_u64(seed);
+    }
+
+    /// The network is another one while `disturbance` lasts.
+    pub(crate) fn alter(&mut self, disturbance: Disturbance) {
+        self.disturbance = Some(disturbance);
     }
 
     /// Does what concerns the links of `party`.
@@ -144,8 +159,12 @@ impl Links {
         }
     }
 
-    /// Sends a frame to all whom its kind concerns.
-    pub(crate) fn send(&mut self, now: Time, frame: Arc<Frame>) {
+    /// Sends a frame to all whom its kind concerns; `cycle` is the scenario's.
+    pub(crate) fn send(&mut self, now: Time, cycle: Option<u64>, frame: Arc<Frame>) {
+        self.network = match &self.disturbance {
+            Some(disturbance) if disturbance.holds(cycle) => disturbance.network,
+            _ => self.usual,
+        };
         let Some(place) = self.place(frame.header.sender) else {
             return;
         };

@@ -1,5 +1,6 @@
 //! What the network does to a frame on its way to one receiver.
 
+use std::ops::Range;
 use std::time::Duration;
 
 use rand::RngExt;
@@ -20,6 +21,26 @@ pub struct Network {
     /// Share of arriving frames of which a bit has flipped on their way, from 0 to 1, for each receiver.
     #[serde(default)]
     pub corruption: f64,
+}
+
+/// A network that is another one for a while.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Disturbance {
+    /// What it is then; before and after it is the usual one.
+    pub network: Network,
+    /// The scenario's cycles in which frames are sent over it; nothing for the whole run, coming into step included.
+    pub cycles: Option<Range<u64>>,
+}
+
+impl Disturbance {
+    /// Whether a frame that is sent in `cycle` goes over it.
+    pub(crate) fn holds(&self, cycle: Option<u64>) -> bool {
+        match (&self.cycles, cycle) {
+            (None, _) => true,
+            (Some(cycles), Some(cycle)) => cycles.contains(&cycle),
+            (Some(_), None) => false,
+        }
+    }
 }
 
 impl Default for Network {

@@ -1,7 +1,8 @@
 //! What a cluster consists of, ready to be started again and again.
 
+use understudy_cluster::Cluster;
 use understudy_plant::Plant;
-use understudy_wire::ProgramId;
+use understudy_wire::{Epoch, ProgramId, StationId};
 
 /// The settings of every party. Remote I/Os and plants are indexed by program.
 #[derive(Debug, Clone)]
@@ -14,4 +15,28 @@ pub struct Parts {
     pub plants: Vec<Option<Plant>>,
     /// For each plant, the program of the plant that it gets its parts from.
     pub fed_by: Vec<Option<ProgramId>>,
+}
+
+/// The parties of a cluster; the simulation gives each station its own epoch.
+pub fn parts(cluster: &Cluster) -> Parts {
+    let stations = 0..cluster.agreement().schedule.stations();
+    let programs = (0..cluster.controllers().len()).map(|index| ProgramId(index as u8));
+    Parts {
+        stations: stations
+            .filter_map(|rank| cluster.station_settings(StationId(rank as u8), Epoch::default()))
+            .collect(),
+        remote_ios: programs
+            .filter_map(|program| cluster.remote_io_settings(program))
+            .collect(),
+        plants: cluster
+            .plants()
+            .iter()
+            .map(|place| place.as_ref().map(|place| place.plant.clone()))
+            .collect(),
+        fed_by: cluster
+            .plants()
+            .iter()
+            .map(|place| place.as_ref().and_then(|place| place.fed_by))
+            .collect(),
+    }
 }

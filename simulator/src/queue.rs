@@ -17,7 +17,7 @@ pub(crate) struct Delivery {
 }
 
 /// Where every frame takes equally long, they arrive as they were sent and a plain queue serves; others are sorted.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Queue {
     even: VecDeque<Delivery>,
     uneven: BinaryHeap<Delivery>,

@@ -19,7 +19,7 @@ use understudy_wire::{
 use crate::fault::Fault;
 use crate::field::Plants;
 use crate::links::Links;
-use crate::network::Network;
+use crate::network::{Disturbance, Network};
 use crate::pace::Pace;
 use crate::parts::Parts;
 use crate::queue::Delivery;
@@ -58,9 +58,10 @@ pub struct NotReady {
     pub waiting: Vec<u8>,
 }
 
-/// A cluster in virtual time.
+/// A cluster in virtual time. A copy goes on exactly as the original does.
+#[derive(Clone)]
 pub struct Simulation {
-    parts: Parts,
+    parts: Arc<Parts>,
     links: Links,
     now: Time,
     stations: Vec<Slot<Station>>,
@@ -112,7 +113,7 @@ impl Simulation {
             faults: Vec::new(),
             pace: Pace::new(parts.stations[0].agreement.schedule.period()),
             founded: parts.stations.len() as u64,
-            parts,
+            parts: Arc::new(parts),
         };
         for program in 0..simulation.remote_ios.len() {
             simulation.show_field(ProgramId(program as u8));
@@ -128,6 +129,21 @@ impl Simulation {
             .faults
             .partition_point(|other| key(other) > key(&fault));
         self.faults.insert(place, fault);
+    }
+
+    /// From here on all chance comes from `seed`. A run on a quiet network has drawn nothing until its first fault.
+    pub fn reseed(&mut self, seed: u64) {
+        self.links.reseed(seed);
+    }
+
+    /// The network is another one while `disturbance` lasts; a later one takes its place.
+    pub fn disturb(&mut self, disturbance: Disturbance) {
+        self.links.alter(disturbance);
+    }
+
+    /// Whether at its last deadline each remote I/O drove directly and heard everybody.
+    pub fn in_step(&self) -> bool {
+        self.ready == ProgramSet::first(self.remote_ios.len())
     }
 
     /// Runs until everybody is in step, and from there `cycles` cycles more.
@@ -174,7 +190,7 @@ impl Simulation {
     ) -> Result<(), NotReady> {
         let all = ProgramSet::first(self.remote_ios.len());
         let give_up = self.now + self.period() * u32::try_from(patience).unwrap_or(u32::MAX);
-        while self.ready != all {
+        while !self.in_step() {
             if self.now >= give_up {
                 let waiting = all.without(self.ready);
                 return Err(NotReady {
@@ -388,6 +404,6 @@ impl Simulation {
         if frame.header.configuration == configuration {
             self.pace.saw(self.now, frame.header.moment);
         }
-        self.links.send(self.now, frame);
+        self.links.send(self.now, self.pace.cycle(), frame);
     }
 }
