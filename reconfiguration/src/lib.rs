@@ -1,1 +1,21 @@
-//! Ladders that go on under failed input channels.
+//! Ladders that go on when input channels fail, after J. Liu and H. Darabi, *Reconfiguration of Ladder Logic Diagrams with
+//! Dynamic Input Sets*; numbers of sections and constraints are theirs.
+//!
+//! The understudy covers a failed controller; this covers a failed input channel. A ladder becomes an automaton
+//! ([`Controller`], by [`explore`] against a model of its plant or from [`record`]s of its scans), what its outputs can prevent is a
+//! [`Relation`], and from both comes what is possible while channels are failed: the [`MegaController`], whose states are sets
+//! of states in which the plant may be, each with an output command that is safe for all of them. [`module_two`] writes it as
+//! rungs below the ladder, and [`proof`] holds the whole to the relation without a line of what made it.
+
+pub mod command;
+mod controller;
+mod mega;
+mod relation;
+mod settle;
+mod signals;
+
+pub use controller::{Controller, Move, State};
+pub use mega::{Analysis, Label, MegaController, MegaState, Question, Unbuilt, failed_channels};
+pub use relation::{Feedback, Relation, Row, feedback, joint_feedback};
+pub use settle::{Command, NoCommand};
+pub use signals::{Bits, Event, Signals};

@@ -1,0 +1,363 @@
+//! The mega-controller Θ: what may be true while channels fail and come back, sections 2 and 5.
+//!
+//! A state is a set of states of S in which the plant may be, with the channels that are failed. It is built on the fly from
+//! x0 with all channels working. Steps 4 and 5 of section 2 are read with their conditions put right: a channel breaks while it
+//! works, and is repaired while it is broken.
+//!
+//! [`Analysis::Section2`] is the paper's construction to the letter. The other two are what a scan can do besides: it keeps
+//! unseen events from happening where outputs can ([`crate::settle`]), reads a repaired channel's value (*disaggregation*), and
+//! sees all inputs of a scan at once. They differ in how much may have happened unseen before a failure is known.
+
+use rustc_hash::FxHashMap;
+
+use crate::command::Objective;
+use crate::controller::{Controller, Move, reach};
+use crate::relation::{Feedback, Relation, joint_feedback};
+use crate::settle::{Command, Ground, NoCommand};
+use crate::signals::Event;
+
+/// How the observation is analysed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Analysis {
+    /// As section 2 has it: every string of unseen events may happen.
+    Section2,
+    /// A failure is known before the channel misses an event.
+    Prompt,
+    /// A channel may have missed one event before its failure is known.
+    #[default]
+    Late,
+}
+
+/// What is asked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Question {
+    /// The inputs that may fail, at most 64.
+    pub channels: Vec<usize>,
+    /// How many of them at once.
+    pub simultaneous: usize,
+    /// How.
+    pub analysis: Analysis,
+    /// Which of several safe commands.
+    pub objective: Objective,
+    /// Past so many states it is given up.
+    pub maximum_states: usize,
+}
+
+/// y.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MegaState {
+    /// X̄, ascending.
+    pub members: Vec<u32>,
+    /// Bit k: channel k of the question is failed.
+    pub failed: u64,
+    /// What module 2 commands; none where the ladder's own outputs are right.
+    pub command: Option<Command>,
+}
+
+/// What leads from one state of Θ to another.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Label {
+    /// Changes that the working channels show in one scan; none is ω.
+    Seen(Vec<Event>),
+    /// b: this channel of the question fails.
+    Break(usize),
+    /// r: it is repaired, and shows this value where the analysis reads it.
+    Repair(usize, Option<bool>),
+}
+
+/// Θ with its commands.
+#[derive(Debug, Clone)]
+pub struct MegaController {
+    /// Y; state 0 is y0.
+    pub states: Vec<MegaState>,
+    /// g, for each state.
+    pub edges: Vec<Vec<(Label, usize)>>,
+    /// The states from which nothing leads back to a marked state with all channels working, step 7.
+    pub dangling: Vec<bool>,
+    /// How many different integer programs were solved.
+    pub programs: usize,
+    places: FxHashMap<(Vec<u32>, u64), usize>,
+}
+
+/// Why Θ could not be built.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Unbuilt {
+    /// More states than the limit.
+    TooLarge(usize),
+    /// States without a safe command, all that were found.
+    NoCommand(Vec<NoCommand>),
+}
+
+/// States without a command that are told; the rest is only looked for.
+const MAXIMUM_TOLD: usize = 20;
+
+impl MegaController {
+    /// Builds Θ.
+    ///
+    /// # Errors
+    /// It grows past the limit, or there are states for which no command is safe.
+    pub fn build(
+        controller: &Controller,
+        relation: &Relation,
+        question: &Question,
+    ) -> Result<Self, Unbuilt> {
+        let ground = Ground::new(controller, relation, &question.objective);
+        let mut builder = Builder {
+            ground,
+            question,
+            states: Vec::new(),
+            edges: Vec::new(),
+            places: FxHashMap::default(),
+            without: Vec::new(),
+        };
+        builder.place(vec![0], 0);
+        let mut next = 0;
+        while next < builder.states.len() {
+            builder.expand(next);
+            if builder.states.len() > question.maximum_states {
+                return Err(Unbuilt::TooLarge(question.maximum_states));
+            }
+            if builder.without.len() >= MAXIMUM_TOLD {
+                break;
+            }
+            next += 1;
+        }
+        if !builder.without.is_empty() {
+            return Err(Unbuilt::NoCommand(builder.without));
+        }
+        let marked = controller.marked();
+        let mut backward = vec![Vec::new(); builder.states.len()];
+        for (source, edges) in builder.edges.iter().enumerate() {
+            for (_, target) in edges {
+                backward[*target].push(source);
+            }
+        }
+        let home = builder.states.iter().enumerate().filter(|(_, state)| {
+            state.failed == 0 && state.members.len() == 1 && marked[state.members[0] as usize]
+        });
+        let alive = reach(&backward, home.map(|(place, _)| place));
+        Ok(Self {
+            dangling: alive.iter().map(|alive| !alive).collect(),
+            programs: builder.ground.program_count(),
+            states: builder.states,
+            edges: builder.edges,
+            places: builder.places,
+        })
+    }
+
+    /// The state of these members and failed channels.
+    pub fn find(&self, members: &[u32], failed: u64) -> Option<usize> {
+        self.places.get(&(members.to_vec(), failed)).copied()
+    }
+
+    /// Where `label` leads from `state`.
+    pub fn follow(&self, state: usize, label: &Label) -> Option<usize> {
+        let edges = self.edges[state].iter();
+        edges
+            .clone()
+            .find(|(known, _)| known == label)
+            .map(|(_, target)| *target)
+    }
+
+    /// How many transitions.
+    pub fn edge_count(&self) -> usize {
+        self.edges.iter().map(Vec::len).sum()
+    }
+
+    /// Φ̃(y, e) for an event of Σ, step 2.
+    pub fn feedback(
+        &self,
+        controller: &Controller,
+        relation: &Relation,
+        state: usize,
+        event: Event,
+    ) -> Feedback {
+        let members = self.states[state].members.iter();
+        joint_feedback(
+            members.map(|&member| {
+                crate::relation::feedback(controller, relation, member as usize, event)
+            }),
+        )
+    }
+}
+
+/// The channels of `failed` as places among the inputs.
+pub fn failed_channels(channels: &[usize], failed: u64) -> impl Iterator<Item = usize> + '_ {
+    let places = channels.iter().enumerate();
+    places
+        .filter(move |(bit, _)| failed >> bit & 1 == 1)
+        .map(|(_, &input)| input)
+}
+
+struct Builder<'a> {
+    ground: Ground<'a>,
+    question: &'a Question,
+    states: Vec<MegaState>,
+    edges: Vec<Vec<(Label, usize)>>,
+    places: FxHashMap<(Vec<u32>, u64), usize>,
+    without: Vec<NoCommand>,
+}
+
+impl Builder<'_> {
+    fn is_unseen(&self, failed: u64, event: Event) -> bool {
+        event.channel().is_some_and(|input| {
+            let bit = self
+                .question
+                .channels
+                .iter()
+                .position(|&known| known == input);
+            bit.is_some_and(|bit| failed >> bit & 1 == 1)
+        })
+    }
+
+    /// Settles `seed` and numbers the state; nothing where no command is safe.
+    fn place(&mut self, seed: Vec<u32>, failed: u64) -> Option<usize> {
+        let channels: Vec<usize> = failed_channels(&self.question.channels, failed).collect();
+        let unseen = |event: &Event| {
+            event
+                .channel()
+                .is_some_and(|input| channels.contains(&input))
+        };
+        let settled = match self.question.analysis {
+            Analysis::Section2 => {
+                let any = |step: &Move| step.events.iter().any(unseen);
+                let members = self.ground.closure(seed, |_, step| any(step));
+                let members: Vec<u32> = members.into_iter().collect();
+                if members.len() == 1 {
+                    Ok((members, None))
+                } else {
+                    let command = self.ground.command(&members, &Default::default(), failed);
+                    command.map(|command| (members, Some(command)))
+                }
+            }
+            Analysis::Prompt | Analysis::Late => {
+                let all = |step: &Move| !step.events.is_empty() && step.events.iter().all(unseen);
+                self.ground.settle(seed, failed, &all)
+            }
+        };
+        let (members, command) = match settled {
+            Ok(settled) => settled,
+            Err(none) => {
+                if !self.without.contains(&none) {
+                    self.without.push(none);
+                }
+                return None;
+            }
+        };
+        let key = (members, failed);
+        if let Some(&place) = self.places.get(&key) {
+            return Some(place);
+        }
+        let place = self.states.len();
+        self.states.push(MegaState {
+            members: key.0.clone(),
+            failed,
+            command,
+        });
+        self.edges.push(Vec::new());
+        self.places.insert(key, place);
+        Some(place)
+    }
+
+    fn expand(&mut self, place: usize) {
+        let mut successors: Vec<(Label, Vec<u32>, u64)> = self.seen(place);
+        let MegaState {
+            members, failed, ..
+        } = self.states[place].clone();
+        for bit in 0..self.question.channels.len() {
+            if failed >> bit & 1 == 1 {
+                self.repair(&members, failed, bit, &mut successors);
+            } else if (failed.count_ones() as usize) < self.question.simultaneous {
+                let after = failed | 1 << bit;
+                let seed = self.after_break(&members, after, bit);
+                successors.push((Label::Break(bit), seed, after));
+            }
+        }
+        for (label, seed, failed) in successors {
+            if let Some(target) = self.place(seed, failed) {
+                self.edges[place].push((label, target));
+            }
+        }
+    }
+
+    /// Step 3.
+    fn seen(&self, place: usize) -> Vec<(Label, Vec<u32>, u64)> {
+        let MegaState {
+            members,
+            failed,
+            command,
+        } = &self.states[place];
+        let mut successors: Vec<(Label, Vec<u32>, u64)> = Vec::new();
+        let mut add = |label: Label, target: usize| {
+            let target = target as u32;
+            match successors.iter_mut().find(|(known, _, _)| *known == label) {
+                Some((_, seed, _)) => seed.push(target),
+                None => successors.push((label, vec![target], *failed)),
+            }
+        };
+        for &member in members {
+            for step in self.ground.controller.moves(member as usize) {
+                let mut events = step.events.clone();
+                events.retain(|&event| !self.is_unseen(*failed, event));
+                if events.is_empty() {
+                    // In a combined state the program does not go on by itself: its outputs are not in force.
+                    let goes_on = self.question.analysis == Analysis::Section2 || command.is_none();
+                    if step.events.is_empty() && goes_on {
+                        add(Label::Seen(events), step.target);
+                    }
+                } else if self.question.analysis == Analysis::Section2 {
+                    for event in events {
+                        add(Label::Seen(vec![event]), step.target);
+                    }
+                } else {
+                    add(Label::Seen(events), step.target);
+                }
+            }
+        }
+        successors.sort();
+        successors
+    }
+
+    /// Step 4: what may be true once the channel is known to be failed.
+    fn after_break(&self, members: &[u32], failed: u64, bit: usize) -> Vec<u32> {
+        let mut seed = members.to_vec();
+        if self.question.analysis == Analysis::Late {
+            let channel = self.question.channels[bit];
+            for &member in members {
+                for step in self.ground.controller.moves(member as usize) {
+                    let missed = |event: &Event| event.channel() == Some(channel);
+                    let unseen = |event: &Event| self.is_unseen(failed, *event);
+                    if step.events.iter().any(missed) && step.events.iter().all(unseen) {
+                        seed.push(step.target as u32);
+                    }
+                }
+            }
+        }
+        seed
+    }
+
+    /// Step 5.
+    fn repair(
+        &self,
+        members: &[u32],
+        failed: u64,
+        bit: usize,
+        successors: &mut Vec<(Label, Vec<u32>, u64)>,
+    ) {
+        let after = failed & !(1 << bit);
+        if self.question.analysis == Analysis::Section2 {
+            successors.push((Label::Repair(bit, None), members.to_vec(), after));
+            return;
+        }
+        let channel = self.question.channels[bit];
+        for value in [false, true] {
+            let shows = |&&member: &&u32| {
+                self.ground.controller.states()[member as usize].inputs.0[channel] == value
+            };
+            let seed: Vec<u32> = members.iter().filter(shows).copied().collect();
+            if !seed.is_empty() {
+                successors.push((Label::Repair(bit, Some(value)), seed, after));
+            }
+        }
+    }
+}
