@@ -186,17 +186,75 @@ fn an_output_that_was_changed_is_found() {
     assert!(!lacking.passed);
 }
 
+/// Held cycles count against the cluster, but for those in which the host under it did not run.
+#[test]
+fn what_a_stall_explains_is_apart() {
+    use understudy_remote_io::Event;
+    use understudy_scenarios::Happening;
+
+    let text = r#"
+title = "Nobody is left for the robot"
+cycles = 60
+
+[[step]]
+at = 50
+action = "crash"
+station = "robot"
+
+[[step]]
+at = 50
+action = "crash"
+station = "understudy"
+
+[expect]
+held = 0
+
+[[expect.during]]
+from = 50
+to = 60
+remote_io = "robot-io"
+source = "reconstructed"
+"#;
+    let (bytes, summary, _) = run(Mode::Full, text, 3);
+    let unmet = summary.expectations.iter().filter(|expected| !expected.met);
+    assert_eq!(unmet.count(), 2, "held cycles, and those of the range");
+    let stalled = account_of(&bytes, text, |record| {
+        let woken_late = match &record.event {
+            Happening::RemoteIo(Event::Applied { moment, .. }) if record.name == "press-io" => {
+                let (moment, late) = (*moment, std::time::Duration::from_millis(5));
+                let event = Happening::RemoteIo(Event::Stalled { moment, late });
+                Some(Record {
+                    event,
+                    ..record.clone()
+                })
+            }
+            _ => None,
+        };
+        woken_late.into_iter().chain([record])
+    });
+    let found: Vec<&str> = stalled
+        .expectations
+        .iter()
+        .map(|expected| expected.found.as_str())
+        .collect();
+    assert!(stalled.passed, "{found:?}");
+    assert_eq!(
+        found.last().copied(),
+        Some("as expected, but for 10 while the host stood still")
+    );
+}
+
 /// The summary of a journal whose records went through `change`.
-fn account_of(
+fn account_of<Changed: IntoIterator<Item = Record>>(
     bytes: &[u8],
     text: &str,
-    mut change: impl FnMut(Record) -> Option<Record>,
+    mut change: impl FnMut(Record) -> Changed,
 ) -> Summary {
     let cluster = cluster(Mode::Full);
     let scenario = scenario(&cluster, text);
     let mut account = Account::new(Terms::of(&cluster), &scenario, OriginRule::Found);
     for record in records(bytes) {
-        if let Some(record) = change(record.expect("a record")) {
+        for record in change(record.expect("a record")) {
             account.observe(&record);
         }
     }
