@@ -18,7 +18,7 @@ use understudy_cluster::Cluster;
 use understudy_node::Station;
 use understudy_plant::PlantMachine;
 use understudy_remote_io::RemoteIo;
-use understudy_wire::{Epoch, Machine, Party, ProgramId, Time};
+use understudy_wire::{Epoch, Machine, Party, Time};
 
 use crate::answer::{Answer, Status};
 use crate::files;
@@ -174,15 +174,8 @@ where
         Some(path) => listed(path)?,
         None => addressed(cluster)?,
     };
-    let feeds = cluster
-        .plants()
-        .iter()
-        .enumerate()
-        .filter_map(|(fed, place)| {
-            let feeder = place.as_ref()?.fed_by?;
-            Some((feeder, ProgramId(fed as u8)))
-        });
-    let endpoints = Endpoints::new(cluster.agreement().cluster, party, parties, feeds.collect());
+    let neighbours = cluster.neighbours();
+    let endpoints = Endpoints::new(cluster.agreement().cluster, party, parties, neighbours);
     let endpoints = endpoints
         .map_err(|error| Answer::failed(Status::BadInput, error.code(), error.to_string()))?;
     let settings = PartySettings {

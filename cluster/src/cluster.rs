@@ -1,5 +1,6 @@
 //! A cluster as all its parties know it.
 
+use std::collections::BTreeSet;
 use std::net::SocketAddr;
 use std::sync::Arc;
 
@@ -8,7 +9,7 @@ use understudy_ladder::Program as LadderProgram;
 use understudy_logic::Circuit;
 use understudy_node::Program;
 use understudy_parity::ParityController;
-use understudy_plant::Plant;
+use understudy_plant::{Followed, Plant};
 use understudy_remote_io::Release;
 use understudy_wire::{Agreement, Epoch, Image, Party, ProgramHash, ProgramId, StationId};
 
@@ -75,6 +76,8 @@ pub struct PlantPlace {
     pub plant: Plant,
     /// The program of the plant whose parts it takes.
     pub fed_by: Option<ProgramId>,
+    /// What it follows, by number.
+    pub follows: Vec<Followed>,
     /// Periods without an actuation after which the fail-safe outputs are in force.
     pub watchdog_cycles: u32,
     /// Where it listens, if the file says so.
@@ -138,6 +141,21 @@ impl Cluster {
     /// In the order of their programs; nothing where a program has no simulated plant.
     pub fn plants(&self) -> &[Option<PlantPlace>] {
         &self.plants
+    }
+
+    /// Pairs (i, j) where plant j takes the parts of plant i or follows what it shows.
+    pub fn neighbours(&self) -> Vec<(ProgramId, ProgramId)> {
+        let plants = self.plants.iter().enumerate();
+        let pairs = plants.flat_map(|(listener, place)| {
+            let place = place.iter();
+            place.flat_map(move |place| {
+                let followed = place.follows.iter().map(|followed| followed.from);
+                let speakers = place.fed_by.into_iter().chain(followed);
+                speakers.map(move |speaker| (speaker, ProgramId(listener as u8)))
+            })
+        });
+        let pairs: BTreeSet<_> = pairs.collect();
+        pairs.into_iter().collect()
     }
 
     /// All programs, compiled, in order.
@@ -240,6 +258,7 @@ impl Cluster {
             agreement: Arc::clone(&self.agreement),
             plant: place.plant.clone(),
             fed_by: place.fed_by,
+            follows: place.follows.clone(),
             fail_safe: self.remote_ios[program.index()].fail_safe.clone(),
             watchdog_cycles: place.watchdog_cycles,
         })

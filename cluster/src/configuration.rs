@@ -4,7 +4,7 @@
 
 use std::fmt::Write;
 
-use understudy_plant::{ModelKind, Signals};
+use understudy_plant::{Followed, ModelKind, Signals};
 use understudy_wire::{Mode, ProgramId};
 
 use crate::canonical::circuit_text;
@@ -58,8 +58,13 @@ pub(crate) fn configuration_text(cluster: &Cluster, plants: &[String]) -> String
     text
 }
 
-/// A plant's model, its signals and its feeder.
-pub(crate) fn plant_text(kind: &ModelKind, signals: &Signals, fed_by: Option<ProgramId>) -> String {
+/// A plant's model, its signals, its feeder, and what it follows by terminal.
+pub(crate) fn plant_text(
+    kind: &ModelKind,
+    signals: &Signals,
+    fed_by: Option<ProgramId>,
+    follows: &[(String, Followed)],
+) -> String {
     let mut text = match kind {
         ModelKind::Robot(parameters) => format!(
             "robot {} {} {}\n",
@@ -78,6 +83,10 @@ pub(crate) fn plant_text(kind: &ModelKind, signals: &Signals, fed_by: Option<Pro
     }
     if let Some(feeder) = fed_by {
         writeln!(text, "fed by {}", feeder.0).expect("a string takes everything");
+    }
+    for (terminal, Followed { from, sensor }) in follows {
+        writeln!(text, "follows {terminal} {} {sensor}", from.0)
+            .expect("a string takes everything");
     }
     text
 }

@@ -77,6 +77,8 @@ pub(crate) struct PlantSection {
     pub(crate) fed_by: Option<Placed<String>>,
     /// By terminal: where the terminal stands, and the signal.
     pub(crate) signals: BTreeMap<String, (Range<usize>, Placed<String>)>,
+    /// By terminal: where the terminal stands, and the sensor of another plant.
+    pub(crate) follows: BTreeMap<String, (Range<usize>, Placed<String>)>,
     pub(crate) watchdog_cycles: u32,
     pub(crate) address: Option<Placed<SocketAddr>>,
 }
@@ -151,6 +153,7 @@ pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
             model: model(fields, &empty, diagnostics),
             fed_by: fields.text("fed_by", diagnostics),
             signals: fields.names("signals", diagnostics),
+            follows: fields.names("follows", diagnostics),
             watchdog_cycles: fields.count("watchdog_cycles", diagnostics),
             address: fields.address("address", diagnostics),
         })

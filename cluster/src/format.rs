@@ -251,6 +251,11 @@ pub(crate) static PLANT: Section = Section {
             "a signal of the controller for a terminal of the model, where their names differ, such as `{ part_present = \"u10\" }`",
         ),
         key(
+            "follows",
+            Kind::Names,
+            "a sensor of another plant for a terminal of this one that the controller does not drive, such as `{ pilot_flame = \"pilot-burner.flame\" }`",
+        ),
+        key(
             "parameters",
             Kind::Parameters,
             "of a built-in model, see below",

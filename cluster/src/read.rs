@@ -16,13 +16,15 @@
 //! | U0212 | a program that does not become a circuit |
 //! | U0213 | more stations, or wider images, than there may be |
 //! | U0214 | a plant with both a model and a ladder, or with neither |
-//! | U0215 | a plant that feeds itself |
+//! | U0215 | a plant that feeds or follows itself |
 //! | U0216 | two sensors of a plant on one input |
+//! | U0217 | a terminal of a plant that two things drive |
 //! | U0251 | warning: an input that no sensor drives |
 //! | U0252 | warning: an output that moves nothing |
 //! | U0253 | warning: not one understudy where the mode wants one |
 //! | U0254 | warning: parts that never come |
 
+mod follows;
 mod ladders;
 mod limits;
 mod names;

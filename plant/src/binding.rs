@@ -1,7 +1,7 @@
 //! Which terminal of a model is which signal of its controller.
 //!
 //! A terminal without an entry in [`Signals`] is bound to the signal of its own name. Every sensor has to be an input of the
-//! controller and every actuator an output; an input that no sensor drives stays 0.
+//! controller and every actuator an output, but for those that follow another plant; an input that no sensor drives stays 0.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
@@ -41,6 +41,11 @@ pub enum BindingProblem {
         /// What both are bound to.
         signal: String,
     },
+    /// A terminal that follows another plant is bound to a signal of the controller too.
+    FollowsTwo {
+        /// The terminal.
+        terminal: String,
+    },
     /// No sensor drives this input of the controller: it stays 0.
     InputStaysZero {
         /// The input.
@@ -53,11 +58,20 @@ pub enum BindingProblem {
     },
 }
 
-/// Of each terminal, its place in u(i) or y(i).
+/// What moves an actuator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Driver {
+    /// A bit of y(i).
+    Output(usize),
+    /// What another plant shows, by its number in `follows`.
+    Neighbour(usize),
+}
+
+/// Of each sensor, its place in u(i); of each actuator, what moves it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Binding {
     pub(crate) sensors: Vec<usize>,
-    pub(crate) actuators: Vec<usize>,
+    pub(crate) actuators: Vec<Driver>,
     /// Bits of u(i).
     pub(crate) inputs: usize,
 }
@@ -68,6 +82,7 @@ impl Binding {
         terminals: &Terminals,
         controller: &Circuit,
         signals: &Signals,
+        follows: &[String],
     ) -> (Option<Self>, Vec<BindingProblem>) {
         let mut problems = Vec::new();
         let known: Arc<[String]> = terminals.names().map(str::to_owned).collect();
@@ -79,10 +94,22 @@ impl Binding {
                 });
             }
         }
+        let actuators: Arc<[String]> = terminals.actuators.as_slice().into();
+        for terminal in follows {
+            if !actuators.contains(terminal) {
+                problems.push(BindingProblem::UnknownTerminal {
+                    terminal: terminal.clone(),
+                    known: Arc::clone(&actuators),
+                });
+            } else if signals.contains_key(terminal) {
+                let terminal = terminal.clone();
+                problems.push(BindingProblem::FollowsTwo { terminal });
+            }
+        }
         let inputs: Arc<[String]> = controller.inputs().into();
         let outputs = controller.outputs().iter();
         let outputs: Arc<[String]> = outputs.map(|output| output.name.clone()).collect();
-        let mut places = |direction: Direction, terminals: &[String], known: &Arc<[String]>| {
+        let mut places = |direction: Direction, terminals: &[&String], known: &Arc<[String]>| {
             let mut places = Vec::with_capacity(terminals.len());
             let mut taken = HashSet::new();
             let place_of: HashMap<&String, usize> = known
@@ -90,7 +117,7 @@ impl Binding {
                 .enumerate()
                 .map(|(place, name)| (name, place))
                 .collect();
-            for terminal in terminals {
+            for &terminal in terminals {
                 let signal = signals.get(terminal).unwrap_or(terminal);
                 let Some(&place) = place_of.get(signal) else {
                     problems.push(BindingProblem::UnknownSignal {
@@ -111,8 +138,12 @@ impl Binding {
             }
             places
         };
-        let sensors = places(Direction::Sensor, &terminals.sensors, &inputs);
-        let actuators = places(Direction::Actuator, &terminals.actuators, &outputs);
+        let sensors: Vec<&String> = terminals.sensors.iter().collect();
+        let sensors = places(Direction::Sensor, &sensors, &inputs);
+        let followed = |terminal: &String| follows.iter().position(|name| name == terminal);
+        let driven = terminals.actuators.iter();
+        let driven: Vec<&String> = driven.filter(|name| followed(name).is_none()).collect();
+        let driven = places(Direction::Actuator, &driven, &outputs);
         let fits = problems.is_empty();
         let unbound = |names: &[String], places: &[usize]| {
             let places: HashSet<usize> = places.iter().copied().collect();
@@ -127,10 +158,16 @@ impl Binding {
                     problems.push(BindingProblem::InputStaysZero { input });
                 }
             }
-            for output in unbound(&outputs, &actuators) {
+            for output in unbound(&outputs, &driven) {
                 problems.push(BindingProblem::OutputHasNoEffect { output });
             }
         }
+        let mut driven = driven.into_iter();
+        let actuators = terminals.actuators.iter().filter_map(|terminal| {
+            let neighbour = followed(terminal).map(Driver::Neighbour);
+            neighbour.or_else(|| driven.next().map(Driver::Output))
+        });
+        let actuators = actuators.collect();
         let binding = Self {
             sensors,
             actuators,

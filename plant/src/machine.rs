@@ -28,6 +28,7 @@ use understudy_wire::{
 };
 
 use crate::event::{Event, Pace};
+use crate::followed::{Followed, Hearing};
 use crate::model::Plant;
 
 /// Periods without an actuation after which the fail-safe outputs are in force, unless configured otherwise.
@@ -44,13 +45,15 @@ pub struct Settings {
     pub plant: Plant,
     /// The program of the plant whose parts it takes.
     pub fed_by: Option<ProgramId>,
+    /// What the plant follows, by number.
+    pub follows: Vec<Followed>,
     /// y(i) where the watchdog has run out; its width is that of the outputs.
     pub fail_safe: Image,
     /// Periods without an actuation after which that is so: at least 2.
     pub watchdog_cycles: u32,
 }
 
-/// A plant between its remote I/O and the plants that it feeds.
+/// A plant between its remote I/O and its neighbours.
 #[derive(Debug, Clone)]
 pub struct PlantMachine {
     settings: Settings,
@@ -58,6 +61,8 @@ pub struct PlantMachine {
     driven: Option<Driven>,
     wakeup: Time,
     feed: Feed,
+    /// By number of what it follows.
+    hearings: Vec<Hearing>,
     reception: Reception,
     said: VecDeque<Output<Event>>,
 }
@@ -103,6 +108,7 @@ impl PlantMachine {
             driven: None,
             wakeup: now,
             feed: Feed::default(),
+            hearings: vec![Hearing::default(); settings.follows.len()],
             reception: Reception::new(Party::Plant(settings.program), &settings.agreement),
             settings,
             said: VecDeque::new(),
@@ -147,12 +153,24 @@ impl PlantMachine {
             {
                 self.drive(now, header, &actuation.outputs);
             }
-            (Body::Field(field), Party::Plant(program))
-                if Some(program) == self.settings.fed_by =>
-            {
-                self.feed.hear(header.moment, field.handed_over);
+            (Body::Field(field), Party::Plant(program)) => {
+                if Some(program) == self.settings.fed_by {
+                    self.feed.hear(header.moment, field.handed_over);
+                }
+                self.follow(program, header.moment, field);
             }
             _ => {}
+        }
+    }
+
+    fn follow(&mut self, program: ProgramId, moment: Moment, field: &Field) {
+        let follows = self.settings.follows.iter().zip(&mut self.hearings);
+        for (number, (followed, hearing)) in follows.enumerate() {
+            if followed.from == program
+                && let Some(on) = hearing.hear(*followed, moment, field)
+            {
+                self.settings.plant.see(number, on);
+            }
         }
     }
 

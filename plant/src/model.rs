@@ -5,7 +5,7 @@ use smallvec::SmallVec;
 use understudy_logic::Circuit;
 use understudy_wire::{Field, Image};
 
-use crate::binding::{Binding, BindingProblem, Signals};
+use crate::binding::{Binding, BindingProblem, Driver, Signals};
 use crate::ladder_model::{self, LadderModel};
 use crate::press::{self, Press, PressParameters};
 use crate::robot::{self, Robot, RobotParameters};
@@ -128,6 +128,8 @@ impl ModelKind {
 pub struct Plant {
     inside: Inside,
     binding: Binding,
+    /// What it follows, as it last saw that.
+    seen: Vec<bool>,
     actuators: Vec<bool>,
     sensors: Vec<bool>,
     position_names: Vec<String>,
@@ -168,14 +170,27 @@ impl Plant {
         signals: &Signals,
         fed: bool,
     ) -> (Option<Self>, Vec<BindingProblem>) {
+        Self::following(kind, controller, signals, &[], fed)
+    }
+
+    /// As [`Self::new`], where the actuators `follows` follow other plants and not the controller. They are 0 until
+    /// [`Self::see`] says otherwise.
+    pub fn following(
+        kind: &ModelKind,
+        controller: &Circuit,
+        signals: &Signals,
+        follows: &[String],
+        fed: bool,
+    ) -> (Option<Self>, Vec<BindingProblem>) {
         let terminals = kind.terminals();
-        let (binding, problems) = Binding::new(&terminals, controller, signals);
+        let (binding, problems) = Binding::new(&terminals, controller, signals, follows);
         let plant = binding.map(|binding| Self {
             inside: match kind {
                 ModelKind::Robot(parameters) => Inside::Robot(Robot::new(parameters.clone(), fed)),
                 ModelKind::Press(parameters) => Inside::Press(Press::new(parameters.clone(), fed)),
                 ModelKind::Ladder(circuit) => Inside::Ladder(Box::new(LadderModel::new(circuit))),
             },
+            seen: vec![false; follows.len()],
             actuators: vec![false; binding.actuators.len()],
             sensors: vec![false; binding.sensors.len()],
             position_names: terminals.positions,
@@ -184,12 +199,22 @@ impl Plant {
         (plant, problems)
     }
 
+    /// From now on what is followed under this number shows `on`; a number that there is not is ignored.
+    pub fn see(&mut self, number: usize, on: bool) {
+        if let Some(seen) = self.seen.get_mut(number) {
+            *seen = on;
+        }
+    }
+
     /// One cycle under y(i), in which `arrived` parts came from the plant that feeds this one. Answers with what it shows then.
     ///
     /// Outputs past the width of `outputs` count as 0.
     pub fn step(&mut self, outputs: &Image, arrived: u64) -> Field {
-        for (actuator, &place) in self.actuators.iter_mut().zip(&self.binding.actuators) {
-            *actuator = outputs.get(place);
+        for (actuator, &driver) in self.actuators.iter_mut().zip(&self.binding.actuators) {
+            *actuator = match driver {
+                Driver::Output(place) => outputs.get(place),
+                Driver::Neighbour(number) => self.seen[number],
+            };
         }
         self.inside.model_mut().step(&self.actuators, arrived);
         self.show()

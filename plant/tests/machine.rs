@@ -48,6 +48,7 @@ fn machine() -> PlantMachine {
             agreement: Arc::new(agreement),
             plant: plant.expect("it fits"),
             fed_by: Some(FEEDER),
+            follows: Vec::new(),
             fail_safe: Image::from_bits([false, true]),
             watchdog_cycles: WATCHDOG_CYCLES,
         },

@@ -1,6 +1,6 @@
 //! The plants behind the remote I/Os, and the wires between them.
 
-use understudy_plant::Plant;
+use understudy_plant::{Followed, Plant};
 use understudy_wire::{Field, Image, ProgramId};
 
 use crate::parts::Parts;
@@ -12,6 +12,7 @@ pub(crate) struct Plants {
     running: Vec<Option<Plant>>,
     shown: Vec<Option<Field>>,
     fed_by: Vec<Option<ProgramId>>,
+    follows: Vec<Vec<Followed>>,
     /// Parts of its feeder that each plant has seen.
     taken: Vec<u64>,
 }
@@ -26,6 +27,7 @@ impl Plants {
                 .map(|plant| plant.as_ref().map(Plant::field))
                 .collect(),
             fed_by: parts.fed_by.clone(),
+            follows: parts.follows.clone(),
             taken: vec![0; parts.plants.len()],
         }
     }
@@ -46,6 +48,11 @@ impl Plants {
         // A feeder that was restarted counts from 0 again.
         let arrived = handed_over.saturating_sub(self.taken[index].min(handed_over));
         self.taken[index] = handed_over;
+        for (number, followed) in self.follows[index].iter().enumerate() {
+            if let Some(field) = &self.shown[followed.from.index()] {
+                plant.see(number, field.sensors.get(followed.sensor));
+            }
+        }
         self.shown[index] = Some(plant.step(outputs, arrived));
     }
 

@@ -1,7 +1,7 @@
 //! What a cluster consists of, ready to be started again and again.
 
 use understudy_cluster::Cluster;
-use understudy_plant::Plant;
+use understudy_plant::{Followed, Plant};
 use understudy_wire::{Epoch, ProgramId, StationId};
 
 /// The settings of every party. Remote I/Os and plants are indexed by program.
@@ -15,6 +15,8 @@ pub struct Parts {
     pub plants: Vec<Option<Plant>>,
     /// For each plant, the program of the plant that it gets its parts from.
     pub fed_by: Vec<Option<ProgramId>>,
+    /// For each plant, what it follows.
+    pub follows: Vec<Vec<Followed>>,
 }
 
 /// The parties of a cluster; the simulation gives each station its own epoch.
@@ -37,6 +39,14 @@ pub fn parts(cluster: &Cluster) -> Parts {
             .plants()
             .iter()
             .map(|place| place.as_ref().and_then(|place| place.fed_by))
+            .collect(),
+        follows: cluster
+            .plants()
+            .iter()
+            .map(|place| match place {
+                Some(place) => place.follows.clone(),
+                None => Vec::new(),
+            })
             .collect(),
     }
 }

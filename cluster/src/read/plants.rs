@@ -6,10 +6,11 @@ use std::time::Duration;
 
 use understudy_diagnostic::Diagnostic;
 use understudy_logic::Circuit;
-use understudy_plant::{BindingProblem, Direction, ModelKind, Plant, Signals};
+use understudy_plant::{BindingProblem, Direction, Followed, ModelKind, Plant, Signals};
 use understudy_wire::ProgramId;
 
 use super::Member;
+use super::follows;
 use super::ladders::Ladders;
 use super::limits::too_wide;
 use super::names::{Names, find_controller};
@@ -24,10 +25,11 @@ pub(crate) struct Plants {
     pub(crate) texts: Vec<String>,
 }
 
-struct Draft {
-    section: PlantSection,
-    name: String,
-    program: usize,
+/// A section that stands behind a controller.
+pub(crate) struct Draft {
+    pub(crate) section: PlantSection,
+    pub(crate) name: String,
+    pub(crate) program: usize,
     kind: Option<ModelKind>,
 }
 
@@ -91,12 +93,13 @@ pub(crate) fn place(
     };
     for draft in &drafts {
         let fed_by = feeder(draft, &drafts, diagnostics);
+        let follows = follows::resolve(draft, &drafts, members, diagnostics);
         let (Some(kind), Some((_, circuit))) = (&draft.kind, &members[draft.program].lowered)
         else {
             continue;
         };
-        plants.texts[draft.program] = plant_text(kind, &signals(&draft.section), fed_by);
-        plants.places[draft.program] = bound(draft, kind, circuit, fed_by, diagnostics);
+        plants.texts[draft.program] = plant_text(kind, &signals(&draft.section), fed_by, &follows);
+        plants.places[draft.program] = bound(draft, kind, circuit, fed_by, follows, diagnostics);
     }
     plants
 }
@@ -114,10 +117,13 @@ fn bound(
     kind: &ModelKind,
     circuit: &Circuit,
     fed_by: Option<ProgramId>,
+    follows: Vec<(String, Followed)>,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<PlantPlace> {
     let section = &draft.section;
-    let (plant, problems) = Plant::new(kind, circuit, &signals(section), fed_by.is_some());
+    let (terminals, follows): (Vec<_>, Vec<_>) = follows.into_iter().unzip();
+    let signals = signals(section);
+    let (plant, problems) = Plant::following(kind, circuit, &signals, &terminals, fed_by.is_some());
     let more = problems.len().saturating_sub(MAXIMUM_MISFITS);
     let problems = problems.into_iter().take(MAXIMUM_MISFITS);
     diagnostics.extend(problems.map(|problem| describe(problem, draft)));
@@ -141,6 +147,7 @@ fn bound(
         },
         plant: plant?,
         fed_by,
+        follows,
         watchdog_cycles: section.watchdog_cycles,
         address: section.address.as_ref().map(|address| address.value),
     })
@@ -209,7 +216,8 @@ fn describe(problem: BindingProblem, draft: &Draft) -> Diagnostic {
     match problem {
         BindingProblem::UnknownTerminal { terminal, known } => {
             let message = format!("the plant `{}` has no terminal `{terminal}`", draft.name);
-            let entry = section.signals.get(&terminal);
+            let mut entries = [&section.signals, &section.follows].into_iter();
+            let entry = entries.find_map(|names| names.get(&terminal));
             let span = entry.map_or(model.clone(), |(span, _)| span.clone());
             Diagnostic::error("U0209", message, span).with_help(known_names(&terminal, &known))
         }
@@ -243,6 +251,16 @@ fn describe(problem: BindingProblem, draft: &Draft) -> Diagnostic {
             let message = format!("two sensors drive the input `{signal}` of `{controller}`");
             Diagnostic::error("U0216", message, signal_span(&terminal))
                 .with_help(format!("the second is `{terminal}`"))
+        }
+        BindingProblem::FollowsTwo { terminal } => {
+            let message = format!(
+                "`{terminal}` of the plant `{}` has both a signal of `{controller}` and a sensor of another plant",
+                draft.name
+            );
+            let entry = section.follows.get(&terminal);
+            let span = entry.map_or(model, |(span, _)| span.clone());
+            Diagnostic::error("U0217", message, span)
+                .with_help("keep one: in `signals`, or in `follows`")
         }
         BindingProblem::InputStaysZero { input } => {
             let message = format!(

@@ -71,7 +71,7 @@ fn what_does_not_matter_is_not_in_the_hash() {
 
 #[test]
 fn whatever_matters_is_in_the_hash() {
-    let different: [&[(&str, &str, &str)]; 21] = [
+    let different: [&[(&str, &str, &str)]; 23] = [
         &[(FILE, "\"press-cell\"", "\"press-cell-2\"")],
         &[(FILE, "10ms", "11ms")],
         &[(FILE, "period", "mode = \"paper\"\nperiod")],
@@ -101,6 +101,16 @@ fn whatever_matters_is_in_the_hash() {
         )],
         &[(FILE, "fed_by = \"arm\"", "")],
         &[(FILE, "fed_by", "watchdog_cycles = 4\nfed_by")],
+        &[(
+            FILE,
+            "fed_by",
+            "follows = { move_up = \"arm.arm_up\" }\nfed_by",
+        )],
+        &[(
+            FILE,
+            "fed_by",
+            "follows = { move_up = \"arm.arm_down\" }\nfed_by",
+        )],
         &[(FILE, "fed_by", "parameters = { ram_cycles = 9 }\nfed_by")],
         &[(
             "robot.ladder",

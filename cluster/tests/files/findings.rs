@@ -154,6 +154,28 @@ parameters = { ram_cycle = 3, feed_cycles = -1 }
 }
 
 #[test]
+fn plants_that_follow_what_is_not_there() {
+    let cluster = HEAD.to_owned()
+        + r#"
+[[controller]]
+name = "press"
+ladder = "press.ladder"
+[[plant]]
+name = "belt"
+controller = "robot"
+ladder = "belt.ladder"
+follows = { go = "belt.there", there = "ram.ram_up", gone = "ram.ram_up" }
+[[plant]]
+name = "ram"
+controller = "press"
+model = "press"
+signals = { part_present = "ram_up", move_down = "down", move_up = "down" }
+follows = { move_up = "belt.lots", move_down = "belt.there", ram = "blet.there", part_present = "there" }
+"#;
+    insta::assert_snapshot!(check(&cluster));
+}
+
+#[test]
 fn a_plant_is_one_thing() {
     let both = "[[plant]]\ncontroller = \"robot\"\nmodel = \"robot\"\nladder = \"belt.ladder\"\n";
     let unknown = "[[plant]]\ncontroller = \"robot\"\nmodel = \"robots\"\nparameters = { x = 1 }\n";

@@ -80,6 +80,7 @@ pub(crate) fn line(programs: usize, mode: Mode, understudies: usize) -> Parts {
         _ => Some(ProgramId(program - 1)),
     });
     Parts {
+        follows: vec![Vec::new(); circuits.len()],
         stations: stations.collect(),
         remote_ios: remote_ios.collect(),
         plants: plants.collect(),
