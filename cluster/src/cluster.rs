@@ -10,7 +10,7 @@ use understudy_logic::Circuit;
 use understudy_node::Program;
 use understudy_parity::ParityController;
 use understudy_plant::{Followed, Plant};
-use understudy_remote_io::Release;
+use understudy_remote_io::{Release, ValueFault};
 use understudy_wire::{Agreement, Epoch, Image, Party, ProgramHash, ProgramId, StationId};
 
 /// What carries the frames.
@@ -61,6 +61,8 @@ pub struct RemoteIo {
     pub fail_safe: Image,
     /// Who releases the outputs after a cold start.
     pub release: Release,
+    /// What is driven while nobody can say which of two stations is right.
+    pub value_fault: ValueFault,
     /// Where it listens, if the file says so.
     pub address: Option<SocketAddr>,
 }
@@ -247,6 +249,7 @@ impl Cluster {
             hold_cycles: remote_io.hold_cycles,
             fail_safe: remote_io.fail_safe.clone(),
             release: remote_io.release,
+            value_fault: remote_io.value_fault,
         })
     }
 

@@ -65,6 +65,8 @@ pub(crate) struct RemoteIoSection {
     pub(crate) fail_safe: Vec<(Placed<String>, bool)>,
     /// Index into [`crate::format::RELEASES`].
     pub(crate) release: usize,
+    /// Index into [`crate::format::VALUE_FAULTS`].
+    pub(crate) value_fault: usize,
     pub(crate) address: Option<Placed<SocketAddr>>,
 }
 
@@ -140,6 +142,7 @@ pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
             hold_cycles: fields.count("hold_cycles", diagnostics),
             fail_safe: fields.bits("fail_safe", diagnostics),
             release: fields.word("release", diagnostics),
+            value_fault: fields.word("value_fault", diagnostics),
             address: fields.address("address", diagnostics),
         })
         .collect();

@@ -89,6 +89,7 @@ const MANY_CYCLES: u32 = 100_000;
 pub(crate) const MODES: [&str; 2] = ["full", "paper"];
 pub(crate) const LINKS: [&str; 2] = ["zenoh", "udp"];
 pub(crate) const RELEASES: [&str; 2] = ["automatic", "operator"];
+pub(crate) const VALUE_FAULTS: [&str; 3] = ["hold", "alarm", "fail-safe"];
 pub(crate) const MODELS: [&str; 2] = ["robot", "press"];
 
 pub(crate) static CLUSTER: Section = Section {
@@ -211,6 +212,14 @@ pub(crate) static REMOTE_IO: Section = Section {
                 default: true,
             },
             "who releases the outputs after the program has started from its initial state",
+        ),
+        key(
+            "value_fault",
+            Kind::Word {
+                words: &VALUE_FAULTS,
+                default: true,
+            },
+            "what is driven while two stations say different outputs from one history and no third one says which is right: `hold`, the last true outputs and then the fail-safe ones, until they agree or the operator releases them; `alarm`, the outputs of the controller itself; `fail-safe`, the fail-safe outputs at once, until the operator releases them",
         ),
         key("address", Kind::Address, "as for a controller"),
     ],

@@ -38,7 +38,7 @@ use understudy_diagnostic::{Diagnostic, Report};
 use understudy_ladder::Program as LadderProgram;
 use understudy_logic::{Circuit, Scan};
 use understudy_node::Program;
-use understudy_remote_io::Release;
+use understudy_remote_io::{Release, ValueFault};
 use understudy_wire::{
     Agreement, ClusterHash, ConfigurationHash, Image, MAXIMUM_PROGRAMS, Mode, Schedule,
 };
@@ -327,6 +327,8 @@ fn remote_ios(
             hold_cycles: section.hold_cycles,
             fail_safe,
             release: [Release::Automatic, Release::Operator][section.release],
+            value_fault: [ValueFault::Hold, ValueFault::Alarm, ValueFault::FailSafe]
+                [section.value_fault],
             address: section.address.map(|address| address.value),
         };
         places.insert(index, remote_io);
@@ -346,6 +348,7 @@ fn remote_ios(
                 hold_cycles: crate::format::REMOTE_IO.default_count("hold_cycles"),
                 fail_safe: fail_safe(member, &[], diagnostics),
                 release: Release::default(),
+                value_fault: ValueFault::default(),
                 address: None,
             }
         })

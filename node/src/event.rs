@@ -72,6 +72,20 @@ pub enum Event {
         /// The station with the other digest.
         station: StationId,
     },
+    /// The program's remote I/O has found this station's state of it faulty: it says nothing of it until the operator releases it.
+    Excluded {
+        /// In this cycle.
+        moment: Moment,
+        /// Whose state.
+        program: ProgramId,
+    },
+    /// The operator has released it: it begins again, without that state.
+    Readmitted {
+        /// In this cycle.
+        moment: Moment,
+        /// Whose state.
+        program: ProgramId,
+    },
     /// A party of this cluster runs another configuration; its frames are dropped.
     Refused {
         /// Who.

@@ -24,6 +24,8 @@ pub(crate) enum Standing {
     Shadow(u32),
     /// Replayed from the initial state, or proved in shadow.
     Proven,
+    /// Its remote I/O has found it faulty: it waits for the operator.
+    Excluded,
 }
 
 /// A station's copy of one program.
@@ -47,14 +49,14 @@ struct State {
     bits: Image,
     lineage: Lineage,
     stepped: Moment,
+    /// Of the state before the last step.
+    digest: Digest,
 }
 
 #[derive(Debug, Clone)]
 struct Copied {
     born: Moment,
     state: State,
-    /// Of the state before the last step.
-    digest: Digest,
 }
 
 /// What a sample did to a copy.
@@ -95,7 +97,8 @@ impl Replica {
         let knows = |copy: &Copied| {
             copy.state.stepped == moment && self.outputs_of == Some(copy.state.lineage)
         };
-        self.standing != Standing::Lost && self.copy.as_ref().is_some_and(knows)
+        !matches!(self.standing, Standing::Lost | Standing::Excluded)
+            && self.copy.as_ref().is_some_and(knows)
     }
 
     /// Whether it may speak of `moment`.
@@ -119,7 +122,7 @@ impl Replica {
             born: copy.born,
             lineage: copy.state.lineage,
             stepped: copy.state.stepped,
-            digest: copy.digest,
+            digest: copy.state.digest,
         })
     }
 
@@ -138,6 +141,9 @@ impl Replica {
         if sample.history.len() > self.history
             || sample.history[0].width() != program.scan.input_count()
         {
+            return Followed::Lost;
+        }
+        if self.standing == Standing::Excluded {
             return Followed::Lost;
         }
         if self.is_current(moment) {
@@ -167,8 +173,8 @@ impl Replica {
                     bits: initial.expect("a circuit packs its initial state"),
                     lineage: genesis,
                     stepped: sample.born,
+                    digest: Digest::default(),
                 },
-                digest: Digest::default(),
             });
             self.replay(program, scratch, sample, place, moment);
             self.standing = Standing::Proven;
@@ -220,8 +226,8 @@ impl Replica {
                 bits: transfer.state.clone(),
                 lineage: transfer.lineage,
                 stepped: transfer.stepped,
+                digest: transfer.digest,
             },
-            digest: transfer.digest,
         });
         self.standing = Standing::Shadow(shadow_cycles);
         if let (Some(place), Some(frame)) = (place, unfollowed)
@@ -245,7 +251,7 @@ impl Replica {
             born: copy.born,
             lineage: copy.state.lineage,
             stepped: copy.state.stepped,
-            digest: copy.digest,
+            digest: copy.state.digest,
             state: copy.state.bits.clone(),
         })
     }
@@ -280,6 +286,18 @@ impl Replica {
         self.past.clear();
         self.standing = Standing::Lost;
         self.unfollowed = None;
+    }
+
+    /// Its remote I/O excludes it, or does so no more: then it begins again without a state. True where that is news.
+    pub(crate) fn set_excluded(&mut self, excluded: bool) -> bool {
+        let news = excluded != (self.standing == Standing::Excluded);
+        if news {
+            self.discard();
+            if excluded {
+                self.standing = Standing::Excluded;
+            }
+        }
+        news
     }
 
     fn in_step(&mut self, shadow_cycles: u32) -> Followed {
@@ -337,7 +355,7 @@ impl Replica {
         };
         before.clone_from(&copy.state);
         self.past.push_back(before);
-        copy.digest = Digest::of(&copy.state.bits);
+        copy.state.digest = Digest::of(&copy.state.bits);
         program.scan.step(
             scratch,
             copy.state.bits.words_mut(),

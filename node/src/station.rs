@@ -21,8 +21,9 @@ use std::sync::Arc;
 use smallvec::SmallVec;
 use understudy_logic::Scratch;
 use understudy_wire::{
-    Admission, Arrival, Attendance, Body, Copies, CycleClock, Frame, Header, Holding, Input,
-    Machine, Output, Party, ProgramId, ProgramSet, Reception, StationId, StationSet, Time,
+    Admission, Arrival, Attendance, Body, Copies, CycleClock, Digest, Frame, Header, Holding,
+    Image, Input, Lineage, Machine, Output, Party, ProgramId, ProgramSet, Reception, Sample,
+    StationId, StationSet, Time,
 };
 
 use crate::event::Event;
@@ -51,6 +52,8 @@ pub struct Station {
     wanted: ProgramSet,
     /// Stations that asked to join in the last cycle; they pace only when nobody who speaks does.
     joining: StationSet,
+    /// Whose states differed in the last cycle.
+    differed: SmallVec<[(ProgramId, StationId); 1]>,
 }
 
 /// What a station remembers of the current cycle only.
@@ -58,12 +61,23 @@ pub struct Station {
 struct CycleNotes {
     spoken: bool,
     asked: bool,
-    /// Programs whose own controller has said its outputs.
-    spoke: ProgramSet,
+    /// The turns of controllers that said their outputs.
+    said: SmallVec<[Said; 2]>,
+    /// Whose states differ from equal ones of this station.
+    differs: SmallVec<[(ProgramId, StationId); 1]>,
     /// Programs that a station of lower rank can give the state of.
     others_have: ProgramSet,
     /// Who asked to join.
     joiners: StationSet,
+}
+
+/// What a controller has said of its own program.
+#[derive(Debug, Clone)]
+struct Said {
+    program: ProgramId,
+    lineage: Lineage,
+    digest: Digest,
+    outputs: Image,
 }
 
 impl Station {
@@ -89,6 +103,7 @@ impl Station {
             paces: false,
             wanted: ProgramSet::EMPTY,
             joining: StationSet::EMPTY,
+            differed: SmallVec::new(),
             settings,
         };
         station.asked = station.next_wakeup();
@@ -174,7 +189,7 @@ impl Station {
             }
         }
         match (&frame.body, frame.header.sender) {
-            (Body::Sample(_), Party::RemoteIo(program)) => self.follow(program, frame),
+            (Body::Sample(sample), Party::RemoteIo(program)) => self.follow(program, frame, sample),
             (Body::Turn(turn), Party::Station(station)) => self.hear_turn(station, turn),
             (Body::Join(join), Party::Station(station)) => self.hear_join(station, join),
             (Body::Transfer(transfer), Party::Station(station)) => self.adopt(station, transfer),
@@ -183,7 +198,9 @@ impl Station {
         self.speak_if_it_is_time(now);
     }
 
-    fn follow(&mut self, program: ProgramId, frame: &Arc<Frame>) {
+    fn follow(&mut self, program: ProgramId, frame: &Arc<Frame>, sample: &Sample) {
+        let excluded = sample.excluded.contains(self.own());
+        let moment = frame.header.moment;
         let Some(replica) = self
             .replicas
             .iter_mut()
@@ -191,6 +208,13 @@ impl Station {
         else {
             return;
         };
+        if replica.set_excluded(excluded) {
+            self.outbox.push_back(Output::Report(if excluded {
+                Event::Excluded { moment, program }
+            } else {
+                Event::Readmitted { moment, program }
+            }));
+        }
         let followed = replica.follow(
             &self.settings.programs[program.index()],
             &mut self.scratch,
@@ -199,7 +223,7 @@ impl Station {
         );
         if let Followed::FromGenesis(lineage) = followed {
             self.report(Event::Adopted {
-                moment: frame.header.moment,
+                moment,
                 program,
                 lineage,
                 from: None,

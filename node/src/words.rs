@@ -7,6 +7,8 @@
 //! one word for each program whose controller was silent       h(j)(x(j), u(j))
 //! ```
 //!
+//! A controller that said something else than the understudy would counts as silent here: its program gets a word of its own, so
+//! that its remote I/O can tell the two apart, and no other program is touched by a value fault.
 //! A program of which it does not know this cycle's output is in no word, instead of spoiling one.
 
 use smallvec::SmallVec;
@@ -21,7 +23,7 @@ pub(crate) fn of_controller(program: ProgramId, outputs: &Image) -> SmallVec<[Wo
 }
 
 /// The words of an understudy that knows the outputs of `known` (those that `outputs_of` answers for), in a cluster of
-/// the programs `all`, where the controllers of `spoke` have said theirs in this cycle.
+/// the programs `all`, where the controllers of `spoke` have said the same in this cycle.
 pub(crate) fn of_understudy<'a>(
     mode: Mode,
     all: ProgramSet,

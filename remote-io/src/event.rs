@@ -7,6 +7,8 @@ use understudy_wire::{
     ConfigurationHash, Image, Lineage, Moment, Party, ProgramId, Source, StationId, StationSet,
 };
 
+use crate::settings::ValueFault;
+
 /// One thing that happened to a remote I/O.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "kebab-case")]
@@ -60,7 +62,7 @@ pub enum Event {
         /// Where it goes on from.
         lineage: Lineage,
     },
-    /// The operator has released the outputs.
+    /// The operator has released the outputs, and the stations that were excluded or accused.
     Released {
         /// In this cycle.
         moment: Moment,
@@ -87,6 +89,17 @@ pub enum Event {
         syndrome: Image,
         /// One of these is wrong.
         accused: StationSet,
+    },
+    /// Stations say different outputs, or have different states, of one history of this program. Reported when it begins.
+    ValueFault {
+        /// In this cycle.
+        moment: Moment,
+        /// Those of them that can be wrong: by majority where it is located.
+        accused: StationSet,
+        /// Whether it is known who is wrong; then the outputs of the others are driven, and the accused excluded.
+        located: bool,
+        /// What is driven otherwise.
+        answer: ValueFault,
     },
     /// Equal lineages and unequal digests of a program's state: a value fault in one of two stations.
     DigestDiffers {
@@ -125,8 +138,10 @@ pub enum Missing {
     TooLate,
     /// This remote I/O does not know its program's history yet.
     NoHistory,
-    /// The operator has not released the outputs after a cold start.
+    /// The operator has not released the outputs after a cold start, or after a value fault.
     NotReleased,
+    /// Stations disagree, and nobody says who is right.
+    ValueFault,
     /// Neither the controller nor any word of an understudy was there with the true lineage.
     NobodyInStep,
     /// A word was there, and another member of it was not.

@@ -8,8 +8,10 @@ mod history;
 mod remote_io;
 mod selection;
 mod settings;
+mod trust;
+mod votes;
 mod witnesses;
 
 pub use event::{Event, Missing};
 pub use remote_io::RemoteIo;
-pub use settings::{Release, Settings};
+pub use settings::{Release, Settings, ValueFault};

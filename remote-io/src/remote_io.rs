@@ -21,13 +21,15 @@ use std::sync::Arc;
 
 use understudy_wire::{
     Admission, Applied, Arrival, Attendance, Body, Change, Copies, CycleClock, Frame, Header,
-    Holding, Image, Input, Machine, Moment, Output, Party, Reception, StationId, Time,
+    Holding, Image, Input, Machine, Moment, Output, Party, ProgramId, Reception, StationId,
+    StationSet, Time,
 };
 
 use crate::event::{Event, Missing};
 use crate::history::History;
 use crate::selection::Selection;
 use crate::settings::Settings;
+use crate::trust::Trust;
 use crate::witnesses::Witnesses;
 
 /// One remote I/O. See [`Machine`] for how it is driven.
@@ -55,6 +57,9 @@ pub struct RemoteIo {
     /// What it had asked for when it last reported a stall.
     stalled: Time,
     last_true: Option<Image>,
+    trust: Trust,
+    /// Words and states that differed at the last deadline, with those who can be wrong.
+    differed: Vec<(Option<ProgramId>, StationSet)>,
     copies: Copies,
     outbox: VecDeque<Output<Event>>,
 }
@@ -100,6 +105,8 @@ impl RemoteIo {
             asked: now,
             stalled: now,
             last_true: None,
+            trust: Trust::default(),
+            differed: Vec::new(),
             copies: Copies::default(),
             outbox: VecDeque::new(),
             settings,
@@ -260,8 +267,9 @@ impl Machine for RemoteIo {
                 }
             }
             Input::Release => {
-                if !self.released {
+                if !self.released || !self.trust.is_complete() {
                     self.released = true;
+                    self.trust.release();
                     let moment = self.moment();
                     self.report(Event::Released { moment });
                 }

@@ -6,9 +6,9 @@
 //! which lineage replaces.)
 //!
 //! ```text
-//!   own frame, own lineage ──────────────────────────► Direct
-//!   word over a mask with me, my lineage,
-//!   and every other member's frame agrees with it ───► Reconstructed
+//!   own frame, own lineage ──────────────────────────► a vote ─┐
+//!   word over a mask with me, my lineage,                      ├─► they agree: Direct, or Reconstructed where it is silent
+//!   and every other member's frame agrees with it ───► a vote ─┘   they do not: see `trust`
 //!   neither ─────────────────────────────────────────► Missing (the caller holds, then falls safe)
 //! ```
 
@@ -20,6 +20,9 @@ use understudy_wire::{
 };
 
 use crate::event::Missing;
+use crate::settings::ValueFault;
+use crate::trust::{Accusation, Judgement, Trust};
+use crate::votes::{Vote, Votes};
 
 /// Where an applied output comes from.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -41,38 +44,93 @@ pub(crate) struct Heard<'a> {
 }
 
 impl<'a> Heard<'a> {
-    /// Selects the `width` outputs of program `me`, whose true lineage after this cycle's sample is `truth`.
+    /// Selects the `width` outputs of program `me`, whose true lineage after this cycle's sample is `truth`; says who is wrong
+    /// where that is news. The paper's mode compares nothing: its theorems are about erasures.
     ///
     /// At most (words heard) × N steps, each over the holdings of one turn.
-    pub(crate) fn select(&self, me: ProgramId, truth: Lineage, width: usize) -> Selection {
+    pub(crate) fn select(
+        &self,
+        me: ProgramId,
+        truth: Lineage,
+        width: usize,
+        trust: &mut Trust,
+        answer: ValueFault,
+    ) -> (Selection, Option<Accusation>) {
         if self.mode == Mode::Paper && self.silent().len() > 1 {
-            return Selection::Missing(Missing::SecondFailure);
+            return (Selection::Missing(Missing::SecondFailure), None);
         }
+        let (mut votes, missing) = self.votes(me, truth, width, trust.excluded());
+        let (judgement, accusation) = match self.mode {
+            Mode::Paper if votes.is_empty() => (Judgement::Silence, None),
+            Mode::Paper => (Judgement::Believed(0), None),
+            Mode::Full => trust.judge(&votes),
+        };
+        let place = match judgement {
+            Judgement::Silence => return (Selection::Missing(missing), accusation),
+            Judgement::Believed(place) => place,
+            Judgement::Doubted if answer == ValueFault::Alarm => 0,
+            Judgement::Doubted => {
+                return (Selection::Missing(Missing::ValueFault), accusation);
+            }
+        };
+        let vote = votes.swap_remove(place);
+        let selection = if vote.station == StationId(me.0) {
+            Selection::Direct(vote.outputs)
+        } else {
+            Selection::Reconstructed(vote.outputs, vote.station)
+        };
+        (selection, accusation)
+    }
+
+    /// What each station that is not `excluded` says of the outputs of `me`, and why nobody does where nobody does.
+    fn votes(
+        &self,
+        me: ProgramId,
+        truth: Lineage,
+        width: usize,
+        excluded: StationSet,
+    ) -> (Votes, Missing) {
+        let mut votes = Votes::new();
+        let mut missing = Missing::NobodyInStep;
         if let Some((word, holding)) = self.own_word(me)
             && holding.lineage == truth
             && word.sum.width() == width
+            && !excluded.contains(StationId(me.0))
         {
-            return Selection::Direct(word.sum.clone());
+            votes.push(Vote {
+                station: StationId(me.0),
+                digest: holding.digest,
+                outputs: word.sum.clone(),
+                independent: true,
+            });
         }
-        let mut missing = Missing::NobodyInStep;
-        for understudy in self.understudies() {
-            let Some(turn) = self.turn_of(understudy) else {
+        for station in self.understudies() {
+            let turn = self
+                .turn_of(station)
+                .filter(|_| !excluded.contains(station));
+            let Some((turn, holding)) = turn.and_then(|turn| Some((turn, holding_of(turn, me)?)))
+            else {
                 continue;
             };
-            if holding_of(turn, me).is_none_or(|holding| holding.lineage != truth) {
+            if holding.lineage != truth {
                 continue;
             }
             for word in turn.words.iter().filter(|word| word.members.contains(me)) {
-                match self
-                    .reconstruct(me, turn, word)
-                    .and_then(|sum| sum.narrowed(width))
-                {
-                    Some(outputs) => return Selection::Reconstructed(outputs, understudy),
-                    None => missing = Missing::TwoErasures,
-                }
+                let sum = self.reconstruct(me, turn, word);
+                let Some(outputs) = sum.and_then(|sum| sum.narrowed(width)) else {
+                    missing = Missing::TwoErasures;
+                    continue;
+                };
+                votes.push(Vote {
+                    station,
+                    digest: holding.digest,
+                    outputs,
+                    independent: word.members.len() == 1,
+                });
+                break;
             }
         }
-        Selection::Missing(missing)
+        (votes, missing)
     }
 
     /// Equation (12) for one word: the sum of the word and of all its other members, or `None` where one of them is not
@@ -291,7 +349,7 @@ mod tests {
             mode: Mode::Full,
         };
         for me in 0..3 {
-            let selection = heard.select(ProgramId(me as u8), TRUE, WIDTHS[me]);
+            let (selection, accusation) = select(heard, me, ValueFault::Alarm);
             let others = (0..3).filter(|&other| other != me && mask >> other & 1 == 1);
             let provable = with_understudy
                 && if mask >> me & 1 == 1 {
@@ -300,8 +358,19 @@ mod tests {
                     alone >> me & 1 == 1
                 };
             match cases[me] {
-                // A value fault of a controller that is alone cannot be seen in its own frame; it is reported, below.
-                Controller::Corrupted => assert_eq!(selection, Selection::Direct(image(me, true))),
+                // A value fault of a controller that is alone cannot be seen in its own frame.
+                Controller::Corrupted => {
+                    assert_eq!(selection, Selection::Direct(image(me, true)));
+                    let (held, _) = select(heard, me, ValueFault::Hold);
+                    let accused = [StationId(me as u8), StationId(3)].into_iter().collect();
+                    let located = false;
+                    if provable {
+                        assert_eq!(held, Selection::Missing(Missing::ValueFault));
+                        assert_eq!(accusation, Some(Accusation { accused, located }));
+                    } else {
+                        assert_eq!((held, accusation), (selection, None));
+                    }
+                }
                 Controller::True => assert_eq!(selection, Selection::Direct(image(me, false))),
                 _ if provable => {
                     let restored = Selection::Reconstructed(image(me, false), StationId(3));
@@ -317,6 +386,12 @@ mod tests {
         let differences = heard.digest_differences().count();
         assert_eq!(differences, if with_understudy { corrupted } else { 0 });
         assert_eq!(heard.syndromes().count(), 0);
+    }
+
+    /// Of a remote I/O that trusts everybody.
+    fn select(heard: Heard<'_>, me: usize, answer: ValueFault) -> (Selection, Option<Accusation>) {
+        let program = ProgramId(me as u8);
+        heard.select(program, TRUE, WIDTHS[me], &mut Trust::default(), answer)
     }
 
     /// An output that is corrupted on its way out of a sound state leaves a syndrome, (10), and accuses all who can be wrong.
@@ -361,7 +436,13 @@ mod tests {
                 mode: Mode::Paper,
             };
             for (me, width) in (0..).zip(WIDTHS) {
-                let selection = heard.select(ProgramId(me), TRUE, width);
+                let (selection, _) = heard.select(
+                    ProgramId(me),
+                    TRUE,
+                    width,
+                    &mut Trust::default(),
+                    ValueFault::Hold,
+                );
                 let missing = matches!(selection, Selection::Missing(_));
                 assert_eq!(missing, silent.len() > 1, "{silent:?}");
             }

@@ -22,6 +22,22 @@ pub struct Settings {
     pub fail_safe: Image,
     /// Who releases the outputs after a cold start.
     pub release: Release,
+    /// What is driven while nobody can say which of two stations is right.
+    pub value_fault: ValueFault,
+}
+
+/// What is driven while two stations say different outputs from one history, and no third one says which is right.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ValueFault {
+    /// The last true outputs for the configured cycles, then the fail-safe ones, until they agree again, a third one
+    /// says who is right, or the operator releases them.
+    #[default]
+    Hold,
+    /// The outputs of the controller itself, which may be wrong.
+    Alarm,
+    /// The fail-safe outputs, at once, until the operator releases them.
+    FailSafe,
 }
 
 /// Who releases the outputs after a program has started cold.

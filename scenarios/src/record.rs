@@ -109,6 +109,8 @@ pub(crate) fn moment(event: &Happening) -> Option<Moment> {
             | Station::Adopted { moment, .. }
             | Station::InStep { moment, .. }
             | Station::DigestDiffers { moment, .. }
+            | Station::Excluded { moment, .. }
+            | Station::Readmitted { moment, .. }
             | Station::Stalled { moment, .. } => Some(*moment),
             Station::Refused { .. } => None,
         },
@@ -122,6 +124,7 @@ pub(crate) fn moment(event: &Happening) -> Option<Moment> {
             | RemoteIo::Cleared { moment, .. }
             | RemoteIo::Syndrome { moment, .. }
             | RemoteIo::DigestDiffers { moment, .. }
+            | RemoteIo::ValueFault { moment, .. }
             | RemoteIo::Stalled { moment, .. } => Some(*moment),
             RemoteIo::StartedCold { born, .. } => Some(*born),
             RemoteIo::Refused { .. } => None,

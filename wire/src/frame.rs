@@ -78,6 +78,8 @@ pub struct Sample {
     pub history: SmallVec<[Image; 2]>,
     /// What was applied last; nothing before the first deadline.
     pub applied: Option<Applied>,
+    /// Stations whose state of this program is proved to be faulty: they say nothing of it until the operator releases them.
+    pub excluded: StationSet,
 }
 
 /// What a remote I/O drove at a deadline.

@@ -59,6 +59,7 @@ fn every_kind() -> Vec<(&'static str, Frame)> {
         before: Lineage(6),
         history: smallvec![image(4, 0b0011), image(4, 0b1010)],
         applied: Some(applied),
+        excluded: StationSet::from_bits(0b10),
     };
     let turn = Turn {
         heard: StationSet::from_bits(0b11),
@@ -171,6 +172,7 @@ fn a_frame_that_breaks_a_promise_never_leaves() {
         before: Lineage(0),
         history: smallvec![],
         applied: None,
+        excluded: StationSet::EMPTY,
     };
     check_refused(remote_io, Body::Sample(empty.clone()));
     let uneven = Sample {

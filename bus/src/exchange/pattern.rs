@@ -151,6 +151,7 @@ fn sample() -> Body {
         before: Lineage(u64::MAX),
         history: (0..8).map(|_| Image::zero(WIDTH)).collect(),
         applied: None,
+        excluded: StationSet::EMPTY,
     })
 }
 

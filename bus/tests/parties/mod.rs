@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use understudy_bus::{Endpoints, Peer};
 use understudy_wire::{
     Agreement, Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Field, Frame, Header, Image,
-    Input, Lineage, Machine, Mode, Moment, Output, Party, ProgramId, Sample, Schedule, StationId,
+    Input, Lineage, Machine, Mode, Moment, Output, Party, ProgramId, Sample, Schedule, StationId, StationSet,
     Time,
 };
 
@@ -122,6 +122,7 @@ fn sample() -> Sample {
         before: Lineage(1),
         history: [Image::zero(3)].into_iter().collect(),
         applied: None,
+        excluded: StationSet::EMPTY,
     }
 }
 

@@ -143,6 +143,7 @@ mod tests {
                         source: Source::FailSafe,
                         outputs: ones(bits),
                     }),
+                    excluded: StationSet::from_bits(u64::MAX),
                 };
                 let bound = sample_bytes(bits, bits, history);
                 check_body(Party::RemoteIo(ProgramId(63)), Body::Sample(sample), bound);

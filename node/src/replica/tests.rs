@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use proptest::prelude::*;
 use understudy_logic::{Circuit, CircuitBuilder, Scan};
 use understudy_wire::{
-    ClusterHash, ConfigurationHash, Cycle, Epoch, Header, Party, ProgramHash, StationId,
+    ClusterHash, ConfigurationHash, Cycle, Epoch, Header, Party, ProgramHash, StationId, StationSet,
 };
 
 use super::*;
@@ -106,6 +106,7 @@ impl Truth {
                 before: self.lineages[self.inputs.len() - 1],
                 history: self.inputs[first..].iter().cloned().collect(),
                 applied: None,
+                excluded: StationSet::EMPTY,
             }),
         })
     }

@@ -5,7 +5,7 @@ use understudy_wire::{
     Body, Holding, Moment, Output, ProgramId, ProgramSet, StationId, StationSet, Time, Turn,
 };
 
-use super::Station;
+use super::{Said, Station};
 use crate::event::Event;
 use crate::replica::{Replica, Standing};
 use crate::words;
@@ -19,7 +19,14 @@ impl Station {
         let understudy = self.settings.agreement.schedule.is_understudy(station);
         for word in &turn.words {
             if !understudy && word.members == ProgramSet::only(own_program) {
-                self.cycle.spoke.insert(own_program);
+                let holdings = turn.holdings.iter();
+                let own = holdings.filter(|holding| holding.program == own_program);
+                self.cycle.said.extend(own.map(|holding| Said {
+                    program: own_program,
+                    lineage: holding.lineage,
+                    digest: holding.digest,
+                    outputs: word.sum.clone(),
+                }));
             }
             if station < self.own() {
                 self.cycle.others_have = self.cycle.others_have.or(word.members);
@@ -48,12 +55,29 @@ impl Station {
             if matches!(replica.standing(), Standing::Shadow(_)) {
                 replica.discard();
             }
-            self.outbox.push_back(Output::Report(Event::DigestDiffers {
-                moment,
-                program: theirs.program,
-                station,
-            }));
+            self.cycle.differs.push((theirs.program, station));
+            if !self.differed.contains(&(theirs.program, station)) {
+                self.outbox.push_back(Output::Report(Event::DigestDiffers {
+                    moment,
+                    program: theirs.program,
+                    station,
+                }));
+            }
         }
+    }
+
+    /// Programs whose controllers have said in this cycle what this station would say of them.
+    fn confirmed(&self) -> ProgramSet {
+        let said = self.cycle.said.iter().filter(|said| {
+            let replica = self.replicas.iter().find(|it| it.id() == said.program);
+            replica.is_some_and(|replica| {
+                replica.outputs() == &said.outputs
+                    && replica.holding().is_some_and(|ours| {
+                        ours.lineage == said.lineage && ours.digest == said.digest
+                    })
+            })
+        });
+        said.map(|said| said.program).collect()
     }
 
     /// It speaks when it has the token and knows its outputs, and at the last call whatever it knows.
@@ -99,7 +123,7 @@ impl Station {
                 self.settings.agreement.mode,
                 ProgramSet::first(self.settings.agreement.schedule.controllers()),
                 known.map(Replica::id).collect(),
-                self.cycle.spoke,
+                self.confirmed(),
                 |program| {
                     let replica = self.replicas.iter().find(|replica| replica.id() == program);
                     replica.map(Replica::outputs)

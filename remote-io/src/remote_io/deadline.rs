@@ -1,11 +1,13 @@
 //! The deadline: something is driven at every one, and only what is true, held, or fail-safe.
 
-use understudy_wire::{Applied, Image, Output, Source, Time};
+use understudy_wire::{Applied, Image, Moment, Output, Source, Time};
 
 use super::{Phase, RemoteIo};
 use crate::event::{Event, Missing};
 use crate::history::History;
 use crate::selection::{Heard, Selection};
+use crate::settings::ValueFault;
+use crate::trust::Accusation;
 
 impl RemoteIo {
     /// The deadline of a cycle that was started. What was heard is worth nothing when it comes a period late.
@@ -17,7 +19,9 @@ impl RemoteIo {
             controllers: self.settings.agreement.schedule.controllers(),
             mode: self.settings.agreement.mode,
         };
-        let width = self.settings.fail_safe.width();
+        let settings = &self.settings;
+        let width = settings.fail_safe.width();
+        let mut accusation = None;
         let (selection, sampled) = match &self.phase {
             Phase::Listening { .. } => (Selection::Missing(Missing::NoHistory), None),
             Phase::Running { sampled: false, .. } => (Selection::Missing(Missing::NoCycle), None),
@@ -26,8 +30,12 @@ impl RemoteIo {
                 (Selection::Missing(Missing::TooLate), Some(sampled))
             }
             Phase::Running { history, .. } => {
+                let (truth, answer) = (history.head(), settings.value_fault);
+                let (selected, found) =
+                    heard.select(settings.program, truth, width, &mut self.trust, answer);
+                accusation = found;
                 let selection = if self.released {
-                    heard.select(self.settings.program, history.head(), width)
+                    selected
                 } else {
                     Selection::Missing(Missing::NotReleased)
                 };
@@ -35,21 +43,56 @@ impl RemoteIo {
             }
         };
         let moment = self.moment();
-        for (syndrome, accused) in heard.syndromes() {
-            self.outbox.push_back(Output::Report(Event::Syndrome {
+        if let Some(Accusation { accused, located }) = accusation {
+            self.report(Event::ValueFault {
                 moment,
-                syndrome,
                 accused,
-            }));
+                located,
+                answer: self.settings.value_fault,
+            });
         }
-        for (program, accused) in heard.digest_differences() {
-            self.outbox.push_back(Output::Report(Event::DigestDiffers {
-                moment,
-                program,
-                accused,
-            }));
+        self.report_differences(moment);
+        let doubted = matches!(selection, Selection::Missing(Missing::ValueFault));
+        if doubted && self.settings.value_fault == ValueFault::FailSafe {
+            self.released = false;
+            self.last_true = None;
         }
         self.apply(selection, sampled);
+    }
+
+    fn heard(&self) -> Heard<'_> {
+        Heard {
+            turns: &self.turns,
+            controllers: self.settings.agreement.schedule.controllers(),
+            mode: self.settings.agreement.mode,
+        }
+    }
+
+    /// Reports words and states of any program that do not agree, when they begin to differ.
+    fn report_differences(&mut self, moment: Moment) {
+        let syndromes: Vec<_> = self.heard().syndromes().collect();
+        let states: Vec<_> = self.heard().digest_differences().collect();
+        let before = std::mem::take(&mut self.differed);
+        for (syndrome, accused) in syndromes {
+            self.differed.push((None, accused));
+            if !before.contains(&(None, accused)) {
+                self.report(Event::Syndrome {
+                    moment,
+                    syndrome,
+                    accused,
+                });
+            }
+        }
+        for (program, accused) in states {
+            self.differed.push((Some(program), accused));
+            if !before.contains(&(Some(program), accused)) {
+                self.report(Event::DigestDiffers {
+                    moment,
+                    program,
+                    accused,
+                });
+            }
+        }
     }
 
     /// u(i)(t), which the sensors may have left since.

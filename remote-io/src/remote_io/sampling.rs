@@ -100,6 +100,7 @@ impl RemoteIo {
             before: history.before(),
             history: history.samples(),
             applied: self.applied.clone(),
+            excluded: self.trust.excluded(),
         });
         if void > 0 {
             self.report(Event::Voided {

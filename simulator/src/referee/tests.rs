@@ -1,7 +1,7 @@
 //! A referee that never blows its whistle proves nothing: every kind of violation is shown to it.
 
 use understudy_logic::CircuitBuilder;
-use understudy_remote_io::Release;
+use understudy_remote_io::{Release, ValueFault};
 use understudy_wire::{
     Agreement, ClusterHash, ConfigurationHash, Cycle, Epoch, Mode, ProgramId, Schedule, StationId,
     StationSet,
@@ -37,6 +37,7 @@ fn referee() -> Referee {
         hold_cycles: 2,
         fail_safe: Image::zero(1),
         release: Release::Automatic,
+        value_fault: ValueFault::Hold,
     };
     Referee::new(&settings, Scan::new(&circuit))
 }

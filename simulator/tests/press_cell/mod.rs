@@ -66,6 +66,7 @@ pub(crate) fn line(programs: usize, mode: Mode, understudies: usize) -> Parts {
                 hold_cycles: HOLD_CYCLES,
                 fail_safe: Image::zero(program.scan.output_count()),
                 release: understudy_remote_io::Release::Automatic,
+                value_fault: understudy_remote_io::ValueFault::Hold,
             });
     let kinds = [
         ModelKind::Robot(RobotParameters::default()),
