@@ -73,6 +73,13 @@ impl Console {
         }
     }
 
+    /// A line while a command runs; nothing under `--json`.
+    pub(crate) fn note(&mut self, line: &str) {
+        if !self.json {
+            self.say(line);
+        }
+    }
+
     /// One line, unless it is the last one again.
     fn say(&mut self, line: &str) {
         if self.said == line {

@@ -3,23 +3,26 @@
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use understudy_cluster::Cluster;
 use understudy_scenarios::{
-    Expectation, LaboratorySettings, RunDirectory, Scenario, Summary, World, run_laboratory,
+    Expectation, HostKind, LaboratorySettings, NetworkSettings, RunDirectory, Scenario, Summary,
+    World, run_laboratory,
 };
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
-use crate::overrides::OverrideArguments;
+use crate::overrides::{OverrideArguments, link_kind};
+use crate::proxy::ImpairmentArguments;
 use crate::run::{answer, circumstances, command_line, machine};
 
 /// Run a cluster on real processes of this machine, and break it as a scenario says
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  understudy lab examples/press-cell/cluster.toml --scenario scenarios/kill-each.toml --link udp")]
+  understudy lab examples/press-cell/cluster.toml --scenario scenarios/kill-each.toml --link udp
+  understudy lab examples/press-cell/cluster.toml --hosts netns --loss 1%")]
 pub(crate) struct Arguments {
     /// The cluster file
     #[arg(value_name = "CLUSTER.toml")]
@@ -38,9 +41,47 @@ pub(crate) struct RunArguments {
     pub(crate) cycles: Option<u64>,
     #[command(flatten)]
     pub(crate) overrides: OverrideArguments,
+    #[command(flatten)]
+    pub(crate) network: NetworkArguments,
     /// Where runs are kept, each in a directory of its own
     #[arg(long, value_name = "DIR", default_value = "runs")]
     pub(crate) out: PathBuf,
+}
+
+/// What lies between the processes.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Network")]
+pub(crate) struct NetworkArguments {
+    /// Where the processes run
+    #[arg(long, value_enum, default_value_t)]
+    hosts: HostArgument,
+    #[command(flatten)]
+    impairment: ImpairmentArguments,
+    /// What the fates of datagrams come from
+    #[arg(long, value_name = "SEED", default_value_t)]
+    network_seed: u64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+enum HostArgument {
+    /// All on the loopback interface
+    #[default]
+    Loopback,
+    /// One host for each station, and one for each remote I/O with its plant: network namespaces joined by a bridge. Needs root
+    Netns,
+}
+
+impl NetworkArguments {
+    pub(crate) fn settings(&self) -> NetworkSettings {
+        NetworkSettings {
+            hosts: match self.hosts {
+                HostArgument::Loopback => HostKind::Loopback,
+                HostArgument::Netns => HostKind::Namespaces,
+            },
+            impairment: self.impairment.impairment(),
+            seed: self.network_seed,
+        }
+    }
 }
 
 /// Cycles of a run without a scenario.
@@ -108,6 +149,8 @@ pub(crate) fn in_laboratory(
         program,
         cluster_file,
         arguments: arguments.overrides.to_arguments(),
+        link: link_kind(cluster),
+        network: arguments.network.settings(),
     };
     let mut watch = |progress| console.show(&progress);
     let run = match run_laboratory(cluster, scenario, settings, directory, &mut watch) {

@@ -20,6 +20,7 @@ mod measure;
 mod overrides;
 mod parity;
 mod party;
+mod proxy;
 mod reliability;
 mod run;
 mod schema;
@@ -73,6 +74,7 @@ enum Command {
     Node(party::Arguments),
     RemoteIo(party::RemoteIoArguments),
     Plant(party::PlantArguments),
+    Proxy(proxy::Arguments),
     Bench(bench::Arguments),
     Schema(schema::Arguments),
     Completions(shell::CompletionsArguments),
@@ -97,6 +99,7 @@ impl Command {
             Self::Node(_) => "node",
             Self::RemoteIo(_) => "remote-io",
             Self::Plant(_) => "plant",
+            Self::Proxy(_) => "proxy",
             Self::Bench(_) => "bench",
             Self::Schema(_) => "schema",
             Self::Completions(_) => "completions",
@@ -121,6 +124,7 @@ impl Command {
             Self::Node(arguments) => party::run_station(&arguments),
             Self::RemoteIo(arguments) => party::run_remote_io(&arguments.common),
             Self::Plant(arguments) => party::run_plant(&arguments.common),
+            Self::Proxy(arguments) => proxy::run(&arguments, console),
             Self::Bench(arguments) => bench::run(arguments, console),
             Self::Schema(arguments) => schema::run(&arguments),
             Self::Completions(arguments) => shell::completions(&arguments),

@@ -129,6 +129,12 @@ impl Endpoints {
         }
     }
 
+    /// Whether this party and `other` have something to say to each other, in either direction.
+    pub fn talks_with(&self, other: Party) -> bool {
+        let own = self.own.party;
+        self.topic(own, other).or(self.topic(other, own)).is_some()
+    }
+
     /// Those who hear this party on `topic`.
     pub(crate) fn audience(&self, topic: Topic) -> impl Iterator<Item = &Peer> {
         self.others
@@ -149,10 +155,9 @@ impl Endpoints {
     /// one pair can end as two halves that never meet.
     pub(crate) fn called(&self) -> impl Iterator<Item = &Peer> {
         let own = self.own.party;
-        self.others.iter().filter(move |peer| {
-            let talks = self.topic(own, peer.party).or(self.topic(peer.party, own));
-            talks.is_some() && peer.party < own
-        })
+        self.others
+            .iter()
+            .filter(move |peer| self.talks_with(peer.party) && peer.party < own)
     }
 }
 

@@ -8,6 +8,7 @@ mod error;
 mod hosts;
 mod impairment;
 mod proxy;
+mod run;
 mod shaper;
 mod tools;
 
@@ -15,4 +16,5 @@ pub use error::NetworkError;
 pub use hosts::{Host, Hosts, missing_tools};
 pub use impairment::{Impairment, Rate, Share, WrittenImpairment};
 pub use proxy::{Direction, Proxy, ProxyCounters, ProxyOrder, Route, Transport};
+pub use run::run_proxy;
 pub use shaper::{Passed, Shaper};

@@ -21,9 +21,16 @@ use std::thread::JoinHandle;
 use nix::sys::eventfd::{EfdFlags, EventFd};
 use nix::time::{ClockId, clock_gettime};
 use serde::{Deserialize, Serialize};
+use thread_priority::{
+    RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
+    set_thread_priority_and_policy, thread_native_id,
+};
 
 use crate::error::NetworkError;
 use crate::impairment::Impairment;
+
+/// Of SCHED_FIFO.
+const PRIORITY: u8 = 45;
 
 /// Orders that wait, at most.
 const ORDERS: usize = 4096;
@@ -198,7 +205,10 @@ impl Proxy {
         let worker = Arc::clone(&shared);
         let thread = std::thread::Builder::new()
             .name("proxy".into())
-            .spawn(move || datagrams::carry(lanes, streams, &taken, &worker))
+            .spawn(move || {
+                run_before_parties();
+                datagrams::carry(lanes, streams, &taken, &worker);
+            })
             .map_err(NetworkError::system("a thread for the proxy"))?;
         Ok(Self {
             addresses,
@@ -240,6 +250,19 @@ impl Drop for Proxy {
             // One that panicked has said so on standard error.
             let _ = thread.join();
         }
+    }
+}
+
+/// A network does not wait for who uses it: before all parties of this machine, where the system grants it.
+fn run_before_parties() {
+    let priority = ThreadPriorityValue::try_from(PRIORITY).map(ThreadPriority::Crossplatform);
+    let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
+    let set = priority.and_then(|priority| {
+        set_thread_priority_and_policy(thread_native_id(), priority, policy)
+            .map_err(|error| error.to_string())
+    });
+    if let Err(error) = set {
+        tracing::debug!(error, "the proxy runs among the other programs");
     }
 }
 

@@ -7,11 +7,10 @@ mod error;
 mod patience;
 mod ports;
 mod process;
+mod site;
 mod steps;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io;
-use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -19,7 +18,7 @@ use nix::time::{ClockId, clock_gettime};
 use tokio::process::Command;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::mpsc::{Receiver, Sender, channel};
-use understudy_bus::{HostEvent, Peer, ZENOH_RUNTIME};
+use understudy_bus::{HostEvent, LinkKind, ZENOH_RUNTIME};
 use understudy_cluster::Cluster;
 use understudy_simulator::{Action, Fault};
 use understudy_wire::Party;
@@ -31,9 +30,11 @@ use crate::run_directory::RunDirectory;
 use crate::scenario::{Scenario, action_word};
 
 pub use error::LaboratoryError;
+pub use site::{HostKind, NetworkSettings};
 
 use patience::Waits;
 use process::{Process, Said, Saying};
+use site::Site;
 use steps::Steps;
 
 /// What the parties say and nobody has read yet, at most; then they wait, and lose records rather than cycles.
@@ -53,6 +54,10 @@ pub struct LaboratorySettings {
     pub cluster_file: PathBuf,
     /// What they are told besides, such as `--period 5ms`: all the same.
     pub arguments: Vec<String>,
+    /// What carries their frames.
+    pub link: LinkKind,
+    /// What lies between them.
+    pub network: NetworkSettings,
 }
 
 /// How far a run is.
@@ -115,15 +120,15 @@ pub fn run_laboratory(
     directory: &RunDirectory,
     watch: &mut dyn FnMut(Progress),
 ) -> Result<LaboratoryRun, LaboratoryError> {
-    if scenario.network.is_some() {
-        return Err(LaboratoryError::Network);
-    }
+    refuse_what_is_simulated(scenario)?;
     let system = |what| move |source| LaboratoryError::System { what, source };
-    let endpoints = directory.file("endpoints.json");
-    let peers = addresses(cluster).map_err(system("free ports of the loopback interface"))?;
-    let text = serde_json::to_string_pretty(&peers).map_err(io::Error::from);
-    text.and_then(|text| std::fs::write(&endpoints, text + "\n"))
-        .map_err(system("to write endpoints.json"))?;
+    let site = Site::prepare(
+        cluster,
+        scenario,
+        settings.link,
+        settings.network,
+        directory,
+    )?;
     let journal = Journal::create(&directory.file("journal.jsonl"))
         .map_err(system("to write journal.jsonl"))?;
     let runtime = tokio::runtime::Builder::new_current_thread()
@@ -133,7 +138,7 @@ pub fn run_laboratory(
     let (sender, receiver) = channel(UNREAD_LINES);
     let laboratory = Laboratory {
         settings,
-        endpoints,
+        site,
         account: Account::new(Terms::of(cluster), scenario, OriginRule::Found),
         journal: Some(journal),
         processes: BTreeMap::new(),
@@ -147,31 +152,32 @@ pub fn run_laboratory(
     Ok(runtime.block_on(laboratory.run(receiver)))
 }
 
-/// From the cluster file, or free ones of the loopback interface.
-fn addresses(cluster: &Cluster) -> io::Result<Vec<Peer>> {
-    let parties: Vec<Party> = cluster.parties().collect();
-    let known: Vec<Option<SocketAddr>> = parties
-        .iter()
-        .map(|&party| cluster.address(party))
-        .collect();
-    let lacking = known.iter().filter(|address| address.is_none()).count();
-    let mut free = ports::free_addresses(lacking)?.into_iter();
-    Ok(parties
-        .into_iter()
-        .zip(known)
-        .filter_map(|(party, known)| {
-            Some(Peer {
-                party,
-                name: cluster.party_name(party)?.to_owned(),
-                address: known.or_else(|| free.next())?,
-            })
-        })
-        .collect())
+/// A process has no way to do some of what a simulation can.
+fn refuse_what_is_simulated(scenario: &Scenario) -> Result<(), LaboratoryError> {
+    let real = |action| {
+        matches!(
+            action,
+            Action::Crash
+                | Action::Restart
+                | Action::Stop
+                | Action::Continue
+                | Action::Release
+                | Action::Cut { .. }
+                | Action::Heal { .. }
+        )
+    };
+    let simulated = scenario.steps.iter().filter(|step| !real(step.action));
+    let words: BTreeSet<&'static str> = simulated.map(|step| step.action.word()).collect();
+    if words.is_empty() {
+        return Ok(());
+    }
+    let words = words.into_iter().collect();
+    Err(LaboratoryError::OnlySimulated { words })
 }
 
 struct Laboratory<'w> {
     settings: LaboratorySettings,
-    endpoints: PathBuf,
+    site: Site,
     account: Account,
     journal: Option<Journal>,
     processes: BTreeMap<Party, Process>,
@@ -190,6 +196,7 @@ impl Laboratory<'_> {
         (self.watch)(Progress::Ending);
         self.end(&mut receiver).await;
         self.note(RunEvent::Finished);
+        self.machine.extend(self.site.describe());
         LaboratoryRun {
             account: self.account,
             journal: self.journal.take().map(Journal::finish).unwrap_or_default(),
@@ -288,7 +295,7 @@ impl Laboratory<'_> {
             .arg(&self.settings.cluster_file)
             .args(["--name", &name])
             .arg("--endpoints")
-            .arg(&self.endpoints)
+            .args(self.site.endpoints(party))
             .arg("--in-laboratory")
             .args(&self.settings.arguments)
             .env(ZENOH_RUNTIME.0, ZENOH_RUNTIME.1);
@@ -297,7 +304,8 @@ impl Laboratory<'_> {
             .entry(party)
             .and_modify(|life| *life += 1)
             .or_insert(1);
-        let process = Process::start(party, *life, command, self.sender.clone());
+        let start = || Process::start(party, *life, command, self.sender.clone());
+        let process = self.site.at(party, start)?;
         let process = process.map_err(|source| LaboratoryError::Start {
             name,
             program: self.settings.program.clone(),
@@ -355,12 +363,15 @@ impl Laboratory<'_> {
             return Ok(());
         };
         let done = match step.action {
+            Action::Cut { to } => self.site.cut(step.party, to, true),
+            Action::Heal { to } => self.site.cut(step.party, to, false),
             Action::Crash => process.crash().await,
             Action::Restart => return self.restarted(step, &name),
             Action::Stop => process.stop(),
             Action::Continue => process.go_on(),
             Action::Release => process.command("release").await,
-            _ => Err(std::io::Error::other("only a simulation can do this")),
+            // Refused before the run began.
+            _ => Err(std::io::ErrorKind::Unsupported.into()),
         };
         done.map_err(|source| LaboratoryError::Step {
             action: action_word(step.action),

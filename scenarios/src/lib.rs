@@ -23,7 +23,8 @@ pub use campaign::{CampaignError, CampaignPlan, Measured, run_campaign};
 pub use figure::{FigureError, Signals, figure};
 pub use journal::{Journal, JournalError, JournalState, records};
 pub use laboratory::{
-    LaboratoryError, LaboratoryRun, LaboratorySettings, Progress, run_laboratory,
+    HostKind, LaboratoryError, LaboratoryRun, LaboratorySettings, NetworkSettings, Progress,
+    run_laboratory,
 };
 pub use parties::Parties;
 pub use read::{MAXIMUM_CYCLES, MAXIMUM_STEPS, ReadScenario, looks_like_a_scenario, read};

@@ -4,7 +4,7 @@ use insta::assert_snapshot;
 
 use crate::understudy;
 
-const COMMANDS: [&str; 17] = [
+const COMMANDS: [&str; 18] = [
     "demo",
     "lab",
     "simulate",
@@ -18,6 +18,7 @@ const COMMANDS: [&str; 17] = [
     "node",
     "remote-io",
     "plant",
+    "proxy",
     "bench",
     "schema",
     "completions",

@@ -5,13 +5,15 @@
     reason = "what is waited for has a deadline on the real clock"
 )]
 
+mod hosts;
+
 use std::collections::BTreeSet;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 use nix::sys::signal::{Signal, kill};
@@ -25,6 +27,12 @@ const PRESS_CELL: &str = "examples/press-cell/cluster.toml";
 /// Its deadline is long beside the delays of a busy machine.
 const PERIOD: &str = "50ms";
 const DEADLINE: Duration = Duration::from_secs(60);
+
+fn one_at_a_time() -> MutexGuard<'static, ()> {
+    ONE_AT_A_TIME
+        .lock()
+        .unwrap_or_else(|poisoned| poisoned.into_inner())
+}
 
 fn empty_folder(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
@@ -91,9 +99,7 @@ fn processes() -> BTreeSet<String> {
 
 /// What a run over plain UDP came to. Cycles in which a machine that other programs share stood still are counted apart.
 fn check(name: &str, scenario: &str, more: &[&str]) -> Value {
-    let _one = ONE_AT_A_TIME
-        .lock()
-        .unwrap_or_else(|poisoned| poisoned.into_inner());
+    let _one = one_at_a_time();
     let out = empty_folder(name);
     let arguments = [
         "lab",
@@ -159,9 +165,7 @@ fn a_remote_io_that_is_started_again_adopts_its_history() {
 
 #[test]
 fn the_demo_at_a_shorter_length() {
-    let _one = ONE_AT_A_TIME
-        .lock()
-        .unwrap_or_else(|poisoned| poisoned.into_inner());
+    let _one = one_at_a_time();
     let out = empty_folder("demo");
     let arguments = [
         "demo", "--cycles", "250", "--link", "udp", "--period", PERIOD, "--out",
@@ -182,11 +186,12 @@ fn the_demo_at_a_shorter_length() {
 }
 
 /// Starts a laboratory and waits until its cycles run.
-fn running(out: &Path) -> (Child, BufReader<std::process::ChildStderr>) {
+fn running(out: &Path, more: &[&str]) -> (Child, BufReader<std::process::ChildStderr>) {
     let mut child = understudy(&[
         "lab", PRESS_CELL, "--link", "udp", "--period", PERIOD, "--cycles", "100000", "--out",
     ])
     .arg(out)
+    .args(more)
     .stdout(Stdio::piped())
     .stderr(Stdio::piped())
     .spawn()
@@ -208,11 +213,9 @@ fn signal(process: u32, signal: Signal) {
 
 #[test]
 fn an_interrupted_run_leaves_its_results_and_no_orphan() {
-    let _one = ONE_AT_A_TIME
-        .lock()
-        .unwrap_or_else(|poisoned| poisoned.into_inner());
+    let _one = one_at_a_time();
     let out = empty_folder("interrupted");
-    let (mut child, _errors) = running(&out);
+    let (mut child, _errors) = running(&out, &[]);
     signal(child.id(), Signal::SIGINT);
     let mut text = String::new();
     child
@@ -229,11 +232,9 @@ fn an_interrupted_run_leaves_its_results_and_no_orphan() {
 
 #[test]
 fn a_killed_laboratory_leaves_no_orphan() {
-    let _one = ONE_AT_A_TIME
-        .lock()
-        .unwrap_or_else(|poisoned| poisoned.into_inner());
+    let _one = one_at_a_time();
     let out = empty_folder("killed");
-    let (mut child, _errors) = running(&out);
+    let (mut child, _errors) = running(&out, &[]);
     child.kill().expect("it lives");
     child.wait().expect("it ends");
     no_orphan(&out);
@@ -241,11 +242,9 @@ fn a_killed_laboratory_leaves_no_orphan() {
 
 #[test]
 fn a_party_that_dies_unasked_ends_the_run_and_is_named() {
-    let _one = ONE_AT_A_TIME
-        .lock()
-        .unwrap_or_else(|poisoned| poisoned.into_inner());
+    let _one = one_at_a_time();
     let out = empty_folder("dies");
-    let (mut child, mut errors) = running(&out);
+    let (mut child, mut errors) = running(&out, &[]);
     signal(process_of(&out, "press"), Signal::SIGKILL);
     let mut said = String::new();
     errors.read_to_string(&mut said).expect("text");
@@ -278,9 +277,7 @@ fn process_of(out: &Path, name: &str) -> u32 {
 
 #[test]
 fn a_port_in_use_is_said_plainly_and_everything_is_stopped() {
-    let _one = ONE_AT_A_TIME
-        .lock()
-        .unwrap_or_else(|poisoned| poisoned.into_inner());
+    let _one = one_at_a_time();
     let out = empty_folder("port");
     let taken = UdpSocket::bind("127.0.0.1:0").expect("a free port");
     let port = taken.local_addr().expect("an address").port();

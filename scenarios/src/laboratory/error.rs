@@ -3,6 +3,9 @@
 use std::io;
 use std::path::PathBuf;
 
+use understudy_bus::BusError;
+use understudy_network::NetworkError;
+
 /// Everything that was started is stopped when one of these comes out. The codes are stable.
 #[derive(Debug, thiserror::Error)]
 pub enum LaboratoryError {
@@ -72,8 +75,17 @@ pub enum LaboratoryError {
         line: String,
     },
     /// The scenario needs what only the simulator has.
-    #[error("U0528: the scenario has faults of the network, which only `understudy simulate` has")]
-    Network,
+    #[error("U0528: only `understudy simulate` has these steps of the scenario: {}", words.join(", "))]
+    OnlySimulated {
+        /// Their actions.
+        words: Vec<&'static str>,
+    },
+    /// The network that was asked for is not to be had.
+    #[error(transparent)]
+    Network(#[from] NetworkError),
+    /// The addresses do not fit together.
+    #[error(transparent)]
+    Endpoints(BusError),
     /// The system refused something that the laboratory needs.
     #[error("U0529: {what}: {source}")]
     System {
@@ -99,7 +111,9 @@ impl LaboratoryError {
             Self::NoCycles { .. } => "U0525",
             Self::Step { .. } => "U0526",
             Self::Record { .. } => "U0527",
-            Self::Network => "U0528",
+            Self::OnlySimulated { .. } => "U0528",
+            Self::Network(error) => error.code(),
+            Self::Endpoints(error) => error.code(),
             Self::System { .. } => "U0529",
         }
     }

@@ -1,0 +1,401 @@
+//! Where the parties of a laboratory run, and what lies between them.
+//!
+//! | hosts | links | a cut is made by |
+//! |---|---|---|
+//! | this machine's loopback interface | direct | nobody |
+//! | this machine's loopback interface | through the proxy | the proxy |
+//! | one network namespace for each station, and for each remote I/O with its plant | the bridge between them | `nft` |
+//! | the same | through the proxy, on the bridge | the proxy |
+//!
+//! The proxy is used where something is asked for that the rest cannot do. Then each party is told of addresses at which the
+//! proxy stands for its peers, one for each pair and direction, and knows nothing of it.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::path::{Path, PathBuf};
+
+use understudy_bus::{Endpoints, LinkKind, Peer};
+use understudy_cluster::Cluster;
+use understudy_network::{
+    Direction, Hosts, Impairment, NetworkError, Proxy, ProxyOrder, Route, Share, Transport,
+};
+use understudy_simulator::{Action, Network};
+use understudy_wire::{Party, ProgramId};
+
+use super::error::LaboratoryError;
+use super::ports;
+use crate::run_directory::RunDirectory;
+use crate::scenario::Scenario;
+
+/// The port of the first party of a host.
+const FIRST_PORT: u16 = 7450;
+
+/// On which hosts the parties run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum HostKind {
+    /// All on this machine, on its loopback interface.
+    #[default]
+    Loopback,
+    /// One network namespace for each station, and one for each remote I/O with its plant.
+    Namespaces,
+}
+
+/// What lies between the parties.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct NetworkSettings {
+    /// Where they run.
+    pub hosts: HostKind,
+    /// What every link does in every direction; in place of the scenario's where it does anything.
+    pub impairment: Impairment,
+    /// What the fates of datagrams come from.
+    pub seed: u64,
+}
+
+/// Where everybody is.
+#[derive(Debug)]
+pub(super) struct Site {
+    parties: Vec<Party>,
+    endpoints: BTreeMap<Party, PathBuf>,
+    hosts: Option<Hosts>,
+    host_of: BTreeMap<Party, usize>,
+    proxy: Option<Proxy>,
+    /// From whom to whom, and the place of the route in the proxy.
+    routes: BTreeMap<(Party, Party), usize>,
+    impairment: Impairment,
+}
+
+impl Site {
+    /// Makes what is needed, and writes down where everybody is.
+    pub(super) fn prepare(
+        cluster: &Cluster,
+        scenario: &Scenario,
+        link: LinkKind,
+        settings: NetworkSettings,
+        directory: &RunDirectory,
+    ) -> Result<Self, LaboratoryError> {
+        let system = |what| move |source| LaboratoryError::System { what, source };
+        let parties: Vec<Party> = cluster.parties().collect();
+        let impairment = if settings.impairment.is_none() {
+            scenario.network.map_or(settings.impairment, impairment_of)
+        } else {
+            settings.impairment
+        };
+        let host_of = hosts_of(&parties);
+        let mut hosts = match settings.hosts {
+            HostKind::Loopback => None,
+            HostKind::Namespaces => Some(Hosts::build(&host_names(cluster, &host_of))?),
+        };
+        let addresses = match &hosts {
+            None => loopback_addresses(cluster)
+                .map_err(system("free ports of the loopback interface"))?,
+            Some(hosts) => namespace_addresses(&parties, &host_of, hosts),
+        };
+        let peers: Vec<Peer> = parties
+            .iter()
+            .zip(addresses)
+            .filter_map(|(&party, address)| {
+                Some(Peer {
+                    party,
+                    name: cluster.party_name(party)?.to_owned(),
+                    address,
+                })
+            })
+            .collect();
+        let list = directory.file("endpoints.json");
+        write_list(&list, &peers).map_err(system("to write endpoints.json"))?;
+        let mut site = Self {
+            endpoints: parties.iter().map(|&party| (party, list.clone())).collect(),
+            parties,
+            hosts: None,
+            host_of,
+            proxy: None,
+            routes: BTreeMap::new(),
+            impairment,
+        };
+        let only_loss = impairment
+            == Impairment {
+                loss: impairment.loss,
+                ..Impairment::default()
+            };
+        match &mut hosts {
+            Some(hosts) if only_loss && !site.cuts_within_a_host(scenario) => {
+                let pairs = site.pairs_of_hosts();
+                hosts.lose(&pairs, impairment.loss)?;
+            }
+            None if impairment.is_none() && !has_cuts(scenario) => {}
+            _ => {
+                let feeds = feeds(cluster);
+                site.route(cluster, &feeds, link, &peers, hosts.as_ref(), settings.seed)?;
+                site.write_views(&peers, directory)
+                    .map_err(system("to write the endpoints of each party"))?;
+            }
+        }
+        site.hosts = hosts;
+        Ok(site)
+    }
+
+    /// Starts something where the party runs.
+    pub(super) fn at<T>(&self, party: Party, work: impl FnOnce() -> T) -> Result<T, NetworkError> {
+        match (&self.hosts, self.host_of.get(&party)) {
+            (Some(hosts), Some(&host)) => hosts.within(host, work),
+            _ => Ok(work()),
+        }
+    }
+
+    /// The file in which the party finds the others.
+    pub(super) fn endpoints(&self, party: Party) -> Option<&Path> {
+        self.endpoints.get(&party).map(PathBuf::as_path)
+    }
+
+    /// Nothing that one says reaches the other any more, or everything does again.
+    pub(super) fn cut(&mut self, from: Party, to: Party, cut: bool) -> io::Result<()> {
+        if let Some(proxy) = &self.proxy {
+            let ways = [
+                ((from, to), Direction::Forth),
+                ((to, from), Direction::Back),
+            ];
+            for (pair, direction) in ways {
+                if let Some(&route) = self.routes.get(&pair) {
+                    proxy.order(ProxyOrder::Cut {
+                        route,
+                        direction,
+                        cut,
+                    });
+                }
+            }
+            return Ok(());
+        }
+        let places = (self.host_of.get(&from), self.host_of.get(&to));
+        match (&mut self.hosts, places) {
+            (Some(hosts), (Some(&from), Some(&to))) => {
+                hosts.cut(&[(from, to)], cut).map_err(io::Error::other)
+            }
+            _ => Err(io::ErrorKind::Unsupported.into()),
+        }
+    }
+
+    /// What a reader of the results should know.
+    pub(super) fn describe(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        if let Some(hosts) = &self.hosts {
+            let count = hosts.hosts().len();
+            notes.push(format!(
+                "{count} hosts, each a network namespace of its own"
+            ));
+            if self.proxy.is_none() && !self.impairment.loss.is_never() {
+                notes.push(format!("nft loses {} on every link", self.impairment.loss));
+            }
+        }
+        if let Some(proxy) = &self.proxy {
+            let counters = proxy.counters();
+            notes.push(format!(
+                "the links pass through the proxy: {} came, {} passed, {} were lost on purpose",
+                counters.came, counters.passed, counters.lost
+            ));
+        }
+        notes
+    }
+
+    /// One route for each pair and direction that has something to say.
+    fn route(
+        &mut self,
+        cluster: &Cluster,
+        feeds: &[(ProgramId, ProgramId)],
+        link: LinkKind,
+        peers: &[Peer],
+        hosts: Option<&Hosts>,
+        seed: u64,
+    ) -> Result<(), LaboratoryError> {
+        let host = hosts.map_or(Ipv4Addr::LOCALHOST, |_| Hosts::SWITCH);
+        let listen = SocketAddr::new(IpAddr::V4(host), 0);
+        let mut routes = Vec::new();
+        for first in peers {
+            let own = Endpoints::new(
+                cluster.agreement().cluster,
+                first.party,
+                peers.to_vec(),
+                feeds.to_vec(),
+            );
+            let own = own.map_err(LaboratoryError::Endpoints)?;
+            for second in peers {
+                // A session goes both ways, and is opened by the later of the two.
+                let opens = link == LinkKind::Udp || second.party < first.party;
+                if !opens || !own.talks_with(second.party) {
+                    continue;
+                }
+                self.routes
+                    .insert((first.party, second.party), routes.len());
+                routes.push(Route {
+                    listen,
+                    to: second.address,
+                    transport: match link {
+                        LinkKind::ZenohTcp => Transport::Tcp,
+                        LinkKind::Zenoh | LinkKind::Udp => Transport::Udp,
+                    },
+                    forth: self.impairment,
+                    back: self.impairment,
+                });
+            }
+        }
+        let start = || Proxy::start(&routes, seed);
+        let proxy = match hosts {
+            Some(hosts) => hosts.in_switch(start)??,
+            None => start()?,
+        };
+        self.proxy = Some(proxy);
+        Ok(())
+    }
+
+    /// What each party is told of the others.
+    fn write_views(&mut self, peers: &[Peer], directory: &RunDirectory) -> io::Result<()> {
+        let Some(proxy) = &self.proxy else {
+            return Ok(());
+        };
+        let folder = directory.file("endpoints");
+        std::fs::create_dir_all(&folder)?;
+        for own in peers {
+            let view: Vec<Peer> = peers
+                .iter()
+                .map(|peer| {
+                    let route = self.routes.get(&(own.party, peer.party));
+                    let stands_for = route.and_then(|&route| proxy.addresses().get(route));
+                    Peer {
+                        address: stands_for.copied().unwrap_or(peer.address),
+                        ..peer.clone()
+                    }
+                })
+                .collect();
+            let path = folder.join(format!("{}.json", own.name));
+            write_list(&path, &view)?;
+            self.endpoints.insert(own.party, path);
+        }
+        Ok(())
+    }
+
+    fn cuts_within_a_host(&self, scenario: &Scenario) -> bool {
+        scenario.steps.iter().any(|step| match step.action {
+            Action::Cut { to } | Action::Heal { to } => {
+                self.host_of.get(&step.party) == self.host_of.get(&to)
+            }
+            _ => false,
+        })
+    }
+
+    fn pairs_of_hosts(&self) -> Vec<(usize, usize)> {
+        let count = self
+            .parties
+            .iter()
+            .filter_map(|party| self.host_of.get(party));
+        let count = count.max().map_or(0, |last| last + 1);
+        let pairs = (0..count).flat_map(|from| (0..count).map(move |to| (from, to)));
+        pairs.filter(|(from, to)| from != to).collect()
+    }
+}
+
+fn has_cuts(scenario: &Scenario) -> bool {
+    let mut steps = scenario.steps.iter();
+    steps.any(|step| matches!(step.action, Action::Cut { .. } | Action::Heal { .. }))
+}
+
+/// The same as the simulator's network, but that jitter keeps the order.
+fn impairment_of(network: Network) -> Impairment {
+    let share = |share: f64| Share::new(share.clamp(0.0, 1.0)).unwrap_or_default();
+    Impairment {
+        loss: share(network.loss),
+        delay: network.latency + network.jitter / 2,
+        jitter: network.jitter / 2,
+        duplicate: share(network.duplicate),
+        corrupt: share(network.corruption),
+        ..Impairment::default()
+    }
+}
+
+/// A station has a host of its own; a plant stands beside its remote I/O.
+fn hosts_of(parties: &[Party]) -> BTreeMap<Party, usize> {
+    let mut host_of = BTreeMap::new();
+    for &party in parties {
+        let beside = match party {
+            Party::Plant(program) => host_of.get(&Party::RemoteIo(program)).copied(),
+            Party::Station(_) | Party::RemoteIo(_) => None,
+        };
+        let next = host_of.values().max().map_or(0, |last: &usize| last + 1);
+        host_of.insert(party, beside.unwrap_or(next));
+    }
+    host_of
+}
+
+fn host_names(cluster: &Cluster, host_of: &BTreeMap<Party, usize>) -> Vec<String> {
+    let count = host_of.values().max().map_or(0, |last| last + 1);
+    let first = |host| host_of.iter().find(|(_, found)| **found == host);
+    (0..count)
+        .filter_map(first)
+        .filter_map(|(&party, _)| cluster.party_name(party))
+        .map(str::to_owned)
+        .collect()
+}
+
+/// From the cluster file, or free ones of the loopback interface.
+fn loopback_addresses(cluster: &Cluster) -> io::Result<Vec<SocketAddr>> {
+    let known: Vec<Option<SocketAddr>> = cluster
+        .parties()
+        .map(|party| cluster.address(party))
+        .collect();
+    let lacking = known.iter().filter(|address| address.is_none()).count();
+    let mut free = ports::free_addresses(lacking)?.into_iter();
+    Ok(known
+        .into_iter()
+        .filter_map(|address| address.or_else(|| free.next()))
+        .collect())
+}
+
+fn namespace_addresses(
+    parties: &[Party],
+    host_of: &BTreeMap<Party, usize>,
+    hosts: &Hosts,
+) -> Vec<SocketAddr> {
+    let mut used: BTreeMap<usize, u16> = BTreeMap::new();
+    parties
+        .iter()
+        .filter_map(|party| {
+            let host = *host_of.get(party)?;
+            let port = used.entry(host).or_insert(FIRST_PORT);
+            *port += 1;
+            let address = hosts.hosts().get(host)?.address();
+            Some((address, *port - 1).into())
+        })
+        .collect()
+}
+
+fn feeds(cluster: &Cluster) -> Vec<(ProgramId, ProgramId)> {
+    let plants = cluster.plants().iter().enumerate();
+    plants
+        .filter_map(|(fed, place)| Some((place.as_ref()?.fed_by?, ProgramId(fed as u8))))
+        .collect()
+}
+
+fn write_list(path: &Path, peers: &[Peer]) -> io::Result<()> {
+    let text = serde_json::to_string_pretty(peers)?;
+    std::fs::write(path, text + "\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use understudy_wire::StationId;
+
+    use super::*;
+
+    #[test]
+    fn a_plant_stands_beside_its_remote_io() {
+        let parties = [
+            Party::Station(StationId(0)),
+            Party::Station(StationId(1)),
+            Party::RemoteIo(ProgramId(0)),
+            Party::RemoteIo(ProgramId(1)),
+            Party::Plant(ProgramId(1)),
+        ];
+        let host_of = hosts_of(&parties);
+        let places: Vec<usize> = parties.iter().map(|party| host_of[party]).collect();
+        assert_eq!(places, [0, 1, 2, 3, 3]);
+    }
+}
