@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use understudy_diagnostic::Severity;
-use understudy_supervisor::operations::{supreduce, sync};
+use understudy_supervisor::operations::{minstate, supreduce, sync};
 use understudy_supervisor::{
     Automaton, Bounds, Finding, Model, SymbolicBounds, Together, model_findings, modular_findings,
-    synthesis_findings, synthesise, synthesise_modularly, synthesise_symbolically, write_model,
+    specification_findings, synthesis_findings, synthesise, synthesise_modularly,
+    synthesise_symbolically, write_model,
 };
 
 use crate::answer::{Answer, Failure, Status};
@@ -22,9 +23,13 @@ Example:
   understudy synth examples/small-factory/model.toml --reduce -o supervisor.toml
   understudy supervisor-to-ladder supervisor.toml --plant supervisor.toml
 
+  understudy synth examples/boiler/complete.toml --engine specified -o supervisors.toml
+  understudy supervisor-to-ladder supervisors.toml --io examples/boiler/complete-map.toml \\
+      --plant examples/boiler/complete.toml -o complete.ladder
+
 Specifications restrain only the events that they know. What is wrong with a model is said with the shortest sequence of
 events that shows it. The symbolic engine counts and decides without listing states; the modular one makes a supervisor for
-each specification and says whether they conflict.")]
+each specification and says whether they conflict. `specified` takes the specifications themselves, where they are supervisors.")]
 pub(crate) struct Arguments {
     /// The model: plants and specifications
     #[arg(value_name = "MODEL.toml")]
@@ -35,6 +40,9 @@ pub(crate) struct Arguments {
     /// Reduce each supervisor: fewer states, the same effect on the plant
     #[arg(long)]
     reduce: bool,
+    /// Merge the states of each supervisor after which the same can happen
+    #[arg(long, conflicts_with = "reduce")]
+    minstate: bool,
     /// A file to write to: .toml is the model with its supervisors; .ADS, .dot and .svg take a single supervisor
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -51,6 +59,8 @@ enum Engine {
     Symbolic,
     /// A supervisor for each specification
     Modular,
+    /// The specifications as they are, where nothing has to be forbidden beyond them
+    Specified,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Answer {
@@ -85,6 +95,7 @@ fn made(arguments: &Arguments, model: Model) -> Result<Answer, Answer> {
     };
     match arguments.engine {
         Engine::Explicit => explicit(arguments, model, bounds),
+        Engine::Specified => specified(arguments, model, bounds),
         Engine::Symbolic => symbolic(arguments, &model, bounds),
         Engine::Modular => modular(arguments, model, bounds),
     }
@@ -105,6 +116,33 @@ fn explicit(arguments: &Arguments, model: Model, bounds: Bounds) -> Result<Answe
         vec![supervisor],
         with_findings(answer, &findings, Status::Failed),
     )
+}
+
+fn specified(arguments: &Arguments, model: Model, bounds: Bounds) -> Result<Answer, Answer> {
+    if arguments.reduce || arguments.minstate {
+        let message = "the engine `specified` takes the specifications as they are".to_owned();
+        return Err(Answer::failed(Status::BadInput, "U0655", message));
+    }
+    let result = synthesise(&model.plants(), &model.specifications(), bounds)
+        .map_err(|error| failed(error.code(), error.to_string()))?;
+    let mut findings = synthesis_findings(&model, &result);
+    findings.extend(specification_findings(&result));
+    let mut value = description(&result.supervisor);
+    value["engine"] = json!("specified");
+    let mut lines = vec![summary(&result.supervisor)];
+    if findings
+        .iter()
+        .any(|finding| finding.severity == Severity::Error)
+    {
+        let answer = Answer::done(lines.join("\n"), value);
+        return Ok(with_findings(answer, &findings, Status::Failed));
+    }
+    let supervisors = model.specifications.clone();
+    lines.extend(supervisors.iter().map(summary));
+    value["supervisors"] = supervisors.iter().map(description).collect();
+    let answer = Answer::done(lines.join("\n"), value);
+    let answer = with_findings(answer, &findings, Status::Failed);
+    written(arguments, model, supervisors, answer)
 }
 
 fn modular(arguments: &Arguments, model: Model, bounds: Bounds) -> Result<Answer, Answer> {
@@ -176,7 +214,7 @@ fn symbolic(arguments: &Arguments, model: &Model, bounds: Bounds) -> Result<Answ
                 .to_owned();
         answer = answer.and_failure(Status::Failed, "U0841", message);
     }
-    if arguments.output.is_none() && !arguments.reduce {
+    if arguments.output.is_none() && !arguments.reduce && !arguments.minstate {
         return Ok(answer);
     }
     let listed = made
@@ -196,6 +234,9 @@ fn reduced(
     supervisor: Automaton,
     bounds: Bounds,
 ) -> Result<Automaton, Answer> {
+    if arguments.minstate {
+        return Ok(minstate(&supervisor));
+    }
     if !arguments.reduce {
         return Ok(supervisor);
     }

@@ -94,6 +94,15 @@ pub fn synthesis_findings(model: &Model, result: &Supcon) -> Vec<Finding> {
     findings
 }
 
+/// U0846 where the specifications, as they were given, are no supervisors: something has to be forbidden beyond them.
+pub fn specification_findings(result: &Supcon) -> Option<Finding> {
+    let (kept, all) = (result.supervisor.state_count(), result.product_states);
+    let message = format!(
+        "the specifications are no supervisors by themselves: with the plants they have {all} states, and a supervisor keeps to {kept} of them"
+    );
+    (!result.is_as_specified()).then(|| Finding::error("U0846", message))
+}
+
 /// What local-modular synthesis found: as for each local supervisor, and U0845 where they conflict.
 pub fn modular_findings(model: &Model, result: &ModularSupervisor) -> Vec<Finding> {
     let mut findings = Vec::new();

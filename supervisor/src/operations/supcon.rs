@@ -51,6 +51,13 @@ pub struct Supcon {
     pub product_states: usize,
 }
 
+impl Supcon {
+    /// Whether nothing had to be forbidden beyond the specification, so that it is a supervisor as it was given.
+    pub fn is_as_specified(&self) -> bool {
+        self.explanation.is_none() && self.product_states == self.supervisor.state_count()
+    }
+}
+
 /// `supcon`: the supremal controllable and nonblocking sublanguage of the meet of `plant` and `specification`.
 ///
 /// The meet forbids every event that the specification does not know: [`Supcon::not_lifted`] lists them, [`lift`] cures it.
