@@ -50,6 +50,8 @@ pub struct Controller {
     pub memory: Vec<String>,
     states: Vec<State>,
     moves: Vec<Vec<Move>>,
+    /// Of each state, from where ω leads to it.
+    omega_before: Vec<Vec<usize>>,
 }
 
 impl Controller {
@@ -67,12 +69,19 @@ impl Controller {
                 moves[source].insert(Move { target, events });
             }
         }
+        let mut omega_before = vec![Vec::new(); states.len()];
+        for (source, moves) in moves.iter().enumerate() {
+            for step in moves.iter().filter(|step| step.events.is_empty()) {
+                omega_before[step.target].push(source);
+            }
+        }
         let moves = moves.into_iter().map(|set| set.into_iter().collect());
         Self {
             signals,
             memory,
             moves: moves.collect(),
             states,
+            omega_before,
         }
     }
 
@@ -144,6 +153,18 @@ impl Controller {
             }
         }
         marked.into_iter().map(|mark| mark == Some(true)).collect()
+    }
+
+    /// `states`, and all from which ω alone leads to them.
+    pub(crate) fn before_omega(&self, states: impl IntoIterator<Item = usize>) -> BTreeSet<usize> {
+        let mut found = BTreeSet::new();
+        let mut stack: Vec<usize> = states.into_iter().collect();
+        while let Some(state) = stack.pop() {
+            if found.insert(state) {
+                stack.extend(&self.omega_before[state]);
+            }
+        }
+        found
     }
 
     /// The states from which nothing follows.

@@ -9,7 +9,11 @@
 
 pub mod command;
 mod controller;
+pub mod explore;
 mod mega;
+pub mod module_two;
+pub mod proof;
+mod quotient;
 mod relation;
 mod settle;
 mod signals;

@@ -77,6 +77,7 @@ pub struct MegaController {
     /// How many different integer programs were solved.
     pub programs: usize,
     places: FxHashMap<(Vec<u32>, u64), usize>,
+    seeds: FxHashMap<(Vec<u32>, u64), Option<usize>>,
 }
 
 /// Why Θ could not be built.
@@ -108,6 +109,7 @@ impl MegaController {
             states: Vec::new(),
             edges: Vec::new(),
             places: FxHashMap::default(),
+            seeds: FxHashMap::default(),
             without: Vec::new(),
         };
         builder.place(vec![0], 0);
@@ -142,12 +144,18 @@ impl MegaController {
             states: builder.states,
             edges: builder.edges,
             places: builder.places,
+            seeds: builder.seeds,
         })
     }
 
     /// The state of these members and failed channels.
     pub fn find(&self, members: &[u32], failed: u64) -> Option<usize> {
         self.places.get(&(members.to_vec(), failed)).copied()
+    }
+
+    /// The state that was come to from `seed`, before it was settled.
+    pub fn settled(&self, seed: &[u32], failed: u64) -> Option<usize> {
+        self.seeds.get(&(seed.to_vec(), failed)).copied().flatten()
     }
 
     /// Where `label` leads from `state`.
@@ -195,6 +203,7 @@ struct Builder<'a> {
     states: Vec<MegaState>,
     edges: Vec<Vec<(Label, usize)>>,
     places: FxHashMap<(Vec<u32>, u64), usize>,
+    seeds: FxHashMap<(Vec<u32>, u64), Option<usize>>,
     without: Vec<NoCommand>,
 }
 
@@ -211,7 +220,19 @@ impl Builder<'_> {
     }
 
     /// Settles `seed` and numbers the state; nothing where no command is safe.
-    fn place(&mut self, seed: Vec<u32>, failed: u64) -> Option<usize> {
+    fn place(&mut self, mut seed: Vec<u32>, failed: u64) -> Option<usize> {
+        seed.sort_unstable();
+        seed.dedup();
+        let key = (seed, failed);
+        if let Some(&known) = self.seeds.get(&key) {
+            return known;
+        }
+        let place = self.settle(key.0.clone(), failed);
+        self.seeds.insert(key, place);
+        place
+    }
+
+    fn settle(&mut self, seed: Vec<u32>, failed: u64) -> Option<usize> {
         let channels: Vec<usize> = failed_channels(&self.question.channels, failed).collect();
         let unseen = |event: &Event| {
             event
@@ -323,8 +344,11 @@ impl Builder<'_> {
         let mut seed = members.to_vec();
         if self.question.analysis == Analysis::Late {
             let channel = self.question.channels[bit];
-            for &member in members {
-                for step in self.ground.controller.moves(member as usize) {
+            // The event may have been missed in the scan in which the ladder made a move of its own.
+            let controller = self.ground.controller;
+            let before = controller.before_omega(members.iter().map(|&member| member as usize));
+            for member in before {
+                for step in controller.moves(member) {
                     let missed = |event: &Event| event.channel() == Some(channel);
                     let unseen = |event: &Event| self.is_unseen(failed, *event);
                     if step.events.iter().any(missed) && step.events.iter().all(unseen) {

@@ -1,0 +1,518 @@
+//! The combined ladder held to S and Λ, by code that shares nothing with what generated it.
+//!
+//! A world in one state of S runs beside the ladder's circuit. Between two scans at most one move of S happens, and only if
+//! the outputs that were in force let it; at most one channel fails or is repaired. A failed channel shows the value
+//! that it had. Every order of all this is tried. After every scan:
+//!
+//! 1. as long as no channel has ever failed, the outputs are those of the ladder alone, on the same inputs;
+//! 2. at most one state of Θ is latched, and the states that it stands for contain the one in which the world is;
+//! 3. where it stands for one state with nothing unseen to prevent, the outputs are those of that state;
+//! 4. otherwise no event can happen that some state of the set must not let happen, and none unseen that leaves the set.
+//!
+//! ω is the ladder's own move: the world follows it where the bits say that the ladder has made it. What the world does so
+//! slowly or so fast that the ladder's timers leave S is outside of the model, and is counted.
+
+use std::time::Duration;
+
+use rustc_hash::FxHashMap;
+use understudy_ladder::{LowerError, Name, Program};
+use understudy_logic::{Circuit, Scan, Scratch};
+
+use crate::controller::{Controller, Move};
+use crate::module_two::Correspondence;
+use crate::relation::Relation;
+use crate::signals::{Bits, Event};
+
+/// What is proved.
+pub struct Claim<'a> {
+    /// S and Φ'.
+    pub controller: &'a Controller,
+    /// Λ.
+    pub relation: &'a Relation,
+    /// Module 1.
+    pub alone: &'a Program,
+    /// Module 1 and 2.
+    pub combined: &'a Program,
+    /// Which bit means what.
+    pub correspondence: &'a Correspondence,
+    /// What each latched bit stands for, by the place that the correspondence names: states of S, and failed channels as bits.
+    pub sets: &'a dyn Fn(usize) -> (Vec<u32>, u64),
+    /// The inputs that may fail.
+    pub channels: &'a [usize],
+    /// How many of them at once.
+    pub simultaneous: usize,
+    /// Whether a channel may miss one event before its failure is known.
+    pub late: bool,
+    /// From one scan to the next.
+    pub period: Duration,
+    /// Past so many states the proof is given up.
+    pub maximum_states: usize,
+}
+
+/// It holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Proof {
+    /// States of world and ladder together.
+    pub states: usize,
+    /// Scans.
+    pub scans: u64,
+    /// Scans after which the ladder or the world was outside of the model.
+    pub outside: u64,
+    /// Latched states of Θ that were come to.
+    pub latched: usize,
+}
+
+/// It does not hold, or could not be decided.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NotProved {
+    /// A scan breaks one of the four.
+    #[error("U1241: the combined ladder is refuted: {what}\n{}", trace.join("\n"))]
+    Refuted {
+        /// Which, and by what.
+        what: String,
+        /// Each scan up to there.
+        trace: Vec<String>,
+    },
+    /// More states than the limit.
+    #[error(
+        "U1242: the proof needs more than {0} states; ask about fewer channels, or lengthen the period"
+    )]
+    TooLarge(usize),
+    /// The ladder is none.
+    #[error("U1243: {0}")]
+    NoCircuit(#[from] LowerError),
+    /// A bit of the correspondence is not in the ladder.
+    #[error("U1244: the combined ladder has no bit `{0}`")]
+    NoBit(String),
+}
+
+impl NotProved {
+    /// Stable code for people.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Refuted { .. } => "U1241",
+            Self::TooLarge(_) => "U1242",
+            Self::NoCircuit(_) => "U1243",
+            Self::NoBit(_) => "U1244",
+        }
+    }
+}
+
+#[derive(Clone, PartialEq, Eq, Hash)]
+struct World {
+    /// Of the combined ladder.
+    registers: Box<[u64]>,
+    /// Of the ladder alone, while no channel has failed.
+    alone: Option<Box<[u64]>>,
+    state: u32,
+    failed: u64,
+    /// What the ladder sees.
+    shown: Box<[bool]>,
+    outputs: Bits,
+    /// Whether one state was thought of, so that the ladder could make moves of its own.
+    is_single: bool,
+}
+
+struct Prover<'a> {
+    claim: &'a Claim<'a>,
+    combined: Scan,
+    alone: Scan,
+    /// Bits of the circuit: outputs that were added to see them.
+    lost: usize,
+    latches: Vec<(usize, Vec<u32>, u64)>,
+    at: Vec<(usize, u32)>,
+    width: usize,
+    scratch: Scratch,
+    known: FxHashMap<World, u32>,
+    nodes: Vec<(World, u32)>,
+    proof: Proof,
+    used: Vec<bool>,
+}
+
+/// Proves `claim`.
+///
+/// # Errors
+/// It is refuted, too large, or the ladder is none.
+pub fn prove(claim: &Claim<'_>) -> Result<Proof, NotProved> {
+    let correspondence = claim.correspondence;
+    let mut watched = claim.combined.clone();
+    let width = watched.outputs.len();
+    // The bits to look at become outputs.
+    let mut bits: Vec<Name> = vec![correspondence.lost.clone()];
+    bits.extend(correspondence.latches.iter().map(|(name, _)| name.clone()));
+    bits.extend(correspondence.at.iter().map(|(name, _)| name.clone()));
+    for bit in &bits {
+        let place = watched.memory.iter().position(|signal| signal.name == *bit);
+        let place = place.ok_or_else(|| NotProved::NoBit(bit.to_string()))?;
+        let signal = watched.memory.remove(place);
+        watched.outputs.push(signal);
+    }
+    let circuit = watched.lower(claim.period)?;
+    let expected = claim.controller.signals.inputs.iter();
+    if let Some(missing) = expected
+        .map(String::as_str)
+        .chain(correspondence.failed.iter().map(Name::as_str))
+        .zip(circuit.inputs())
+        .find(|(wanted, found)| wanted != found)
+    {
+        return Err(NotProved::NoBit(missing.0.to_owned()));
+    }
+    let alone = claim.alone.lower(claim.period)?;
+    let latches = correspondence.latches.iter().enumerate();
+    let latches: Vec<_> = latches
+        .map(|(number, (_, place))| {
+            let (members, failed) = (claim.sets)(*place);
+            (width + 1 + number, members, failed)
+        })
+        .collect();
+    let first_at = width + 1 + latches.len();
+    let at = correspondence.at.iter().enumerate();
+    let at = at.map(|(number, (_, state))| (first_at + number, *state as u32));
+    let mut prover = Prover {
+        claim,
+        combined: Scan::new(&circuit),
+        alone: Scan::new(&alone),
+        lost: width,
+        at: at.collect(),
+        used: vec![false; latches.len()],
+        latches,
+        width,
+        scratch: Scratch::default(),
+        known: FxHashMap::default(),
+        nodes: Vec::new(),
+        proof: Proof::default(),
+    };
+    prover.run(&circuit, &alone)
+}
+
+impl Prover<'_> {
+    fn run(&mut self, combined: &Circuit, alone: &Circuit) -> Result<Proof, NotProved> {
+        let pack = |circuit: &Circuit| -> Box<[u64]> { Scan::new(circuit).initial().into() };
+        let world = World {
+            registers: pack(combined),
+            alone: Some(pack(alone)),
+            state: 0,
+            failed: 0,
+            shown: self.claim.controller.states()[0].inputs.0.clone().into(),
+            outputs: Bits(vec![false; self.width]),
+            is_single: true,
+        };
+        // Before the first scan nothing has happened.
+        self.scan(&world, u32::MAX, 0, 0)?;
+        let mut next = 0;
+        while next < self.nodes.len() {
+            let (world, _) = self.nodes[next].clone();
+            for (state, failed) in self.happenings(&world) {
+                self.scan(&world, next as u32, state, failed)?;
+            }
+            if self.nodes.len() > self.claim.maximum_states {
+                return Err(NotProved::TooLarge(self.claim.maximum_states));
+            }
+            next += 1;
+        }
+        self.proof.states = self.nodes.len();
+        self.proof.latched = self.used.iter().filter(|used| **used).count();
+        Ok(self.proof)
+    }
+
+    /// What may happen before the next scan: where the world is then, and which channels are failed.
+    fn happenings(&self, world: &World) -> Vec<(u32, u64)> {
+        let claim = self.claim;
+        let mut statuses = vec![world.failed];
+        for bit in 0..claim.channels.len() {
+            let other = world.failed ^ (1 << bit);
+            if (other.count_ones() as usize) <= claim.simultaneous {
+                statuses.push(other);
+            }
+        }
+        let mut found = Vec::new();
+        for failed in statuses {
+            found.push((world.state, failed));
+            let newly = failed & !world.failed;
+            for step in claim.controller.moves(world.state as usize) {
+                let is_missed = |event: &Event| {
+                    event.channel().is_some_and(|input| {
+                        let bit = claim.channels.iter().position(|&known| known == input);
+                        bit.is_some_and(|bit| newly >> bit & 1 == 1)
+                    })
+                };
+                if step.events.is_empty() || !claim.late && step.events.iter().any(is_missed) {
+                    continue;
+                }
+                let state = world.state as usize;
+                let is_let = |&event: &Event| claim.relation.allows(state, event, &world.outputs);
+                if step.events.iter().all(is_let) {
+                    found.push((step.target as u32, failed));
+                }
+            }
+        }
+        found
+    }
+
+    fn scan(
+        &mut self,
+        before: &World,
+        parent: u32,
+        state: u32,
+        failed: u64,
+    ) -> Result<(), NotProved> {
+        self.proof.scans += 1;
+        let claim = self.claim;
+        let actual = &claim.controller.states()[state as usize].inputs.0;
+        let mut shown = before.shown.clone();
+        for (input, shown) in shown.iter_mut().enumerate() {
+            let bit = claim.channels.iter().position(|&known| known == input);
+            if !bit.is_some_and(|bit| failed >> bit & 1 == 1) {
+                *shown = actual[input];
+            }
+        }
+        let mut inputs = vec![0; self.combined.input_count().div_ceil(64)];
+        let statuses = (0..claim.channels.len()).map(|bit| failed >> bit & 1 == 1);
+        for (place, value) in shown.iter().copied().chain(statuses).enumerate() {
+            inputs[place / 64] |= u64::from(value) << (place % 64);
+        }
+        let mut registers = before.registers.clone();
+        let mut seen = vec![0; self.combined.output_count().div_ceil(64)];
+        self.combined
+            .step(&mut self.scratch, &mut registers, &inputs, &mut seen);
+        let is_on = |place: usize| seen[place / 64] >> (place % 64) & 1 == 1;
+        let outputs = Bits((0..self.width).map(is_on).collect());
+        let mut world = World {
+            registers,
+            alone: None,
+            state,
+            failed,
+            shown,
+            outputs,
+            is_single: before.is_single,
+        };
+        if failed == 0
+            && let Some(registers) = &before.alone
+        {
+            let mut registers = registers.clone();
+            let mut own = vec![0; self.alone.output_count().div_ceil(64)];
+            let mut inputs = vec![0; self.alone.input_count().div_ceil(64)];
+            for (place, &value) in world.shown.iter().enumerate() {
+                inputs[place / 64] |= u64::from(value) << (place % 64);
+            }
+            self.alone
+                .step(&mut self.scratch, &mut registers, &inputs, &mut own);
+            let own = Bits(
+                (0..self.width)
+                    .map(|place| own[place / 64] >> (place % 64) & 1 == 1)
+                    .collect(),
+            );
+            if own != world.outputs {
+                let what = format!(
+                    "with no channel failed the outputs are {} in place of {own}",
+                    world.outputs
+                );
+                return Err(self.refuted(parent, &world, what));
+            }
+            world.alone = Some(registers);
+        }
+        let latched: Vec<usize> = (0..self.latches.len())
+            .filter(|&number| is_on(self.latches[number].0))
+            .collect();
+        let at: Vec<u32> = self
+            .at
+            .iter()
+            .filter(|(place, _)| is_on(*place))
+            .map(|(_, state)| *state)
+            .collect();
+        let lost = is_on(self.lost);
+        let inside = match self.judge(&mut world, &latched, &at, lost) {
+            Ok(inside) => inside,
+            Err(what) => return Err(self.refuted(parent, &world, what)),
+        };
+        for number in latched {
+            self.used[number] = true;
+        }
+        if !inside {
+            self.proof.outside += 1;
+            return Ok(());
+        }
+        if !self.known.contains_key(&world) {
+            self.known.insert(world.clone(), self.nodes.len() as u32);
+            self.nodes.push((world, parent));
+        }
+        Ok(())
+    }
+
+    /// Whether world and ladder are still in the model; what is broken.
+    fn judge(
+        &self,
+        world: &mut World,
+        latched: &[usize],
+        at: &[u32],
+        lost: bool,
+    ) -> Result<bool, String> {
+        let claim = self.claim;
+        let number = |state: u32| Controller::number(state as usize);
+        if latched.len() + usize::from(lost) > 1 {
+            return Err("two states of the mega-controller are latched at once".into());
+        }
+        if lost {
+            return self
+                .keeps_back(&[world.state], 0, &world.outputs)
+                .map(|()| false);
+        }
+        let (members, failed) = match latched {
+            [] if at.is_empty() && world.failed == 0 => return Ok(false),
+            [] => (at.to_vec(), world.failed),
+            [one, ..] => (self.latches[*one].1.clone(), self.latches[*one].2),
+        };
+        if failed != world.failed {
+            return Err(format!(
+                "the mega-controller takes {failed:b} for failed, and {:b} are",
+                world.failed
+            ));
+        }
+        if !members.contains(&world.state) {
+            let own = self.own_moves(world.state);
+            match own.iter().find(|state| members.contains(state)) {
+                Some(&state) if world.is_single || members.len() == 1 => world.state = state,
+                _ if world.alone.is_some() => return Ok(false),
+                _ => {
+                    let sets: Vec<String> = members
+                        .iter()
+                        .map(|&state| number(state).to_string())
+                        .collect();
+                    return Err(format!(
+                        "the plant is in state {}, and the mega-controller thinks of {}",
+                        number(world.state),
+                        sets.join(" ")
+                    ));
+                }
+            }
+        }
+        world.is_single = members.len() == 1;
+        let is_adjusted = members.len() > 1 || self.must_prevent(&members, failed);
+        let state = &claim.controller.states()[world.state as usize];
+        if !is_adjusted && world.outputs != state.outputs {
+            return Err(format!(
+                "in state {} the outputs are {} in place of {}",
+                number(world.state),
+                world.outputs,
+                state.outputs
+            ));
+        }
+        if is_adjusted {
+            self.keeps_back(&members, failed, &world.outputs)?;
+        }
+        Ok(true)
+    }
+
+    /// Where ω alone leads.
+    fn own_moves(&self, state: u32) -> Vec<u32> {
+        let mut found = vec![state];
+        let mut next = 0;
+        while next < found.len() {
+            for step in self.claim.controller.moves(found[next] as usize) {
+                let target = step.target as u32;
+                if step.events.is_empty() && !found.contains(&target) {
+                    found.push(target);
+                }
+            }
+            next += 1;
+        }
+        found
+    }
+
+    /// Whether an unseen move leaves `members`.
+    fn must_prevent(&self, members: &[u32], failed: u64) -> bool {
+        members.iter().any(|&state| {
+            self.unseen(state, failed)
+                .any(|step| !members.contains(&(step.target as u32)))
+        })
+    }
+
+    fn unseen(&self, state: u32, failed: u64) -> impl Iterator<Item = &Move> {
+        let claim = self.claim;
+        let is_unseen = move |event: &Event| {
+            event.channel().is_some_and(|input| {
+                let bit = claim.channels.iter().position(|&known| known == input);
+                bit.is_some_and(|bit| failed >> bit & 1 == 1)
+            })
+        };
+        let moves = claim.controller.moves(state as usize).iter();
+        moves.filter(move |step| !step.events.is_empty() && step.events.iter().all(is_unseen))
+    }
+
+    /// 4.
+    fn keeps_back(&self, members: &[u32], failed: u64, outputs: &Bits) -> Result<(), String> {
+        let claim = self.claim;
+        let (controller, relation) = (claim.controller, claim.relation);
+        let is_possible = |state: u32, event: Event| {
+            controller
+                .moves(state as usize)
+                .iter()
+                .any(|step| step.events.contains(&event))
+        };
+        let own = |state: u32| &controller.states()[state as usize].outputs;
+        let forbids = |state: u32, event: Event| {
+            !is_possible(state, event) && !relation.allows(state as usize, event, own(state))
+        };
+        for &state in members {
+            for event in controller.signals.events() {
+                let concerns = is_possible(state, event) || forbids(state, event);
+                let is_let = relation.allows(state as usize, event, outputs);
+                let by = members.iter().find(|&&other| forbids(other, event));
+                let rows = !relation.rows(state as usize, event).is_empty();
+                if rows
+                    && concerns
+                    && is_let
+                    && let Some(&by) = by
+                {
+                    return Err(format!(
+                        "the outputs {outputs} let {} happen in state {}, and state {} forbids it",
+                        controller.signals.event_name(event),
+                        Controller::number(state as usize),
+                        Controller::number(by as usize),
+                    ));
+                }
+            }
+            for step in self.unseen(state, failed) {
+                let is_let = |&event: &Event| relation.allows(state as usize, event, outputs);
+                if !members.contains(&(step.target as u32)) && step.events.iter().all(is_let) {
+                    return Err(format!(
+                        "the outputs {outputs} let {} happen unseen in state {}",
+                        controller.signals.event_names(&step.events),
+                        Controller::number(state as usize),
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn refuted(&self, parent: u32, world: &World, what: String) -> NotProved {
+        let signals = &self.claim.controller.signals;
+        let line = |world: &World| {
+            let failed: Vec<&str> = (0..self.claim.channels.len())
+                .filter(|bit| world.failed >> bit & 1 == 1)
+                .map(|bit| signals.inputs[self.claim.channels[bit]].as_str())
+                .collect();
+            format!(
+                "  state {:>4}  inputs {}  outputs {}  failed {}",
+                Controller::number(world.state as usize),
+                Bits(world.shown.to_vec()),
+                world.outputs,
+                if failed.is_empty() {
+                    "-".to_owned()
+                } else {
+                    failed.join(" ")
+                }
+            )
+        };
+        let mut trace = vec![line(world)];
+        let mut at = parent;
+        while at != u32::MAX && trace.len() < 60 {
+            let (world, before) = &self.nodes[at as usize];
+            trace.push(line(world));
+            at = *before;
+        }
+        trace.reverse();
+        NotProved::Refuted { what, trace }
+    }
+}
