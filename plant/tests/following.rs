@@ -181,7 +181,7 @@ proptest! {
     #[test]
     fn loss_and_reordering_cost_time_only(frames in prop::collection::vec((1..20_u64, any::<bool>()), 1..40)) {
         let mut machine = machine();
-        let flame = |cycle: u64| cycle % 3 != 0;
+        let flame = |cycle: u64| !cycle.is_multiple_of(3);
         let mut newest = 0;
         for (step, (cycle, lost)) in (1..).zip(frames) {
             if !lost {

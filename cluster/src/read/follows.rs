@@ -18,50 +18,56 @@ pub(crate) fn resolve(
     let entries = draft.section.follows.iter();
     entries
         .filter_map(|(terminal, (_, sensor))| {
-            let followed = followed(sensor, draft, drafts, members);
-            let followed = followed.map_err(|diagnostic| diagnostics.push(diagnostic));
-            Some((terminal.clone(), followed.ok()??))
+            let followed = followed(sensor, draft, drafts, members, diagnostics)?;
+            Some((terminal.clone(), followed))
         })
         .collect()
 }
 
-/// Nothing where the ladder of the other plant's controller has errors, which are reported there.
 fn followed(
     sensor: &Placed<String>,
     draft: &Draft,
     drafts: &[Draft],
     members: &[Member],
-) -> Result<Option<Followed>, Diagnostic> {
-    let span = || sensor.span.clone();
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<Followed> {
+    let mut report = |code, message: String, help: &str| {
+        let span = sensor.span.clone();
+        diagnostics.push(Diagnostic::error(code, message, span).with_help(help));
+    };
     let Some((plant, signal)) = sensor.value.split_once('.') else {
         let message = format!("{:?} names no sensor of a plant", sensor.value);
-        return Err(Diagnostic::error("U0206", message, span())
-            .with_help("the plant, a dot, and its signal: `\"pilot-burner.flame\"`"));
+        let help = "the plant, a dot, and its signal: `\"pilot-burner.flame\"`";
+        report("U0206", message, help);
+        return None;
     };
     if plant == draft.name {
         let message = format!("the plant `{plant}` follows itself");
-        return Err(Diagnostic::error("U0215", message, span())
-            .with_help("what a plant knows of itself is in its ladder"));
+        report(
+            "U0215",
+            message,
+            "what a plant knows of itself is in its ladder",
+        );
+        return None;
     }
     let Some(other) = drafts.iter().find(|other| other.name == plant) else {
         let known = drafts.iter().map(|other| other.name.as_str());
         let known = known.filter(|name| *name != draft.name);
-        return Err(
-            Diagnostic::error("U0209", format!("there is no plant `{plant}`"), span())
-                .with_help(suggestion(plant, known)),
-        );
+        let message = format!("there is no plant `{plant}`");
+        report("U0209", message, &suggestion(plant, known));
+        return None;
     };
-    let Some((_, controller)) = &members[other.program].lowered else {
-        return Ok(None);
-    };
+    // Where the other plant's controller has no circuit, that was reported there.
+    let (_, controller) = members[other.program].lowered.as_ref()?;
     let inputs = controller.inputs();
     let Some(place) = inputs.iter().position(|input| input == signal) else {
         let message = format!("the plant `{plant}` has no sensor `{signal}`");
-        return Err(Diagnostic::error("U0209", message, span())
-            .with_help(suggestion(signal, inputs.iter().map(String::as_str))));
+        let known = inputs.iter().map(String::as_str);
+        report("U0209", message, &suggestion(signal, known));
+        return None;
     };
-    Ok(Some(Followed {
+    Some(Followed {
         from: ProgramId(other.program as u8),
         sensor: place,
-    }))
+    })
 }
