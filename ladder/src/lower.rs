@@ -82,6 +82,31 @@ impl Program {
     /// A period out of [`PERIODS`], or a program with errors. A preset that is no multiple of the period is rounded up; see
     /// [`Program::preset_warnings`].
     pub fn lower(&self, period: Duration) -> Result<Circuit, LowerError> {
+        let outputs = self.outputs.iter().map(|signal| signal.name.to_string());
+        self.lower_showing(period, outputs.collect())
+    }
+
+    /// [`Self::lower`], with every memory bit and every output pin of a block (`pause.Q`) as an output behind those of the program, each
+    /// as it is after the scan.
+    ///
+    /// # Errors
+    /// As [`Self::lower`].
+    pub fn lower_observed(&self, period: Duration) -> Result<Circuit, LowerError> {
+        let blocks = self.blocks();
+        let pins = blocks.iter().flat_map(|block| {
+            let pins = block.kind.outputs().iter();
+            pins.map(|pin| format!("{}.{pin}", block.name))
+        });
+        let signals = self.writable().map(|signal| signal.name.to_string());
+        let outputs = self.outputs.iter().map(|signal| signal.name.to_string());
+        let mut shown: Vec<String> = outputs.collect();
+        let outputs: HashSet<String> = shown.iter().cloned().collect();
+        shown.extend(signals.filter(|name| !outputs.contains(name)).chain(pins));
+        self.lower_showing(period, shown)
+    }
+
+    /// `shown` are signals that the program writes, or pins of its blocks.
+    fn lower_showing(&self, period: Duration, shown: Vec<String>) -> Result<Circuit, LowerError> {
         validate(self, period)?;
         let mut lowering = Lowering::new(self, period);
         for rung in &self.rungs {
@@ -91,7 +116,7 @@ impl Program {
                 lowering.coil(coil.kind, &coil.target, power);
             }
         }
-        Ok(lowering.finish(self))
+        Ok(lowering.finish(self, shown))
     }
 
     /// A warning for each timer whose preset is no multiple of `period`.
@@ -325,11 +350,10 @@ impl<'a> Lowering<'a> {
     }
 
     /// Numbers the registers and moves everything into one circuit.
-    fn finish(mut self, program: &Program) -> Circuit {
-        let outputs: Vec<Expression> = program
-            .outputs
+    fn finish(mut self, program: &Program, shown: Vec<String>) -> Circuit {
+        let outputs: Vec<Expression> = shown
             .iter()
-            .map(|signal| self.read(self.places[signal.name.as_str()]))
+            .map(|name| self.read(self.places[name.as_str()]))
             .collect();
         let mut builder = CircuitBuilder::new(program.name.to_string());
         for signal in &program.inputs {
@@ -359,8 +383,8 @@ impl<'a> Lowering<'a> {
         for (register, &next) in registers.into_iter().zip(next) {
             builder.set_next(register, next);
         }
-        for (signal, &value) in program.outputs.iter().zip(outputs) {
-            builder.output(signal.name.to_string(), value);
+        for (name, &value) in shown.into_iter().zip(outputs) {
+            builder.output(name, value);
         }
         builder.finish().expect("names were checked to be unique")
     }

@@ -9,7 +9,10 @@ use std::collections::{HashMap, HashSet};
 
 use oxidd::bdd::{BDDFunction, BDDManagerRef, new_manager};
 use oxidd::util::{AllocResult, OptBool, SatCountCache};
-use oxidd::{BooleanFunction, Function, HasWorkers, Manager, ManagerRef, VarNo, WorkerPool};
+use oxidd::{
+    BooleanFunction, BooleanFunctionQuant, Function, FunctionSubst, HasWorkers, Manager,
+    ManagerRef, Subst, VarNo, WorkerPool,
+};
 
 use crate::expression::{Expression, Graph, Operation, Variable};
 
@@ -53,6 +56,9 @@ pub struct Diagrams {
 /// One function; equal to another of the same [`Diagrams`] exactly when the functions are equal.
 #[derive(Clone, PartialEq, Eq, Hash)]
 pub struct Diagram(BDDFunction);
+
+/// Functions in the place of variables, all at once. What is worked out under one substitution is remembered for the next use of it.
+pub struct Substitution(Option<Subst<BDDFunction>>);
 
 impl Diagrams {
     /// Nodes alive at once by default; about 100 MB when they are all in use.
@@ -168,6 +174,68 @@ impl Diagrams {
         zero: &Diagram,
     ) -> Result<Diagram, BddError> {
         self.checked(self.deep(|| condition.0.ite(&one.0, &zero.0)))
+    }
+
+    /// Whether the function is 1 for some value of each variable of the product `variables`.
+    ///
+    /// # Errors
+    /// Too many nodes.
+    pub fn exists(&self, diagram: &Diagram, variables: &Diagram) -> Result<Diagram, BddError> {
+        self.checked(self.deep(|| diagram.0.exists(&variables.0)))
+    }
+
+    /// The product of declared variables, for [`Self::exists`].
+    ///
+    /// # Errors
+    /// One of them is not declared, or there is no node left.
+    pub fn product(
+        &self,
+        variables: impl IntoIterator<Item = Variable>,
+    ) -> Result<Diagram, BddError> {
+        let one = self.constant(true);
+        variables.into_iter().try_fold(one, |product, variable| {
+            self.and(&product, &self.variable(variable)?)
+        })
+    }
+
+    /// Puts each function in the place of its variable.
+    ///
+    /// # Errors
+    /// A variable that is not declared.
+    pub fn substitution(
+        &self,
+        pairs: impl IntoIterator<Item = (Variable, Diagram)>,
+    ) -> Result<Substitution, BddError> {
+        let (mut variables, mut functions) = (Vec::new(), Vec::new());
+        for (variable, function) in pairs {
+            let number = self.numbers.get(&variable);
+            variables.push(*number.ok_or(BddError::UnknownVariable(variable))?);
+            functions.push(function.0);
+        }
+        let any = !variables.is_empty();
+        Ok(Substitution(any.then(|| Subst::new(variables, functions))))
+    }
+
+    /// The function with those of `substitution` in the place of its variables.
+    ///
+    /// # Errors
+    /// Too many nodes.
+    pub fn substitute(
+        &self,
+        diagram: &Diagram,
+        substitution: &Substitution,
+    ) -> Result<Diagram, BddError> {
+        match &substitution.0 {
+            None => Ok(diagram.clone()),
+            Some(pairs) => self.checked(self.deep(|| diagram.0.substitute(pairs))),
+        }
+    }
+
+    /// The function's value under an assignment of all declared variables.
+    pub fn value(&self, diagram: &Diagram, assignment: impl Fn(Variable) -> bool) -> bool {
+        let values = self.variables.iter().enumerate();
+        let values = values.map(|(number, &variable)| (number as VarNo, assignment(variable)));
+        diagram.0.eval(values)
     }
 
     /// Under how many assignments of all declared variables the function is 1; `None` for more than 127 variables.

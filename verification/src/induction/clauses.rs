@@ -1,0 +1,206 @@
+//! Scans one after the other as clauses, after Tseitin: a variable an operation and scan.
+
+use std::collections::HashMap;
+
+use batsat::{BasicSolver, Lit, SolverInterface, lbool};
+use understudy_logic::{Circuit, Expression, Operation, Variable};
+
+use crate::property::Formula;
+use crate::symbolic::{Cone, Resolved, Signal};
+
+/// The scans so far.
+pub(super) struct Unrolling<'c> {
+    circuit: &'c Circuit,
+    solver: BasicSolver,
+    one: Lit,
+    /// Registers of the cone.
+    registers: Vec<u32>,
+    /// For each scan the registers before it, in the order of `registers`.
+    before: Vec<Vec<Lit>>,
+    /// For each scan the inputs and operations that were asked for.
+    inputs: Vec<HashMap<u32, Lit>>,
+    made: Vec<HashMap<Expression, Lit>>,
+}
+
+impl<'c> Unrolling<'c> {
+    /// No scan yet; the first one starts from the initial registers, or from any.
+    pub(super) fn new(circuit: &'c Circuit, cone: &Cone, from_start: bool) -> Self {
+        let mut solver = BasicSolver::default();
+        let one = Lit::new(solver.new_var_default(), true);
+        solver.add_clause_reuse(&mut vec![one]);
+        let registers: Vec<u32> = (0..circuit.registers().len() as u32)
+            .filter(|&register| cone.variables.contains(&Variable::Register(register)))
+            .collect();
+        let first = registers.iter().map(|&register| {
+            if !from_start {
+                return Lit::new(solver.new_var_default(), true);
+            }
+            if circuit.registers()[register as usize].initial {
+                one
+            } else {
+                !one
+            }
+        });
+        let before = vec![first.collect()];
+        Self {
+            circuit,
+            solver,
+            one,
+            registers,
+            before,
+            inputs: Vec::new(),
+            made: Vec::new(),
+        }
+    }
+
+    /// Adds a scan.
+    pub(super) fn scan(&mut self) {
+        self.inputs.push(HashMap::new());
+        self.made.push(HashMap::new());
+        let scan = self.made.len() - 1;
+        let registers = self.registers.clone();
+        let next = registers.into_iter().map(|register| {
+            let next = self.circuit.registers()[register as usize].next;
+            self.expression(next, scan)
+        });
+        let next = next.collect();
+        self.before.push(next);
+    }
+
+    /// Requires the registers before `scan` to differ from those before each earlier one.
+    pub(super) fn differ(&mut self, scan: usize) {
+        for earlier in 0..scan {
+            let pairs = self.before[earlier].iter().zip(&self.before[scan]);
+            let pairs: Vec<(Lit, Lit)> = pairs.map(|(left, right)| (*left, *right)).collect();
+            let mut some: Vec<Lit> = pairs
+                .into_iter()
+                .map(|(left, right)| self.sum(left, right))
+                .collect();
+            self.solver.add_clause_reuse(&mut some);
+        }
+    }
+
+    /// The truth of a formula of one scan.
+    pub(super) fn literal(&mut self, formula: &Resolved, scan: usize) -> Lit {
+        let mut of = |formula: &Resolved| self.literal(formula, scan);
+        match formula {
+            Formula::Constant(true) => self.one,
+            Formula::Signal(Signal::Output(output)) => {
+                let value = self.circuit.outputs()[*output].value;
+                self.expression(value, scan)
+            }
+            Formula::Signal(Signal::Input(input)) => self.input(*input as u32, scan),
+            Formula::Not(inner) => !of(inner),
+            Formula::And(left, right) => {
+                let (left, right) = (of(left), of(right));
+                self.product(left, right)
+            }
+            Formula::Or(left, right) => {
+                let (left, right) = (of(left), of(right));
+                !self.product(!left, !right)
+            }
+            Formula::Implies(left, right) => {
+                let (left, right) = (of(left), of(right));
+                !self.product(left, !right)
+            }
+            Formula::Same(left, right) => {
+                let (left, right) = (of(left), of(right));
+                !self.sum(left, right)
+            }
+            // What speaks of later scans is kept out by the caller; nothing is claimed of it.
+            _ => !self.one,
+        }
+    }
+
+    /// Whether all that is required can hold together with `assumed`.
+    pub(super) fn satisfiable(&mut self, assumed: Lit) -> bool {
+        self.solver.solve_limited(&[assumed]) == lbool::TRUE
+    }
+
+    pub(super) fn require(&mut self, literal: Lit) {
+        self.solver.add_clause_reuse(&mut vec![literal]);
+    }
+
+    /// The inputs of a scan in the assignment that was found; those that do not matter are 0.
+    pub(super) fn inputs(&self, scan: usize) -> Vec<bool> {
+        let mut inputs = vec![false; self.circuit.inputs().len()];
+        for (&input, &literal) in &self.inputs[scan] {
+            inputs[input as usize] = self.solver.value_lit(literal) == lbool::TRUE;
+        }
+        inputs
+    }
+
+    fn input(&mut self, input: u32, scan: usize) -> Lit {
+        let solver = &mut self.solver;
+        let fresh = || Lit::new(solver.new_var_default(), true);
+        *self.inputs[scan].entry(input).or_insert_with(fresh)
+    }
+
+    fn expression(&mut self, root: Expression, scan: usize) -> Lit {
+        let circuit = self.circuit;
+        let mut pending = vec![root];
+        while let Some(&expression) = pending.last() {
+            if self.made[scan].contains_key(&expression) {
+                pending.pop();
+                continue;
+            }
+            let operation = circuit.graph().operation(expression);
+            let waiting = pending.len();
+            let made = &self.made[scan];
+            pending.extend(
+                operation
+                    .operands()
+                    .filter(|operand| !made.contains_key(operand)),
+            );
+            if pending.len() > waiting {
+                continue;
+            }
+            let of = |operand: Expression| self.made[scan][&operand];
+            let literal = match operation {
+                Operation::Constant(true) => self.one,
+                Operation::Constant(false) => !self.one,
+                Operation::Variable(Variable::Input(input)) => self.input(input, scan),
+                Operation::Variable(Variable::Register(register)) => {
+                    let place = self.registers.binary_search(&register);
+                    self.before[scan][place.expect("the cone holds what its functions read")]
+                }
+                Operation::Not(operand) => !of(operand),
+                Operation::And(left, right) => {
+                    let (left, right) = (of(left), of(right));
+                    self.product(left, right)
+                }
+                Operation::Or(left, right) => {
+                    let (left, right) = (of(left), of(right));
+                    !self.product(!left, !right)
+                }
+                Operation::Xor(left, right) => {
+                    let (left, right) = (of(left), of(right));
+                    self.sum(left, right)
+                }
+            };
+            self.made[scan].insert(expression, literal);
+        }
+        self.made[scan][&root]
+    }
+
+    fn product(&mut self, left: Lit, right: Lit) -> Lit {
+        let both = Lit::new(self.solver.new_var_default(), true);
+        for clause in [&[!both, left][..], &[!both, right], &[both, !left, !right]] {
+            self.solver.add_clause_reuse(&mut clause.to_vec());
+        }
+        both
+    }
+
+    fn sum(&mut self, left: Lit, right: Lit) -> Lit {
+        let one = Lit::new(self.solver.new_var_default(), true);
+        for clause in [
+            [!one, left, right],
+            [!one, !left, !right],
+            [one, !left, right],
+            [one, left, !right],
+        ] {
+            self.solver.add_clause_reuse(&mut clause.to_vec());
+        }
+        one
+    }
+}

@@ -1,0 +1,123 @@
+//! A ladder against its properties, and against what everybody wants of a ladder without saying so.
+
+mod unasked;
+
+use std::time::Duration;
+
+use understudy_diagnostic::Diagnostic;
+use understudy_ladder::{LowerError, Program};
+use understudy_logic::Circuit;
+use understudy_logic::bdd::{BddError, Diagrams};
+
+use crate::property::{Named, Property};
+use crate::symbolic::{Checker, Resolved, Signal, Trace, Verdict, resolve};
+
+pub use unasked::{Lamp, OutputFinding};
+
+/// Bounds of a proof.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Bounds {
+    /// Nodes of decision diagrams alive at once.
+    pub nodes: usize,
+}
+
+impl Default for Bounds {
+    fn default() -> Self {
+        Self {
+            nodes: Diagrams::DEFAULT_LIMIT,
+        }
+    }
+}
+
+/// What came of one property.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Answer {
+    /// It holds in every run; where it says that something can happen, the scans show how.
+    Holds(Option<Trace>),
+    /// It does not hold; the scans show a run, where a run can show it.
+    Fails(Option<Trace>),
+    /// Neither was proved within the bounds.
+    Undecided(BddError),
+}
+
+/// A program as its properties see it.
+#[derive(Debug)]
+pub struct Subject {
+    circuit: Circuit,
+    outputs: usize,
+}
+
+impl Subject {
+    /// `program`, one scan a `period`; memory bits and pins of blocks (`pause.Q`) can be named in properties too.
+    ///
+    /// # Errors
+    /// The program has errors, or the period is out of bounds.
+    pub fn new(program: &Program, period: Duration) -> Result<Self, LowerError> {
+        Ok(Self {
+            circuit: program.lower_observed(period)?,
+            outputs: program.outputs.len(),
+        })
+    }
+
+    /// What is proved about: the program's outputs come first, then its memory and pins.
+    pub fn circuit(&self) -> &Circuit {
+        &self.circuit
+    }
+
+    /// The program's own outputs.
+    pub fn outputs(&self) -> impl Iterator<Item = Signal> + use<> {
+        (0..self.outputs).map(Signal::Output)
+    }
+
+    /// The formula of `property` over the program's signals; what is wrong has places in the property's file.
+    ///
+    /// # Errors
+    /// Every name that is no signal of the program (U0435).
+    pub fn resolve(&self, property: &Property) -> Result<Resolved, Vec<Diagnostic>> {
+        resolve(&property.formula, &self.circuit).map_err(|unknown| {
+            unknown
+                .into_iter()
+                .map(|named| self.unknown(named))
+                .collect()
+        })
+    }
+
+    fn unknown(&self, named: &Named) -> Diagnostic {
+        let outputs = self.circuit.outputs().iter().map(|output| &output.name);
+        let names = outputs.chain(self.circuit.inputs());
+        let distance = |name: &String| strsim::damerau_levenshtein(name, &named.name);
+        let nearest = names.clone().min_by_key(|name| distance(name));
+        let near = named.name.chars().count() / 3 + 1;
+        let help = match nearest {
+            Some(nearest) if distance(nearest) <= near => format!("did you mean `{nearest}`?"),
+            _ => {
+                let known: Vec<&str> = names.take(12).map(String::as_str).collect();
+                format!("signals are, among others: {}", known.join(", "))
+            }
+        };
+        let message = format!("`{}` is no signal of `{}`", named.name, self.circuit.name());
+        Diagnostic::error("U0435", message, named.span.clone()).with_help(help)
+    }
+
+    /// Decides `properties` one after the other; `fair` restricts the runs that are looked at. Each answer is told as it comes.
+    pub fn check(
+        &self,
+        properties: &[Resolved],
+        fair: Vec<Resolved>,
+        bounds: Bounds,
+        answered: &mut dyn FnMut(usize, &Answer),
+    ) -> Vec<Answer> {
+        let mut checker = Checker::new(&self.circuit, fair, bounds.nodes);
+        let mut answers = Vec::with_capacity(properties.len());
+        for (place, property) in properties.iter().enumerate() {
+            let answer = match checker.check(property) {
+                Ok(Verdict::Holds(trace)) => Answer::Holds(trace),
+                Ok(Verdict::Fails(trace)) => Answer::Fails(trace),
+                Err(error) => Answer::Undecided(error),
+            };
+            answered(place, &answer);
+            answers.push(answer);
+        }
+        answers
+    }
+}

@@ -1,0 +1,124 @@
+//! CTL with fairness on a circuit, by sets of states as decision diagrams.
+//!
+//! A state is (x, u): the registers before a scan and the inputs in it; outputs are h(x, u), and the scan leads to every (f(x, u), u').
+//! So a set S is entered in one step from
+//!
+//! ```text
+//! EX S = { (x, u) : there is u' with (f(x, u), u') in S }
+//! ```
+//!
+//! which is a quantification and a substitution; no relation between old and new bits is ever built. Only what a property depends on is
+//! looked at: its signals, the registers in their functions, and so on; the rest of the program cannot change its truth.
+
+mod check;
+mod core;
+mod model;
+mod trace;
+
+use understudy_logic::Circuit;
+use understudy_logic::bdd::BddError;
+
+use crate::property::{Formula, Named};
+
+pub(crate) use model::Cone;
+pub(crate) use trace::rows;
+pub use trace::{ScanRow, Trace, replays};
+
+/// A property whose signals are known to be those of a circuit, by their number in it.
+pub type Resolved = Formula<Signal>;
+
+/// A signal of a circuit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Signal {
+    /// An output, by its index.
+    Output(usize),
+    /// An input, by its index.
+    Input(usize),
+}
+
+/// The formula over the signals of `circuit`; an output goes before an input of the same name.
+///
+/// # Errors
+/// The names in it that are no signals of the circuit.
+pub fn resolve<'f>(
+    formula: &'f Formula<Named>,
+    circuit: &Circuit,
+) -> Result<Resolved, Vec<&'f Named>> {
+    let resolved = formula.map(&|named: &Named| signal(&named.name, circuit));
+    resolved.ok_or_else(|| {
+        let names = formula.signals().into_iter();
+        names
+            .filter(|named| signal(&named.name, circuit).is_none())
+            .collect()
+    })
+}
+
+fn signal(name: &str, circuit: &Circuit) -> Option<Signal> {
+    let output = circuit
+        .outputs()
+        .iter()
+        .position(|output| output.name == name);
+    let input = || circuit.inputs().iter().position(|input| input == name);
+    output
+        .map(Signal::Output)
+        .or_else(|| input().map(Signal::Input))
+}
+
+/// What came of one property.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Verdict {
+    /// It holds; the scans show how, where scans can show it (that something can be reached).
+    Holds(Option<Trace>),
+    /// It does not hold; the scans show why, where scans can show it.
+    Fails(Option<Trace>),
+}
+
+/// Decides properties of one circuit.
+pub struct Checker<'c> {
+    circuit: &'c Circuit,
+    fair: Vec<Resolved>,
+    nodes: usize,
+    models: Vec<model::Model<'c>>,
+}
+
+impl Signal {
+    /// Its name in `circuit`.
+    pub fn name(self, circuit: &Circuit) -> &str {
+        match self {
+            Self::Output(output) => &circuit.outputs()[output].name,
+            Self::Input(input) => &circuit.inputs()[input],
+        }
+    }
+}
+
+impl<'c> Checker<'c> {
+    /// Over the runs in which each of `fair` comes again and again (all runs where there is none), with at most `nodes` nodes alive.
+    pub fn new(circuit: &'c Circuit, fair: Vec<Resolved>, nodes: usize) -> Self {
+        Self {
+            circuit,
+            fair,
+            nodes,
+            models: Vec::new(),
+        }
+    }
+
+    /// Whether every first scan satisfies `property`: the registers as they start, the inputs any.
+    ///
+    /// # Errors
+    /// The diagrams need more nodes than allowed.
+    pub fn check(&mut self, property: &Resolved) -> Result<Verdict, BddError> {
+        let cone = model::Cone::of(self.circuit, self.fair.iter().chain([property]));
+        let known = self.models.iter().position(|model| model.cone == cone);
+        let model = match known {
+            Some(place) => &mut self.models[place],
+            None => {
+                // What other properties need is dropped: the bound is on what is alive at once.
+                self.models.clear();
+                let model = model::Model::new(self.circuit, cone, &self.fair, self.nodes)?;
+                self.models.push(model);
+                &mut self.models[0]
+            }
+        };
+        check::check(model, property)
+    }
+}

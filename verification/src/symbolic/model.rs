@@ -1,0 +1,186 @@
+//! The part of a circuit that a property depends on, as diagrams.
+
+use std::collections::BTreeSet;
+
+use understudy_logic::bdd::{BddError, Diagram, Diagrams, Substitution, depth_first_order};
+use understudy_logic::{Circuit, Expression, Operation, Variable};
+
+use super::core::Core;
+use super::{Resolved, Signal};
+
+/// The inputs and registers that some signals depend on, now and later.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(crate) struct Cone {
+    pub(crate) signals: BTreeSet<Signal>,
+    pub(crate) variables: BTreeSet<Variable>,
+}
+
+impl Cone {
+    pub(crate) fn of<'f>(
+        circuit: &Circuit,
+        formulas: impl IntoIterator<Item = &'f Resolved>,
+    ) -> Self {
+        let mut cone = Self::default();
+        for formula in formulas {
+            cone.signals.extend(formula.signals());
+        }
+        let graph = circuit.graph();
+        let mut seen = BTreeSet::new();
+        let mut pending: Vec<Expression> = Vec::new();
+        for signal in &cone.signals {
+            match signal {
+                Signal::Output(output) => pending.push(circuit.outputs()[*output].value),
+                Signal::Input(input) => {
+                    cone.variables.insert(Variable::Input(*input as u32));
+                }
+            }
+        }
+        while let Some(expression) = pending.pop() {
+            if !seen.insert(expression) {
+                continue;
+            }
+            let operation = graph.operation(expression);
+            if let Operation::Variable(variable) = operation
+                && cone.variables.insert(variable)
+                && let Variable::Register(register) = variable
+            {
+                pending.push(circuit.registers()[register as usize].next);
+            }
+            pending.extend(operation.operands());
+        }
+        cone
+    }
+
+    /// The signals that it is about, then the other inputs that they depend on.
+    pub(crate) fn shown(&self) -> Vec<Signal> {
+        let inputs = self.variables.iter().filter_map(|variable| match variable {
+            Variable::Input(input) => Some(Signal::Input(*input as usize)),
+            Variable::Register(_) => None,
+        });
+        let others = inputs.filter(|input| !self.signals.contains(input));
+        self.signals.iter().copied().chain(others).collect()
+    }
+}
+
+/// A circuit's part as diagrams over (x, u).
+pub(super) struct Model<'c> {
+    pub(super) circuit: &'c Circuit,
+    pub(super) cone: Cone,
+    pub(super) diagrams: Diagrams,
+    /// u of the cone.
+    inputs: Diagram,
+    /// x := f(x, u).
+    step: Substitution,
+    signals: Vec<(Signal, Diagram)>,
+    /// Each comes again and again in a fair run.
+    pub(super) fair: Vec<Diagram>,
+    /// From where a fair run goes on; nothing where every run is fair.
+    pub(super) fair_states: Option<Diagram>,
+}
+
+impl<'c> Model<'c> {
+    pub(super) fn new(
+        circuit: &'c Circuit,
+        cone: Cone,
+        fair: &[Resolved],
+        nodes: usize,
+    ) -> Result<Self, BddError> {
+        let graph = circuit.graph();
+        let registers: Vec<u32> = cone
+            .variables
+            .iter()
+            .filter_map(|variable| match variable {
+                Variable::Register(register) => Some(*register),
+                Variable::Input(_) => None,
+            })
+            .collect();
+        let diagrams = Diagrams::new(order(circuit, &cone, &registers), nodes);
+        let inputs = cone.variables.iter().copied();
+        let inputs = inputs.filter(|variable| matches!(variable, Variable::Input(_)));
+        let inputs = diagrams.product(inputs)?;
+        let mut builder = diagrams.builder(graph, |variable| variable);
+        let mut pairs = Vec::with_capacity(registers.len());
+        for &register in &registers {
+            let next = builder.diagram(circuit.registers()[register as usize].next)?;
+            pairs.push((Variable::Register(register), next));
+        }
+        let mut signals = Vec::new();
+        for &signal in &cone.signals {
+            let diagram = match signal {
+                Signal::Output(output) => builder.diagram(circuit.outputs()[output].value)?,
+                Signal::Input(input) => diagrams.variable(Variable::Input(input as u32))?,
+            };
+            signals.push((signal, diagram));
+        }
+        drop(builder);
+        let step = diagrams.substitution(pairs)?;
+        let mut model = Self {
+            circuit,
+            cone,
+            diagrams,
+            inputs,
+            step,
+            signals,
+            fair: Vec::new(),
+            fair_states: None,
+        };
+        for condition in fair {
+            let condition = model.states(&Core::of(condition))?;
+            model.fair.push(condition);
+        }
+        if !model.fair.is_empty() {
+            let everywhere = model.diagrams.constant(true);
+            model.fair_states = Some(model.always(&everywhere)?);
+        }
+        Ok(model)
+    }
+
+    pub(super) fn signal(&self, signal: Signal) -> &Diagram {
+        let found = self.signals.iter().find(|(known, _)| *known == signal);
+        &found.expect("a signal of the cone").1
+    }
+
+    /// EX `set`.
+    pub(super) fn before(&self, set: &Diagram) -> Result<Diagram, BddError> {
+        let some_input = self.diagrams.exists(set, &self.inputs)?;
+        self.diagrams.substitute(&some_input, &self.step)
+    }
+
+    /// The states of `set` whose registers are `registers`, of which those of the cone count.
+    pub(super) fn with_registers(
+        &self,
+        set: &Diagram,
+        registers: &[bool],
+    ) -> Result<Diagram, BddError> {
+        let mut states = set.clone();
+        for &variable in self.cone.variables.iter().rev() {
+            let Variable::Register(register) = variable else {
+                continue;
+            };
+            let bit = self.diagrams.variable(variable)?;
+            let literal = if registers[register as usize] {
+                bit
+            } else {
+                self.diagrams.not(&bit)?
+            };
+            states = self.diagrams.and(&states, &literal)?;
+        }
+        Ok(states)
+    }
+}
+
+/// What a reader meets together comes together: each register before what its function depends on, from the signals on.
+fn order(circuit: &Circuit, cone: &Cone, registers: &[u32]) -> Vec<Variable> {
+    let outputs = cone.signals.iter().filter_map(|signal| match signal {
+        Signal::Output(output) => Some(circuit.outputs()[*output].value),
+        Signal::Input(_) => None,
+    });
+    let next = registers
+        .iter()
+        .map(|&register| circuit.registers()[register as usize].next);
+    let roots: Vec<Expression> = outputs.chain(next).collect();
+    let mut order = depth_first_order(circuit.graph(), &roots);
+    let placed: BTreeSet<Variable> = order.iter().copied().collect();
+    order.extend(cone.variables.difference(&placed).copied());
+    order
+}

@@ -1,0 +1,356 @@
+//! Runs that show why a formula holds: a witness, or a counterexample of its negation.
+//!
+//! A run is found in the sets, and then told by evaluating the circuit itself on the inputs that were found. A run without end is a
+//! *lasso*: it goes on from its last scan to an earlier one.
+
+use understudy_logic::bdd::{BddError, Diagram};
+use understudy_logic::{Circuit, Scan, Scratch, Variable};
+
+use super::Signal;
+use super::core::Core;
+use super::model::{Cone, Model};
+
+/// One scan of a [`Trace`].
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ScanRow {
+    /// u, in the order of the circuit.
+    pub inputs: Vec<bool>,
+    /// y, in the order of the circuit.
+    pub outputs: Vec<bool>,
+}
+
+/// A run from the first scan on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Trace {
+    /// What matters for it: the property's signals, then the other inputs that they depend on.
+    pub signals: Vec<Signal>,
+    /// At least one.
+    pub scans: Vec<ScanRow>,
+    /// After the last scan everything goes on as from this one; nothing where what comes later does not matter.
+    pub again_from: Option<usize>,
+}
+
+impl Trace {
+    /// The values of one signal, scan by scan.
+    pub fn values(&self, signal: Signal) -> impl Iterator<Item = bool> + '_ {
+        self.scans.iter().map(move |scan| match signal {
+            Signal::Output(output) => scan.outputs[output],
+            Signal::Input(input) => scan.inputs[input],
+        })
+    }
+}
+
+/// Scans that a run may have; a longer one is cut and goes on anyhow.
+const MAXIMUM_SCANS: usize = 20_000;
+
+/// x before a scan, and u in it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct State {
+    registers: Vec<bool>,
+    inputs: Vec<bool>,
+}
+
+/// Finds runs in the sets of a model.
+pub(super) struct Tracer<'m, 'c> {
+    model: &'m Model<'c>,
+    scan: Scan,
+}
+
+impl<'m, 'c> Tracer<'m, 'c> {
+    pub(super) fn new(model: &'m Model<'c>) -> Self {
+        Self {
+            model,
+            scan: Scan::new(model.circuit),
+        }
+    }
+
+    /// A run from one of the states `first`, all of which start from `registers` and satisfy `formula`; nothing where `formula` speaks of
+    /// every way on.
+    pub(super) fn trace(
+        &self,
+        formula: &Core,
+        registers: &[bool],
+        first: &Diagram,
+    ) -> Result<Option<Trace>, BddError> {
+        if matches!(formula, Core::Not(inner) if inner.is_temporal()) {
+            return Ok(None);
+        }
+        let nearest = self.nearest(formula, first)?;
+        let Some(state) = self.pick(registers.to_vec(), &nearest)? else {
+            return Ok(None);
+        };
+        let mut run = Run {
+            states: vec![state],
+            again_from: None,
+        };
+        self.extend(&mut run, formula)?;
+        Ok(Some(self.told(run)))
+    }
+
+    /// Those of `states`, all of which satisfy `formula`, from which the fewest scans show it.
+    fn nearest(&self, formula: &Core, states: &Diagram) -> Result<Diagram, BddError> {
+        let model = self.model;
+        let rings = match formula {
+            Core::And(left, right) => {
+                let shown = if shows(left) { left } else { right };
+                return self.nearest(shown, states);
+            }
+            Core::Until(hold, end) => {
+                let end = model.fair_only(&model.states(end)?)?;
+                model.rings(&model.states(hold)?, &end)?
+            }
+            Core::Reaches(scans, end) => {
+                let end = model.fair_only(&model.states(end)?)?;
+                model.within(*scans, &model.diagrams.constant(true), &end)?
+            }
+            _ => Vec::new(),
+        };
+        for ring in &rings {
+            let near = model.diagrams.and(states, ring)?;
+            if !near.is_constant(false) {
+                return Ok(near);
+            }
+        }
+        Ok(states.clone())
+    }
+
+    /// Lengthens a run whose last state satisfies `formula` until it shows that.
+    fn extend(&self, run: &mut Run, formula: &Core) -> Result<(), BddError> {
+        let model = self.model;
+        match formula {
+            Core::Constant(_) | Core::Signal(_) | Core::Not(_) => Ok(()),
+            Core::And(left, right) => {
+                // One run can show only one way on; the first that has one is shown.
+                let shown = if shows(left) { left } else { right };
+                self.extend(run, shown)
+            }
+            Core::Next(inner) => {
+                let states = model.fair_only(&model.states(inner)?)?;
+                self.step(run, &states)?;
+                self.extend(run, inner)
+            }
+            Core::Until(hold, end) => {
+                let (hold, last) = (model.states(hold)?, model.fair_only(&model.states(end)?)?);
+                let rings = model.rings(&hold, &last)?;
+                self.descend(run, &rings)?;
+                self.extend(run, end)
+            }
+            Core::Reaches(scans, end) => {
+                let last = model.fair_only(&model.states(end)?)?;
+                let everywhere = model.diagrams.constant(true);
+                let rings = model.within(*scans, &everywhere, &last)?;
+                self.descend(run, &rings)?;
+                self.extend(run, end)
+            }
+            Core::Stays(scans, inner) => {
+                let kept = model.stays(*scans, &model.states(inner)?)?;
+                for left in (0..*scans as usize).rev() {
+                    self.step(run, &kept[left.min(kept.len() - 1)])?;
+                }
+                Ok(())
+            }
+            Core::Always(inner) => {
+                let inside = model.always(&model.states(inner)?)?;
+                self.lasso(run, &inside)
+            }
+        }
+    }
+
+    /// Walks from ring to ring until the innermost.
+    fn descend(&self, run: &mut Run, rings: &[Diagram]) -> Result<(), BddError> {
+        let within = |ring: &&Diagram| self.contains(ring, run.last());
+        let Some(mut ring) = rings.iter().position(|ring| within(&ring)) else {
+            return Ok(());
+        };
+        while ring > 0 && run.states.len() < MAXIMUM_SCANS {
+            self.step(run, &rings[ring - 1])?;
+            let last = run.last().clone();
+            ring = rings[..ring]
+                .iter()
+                .position(|ring| self.contains(ring, &last))
+                .unwrap_or(0);
+        }
+        Ok(())
+    }
+
+    /// Stays `inside`, which every state of it can, meets every condition of fairness, and comes back to where it was.
+    fn lasso(&self, run: &mut Run, inside: &Diagram) -> Result<(), BddError> {
+        let model = self.model;
+        while run.states.len() < MAXIMUM_SCANS {
+            let start = run.states.len() - 1;
+            self.step(run, inside)?;
+            for condition in &model.fair {
+                let end = model.diagrams.and(inside, condition)?;
+                self.descend(run, &model.rings(inside, &end)?)?;
+            }
+            let back = self.only(&run.states[start])?;
+            let rings = model.rings(inside, &back)?;
+            let returns = rings.iter().any(|ring| self.contains(ring, run.last()));
+            if returns {
+                self.descend(run, &rings)?;
+                run.states.pop();
+                run.again_from = Some(start);
+                return Ok(());
+            }
+            // The start lies outside of what this run can come back to; from here on fewer states are left.
+        }
+        Ok(())
+    }
+
+    /// One scan on, into `states`.
+    fn step(&self, run: &mut Run, states: &Diagram) -> Result<(), BddError> {
+        let registers = self.next(run.last());
+        if let Some(state) = self.pick(registers, states)? {
+            run.states.push(state);
+        }
+        Ok(())
+    }
+
+    /// One of `states` with these registers; inputs that do not matter are 0.
+    fn pick(&self, registers: Vec<bool>, states: &Diagram) -> Result<Option<State>, BddError> {
+        let here = self.model.with_registers(states, &registers)?;
+        let Some(chosen) = self.model.diagrams.satisfying(&here) else {
+            return Ok(None);
+        };
+        let mut inputs = vec![false; self.model.circuit.inputs().len()];
+        for (variable, value) in chosen {
+            if let Variable::Input(input) = variable {
+                inputs[input as usize] = value;
+            }
+        }
+        Ok(Some(State { registers, inputs }))
+    }
+
+    fn contains(&self, states: &Diagram, state: &State) -> bool {
+        self.model
+            .diagrams
+            .value(states, |variable| match variable {
+                Variable::Input(input) => state.inputs[input as usize],
+                Variable::Register(register) => state.registers[register as usize],
+            })
+    }
+
+    /// The set of one state, as far as the cone sees it.
+    fn only(&self, state: &State) -> Result<Diagram, BddError> {
+        let model = self.model;
+        let mut states = model.with_registers(&model.diagrams.constant(true), &state.registers)?;
+        for &variable in &model.cone.variables {
+            if let Variable::Input(input) = variable {
+                let bit = model.diagrams.variable(variable)?;
+                let literal = if state.inputs[input as usize] {
+                    bit
+                } else {
+                    model.diagrams.not(&bit)?
+                };
+                states = model.diagrams.and(&states, &literal)?;
+            }
+        }
+        Ok(states)
+    }
+
+    /// x(t+1), by the circuit itself.
+    fn next(&self, state: &State) -> Vec<bool> {
+        let mut registers = packed(&state.registers);
+        let mut outputs = vec![0; self.scan.output_count().div_ceil(64)];
+        let inputs = packed(&state.inputs);
+        self.scan.step(
+            &mut Scratch::default(),
+            &mut registers,
+            &inputs,
+            &mut outputs,
+        );
+        unpacked(&registers, state.registers.len())
+    }
+
+    fn told(&self, run: Run) -> Trace {
+        let inputs = run.states.into_iter().map(|state| state.inputs);
+        Trace {
+            again_from: run.again_from,
+            ..rows(self.model.circuit, &self.model.cone, inputs.collect())
+        }
+    }
+}
+
+/// The run from the first scan on with these inputs, one list a scan.
+pub(crate) fn rows(circuit: &Circuit, cone: &Cone, inputs: Vec<Vec<bool>>) -> Trace {
+    let scan = Scan::new(circuit);
+    let mut scratch = Scratch::default();
+    let mut state = scan.initial().to_vec();
+    let mut outputs = vec![0; scan.output_count().div_ceil(64)];
+    let rows = inputs.into_iter().map(|inputs| {
+        scan.step(&mut scratch, &mut state, &packed(&inputs), &mut outputs);
+        ScanRow {
+            inputs,
+            outputs: unpacked(&outputs, scan.output_count()),
+        }
+    });
+    Trace {
+        signals: cone.shown(),
+        scans: rows.collect(),
+        again_from: None,
+    }
+}
+
+/// States one after the other.
+struct Run {
+    states: Vec<State>,
+    again_from: Option<usize>,
+}
+
+impl Run {
+    fn last(&self) -> &State {
+        &self.states[self.states.len() - 1]
+    }
+}
+
+/// Whether a run can show it.
+fn shows(formula: &Core) -> bool {
+    match formula {
+        Core::Constant(_) | Core::Signal(_) | Core::Not(_) => false,
+        Core::And(left, right) => shows(left) || shows(right),
+        _ => true,
+    }
+}
+
+fn packed(bits: &[bool]) -> Vec<u64> {
+    let mut words = vec![0; bits.len().div_ceil(64)];
+    for (place, &bit) in bits.iter().enumerate() {
+        words[place / 64] |= u64::from(bit) << (place % 64);
+    }
+    words
+}
+
+fn unpacked(words: &[u64], width: usize) -> Vec<bool> {
+    (0..width)
+        .map(|place| words[place / 64] >> (place % 64) & 1 == 1)
+        .collect()
+}
+
+/// Does the circuit do on the inputs of `trace` what the trace says? The check of what was found shares nothing with the search.
+pub fn replays(circuit: &Circuit, trace: &Trace) -> bool {
+    let graph = circuit.graph();
+    let registers = circuit.registers();
+    let mut state: Vec<bool> = registers.iter().map(|register| register.initial).collect();
+    let mut entered = Vec::new();
+    for row in &trace.scans {
+        entered.push(state.clone());
+        let value = |variable: Variable| match variable {
+            Variable::Input(input) => row.inputs[input as usize],
+            Variable::Register(register) => state[register as usize],
+        };
+        let outputs = circuit.outputs().iter();
+        let same = outputs
+            .zip(&row.outputs)
+            .all(|(output, told)| graph.evaluate(output.value, value) == *told);
+        if !same {
+            return false;
+        }
+        state = registers
+            .iter()
+            .map(|register| graph.evaluate(register.next, value))
+            .collect();
+    }
+    trace
+        .again_from
+        .is_none_or(|from| entered.get(from).is_some())
+}

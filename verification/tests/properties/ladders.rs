@@ -1,0 +1,151 @@
+//! Ladders as people write them.
+
+use std::time::Duration;
+
+use understudy_ladder::parse;
+use understudy_logic::Circuit;
+use understudy_logic::bdd::Diagrams;
+use understudy_verification::program::{Bounds, Lamp, OutputFinding, Subject};
+use understudy_verification::property::read_one;
+use understudy_verification::smv;
+use understudy_verification::symbolic::{Checker, Trace, Verdict, replays, resolve};
+
+const SEAL_IN: &str = "\
+program pump
+input start
+input stop
+output motor
+output lamp
+memory ready
+
+rung
+    [ start | motor ] /stop ( motor )
+rung
+    motor {TON warm 30ms}
+rung
+    warm.Q ( ready )
+rung
+    ready /stop ( lamp )
+";
+
+fn circuit() -> Circuit {
+    let parsed = parse(SEAL_IN);
+    assert_eq!(parsed.diagnostics, []);
+    parsed
+        .program
+        .lower_observed(Duration::from_millis(10))
+        .expect("a right program")
+}
+
+fn check(property: &str, fair: &[&str]) -> (bool, Option<Vec<String>>) {
+    let circuit = circuit();
+    let formula = |text: &str| {
+        let property = read_one(text).expect("right");
+        resolve(&property.formula, &circuit).expect("known signals")
+    };
+    let fair = fair.iter().map(|text| formula(text)).collect();
+    let mut checker = Checker::new(&circuit, fair, Diagrams::DEFAULT_LIMIT);
+    let (holds, trace) = match checker.check(&formula(property)).expect("small") {
+        Verdict::Holds(trace) => (true, trace),
+        Verdict::Fails(trace) => (false, trace),
+    };
+    let rows = trace.map(|trace| {
+        assert!(replays(&circuit, &trace));
+        let bits = |bits: &[bool]| -> String {
+            bits.iter()
+                .map(|&bit| if bit { '1' } else { '0' })
+                .collect()
+        };
+        let rows = trace.scans.iter();
+        rows.map(|row| format!("{} {}", bits(&row.inputs), bits(&row.outputs)))
+            .collect()
+    });
+    (holds, rows)
+}
+
+#[test]
+fn a_seal_in_keeps_what_it_promises() {
+    assert_eq!(check("never motor and stop", &[]), (true, None));
+    assert_eq!(check("lamp only while motor", &[]), (true, None));
+    assert!(check("motor can always be reached", &[]).0);
+    assert!(check("motor stays until stop", &[]).0);
+    assert!(check("warm.Q only while motor", &[]).0);
+    // The operator may stop it before it is warm, or for ever.
+    assert!(!check("motor is followed by lamp", &[]).0);
+    assert!(!check("motor is followed by lamp", &["!stop"]).0);
+    assert!(check("AG (AG !stop -> (motor -> ABF 0..5 lamp))", &[]).0);
+    // Fair runs start again and again.
+    assert!(!check("AF motor", &[]).0);
+    assert!(check("AF motor", &["start & !stop"]).0);
+}
+
+#[test]
+fn what_is_reached_is_shown_scan_by_scan() {
+    let (holds, rows) = check("lamp can be reached", &[]);
+    assert!(holds);
+    let rows = rows.expect("a run");
+    // The start, and the three scans of the timer.
+    assert_eq!(rows.len(), 4, "{rows:?}");
+    assert_eq!(rows[0], "10 1000");
+    let (holds, rows) = check("AG !lamp", &[]);
+    assert!(!holds);
+    assert_eq!(rows.expect("a run").len(), 4);
+}
+
+#[test]
+fn every_output_is_asked_whether_it_can_be_switched() {
+    let check = |rung: &str, expected: OutputFinding| {
+        let text = format!("program p\ninput a\noutput y\nrung\n    {rung}\n");
+        let program = parse(&text).program;
+        let subject = Subject::new(&program, Duration::from_millis(10)).expect("right");
+        let found = subject.switches(Bounds::default());
+        let found = found.into_iter().map(|(_, finding)| match finding {
+            // Which scans show it is not the matter here.
+            OutputFinding::Stuck(lamp, _) => format!("Stuck({lamp:?})"),
+            other => format!("{other:?}"),
+        });
+        let expected = match expected {
+            OutputFinding::Stuck(lamp, _) => format!("Stuck({lamp:?})"),
+            other => format!("{other:?}"),
+        };
+        assert_eq!(found.collect::<Vec<_>>(), [expected], "{rung}");
+    };
+    let stuck = |lamp| {
+        let signals = Vec::new();
+        let (scans, again_from) = (Vec::new(), None);
+        OutputFinding::Stuck(
+            lamp,
+            Trace {
+                signals,
+                scans,
+                again_from,
+            },
+        )
+    };
+    check("a ( y )", OutputFinding::Free);
+    check("a /a ( y )", OutputFinding::Never(Lamp::On));
+    check("[ a | /a ] ( y )", OutputFinding::Never(Lamp::Off));
+    check("a ( S y )", stuck(Lamp::Off));
+}
+
+/// What NuSMV is given: read by it once, and kept.
+#[test]
+fn the_texts_for_nusmv() {
+    let program = parse(SEAL_IN).program;
+    let circuit = circuit();
+    let properties = ["never motor and stop", "lamp can always be reached"].map(|text| {
+        let property = read_one(text).expect("right");
+        resolve(&property.formula, &circuit).expect("known signals")
+    });
+    insta::assert_snapshot!("of_circuit", smv::of_circuit(&circuit, &properties, &[]));
+    insta::assert_snapshot!("of_rungs", smv::of_rungs(&program));
+}
+
+#[test]
+fn an_unknown_signal_is_named() {
+    let property = read_one("AG (motor -> lmap & oops)").expect("right");
+    let circuit = circuit();
+    let unknown = resolve(&property.formula, &circuit).expect_err("two are unknown");
+    let names: Vec<&str> = unknown.iter().map(|named| named.name.as_str()).collect();
+    assert_eq!(names, ["lmap", "oops"]);
+}

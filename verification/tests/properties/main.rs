@@ -1,0 +1,6 @@
+//! Properties of circuits: against a checker that lists every state, and on ladders.
+
+mod ladders;
+mod naive;
+mod random;
+mod reading;

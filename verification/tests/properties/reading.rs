@@ -1,0 +1,78 @@
+//! What is written, and what it means.
+
+use understudy_verification::property::{read, read_one};
+
+fn check(text: &str, meaning: &str) {
+    let property = read_one(text).unwrap_or_else(|wrong| panic!("{text}: {wrong:?}"));
+    assert_eq!(property.formula.to_string(), meaning, "{text}");
+    // What is printed means the same again.
+    let again = read_one(meaning).unwrap_or_else(|wrong| panic!("{meaning}: {wrong:?}"));
+    assert_eq!(again.formula.to_string(), meaning);
+}
+
+#[test]
+fn sentences_and_formulas_mean_the_same() {
+    check("never a and b", "AG !(a & b)");
+    check("never a and b and c together", "AG !((a & b) & c)");
+    check("never a & !b", "AG !(a & !b)");
+    check("always a | b", "AG (a | b)");
+    check("a only while b", "AG (a -> b)");
+    check("a is followed by b", "AG (a -> (AF b))");
+    check(
+        "a is followed by b within 5 scans",
+        "AG (a -> (ABF 0..5 b))",
+    );
+    check("a can be reached", "EF a");
+    check("a & b can always be reached", "AG (EF (a & b))");
+    check("a stays until b", "AG (a -> !(E[!b U (!a & !b)]))");
+    check("not a", "!a");
+    check("/a & pause.Q", "!a & pause.Q");
+    check("a -> b -> c", "a -> (b -> c)");
+    check("a <-> EX b", "a <-> (EX b)");
+    check("A[a U E[b U c]]", "A[a U (E[b U c])]");
+    check("AG true", "AG TRUE");
+    // Words of sentences are names elsewhere.
+    check("AG (never -> until)", "AG (never -> until)");
+}
+
+#[test]
+fn everything_that_is_wrong_is_said_in_one_run() {
+    let text = "\
+AG (a
+exclusion: never a and
+# a comment
+a ? b
+fair: AG a
+a is followed by b within 5
+AG a b
+ABF 1..2 a
+E[a b]
+a is followed by b within 123456 scans
+right: AG a
+";
+    let found = read(text);
+    assert_eq!(found.properties.len(), 1);
+    assert_eq!(found.properties[0].name.as_deref(), Some("right"));
+    let lines: Vec<String> = found
+        .diagnostics
+        .iter()
+        .map(|wrong| {
+            let line = text[..wrong.span.start].matches('\n').count() + 1;
+            let label = wrong.label.as_deref().unwrap_or_default();
+            format!("{line}: {} {} {label}", wrong.code, wrong.message)
+        })
+        .collect();
+    insta::assert_snapshot!(lines.join("\n"));
+}
+
+#[test]
+fn deep_nesting_is_an_error_and_no_crash() {
+    for text in [
+        "(".repeat(100_000),
+        "!".repeat(100_000),
+        "AG ".repeat(100_000),
+    ] {
+        let wrong = read_one(&text).expect_err("too deep");
+        assert_eq!(wrong[0].code, "U0432");
+    }
+}
