@@ -176,12 +176,12 @@ fn kills(count: u64, seed: u64, arguments: &RunArguments, console: &mut Console)
         title: format!("{count} kills at random phases, from seed {seed}"),
         cycles: KILL_EVERY * (count + 1),
         steps: steps.collect(),
-        network: None,
         expect: Expectation {
             held: Some(0),
             fail_safe: Some(0),
             ..Expectation::default()
         },
+        ..Scenario::default()
     };
     cell.run(&scenario, arguments, console)
 }

@@ -52,7 +52,10 @@ impl Console {
         let bar = io::stderr().is_terminal();
         match progress {
             Progress::Cycle { cycle, cycles } if bar => {
-                let bar = self.progress.get_or_insert_with(|| cycle_bar(*cycles));
+                let words = "cycle {pos} of {len}, {eta} left";
+                let bar = self
+                    .progress
+                    .get_or_insert_with(|| progress_bar(*cycles, words));
                 bar.set_position(*cycle);
             }
             Progress::Cycle { .. } if self.in_step => {}
@@ -80,6 +83,14 @@ impl Console {
         }
     }
 
+    /// A bar of so many steps on a terminal, with `words` of the progress library's template; hidden elsewhere.
+    pub(crate) fn bar(&self, length: u64, words: &str) -> ProgressBar {
+        if self.json || !io::stderr().is_terminal() {
+            return ProgressBar::hidden();
+        }
+        progress_bar(length, words)
+    }
+
     /// One line, unless it is the last one again.
     fn say(&mut self, line: &str) {
         if self.said == line {
@@ -95,9 +106,9 @@ impl Console {
     }
 }
 
-fn cycle_bar(cycles: u64) -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(Some(cycles), ProgressDrawTarget::stderr_with_hz(10));
-    if let Ok(style) = ProgressStyle::with_template("{bar:40} cycle {pos} of {len}, {eta} left") {
+fn progress_bar(length: u64, words: &str) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr_with_hz(10));
+    if let Ok(style) = ProgressStyle::with_template(&format!("{{bar:40}} {words}")) {
         bar.set_style(style);
     }
     bar.enable_steady_tick(Duration::from_millis(200));

@@ -6,8 +6,8 @@ use std::time::SystemTime;
 use clap::{Args, ValueEnum};
 use understudy_cluster::Cluster;
 use understudy_scenarios::{
-    Expectation, HostKind, LaboratorySettings, NetworkSettings, RunDirectory, Scenario, Summary,
-    World, run_laboratory,
+    HostKind, LaboratorySettings, NetworkSettings, RunDirectory, Scenario, Summary, World,
+    run_laboratory,
 };
 
 use crate::answer::{Answer, Status};
@@ -122,9 +122,7 @@ pub(crate) fn scenario_or_undisturbed(
         None => Ok(Scenario {
             title: format!("{} undisturbed", cluster.name()),
             cycles: UNDISTURBED_CYCLES,
-            steps: Vec::new(),
-            network: None,
-            expect: Expectation::default(),
+            ..Scenario::default()
         }),
     }
 }

@@ -8,6 +8,7 @@
 mod answer;
 mod automata;
 mod bench;
+mod campaign;
 mod check;
 mod console;
 mod demo;
@@ -70,6 +71,7 @@ enum Command {
     SupervisorToLadder(supervisor_to_ladder::Arguments),
     Reliability(reliability::Arguments),
     Measure(measure::Arguments),
+    Campaign(campaign::Arguments),
     Init(init::Arguments),
     Node(party::Arguments),
     RemoteIo(party::RemoteIoArguments),
@@ -95,6 +97,7 @@ impl Command {
             Self::SupervisorToLadder(_) => "supervisor-to-ladder",
             Self::Reliability(_) => "reliability",
             Self::Measure(_) => "measure",
+            Self::Campaign(_) => "campaign",
             Self::Init(_) => "init",
             Self::Node(_) => "node",
             Self::RemoteIo(_) => "remote-io",
@@ -120,6 +123,7 @@ impl Command {
             Self::SupervisorToLadder(arguments) => supervisor_to_ladder::run(&arguments),
             Self::Reliability(arguments) => reliability::run(&arguments),
             Self::Measure(arguments) => measure::run(&arguments),
+            Self::Campaign(arguments) => campaign::run(&arguments, console),
             Self::Init(arguments) => init::run(&arguments),
             Self::Node(arguments) => party::run_station(&arguments),
             Self::RemoteIo(arguments) => party::run_remote_io(&arguments.common),

@@ -28,7 +28,7 @@ pub(crate) struct Arguments {
     /// The scenario file; without one the cluster runs undisturbed
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
-    /// What all chance in the run comes from; by default taken from the clock, and printed
+    /// What all chance in the run comes from; by default the scenario's, or else taken from the clock, and printed
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Cycles in place of the scenario's; steps and expectations past them are left out
@@ -51,7 +51,8 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         Ok(scenario) => scenario.shortened(arguments.cycles),
         Err(answer) => return answer,
     };
-    let seed = arguments.seed.unwrap_or_else(seed_of_the_clock);
+    let seed = arguments.seed.or(scenario.seed);
+    let seed = seed.unwrap_or_else(seed_of_the_clock);
     let directory = match &arguments.out {
         None => None,
         Some(out) => match RunDirectory::create(out, SystemTime::now()) {

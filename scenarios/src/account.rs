@@ -117,6 +117,8 @@ pub struct Account {
     pub(crate) during: Vec<(During, RangeFinding)>,
     pub(crate) refused: Vec<(String, String)>,
     pub(crate) interrupted: bool,
+    /// Whether everybody was in step in the last cycle of the scenario.
+    pub(crate) protected: bool,
     pub(crate) records: u64,
 }
 
@@ -151,6 +153,7 @@ impl Account {
                 .collect(),
             refused: Vec::new(),
             interrupted: false,
+            protected: false,
             records: 0,
             terms,
         }

@@ -35,6 +35,11 @@ impl<'a, 't> Fields<'a, 't> {
         self.place.clone()
     }
 
+    /// Asks for keys whose value has no meaning here, because of an error that is reported.
+    pub(crate) fn ignore(&mut self, keys: &[&'static str]) {
+        self.known.extend(keys);
+    }
+
     fn get(&mut self, key: &'static str) -> Option<&'a Spanned<DeValue<'t>>> {
         self.known.push(key);
         self.table.get(key)
@@ -79,6 +84,21 @@ impl<'a, 't> Fields<'a, 't> {
     ) -> Option<Placed<u64>> {
         let value = self.get(key)?;
         count(value, diagnostics)
+    }
+
+    /// Yes or no.
+    pub(crate) fn flag(
+        &mut self,
+        key: &'static str,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Option<Placed<bool>> {
+        let value = self.get(key)?;
+        expect(
+            value,
+            value.get_ref().as_bool(),
+            "true or false",
+            diagnostics,
+        )
     }
 
     /// A share from 0 to 1.

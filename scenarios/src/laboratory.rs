@@ -167,7 +167,10 @@ fn refuse_what_is_simulated(scenario: &Scenario) -> Result<(), LaboratoryError> 
         )
     };
     let simulated = scenario.steps.iter().filter(|step| !real(step.action));
-    let words: BTreeSet<&'static str> = simulated.map(|step| step.action.word()).collect();
+    let mut words: BTreeSet<&'static str> = simulated.map(|step| step.action.word()).collect();
+    if scenario.network_cycles.is_some() {
+        words.insert("a network that is disturbed for some of its cycles");
+    }
     if words.is_empty() {
         return Ok(());
     }

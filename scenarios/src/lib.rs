@@ -4,6 +4,7 @@ mod account;
 mod campaign;
 mod fields;
 mod figure;
+mod injection;
 mod journal;
 mod laboratory;
 mod parties;
@@ -17,10 +18,16 @@ mod simulation;
 mod summary;
 mod table;
 mod terms;
+mod write;
 
 pub use account::{Account, Counts, Interval, OriginRule, Presence, Service, Stall, Terms};
 pub use campaign::{CampaignError, CampaignPlan, Measured, run_campaign};
 pub use figure::{FigureError, Signals, figure};
+pub use injection::{
+    CoverageRow, Deadlines, Failure, Findings, FindingsError, InjectionPlan, Kind,
+    MAXIMUM_FAILURES, MAXIMUM_RUN_CYCLES, MINIMUM_RUN_CYCLES, MergeError, NoShard, Phase,
+    PictureError, Property, Role, Shard, inject, merge, picture,
+};
 pub use journal::{Journal, JournalError, JournalState, records};
 pub use laboratory::{
     HostKind, LaboratoryError, LaboratoryRun, LaboratorySettings, NetworkSettings, Progress,
@@ -42,4 +49,5 @@ pub use summary::{
 };
 pub use table::{Cell, Row, Table};
 pub use terms::parts;
-pub use understudy_simulator::{Action, Fault, Network};
+pub use understudy_simulator::{Action, Disturbance, Fault, Network};
+pub use write::write;

@@ -13,17 +13,18 @@
 //! | U0309 | an action that does not fit its party |
 //! | U0310 | a range of cycles that is empty or past the end |
 
-use std::collections::BTreeMap;
+mod steps;
+
 use std::ops::Range;
 
 use toml::de::DeTable;
 use understudy_diagnostic::{Diagnostic, Report, has_errors};
-use understudy_simulator::{Action, Fault, Network};
+use understudy_simulator::{Disturbance, Network};
 use understudy_wire::{Party, ProgramId, Source};
 
-use crate::fields::{Fields, Placed, suggest};
+use crate::fields::{Fields, suggest};
 use crate::parties::Parties;
-use crate::scenario::{ACTIONS, During, Expectation, SOURCES, Scenario, action_word, source_word};
+use crate::scenario::{During, Expectation, SOURCES, Scenario, source_word};
 
 /// Cycles of one scenario, at most.
 pub const MAXIMUM_CYCLES: u64 = 100_000_000;
@@ -82,6 +83,9 @@ pub fn looks_like_a_scenario(text: &str) -> bool {
         .any(|key| table.get_ref().contains_key(*key))
 }
 
+/// Frames, bits and ages of a step, at most.
+pub(crate) const MAXIMUM_NUMBER: u16 = 1000;
+
 struct Reader<'p> {
     parties: Option<&'p Parties>,
     diagnostics: Vec<Diagnostic>,
@@ -104,154 +108,69 @@ impl Reader<'_> {
         });
         // Later checks need some end; an unknown one must not bring further errors.
         let end = cycles.unwrap_or(MAXIMUM_CYCLES);
+        let seed = fields.count("seed", found);
         let steps = fields.tables("step", "a step", found);
         let network = fields.table("network", "the network", found);
         let expect = fields.table("expect", "the expectation", found);
         fields.finish(found);
         let steps = self.steps(steps, end);
-        let network = network.map(|network| self.network(network));
+        let disturbance = network.map(|network| self.network(network, end));
         let expect =
             expect.map_or_else(Expectation::default, |expect| self.expectation(expect, end));
         Some(Scenario {
             title: title?.0.to_owned(),
             cycles: cycles?,
+            seed: seed.map(|(seed, _)| seed),
             steps,
-            network,
+            network: disturbance.as_ref().map(|disturbance| disturbance.network),
+            network_cycles: disturbance.and_then(|disturbance| disturbance.cycles),
             expect,
         })
     }
 
-    fn steps(&mut self, tables: Vec<Fields<'_, '_>>, end: u64) -> Vec<Fault> {
-        if let Some(first_too_many) = tables.get(MAXIMUM_STEPS) {
-            let message = format!("{} steps: {MAXIMUM_STEPS} at most", tables.len());
-            let place = first_too_many.place();
-            self.diagnostics
-                .push(Diagnostic::error("U0305", message, place));
-        }
-        let mut placed: Vec<Placed<(Fault, String)>> = tables
-            .into_iter()
-            .take(MAXIMUM_STEPS)
-            .filter_map(|fields| self.step(fields, end))
-            .collect();
-        placed.sort_by(|((left, _), _), ((right, _), _)| {
-            left.at_cycle
-                .cmp(&right.at_cycle)
-                .then(left.phase.total_cmp(&right.phase))
-        });
-        self.steps_are_possible(&placed);
-        placed.into_iter().map(|((step, _), _)| step).collect()
-    }
-
-    fn step(&mut self, mut fields: Fields<'_, '_>, end: u64) -> Option<Placed<(Fault, String)>> {
-        let found = &mut self.diagnostics;
-        let place = fields.place();
-        let at = fields.count("at", found);
-        let at = fields.required("at", at, found);
-        let phase = fields.share("phase", found);
-        let action = fields.text("action", found);
-        let action = fields.required("action", action, found);
-        let station = fields.text("station", found);
-        let station = fields.required("station", station, found);
-        fields.finish(found);
-        if let Some((at, place)) = &at
-            && *at >= end
-        {
-            let message =
-                format!("this step is at cycle {at}, and the run ends before cycle {end}");
-            found.push(Diagnostic::error("U0305", message, place.clone()));
-        }
-        if let Some((phase, place)) = &phase
-            && *phase >= 1.0
-        {
-            let message = format!("a phase of {phase} is the next cycle; it is below 1");
-            found.push(Diagnostic::error("U0305", message, place.clone()));
-        }
-        let action = action.and_then(|(word, place)| {
-            let known = ACTIONS.into_iter().map(action_word);
-            let action = ACTIONS
-                .into_iter()
-                .find(|action| action_word(*action) == word);
-            if action.is_none() {
-                let message = format!("there is no action `{word}`");
-                let help = suggest(word, known);
-                found.push(Diagnostic::error("U0306", message, place).with_help(help));
-            }
-            action
-        });
-        let (station, station_place) = station?;
-        let party = self.party(station, &station_place);
-        let (action, party) = (action?, party?);
-        if action == Action::Release && !matches!(party, Party::RemoteIo(_)) {
-            let message = format!("`{station}` has no outputs that could be released");
-            self.diagnostics.push(
-                Diagnostic::error("U0309", message, station_place)
-                    .with_help("release names a remote I/O"),
-            );
-            return None;
-        }
-        let step = Fault {
-            at_cycle: at?.0,
-            phase: phase.map_or(0.0, |(phase, _)| phase),
-            action,
-            party,
-        };
-        Some(((step, station.to_owned()), place))
-    }
-
-    /// Nobody is crashed twice without a restart between, and nobody is restarted who runs.
-    fn steps_are_possible(&mut self, placed: &[Placed<(Fault, String)>]) {
-        let mut last: BTreeMap<&str, (Action, Range<usize>)> = BTreeMap::new();
-        for ((step, name), place) in placed {
-            let before = last.get(name.as_str());
-            let possible = matches!(
-                (before.map(|(action, _)| *action), step.action),
-                (_, Action::Release)
-                    | (
-                        None | Some(Action::Restart | Action::Continue),
-                        Action::Crash | Action::Stop
-                    )
-                    | (Some(Action::Stop), Action::Continue | Action::Crash)
-                    | (Some(Action::Crash), Action::Restart)
-            );
-            if !possible {
-                let why = match before {
-                    Some((Action::Crash, _)) => "has crashed by then; restart it first",
-                    Some((Action::Stop, _)) => "stands still by then; continue it first",
-                    _ => "runs by then",
-                };
-                let message = format!(
-                    "{} at cycle {}: `{name}` {why}",
-                    action_word(step.action),
-                    step.at_cycle
-                );
-                let mut diagnostic = Diagnostic::error("U0308", message, place.clone());
-                if let Some((_, before)) = before {
-                    diagnostic = diagnostic.with_related(before.clone(), "its last step");
-                }
-                self.diagnostics.push(diagnostic);
-            }
-            if step.action != Action::Release {
-                last.insert(name, (step.action, place.clone()));
-            }
-        }
-    }
-
-    fn network(&mut self, mut fields: Fields<'_, '_>) -> Network {
+    fn network(&mut self, mut fields: Fields<'_, '_>, end: u64) -> Disturbance {
         let found = &mut self.diagnostics;
         let usual = Network::default();
         let latency = fields.duration("latency", found);
         let jitter = fields.duration("jitter", found);
-        let loss = fields.share("loss", found);
-        let duplicate = fields.share("duplicate", found);
+        let mut share = |key| fields.share(key, found).map_or(0.0, |(share, _)| share);
         let network = Network {
+            loss: share("loss"),
+            duplicate: share("duplicate"),
+            corruption: share("corruption"),
             latency: latency.map_or(usual.latency, |(latency, _)| latency),
             jitter: jitter.map_or(usual.jitter, |(jitter, _)| jitter),
-            loss: loss.map_or(usual.loss, |(loss, _)| loss),
-            duplicate: duplicate.map_or(usual.duplicate, |(duplicate, _)| duplicate),
-            ..usual
         };
+        let from = fields.count("from", found);
+        let to = fields.count("to", found);
+        let place = fields.place();
         fields.finish(found);
-        network
+        let cycles = (from.is_some() || to.is_some()).then(|| {
+            let place = to
+                .as_ref()
+                .or(from.as_ref())
+                .map_or(place, |(_, place)| place.clone());
+            let from = from.map_or(0, |(from, _)| from);
+            let to = to.map_or(end, |(to, _)| to);
+            self.range(from, to, end, place)
+        });
+        Disturbance { network, cycles }
+    }
+
+    /// A range of cycles; an error where it is empty or past the end.
+    fn range(&mut self, from: u64, to: u64, end: u64, place: Range<usize>) -> Range<u64> {
+        if from >= to || to > end {
+            let why = if from >= to {
+                "no cycle"
+            } else {
+                "past the end"
+            };
+            let message =
+                format!("cycles {from} up to, not including, {to} of a run of {end}: {why}");
+            self.diagnostics
+                .push(Diagnostic::error("U0310", message, place));
+        }
+        from..to
     }
 
     fn expectation(&mut self, mut fields: Fields<'_, '_>, end: u64) -> Expectation {
@@ -261,6 +180,7 @@ impl Reader<'_> {
         let held = count("held");
         let fail_safe = count("fail_safe");
         let mishaps = count("mishaps");
+        let protected = fields.flag("protected", found);
         let functional = fields.texts("functional", found);
         let finished = fields.counts("finished", found);
         let during = fields.tables("during", "a range", found);
@@ -270,6 +190,7 @@ impl Reader<'_> {
             held,
             fail_safe,
             mishaps,
+            protected: protected.is_some_and(|(protected, _)| protected),
             functional: functional
                 .into_iter()
                 .filter_map(|(name, place)| self.plant(name, &place))
@@ -311,17 +232,7 @@ impl Reader<'_> {
             }
         }
         let ((from, _), (to, to_place)) = (from?, to?);
-        if from >= to || to > end {
-            let message = format!(
-                "cycles {from} up to, not including, {to} of a run of {end}: {}",
-                if from >= to {
-                    "no cycle"
-                } else {
-                    "past the end"
-                }
-            );
-            found.push(Diagnostic::error("U0310", message, to_place));
-        }
+        self.range(from, to, end, to_place);
         let (name, place) = remote_io?;
         let remote_io = match self.party(name, &place)? {
             Party::RemoteIo(program) => program,

@@ -4,22 +4,29 @@
 //! every understudy speaks for all programs. So the same file means the same on a slow host, a fast one and in the simulator.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use serde::Serialize;
-use understudy_simulator::{Action, Fault, Network};
+use understudy_simulator::{Action, Disturbance, Fault, Network};
 use understudy_wire::{ProgramId, Source};
 
+use crate::parties::Parties;
+
 /// A scenario whose names belong to a cluster.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Scenario {
     /// For people.
     pub title: String,
     /// How many cycles are run and judged from the origin on.
     pub cycles: u64,
+    /// What all chance of a simulated run comes from, where the command line does not say.
+    pub seed: Option<u64>,
     /// What is done to whom, in the order of its times.
     pub steps: Vec<Fault>,
     /// Faults of the network; only the simulator has them.
     pub network: Option<Network>,
+    /// The cycles in which it has them; nothing for the whole run, coming into step included. Only the simulator can do that.
+    pub network_cycles: Option<Range<u64>>,
     /// What must come of it.
     pub expect: Expectation,
 }
@@ -28,8 +35,16 @@ pub struct Scenario {
 pub const TABLE_TWO: &str = include_str!("../table-two.toml");
 
 impl Scenario {
+    /// What a simulated network is, and when.
+    pub fn disturbance(&self) -> Option<Disturbance> {
+        Some(Disturbance {
+            network: self.network?,
+            cycles: self.network_cycles.clone(),
+        })
+    }
+
     /// The same with `cycles` cycles in place of its own; steps and expectations that they do not reach are left out, and so
-    /// are counts of finished parts, which belong to the whole.
+    /// are counts of finished parts and protection at the end, which belong to the whole.
     #[must_use]
     pub fn shortened(mut self, cycles: Option<u64>) -> Self {
         let Some(cycles) = cycles else {
@@ -42,24 +57,50 @@ impl Scenario {
                 during.to = during.to.min(cycles);
             }
             self.expect.finished.clear();
+            self.expect.protected = false;
         }
         self.cycles = cycles;
         self
     }
 }
 
-/// Every action, in the order in which they are explained.
-pub const ACTIONS: [Action; 5] = [
-    Action::Crash,
-    Action::Restart,
-    Action::Stop,
-    Action::Continue,
-    Action::Release,
+/// Every action as scenario files write it, in the order in which they are explained.
+pub const ACTIONS: [&str; 14] = [
+    "crash",
+    "restart",
+    "restart-misconfigured",
+    "stop",
+    "continue",
+    "slow",
+    "release",
+    "cut",
+    "heal",
+    "corrupt",
+    "replay",
+    "flip-state",
+    "flip-sample",
+    "flip-word",
 ];
 
 /// An action as scenario files write it.
 pub fn action_word(action: Action) -> &'static str {
     action.word()
+}
+
+/// An action with its numbers and names, as tables write it.
+pub(crate) fn action_text(action: Action, parties: &Parties) -> String {
+    let word = action_word(action);
+    match action {
+        Action::Cut { to } | Action::Heal { to } => format!("{word} to {}", parties.name(to)),
+        Action::Slow { by } => format!("{word} by {by:?}"),
+        Action::Corrupt { frames } => format!("{word} {frames} frames"),
+        Action::Replay { age } => format!("{word} of {age} frames ago"),
+        Action::FlipState { program, bit } => format!("{word} bit {bit} of program {}", program.0),
+        Action::FlipSample { bit, frames } | Action::FlipWord { bit, frames } => {
+            format!("{word} bit {bit} in {frames} frames")
+        }
+        _ => word.to_owned(),
+    }
 }
 
 /// What must come of a run. Counts are over all remote I/Os, from the origin to the last cycle.
@@ -73,6 +114,8 @@ pub struct Expectation {
     pub fail_safe: Option<u64>,
     /// Mishaps of all plants, at most.
     pub mishaps: Option<u64>,
+    /// Whether everybody must be in step at the end: each plant driven directly, and every station heard.
+    pub protected: bool,
     /// Plants that must stay functional throughout.
     pub functional: Vec<ProgramId>,
     /// Parts that a plant must have finished, at least.

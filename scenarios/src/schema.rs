@@ -2,8 +2,8 @@
 
 use schemars::Schema;
 
-use crate::read::MAXIMUM_CYCLES;
-use crate::scenario::{ACTIONS, SOURCES, action_word, source_word};
+use crate::read::{MAXIMUM_CYCLES, MAXIMUM_NUMBER};
+use crate::scenario::{ACTIONS, SOURCES, source_word};
 
 /// JSON Schema 2020-12 of the data of a scenario file. Whether names and cycles fit together is beyond a schema; [`crate::read`]
 /// checks it.
@@ -12,6 +12,8 @@ pub fn scenario_schema() -> Schema {
     let share = || serde_json::json!({ "type": "number", "minimum": 0, "maximum": 1 });
     let time =
         || serde_json::json!({ "type": "string", "pattern": "^[0-9]+(\\.[0-9]*)?(s|ms|us|ns)$" });
+    let small = |least: u16| serde_json::json!({ "type": "integer", "minimum": least, "maximum": MAXIMUM_NUMBER });
+    let name = serde_json::json!({ "type": "string" });
     let source = serde_json::json!({ "enum": SOURCES.map(source_word) });
     schemars::json_schema!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -22,6 +24,7 @@ pub fn scenario_schema() -> Schema {
         "properties": {
             "title": { "type": "string" },
             "cycles": { "type": "integer", "minimum": 1, "maximum": MAXIMUM_CYCLES },
+            "seed": count(),
             "step": { "type": "array", "items": {
                 "type": "object",
                 "additionalProperties": false,
@@ -29,14 +32,29 @@ pub fn scenario_schema() -> Schema {
                 "properties": {
                     "at": count(),
                     "phase": share(),
-                    "action": { "enum": ACTIONS.map(action_word) },
-                    "station": { "type": "string" },
+                    "action": { "enum": ACTIONS },
+                    "station": name.clone(),
+                    "to": { "anyOf": [name.clone(), { "type": "array", "items": name }] },
+                    "both_ways": { "type": "boolean" },
+                    "by": time(),
+                    "frames": small(1),
+                    "age": small(1),
+                    "program": { "type": "string" },
+                    "bit": small(0),
                 },
             } },
             "network": {
                 "type": "object",
                 "additionalProperties": false,
-                "properties": { "loss": share(), "duplicate": share(), "latency": time(), "jitter": time() },
+                "properties": {
+                    "loss": share(),
+                    "duplicate": share(),
+                    "corruption": share(),
+                    "latency": time(),
+                    "jitter": time(),
+                    "from": count(),
+                    "to": count(),
+                },
             },
             "expect": {
                 "type": "object",
@@ -46,6 +64,7 @@ pub fn scenario_schema() -> Schema {
                     "held": count(),
                     "fail_safe": count(),
                     "mishaps": count(),
+                    "protected": { "type": "boolean" },
                     "functional": { "type": "array", "items": { "type": "string" } },
                     "finished": { "type": "object", "additionalProperties": count() },
                     "during": { "type": "array", "items": {

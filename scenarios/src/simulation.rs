@@ -3,7 +3,7 @@
 use understudy_cluster::Cluster;
 use understudy_plant::{Event as PlantEvent, Pace};
 use understudy_remote_io::Event as RemoteIoEvent;
-use understudy_simulator::{NotReady, Record as Simulated, Simulation};
+use understudy_simulator::{Network, NotReady, Record as Simulated, Simulation};
 use understudy_wire::{Field, Image, Moment, Party};
 
 use crate::account::{Account, OriginRule, Terms};
@@ -32,8 +32,10 @@ pub fn simulate(
     let terms = Terms::of(cluster);
     let parties = terms.parties.clone();
     let mut account = Account::new(terms, scenario, OriginRule::Told);
-    let network = scenario.network.unwrap_or_default();
-    let mut simulation = Simulation::new(parts(cluster), network, seed);
+    let mut simulation = Simulation::new(parts(cluster), Network::default(), seed);
+    if let Some(disturbance) = scenario.disturbance() {
+        simulation.disturb(disturbance);
+    }
     for fault in &scenario.steps {
         simulation.schedule(*fault);
     }

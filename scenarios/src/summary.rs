@@ -6,7 +6,7 @@ use understudy_wire::{Party, ProgramId, Source};
 
 use crate::account::{Account, Counts, Interval, Presence, RangeFinding, Service, Stall};
 use crate::journal::JournalState;
-use crate::scenario::{During, Scenario, action_word, source_word};
+use crate::scenario::{During, Scenario, action_text, source_word};
 
 /// The whole of `summary.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -198,7 +198,7 @@ impl Summary {
             })
         });
         let steps = account.steps.iter().map(|step| StepSummary {
-            action: action_word(step.action).to_owned(),
+            action: action_text(step.action, parties),
             name: name(step.party),
             asked: step.asked,
             measured: step.measured,
@@ -298,6 +298,14 @@ fn expectations(
     }
     if let Some(allowed) = expect.mishaps {
         list.push(at_most("mishaps", allowed, mishaps, 0));
+    }
+    if expect.protected {
+        let found = account.protected;
+        list.push(ExpectationSummary {
+            expected: "everybody in step at the end".to_owned(),
+            found: if found { "in step" } else { "not in step" }.to_owned(),
+            met: found,
+        });
     }
     let plant_name = |program| account.terms.parties.name(Party::Plant(program));
     let plant = |program| {

@@ -116,6 +116,80 @@ source = "direct"
 }
 
 #[test]
+fn steps_with_numbers_and_peers() {
+    assert_snapshot!(check(
+        r#"
+title = "Keys that belong to other actions, and numbers out of bounds"
+cycles = 100
+seed = -3
+[network]
+corruption = 2
+from = 50
+to = 50
+[[step]]
+at = 10
+action = "cut"
+station = "robot"
+to = ["press", "pres-io", "robot", "arm"]
+both_ways = "yes"
+[[step]]
+at = 10
+action = "slow"
+station = "arm"
+by = "2ms"
+[[step]]
+at = 10
+action = "slow"
+station = "press"
+[[step]]
+at = 10
+action = "slow"
+station = "press"
+by = "2s"
+frames = 3
+[[step]]
+at = 10
+action = "flip-state"
+station = "understudy"
+bit = 70000
+[[step]]
+at = 10
+action = "flip-state"
+station = "understudy"
+program = "robot-io"
+[[step]]
+at = 10
+action = "flip-word"
+station = "press-io"
+[[step]]
+at = 10
+action = "corrupt"
+station = "press-io"
+frames = 0
+[expect]
+protected = 1
+"#
+    ));
+}
+
+/// One step of a file may be many: a cut to several parties, both ways.
+#[test]
+fn a_cut_names_one_or_many_or_nobody() {
+    let steps = |keys: &str| {
+        let text = format!(
+            "title = \"\"\ncycles = 100\n[[step]]\nat = 10\naction = \"cut\"\nstation = \"robot\"\n{keys}"
+        );
+        let scenario = read("cut.toml", &text, Some(&parties())).scenario;
+        scenario.expect("no errors").steps.len()
+    };
+    assert_eq!(steps("to = \"press\""), 1);
+    assert_eq!(steps("to = \"press\"\nboth_ways = true"), 2);
+    assert_eq!(steps("to = [\"press\", \"press-io\"]"), 2);
+    assert_eq!(steps(""), 4);
+    assert_eq!(steps("both_ways = true"), 8);
+}
+
+#[test]
 fn a_text_that_is_no_toml() {
     assert_snapshot!(check("title = \"open\ncycles = = 3\n[expect\n"));
 }

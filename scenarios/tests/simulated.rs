@@ -100,6 +100,11 @@ fn remote_io_restart() {
 }
 
 #[test]
+fn stations_are_cut_off() {
+    check(Mode::Full, include_str!("../cut-off.toml"));
+}
+
+#[test]
 fn lossy() {
     let summary = check(Mode::Full, include_str!("../lossy.toml"));
     assert!(summary.total().held > 0, "loss costs something");

@@ -4,7 +4,8 @@ use insta::assert_snapshot;
 
 use crate::understudy;
 
-const COMMANDS: [&str; 18] = [
+const COMMANDS: [&str; 19] = [
+    "campaign",
     "demo",
     "lab",
     "simulate",

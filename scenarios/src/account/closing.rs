@@ -1,6 +1,6 @@
 //! The end of a cycle, and of a run: what was open is counted.
 
-use understudy_wire::{ProgramId, Source};
+use understudy_wire::{ProgramId, ProgramSet, Source};
 
 use super::presence::{Interval, Presence, Presences};
 use super::stalls::Stall;
@@ -13,6 +13,11 @@ impl Account {
         };
         self.presences.close_cycle(at, cycle.heard);
         let stalled = self.stalls.explains(number);
+        // A stall of the host hides for a moment who is there, and changes nothing about it.
+        let in_step = cycle.content == ProgramSet::first(self.services.len());
+        if !stalled || in_step {
+            self.protected = in_step;
+        }
         for (program, service) in self.services.iter_mut().enumerate() {
             let outcome = cycle.outcomes.get(&ProgramId(program as u8)).copied();
             service.close_cycle(at, outcome, stalled);

@@ -95,7 +95,9 @@ impl Presences {
         };
         match action {
             Action::Crash | Action::Stop => self.changes.push((at, station, true)),
-            Action::Restart | Action::Continue => self.changes.push((at, station, false)),
+            Action::Restart | Action::RestartMisconfigured | Action::Continue => {
+                self.changes.push((at, station, false));
+            }
             _ => {}
         }
     }

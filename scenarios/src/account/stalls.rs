@@ -35,7 +35,7 @@ const OWN_DOING_CYCLES: i64 = 5;
 pub(crate) struct Stalls {
     /// Numbers of cycles that are explained, the newest few thousand.
     explained: BTreeSet<i64>,
-    /// Parties that the scenario has stopped or crashed, and when it let them go on.
+    /// Parties that the scenario has stopped, crashed or slowed down, and when it let them go on.
     disturbed: BTreeMap<Party, Option<i64>>,
     pub(crate) listed: Vec<(i64, Party, Duration)>,
     pub(crate) count: u64,
@@ -44,10 +44,16 @@ pub(crate) struct Stalls {
 impl Stalls {
     pub(crate) fn step(&mut self, number: i64, party: Party, action: Action) {
         match action {
+            Action::Slow { by } if !by.is_zero() => {
+                self.disturbed.insert(party, None);
+            }
             Action::Crash | Action::Stop => {
                 self.disturbed.insert(party, None);
             }
-            Action::Restart | Action::Continue => {
+            Action::Restart
+            | Action::RestartMisconfigured
+            | Action::Continue
+            | Action::Slow { .. } => {
                 self.disturbed
                     .insert(party, Some(number + OWN_DOING_CYCLES));
             }

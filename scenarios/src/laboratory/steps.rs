@@ -106,8 +106,7 @@ mod tests {
                     action: Action::Crash,
                 })
                 .collect(),
-            network: None,
-            expect: crate::scenario::Expectation::default(),
+            ..Scenario::default()
         };
         Steps::new(&scenario, PERIOD)
     }

@@ -1,0 +1,223 @@
+//! A faultload by chance. Invariant: it is a function of the cluster's schedule, the kinds and the random numbers, and everything in
+//! it can be written in a scenario file and read back unchanged.
+
+use std::ops::Range;
+use std::time::Duration;
+
+use rand::RngExt;
+use rand_pcg::Pcg64;
+use understudy_simulator::{Action, Disturbance, Fault, Network};
+use understudy_wire::{Party, ProgramId, Schedule};
+
+use super::faultload::{Faultload, Injection};
+use super::kind::{Kind, Role};
+
+/// Injections of one run, at most.
+const MAXIMUM_INJECTIONS: u32 = 6;
+
+/// Restarts of one storm, at most.
+const MAXIMUM_RESTARTS: u64 = 6;
+
+/// Draws what happens in `cycles`, a range of the run's cycles that is not empty.
+pub(super) fn draw(
+    random: &mut Pcg64,
+    schedule: &Schedule,
+    kinds: &[Kind],
+    cycles: &Range<u64>,
+) -> Faultload {
+    let mut drawn = Draw {
+        random,
+        schedule,
+        cycles: cycles.clone(),
+    };
+    let mut faultload = Faultload::default();
+    let (of_network, of_parties): (Vec<Kind>, Vec<Kind>) = kinds
+        .iter()
+        .partition(|kind| kind.roles() == [Role::Network]);
+    if !of_network.is_empty() && (of_parties.is_empty() || drawn.random.random_range(0..4) == 0) {
+        faultload.network = Some(drawn.network(&of_network));
+    }
+    if of_parties.is_empty() {
+        return faultload;
+    }
+    for _ in 0..drawn.random.random_range(1..=MAXIMUM_INJECTIONS) {
+        let kind = drawn.one_of(&of_parties);
+        if let Some(injection) = drawn.injection(kind)
+            && !faultload
+                .injections
+                .iter()
+                .any(|other| other.collides_with(&injection))
+        {
+            faultload.injections.push(injection);
+        }
+    }
+    faultload
+}
+
+struct Draw<'a> {
+    random: &'a mut Pcg64,
+    schedule: &'a Schedule,
+    cycles: Range<u64>,
+}
+
+impl Draw<'_> {
+    fn one_of<T: Copy>(&mut self, list: &[T]) -> T {
+        list[self.random.random_range(0..list.len())]
+    }
+
+    /// From when to when, and where in its cycles; short ones are as likely as long ones.
+    fn span(&mut self) -> (Range<u64>, f64) {
+        let from = self.random.random_range(self.cycles.clone());
+        let long = self.random.random_range(0..2) == 0;
+        let cycles = self.random.random_range(if long { 3..40 } else { 0..3 });
+        let phase = f64::from(self.random.random_range(0..1000)) / 1000.0;
+        (from..(from + cycles).min(self.cycles.end - 1), phase)
+    }
+
+    /// Nothing where the cluster has nobody of the role.
+    fn injection(&mut self, kind: Kind) -> Option<Injection> {
+        let schedule = self.schedule;
+        let role = self.one_of(kind.roles());
+        let parties: Vec<Party> = role.parties(schedule).collect();
+        if parties.is_empty() {
+            return None;
+        }
+        let party = self.one_of(&parties);
+        let (span, phase) = self.span();
+        let step = |at_cycle: u64, action: Action| Fault {
+            at_cycle,
+            phase,
+            party,
+            action,
+        };
+        let (from, to) = (span.start, span.end);
+        let lasting = |begins, ends| vec![step(from, begins), step(to, ends)];
+        let steps = match kind {
+            Kind::Crash => lasting(Action::Crash, Action::Restart),
+            Kind::Stop => lasting(Action::Stop, Action::Continue),
+            Kind::RestartStorm => {
+                let restarts = self.random.random_range(2..=MAXIMUM_RESTARTS);
+                let between = (to - from) / restarts;
+                (0..restarts)
+                    .flat_map(|restart| {
+                        let at = from + restart * between;
+                        [step(at, Action::Crash), step(at, Action::Restart)]
+                    })
+                    .collect()
+            }
+            Kind::Misconfiguration => {
+                let middle = from.midpoint(to);
+                vec![
+                    step(from, Action::Crash),
+                    step(from, Action::RestartMisconfigured),
+                    step(middle, Action::Crash),
+                    step(to, Action::Restart),
+                ]
+            }
+            Kind::Slow => {
+                let by = schedule.period() / 20 * self.random.random_range(1..=40);
+                lasting(Action::Slow { by }, Action::Slow { by: Duration::ZERO })
+            }
+            Kind::OneWayCut => {
+                let to = self.other(party)?;
+                lasting(Action::Cut { to }, Action::Heal { to })
+            }
+            Kind::Cut => {
+                let peer = self.other(party)?;
+                cuts(&[peer], party, phase, from, to)
+            }
+            Kind::Isolation => cuts(&self.others(party), party, phase, from, to),
+            Kind::CorruptFrames => {
+                let frames = self.random.random_range(1..=8);
+                vec![step(from, Action::Corrupt { frames })]
+            }
+            Kind::Replay => {
+                let age = self.random.random_range(1..=16);
+                vec![step(from, Action::Replay { age })]
+            }
+            Kind::FlippedState => {
+                let program = match (role, party) {
+                    (Role::Controller, Party::Station(station)) => ProgramId(station.0),
+                    _ => ProgramId(self.random.random_range(0..schedule.controllers()) as u8),
+                };
+                let bit = self.random.random_range(0..64);
+                vec![step(from, Action::FlipState { program, bit })]
+            }
+            Kind::FlippedSample => {
+                let (bit, frames) = self.flip();
+                vec![step(from, Action::FlipSample { bit, frames })]
+            }
+            Kind::FlippedWord => {
+                let (bit, frames) = self.flip();
+                vec![step(from, Action::FlipWord { bit, frames })]
+            }
+            Kind::Loss | Kind::Duplication | Kind::Jitter | Kind::Corruption => return None,
+        };
+        Some(Injection { kind, role, steps })
+    }
+
+    fn flip(&mut self) -> (u16, u16) {
+        (
+            self.random.random_range(0..64),
+            self.random.random_range(1..=4),
+        )
+    }
+
+    fn others(&self, party: Party) -> Vec<Party> {
+        let parties = Role::ALL.into_iter();
+        parties
+            .flat_map(|role| role.parties(self.schedule))
+            .filter(|other| *other != party)
+            .collect()
+    }
+
+    fn other(&mut self, party: Party) -> Option<Party> {
+        let others = self.others(party);
+        (!others.is_empty()).then(|| self.one_of(&others))
+    }
+
+    /// Another network for a while; each kind but the first is in it with an even chance.
+    fn network(&mut self, kinds: &[Kind]) -> Disturbance {
+        let (span, _) = self.span();
+        let first = self.one_of(kinds);
+        let mut network = Network::default();
+        for &kind in kinds {
+            if kind != first && self.random.random_range(0..2) == 0 {
+                continue;
+            }
+            let share = f64::from(self.random.random_range(1..=200)) / 1000.0;
+            match kind {
+                Kind::Loss => network.loss = share,
+                Kind::Duplication => network.duplicate = share,
+                Kind::Corruption => network.corruption = share,
+                // Up to a third of the period, in whole microseconds.
+                Kind::Jitter => {
+                    let most = self.schedule.period().as_micros() as f64 / 3.0;
+                    let jitter = (most * share * 5.0) as u64;
+                    network.jitter = Duration::from_micros(jitter.max(1));
+                }
+                _ => {}
+            }
+        }
+        Disturbance {
+            network,
+            cycles: Some(span.start..span.end + 1),
+        }
+    }
+}
+
+/// Cuts `party` off from each peer, both ways.
+fn cuts(peers: &[Party], party: Party, phase: f64, from: u64, to: u64) -> Vec<Fault> {
+    let both = |at_cycle: u64, action: fn(Party) -> Action| {
+        peers.iter().flat_map(move |&peer| {
+            [(party, peer), (peer, party)].map(|(from, to)| Fault {
+                at_cycle,
+                phase,
+                party: from,
+                action: action(to),
+            })
+        })
+    };
+    let begins = both(from, |to| Action::Cut { to });
+    begins.chain(both(to, |to| Action::Heal { to })).collect()
+}

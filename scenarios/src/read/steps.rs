@@ -1,0 +1,318 @@
+//! The steps of a scenario: what is done to whom, and whether it can be done then.
+
+use std::collections::BTreeMap;
+use std::ops::{Range, RangeInclusive};
+use std::time::Duration;
+
+use understudy_diagnostic::Diagnostic;
+use understudy_simulator::{Action, Fault};
+use understudy_wire::{Party, ProgramId};
+
+use super::{MAXIMUM_NUMBER, MAXIMUM_STEPS, Reader};
+use crate::fields::{Fields, Placed, suggest};
+use crate::scenario::{ACTIONS, action_word};
+
+/// Keys that only some actions have.
+const KEYS_OF_ACTIONS: [&str; 7] = ["to", "both_ways", "by", "frames", "age", "program", "bit"];
+
+/// How late a slow party is, at most.
+const MAXIMUM_SLOWNESS: Duration = Duration::from_secs(1);
+
+/// A step with the name of its party and its place. One step of a file may be several: a cut to many, or both ways.
+type Step = Placed<(Vec<Fault>, String)>;
+
+impl Reader<'_> {
+    pub(super) fn steps(&mut self, tables: Vec<Fields<'_, '_>>, end: u64) -> Vec<Fault> {
+        if let Some(first_too_many) = tables.get(MAXIMUM_STEPS) {
+            let message = format!("{} steps: {MAXIMUM_STEPS} at most", tables.len());
+            let place = first_too_many.place();
+            self.diagnostics
+                .push(Diagnostic::error("U0305", message, place));
+        }
+        let mut placed: Vec<Step> = tables
+            .into_iter()
+            .take(MAXIMUM_STEPS)
+            .filter_map(|fields| self.step(fields, end))
+            .collect();
+        let time = |((faults, _), _): &Step| {
+            let fault = faults.first();
+            fault.map_or((0, 0.0), |fault| (fault.at_cycle, fault.phase))
+        };
+        placed.sort_by(|left, right| {
+            let (left, right) = (time(left), time(right));
+            left.0.cmp(&right.0).then(left.1.total_cmp(&right.1))
+        });
+        self.steps_are_possible(&placed);
+        placed
+            .into_iter()
+            .flat_map(|((faults, _), _)| faults)
+            .collect()
+    }
+
+    fn step(&mut self, mut fields: Fields<'_, '_>, end: u64) -> Option<Step> {
+        let found = &mut self.diagnostics;
+        let place = fields.place();
+        let at = fields.count("at", found);
+        let at = fields.required("at", at, found);
+        let phase = fields.share("phase", found);
+        let action = fields.text("action", found);
+        let action = fields.required("action", action, found);
+        let station = fields.text("station", found);
+        let station = fields.required("station", station, found);
+        if let Some((at, place)) = &at
+            && *at >= end
+        {
+            let message =
+                format!("this step is at cycle {at}, and the run ends before cycle {end}");
+            found.push(Diagnostic::error("U0305", message, place.clone()));
+        }
+        if let Some((phase, place)) = &phase
+            && *phase >= 1.0
+        {
+            let message = format!("a phase of {phase} is the next cycle; it is below 1");
+            found.push(Diagnostic::error("U0305", message, place.clone()));
+        }
+        let word = action.and_then(|(word, place)| {
+            let known = ACTIONS.into_iter().find(|known| *known == word);
+            if known.is_none() {
+                let message = format!("there is no action `{word}`");
+                let help = suggest(word, ACTIONS.into_iter());
+                found.push(Diagnostic::error("U0306", message, place).with_help(help));
+            }
+            known
+        });
+        let party = station.as_ref().map(|(name, place)| {
+            let party = self.party(name, place);
+            (party, *name, place.clone())
+        });
+        let actions = match (word, &party) {
+            (Some(word), Some((party, name, place))) => {
+                self.actions(word, &mut fields, *party, name, place)
+            }
+            _ => {
+                fields.ignore(&KEYS_OF_ACTIONS);
+                None
+            }
+        };
+        fields.finish(&mut self.diagnostics);
+        let (party, name, _) = party?;
+        let (party, (at_cycle, _)) = (party?, at?);
+        let phase = phase.map_or(0.0, |(phase, _)| phase);
+        let faults = actions?.into_iter().map(|(by, action)| Fault {
+            at_cycle,
+            phase,
+            party: by.unwrap_or(party),
+            action,
+        });
+        Some(((faults.collect(), name.to_owned()), place))
+    }
+
+    /// What an action is in full: each with the party that does it, where that is another one than the step names.
+    fn actions(
+        &mut self,
+        word: &'static str,
+        fields: &mut Fields<'_, '_>,
+        party: Option<Party>,
+        name: &str,
+        place: &Range<usize>,
+    ) -> Option<Vec<(Option<Party>, Action)>> {
+        let one = |action| Some(vec![(None, action)]);
+        let any = |_: Party| true;
+        let in_cluster = |party: Party| !matches!(party, Party::Plant(_));
+        let of_remote_io = |party: Party| matches!(party, Party::RemoteIo(_));
+        let of_station = |party: Party| matches!(party, Party::Station(_));
+        let (fits, wanted): (fn(Party) -> bool, &str) = match word {
+            "crash" | "restart" | "stop" | "continue" => (any, ""),
+            "release" => (of_remote_io, "names a remote I/O"),
+            "flip-state" | "flip-word" => (of_station, "names a controller or an understudy"),
+            _ => (in_cluster, "names a station or a remote I/O, and no plant"),
+        };
+        if let Some(party) = party.filter(|&party| !fits(party)) {
+            let message = match (word, party) {
+                ("release", _) => format!("`{name}` has no outputs that could be released"),
+                _ => format!("`{name}` is nobody to whom `{word}` can be done"),
+            };
+            self.diagnostics.push(
+                Diagnostic::error("U0309", message, place.clone())
+                    .with_help(format!("{word} {wanted}")),
+            );
+            fields.ignore(&KEYS_OF_ACTIONS);
+            return None;
+        }
+        match word {
+            "crash" => one(Action::Crash),
+            "restart" => one(Action::Restart),
+            "restart-misconfigured" => one(Action::RestartMisconfigured),
+            "stop" => one(Action::Stop),
+            "continue" => one(Action::Continue),
+            "release" => one(Action::Release),
+            "slow" => one(Action::Slow {
+                by: self.slowness(fields)?,
+            }),
+            "cut" => self.cut(fields, party, |to| Action::Cut { to }),
+            "heal" => self.cut(fields, party, |to| Action::Heal { to }),
+            "corrupt" => one(Action::Corrupt {
+                frames: self.number(fields, "frames", 1)?,
+            }),
+            "replay" => one(Action::Replay {
+                age: self.number(fields, "age", 1)?,
+            }),
+            "flip-state" => {
+                let program = self.program(fields, party);
+                let bit = self.number(fields, "bit", 0)?;
+                one(Action::FlipState {
+                    program: program?,
+                    bit,
+                })
+            }
+            _ => {
+                let bit = self.number(fields, "bit", 0);
+                let frames = self.number(fields, "frames", 1);
+                let (bit, frames) = (bit?, frames?);
+                one(match word {
+                    "flip-sample" => Action::FlipSample { bit, frames },
+                    _ => Action::FlipWord { bit, frames },
+                })
+            }
+        }
+    }
+
+    /// A small number; its least value where the step does not say.
+    fn number(
+        &mut self,
+        fields: &mut Fields<'_, '_>,
+        key: &'static str,
+        least: u16,
+    ) -> Option<u16> {
+        let Some((number, place)) = fields.count(key, &mut self.diagnostics) else {
+            return Some(least);
+        };
+        let bounds: RangeInclusive<u64> = u64::from(least)..=u64::from(MAXIMUM_NUMBER);
+        if bounds.contains(&number) {
+            return u16::try_from(number).ok();
+        }
+        let message = format!("`{key}` is {number}: it is from {least} to {MAXIMUM_NUMBER}");
+        self.diagnostics
+            .push(Diagnostic::error("U0305", message, place));
+        None
+    }
+
+    fn slowness(&mut self, fields: &mut Fields<'_, '_>) -> Option<Duration> {
+        let by = fields.duration("by", &mut self.diagnostics);
+        let (by, place) = fields.required("by", by, &mut self.diagnostics)?;
+        if by <= MAXIMUM_SLOWNESS {
+            return Some(by);
+        }
+        let message = format!("{by:?} late: {MAXIMUM_SLOWNESS:?} at most");
+        self.diagnostics
+            .push(Diagnostic::error("U0305", message, place));
+        None
+    }
+
+    /// One action for each party that is named by `to`, or for all others where nobody is; with `both_ways`, one for each of
+    /// them as well.
+    fn cut(
+        &mut self,
+        fields: &mut Fields<'_, '_>,
+        party: Option<Party>,
+        action: fn(Party) -> Action,
+    ) -> Option<Vec<(Option<Party>, Action)>> {
+        let names = fields.texts("to", &mut self.diagnostics);
+        let both_ways = fields.flag("both_ways", &mut self.diagnostics);
+        let both_ways = both_ways.is_some_and(|(both, _)| both);
+        let mut peers = Vec::new();
+        for (name, place) in &names {
+            match self.party(name, place) {
+                Some(peer @ (Party::Station(_) | Party::RemoteIo(_))) if Some(peer) != party => {
+                    peers.push(peer);
+                }
+                Some(_) => {
+                    let message = format!("`{name}` is nobody who could hear it");
+                    let help = "another station or a remote I/O";
+                    self.diagnostics
+                        .push(Diagnostic::error("U0309", message, place.clone()).with_help(help));
+                }
+                None => {}
+            }
+        }
+        let party = party?;
+        if names.is_empty() {
+            let all = self.parties?.iter().map(|(peer, _)| peer);
+            peers.extend(all.filter(|&peer| peer != party && !matches!(peer, Party::Plant(_))));
+        }
+        let there = peers.iter().map(|&peer| (None, action(peer)));
+        let back = peers.iter().map(|&peer| (Some(peer), action(party)));
+        let both = there
+            .clone()
+            .chain(back.take(if both_ways { peers.len() } else { 0 }));
+        Some(both.collect())
+    }
+
+    /// The program whose state it is: named by its controller; a controller's own where the step does not say.
+    fn program(&mut self, fields: &mut Fields<'_, '_>, party: Option<Party>) -> Option<ProgramId> {
+        let named = fields.text("program", &mut self.diagnostics);
+        let programs = self.parties?.remote_ios().count();
+        let controller = |party: Option<Party>| match party {
+            Some(Party::Station(station)) if station.index() < programs => {
+                Some(ProgramId(station.0))
+            }
+            _ => None,
+        };
+        let (asked, place) = match &named {
+            Some((name, place)) => (self.party(name, place), place.clone()),
+            None => (party, fields.place()),
+        };
+        let program = controller(asked);
+        if program.is_none() && asked.is_some() {
+            let message = "whose state is it? `program` names a controller".to_owned();
+            let names = self.parties?.stations().take(programs);
+            let help = suggest("", names.map(|(_, name)| name));
+            self.diagnostics
+                .push(Diagnostic::error("U0309", message, place).with_help(help));
+        }
+        program
+    }
+
+    /// Nobody is crashed twice without a restart between, and nobody is restarted who runs.
+    fn steps_are_possible(&mut self, placed: &[Step]) {
+        let mut last: BTreeMap<&str, (Action, Range<usize>)> = BTreeMap::new();
+        for ((faults, name), place) in placed {
+            let Some(step) = faults.first() else {
+                continue;
+            };
+            // A process that was restarted runs, whatever it was restarted with.
+            let action = match step.action {
+                Action::RestartMisconfigured => Action::Restart,
+                Action::Crash | Action::Restart | Action::Stop | Action::Continue => step.action,
+                _ => continue,
+            };
+            let before = last.get(name.as_str());
+            let possible = matches!(
+                (before.map(|(action, _)| *action), action),
+                (
+                    None | Some(Action::Restart | Action::Continue),
+                    Action::Crash | Action::Stop
+                ) | (Some(Action::Stop), Action::Continue | Action::Crash)
+                    | (Some(Action::Crash), Action::Restart)
+            );
+            if !possible {
+                let why = match before {
+                    Some((Action::Crash, _)) => "has crashed by then; restart it first",
+                    Some((Action::Stop, _)) => "stands still by then; continue it first",
+                    _ => "runs by then",
+                };
+                let message = format!(
+                    "{} at cycle {}: `{name}` {why}",
+                    action_word(step.action),
+                    step.at_cycle
+                );
+                let mut diagnostic = Diagnostic::error("U0308", message, place.clone());
+                if let Some((_, before)) = before {
+                    diagnostic = diagnostic.with_related(before.clone(), "its last step");
+                }
+                self.diagnostics.push(diagnostic);
+            }
+            last.insert(name, (action, place.clone()));
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! A scenario as the text of a file that [`crate::read`] reads back unchanged.
+
+use std::fmt::Write as _;
+use std::time::Duration;
+
+use understudy_simulator::{Action, Disturbance, Fault, Network};
+use understudy_wire::{Party, StationId};
+
+use crate::parties::Parties;
+use crate::scenario::{Expectation, Scenario, action_word, source_word};
+
+/// The text; `parties` are those of the scenario's cluster, and `remarks` stand above it for people.
+pub fn write(scenario: &Scenario, parties: &Parties, remarks: &[String]) -> String {
+    let mut text = String::new();
+    for line in remarks.iter().flat_map(|remark| remark.lines()) {
+        let _ = writeln!(text, "# {line}");
+    }
+    let _ = writeln!(text, "title = {}", quoted(&scenario.title));
+    let _ = writeln!(text, "cycles = {}", scenario.cycles);
+    if let Some(seed) = scenario.seed {
+        let _ = writeln!(text, "seed = {seed}");
+    }
+    if let Some(disturbance) = scenario.disturbance() {
+        write_network(&mut text, &disturbance);
+    }
+    for step in &scenario.steps {
+        write_step(&mut text, step, parties);
+    }
+    write_expectation(&mut text, &scenario.expect, parties);
+    text
+}
+
+fn write_network(text: &mut String, disturbance: &Disturbance) {
+    let (network, usual) = (disturbance.network, Network::default());
+    text.push_str("\n[network]\n");
+    let shares = [
+        ("loss", network.loss),
+        ("duplicate", network.duplicate),
+        ("corruption", network.corruption),
+    ];
+    for (key, share) in shares.into_iter().filter(|(_, share)| *share > 0.0) {
+        let _ = writeln!(text, "{key} = {share:?}");
+    }
+    if network.latency != usual.latency {
+        let _ = writeln!(text, "latency = {}", time(network.latency));
+    }
+    if network.jitter != usual.jitter {
+        let _ = writeln!(text, "jitter = {}", time(network.jitter));
+    }
+    if let Some(cycles) = &disturbance.cycles {
+        let _ = writeln!(text, "from = {}\nto = {}", cycles.start, cycles.end);
+    }
+}
+
+fn write_step(text: &mut String, step: &Fault, parties: &Parties) {
+    let name = |party| quoted(parties.name(party));
+    let _ = writeln!(text, "\n[[step]]\nat = {}", step.at_cycle);
+    if step.phase > 0.0 {
+        let _ = writeln!(text, "phase = {:?}", step.phase);
+    }
+    let _ = writeln!(text, "action = {}", quoted(action_word(step.action)));
+    let _ = writeln!(text, "station = {}", name(step.party));
+    let _ = match step.action {
+        Action::Cut { to } | Action::Heal { to } => writeln!(text, "to = {}", name(to)),
+        Action::Slow { by } => writeln!(text, "by = {}", time(by)),
+        Action::Corrupt { frames } => writeln!(text, "frames = {frames}"),
+        Action::Replay { age } => writeln!(text, "age = {age}"),
+        Action::FlipState { program, bit } => {
+            let controller = name(Party::Station(StationId(program.0)));
+            writeln!(text, "program = {controller}\nbit = {bit}")
+        }
+        Action::FlipSample { bit, frames } | Action::FlipWord { bit, frames } => {
+            writeln!(text, "bit = {bit}\nframes = {frames}")
+        }
+        _ => Ok(()),
+    };
+}
+
+fn write_expectation(text: &mut String, expect: &Expectation, parties: &Parties) {
+    let _ = writeln!(text, "\n[expect]\nwrong = {}", expect.wrong);
+    let counts = [
+        ("held", expect.held),
+        ("fail_safe", expect.fail_safe),
+        ("mishaps", expect.mishaps),
+    ];
+    for (key, count) in counts {
+        if let Some(count) = count {
+            let _ = writeln!(text, "{key} = {count}");
+        }
+    }
+    if expect.protected {
+        text.push_str("protected = true\n");
+    }
+    let plant = |program| quoted(parties.name(Party::Plant(program)));
+    if !expect.functional.is_empty() {
+        let names: Vec<String> = expect.functional.iter().copied().map(plant).collect();
+        let _ = writeln!(text, "functional = [{}]", names.join(", "));
+    }
+    if !expect.finished.is_empty() {
+        let finished = expect.finished.iter();
+        let counts: Vec<String> = finished
+            .map(|(&program, count)| format!("{} = {count}", plant(program)))
+            .collect();
+        let _ = writeln!(text, "finished = {{ {} }}", counts.join(", "));
+    }
+    for during in &expect.during {
+        let sources: Vec<String> = during
+            .sources
+            .iter()
+            .map(|&source| quoted(source_word(source)))
+            .collect();
+        let _ = writeln!(
+            text,
+            "\n[[expect.during]]\nfrom = {}\nto = {}\nremote_io = {}\nsource = [{}]",
+            during.from,
+            during.to,
+            quoted(parties.name(Party::RemoteIo(during.remote_io))),
+            sources.join(", ")
+        );
+    }
+}
+
+/// A TOML text in quotes.
+fn quoted(text: &str) -> String {
+    let mut quoted = String::from("\"");
+    for letter in text.chars() {
+        match letter {
+            '"' | '\\' => quoted.extend(['\\', letter]),
+            letter if letter.is_control() => {
+                let _ = write!(quoted, "\\u{:04x}", u32::from(letter));
+            }
+            letter => quoted.push(letter),
+        }
+    }
+    quoted.push('"');
+    quoted
+}
+
+/// In the largest unit that leaves a whole number.
+fn time(duration: Duration) -> String {
+    let nanoseconds = duration.as_nanos();
+    let units = [
+        ("s", 1_000_000_000),
+        ("ms", 1_000_000),
+        ("us", 1_000),
+        ("ns", 1),
+    ];
+    let unit = units.iter().find(|(_, scale)| nanoseconds % scale == 0);
+    let (unit, scale) = unit.unwrap_or(&("ns", 1));
+    format!("\"{}{unit}\"", nanoseconds / scale)
+}
