@@ -3,6 +3,7 @@
 mod campaign;
 mod check;
 mod des;
+mod examples;
 mod help;
 mod others;
 mod reliability;

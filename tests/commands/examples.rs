@@ -1,0 +1,215 @@
+//! The examples, as their READMEs run them.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use crate::{Answer, empty_folder, understudy};
+
+/// Sorted, so that a failure names the same file first wherever it is run.
+fn entries(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).expect("a folder");
+    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.expect("there").path()).collect();
+    paths.sort();
+    paths
+}
+
+fn folders() -> Vec<PathBuf> {
+    entries(&Path::new(env!("CARGO_MANIFEST_DIR")).join("examples"))
+}
+
+fn name(path: &Path) -> String {
+    path.file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("text")
+}
+
+/// The scenarios of a cluster's folder.
+fn scenarios(folder: &Path) -> Vec<PathBuf> {
+    let is_scenario = |path: &PathBuf| {
+        path.extension()
+            .is_some_and(|extension| extension == "toml")
+            && fs::read_to_string(path).is_ok_and(|text| text.contains("\ncycles = "))
+    };
+    entries(folder).into_iter().filter(is_scenario).collect()
+}
+
+fn succeeds(arguments: &[&str]) -> Answer {
+    let answer = understudy(arguments);
+    assert_eq!(
+        answer.status, 0,
+        "{arguments:?}\n{}{}",
+        answer.output, answer.errors
+    );
+    answer
+}
+
+#[test]
+fn every_cluster_scenario_and_ladder_is_right() {
+    for folder in folders() {
+        let cluster = folder.join("cluster.toml");
+        let mut files: Vec<PathBuf> = entries(&folder);
+        files.retain(|path| {
+            path.extension()
+                .is_some_and(|extension| extension == "ladder")
+        });
+        if cluster.exists() {
+            files.insert(0, cluster);
+            files.extend(scenarios(&folder));
+        }
+        if !files.is_empty() {
+            let files = files.iter().map(|path| text(path));
+            succeeds(&[&["check"], &files.collect::<Vec<_>>()[..]].concat());
+        }
+    }
+}
+
+#[test]
+fn every_scenario_comes_out_as_it_expects() {
+    for folder in folders() {
+        let cluster = folder.join("cluster.toml");
+        if !cluster.exists() {
+            continue;
+        }
+        for scenario in scenarios(&folder) {
+            let (cluster, scenario) = (text(&cluster), text(&scenario));
+            succeeds(&["simulate", cluster, "--scenario", scenario, "--seed", "1"]);
+        }
+    }
+}
+
+#[test]
+fn the_gallery_has_every_example() {
+    let gallery = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/examples.md");
+    let gallery = fs::read_to_string(gallery).expect("a page");
+    for folder in folders() {
+        let row = format!("| [{0}](../examples/{0}) |", name(&folder));
+        assert!(gallery.contains(&row), "docs/examples.md lacks {row}");
+    }
+}
+
+/// The states and transitions of an answer, as the reference files have them.
+fn counts(answer: &Answer) -> Value {
+    let result = &answer.json()["result"];
+    json!([result["states"], result["transitions"]])
+}
+
+#[test]
+fn models_have_the_counts_of_other_tools() {
+    for example in ["small-factory", "transfer-line", "guideway", "agv"] {
+        let out = empty_folder(&format!("examples_{example}"));
+        let folder = Path::new("examples").join(example);
+        let expected = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder.join("expected.json"));
+        let expected = fs::read_to_string(expected).expect("a reference");
+        let expected: Value = serde_json::from_str(&expected).expect("JSON");
+        let model = folder.join("model.toml");
+        let model = text(&model);
+        let (super_file, reduced_file) = (out.join("SUPER.ADS"), out.join("SIMSUP.ADS"));
+        let synth = |more: &[&str]| succeeds(&[&["synth", model, "--json"], more].concat());
+        let made = synth(&["-o", text(&super_file)]);
+        assert_eq!(counts(&made), expected["super"], "{example}");
+        let symbolic = synth(&["--engine", "symbolic"]);
+        assert_eq!(counts(&symbolic), expected["super"], "{example}");
+        let reduced = synth(&["--reduce", "-o", text(&reduced_file)]);
+        let (states, theirs) = (&counts(&reduced)[0], &expected["supreduce_TCT"][0]);
+        assert!(states.as_u64() <= theirs.as_u64(), "{example}: {states}");
+        // The named model is TCT's.
+        let theirs = format!(
+            "supervisor/tests/data/{}/_SUPER.ADS",
+            example.replace('-', "_")
+        );
+        succeeds(&["des", "isomorph", text(&super_file), &theirs]);
+        let avalanche = succeeds(&["des", "avalanche", &theirs, "--json"]).json();
+        assert_eq!(
+            avalanche["result"]["events"], expected["avalanche_super"],
+            "{example}"
+        );
+    }
+}
+
+#[test]
+fn the_papers_small_automata_have_their_avalanche_events_and_ladders_without() {
+    for example in ["TEST", "FIG4", "FIG6"] {
+        let out = empty_folder(&format!("examples_{example}"));
+        let file = format!("examples/avalanche/{example}.ADS");
+        let expected = format!(
+            "{}/examples/avalanche/{example}.expected.json",
+            env!("CARGO_MANIFEST_DIR")
+        );
+        let expected = fs::read_to_string(expected).expect("a reference");
+        let expected: Value = serde_json::from_str(&expected).expect("JSON");
+        let found = succeeds(&["des", "avalanche", &file, "--json"]).json();
+        assert_eq!(found["result"]["events"], expected["avalanche_events"]);
+        let size = succeeds(&["des", "sync", &file, "--json"]);
+        assert_eq!(counts(&size), expected["size"], "{example}");
+        // Figure 4 is two strings that end in states that nobody marked; no controller is to run it.
+        if example != "FIG4" {
+            let ladder = out.join("proved.ladder");
+            succeeds(&["supervisor-to-ladder", &file, "-o", text(&ladder)]);
+            succeeds(&["check", text(&ladder)]);
+        }
+    }
+}
+
+/// As in the README; each ladder is proved again on the way.
+#[test]
+fn the_boilers_ladders_are_made_from_their_models() {
+    let out = empty_folder("examples_boiler");
+    for name in ["pilot", "main", "complete"] {
+        let model = format!("examples/boiler/{name}.toml");
+        let map = format!("examples/boiler/{name}-map.toml");
+        let (supervisors, ladder) = (
+            out.join(format!("{name}-supervisors.toml")),
+            out.join(format!("{name}.ladder")),
+        );
+        let (supervisors, made) = (text(&supervisors), text(&ladder));
+        succeeds(&["synth", &model, "--engine", "specified", "-o", supervisors]);
+        let convert = ["supervisor-to-ladder", supervisors, "--io", &map];
+        succeeds(&[&convert[..], &["--plant", &model, "-o", made]].concat());
+        let ours = format!(
+            "{}/examples/boiler/{name}.ladder",
+            env!("CARGO_MANIFEST_DIR")
+        );
+        let (made, ours) = (fs::read(made), fs::read(ours));
+        assert!(
+            made.expect("written") == ours.expect("there"),
+            "examples/boiler/{name}.ladder is another one"
+        );
+    }
+}
+
+#[test]
+fn specifications_that_are_no_supervisors_are_not_taken_for_ones() {
+    let out = empty_folder("examples_specified").join("supervisors.toml");
+    let model = "examples/transfer-line/model.toml";
+    let run = ["synth", model, "--engine", "specified", "-o", text(&out)];
+    let answer = understudy(&run);
+    assert_eq!(answer.status, 1);
+    assert!(answer.errors.contains("U0846"), "{}", answer.errors);
+    assert!(!out.exists());
+    let reduced = understudy(&[&run[..], &["--reduce"]].concat());
+    assert_eq!(reduced.status, 2);
+}
+
+/// Tables 3.1 and 3.2, as the library's tests hold them row by row: what the command prints is the same.
+#[test]
+fn the_motivating_example_has_the_tables_of_the_thesis() {
+    for mode in ["automatic", "manual"] {
+        let answer = succeeds(&[
+            "supervisor-to-ladder",
+            "examples/motivating-example/supervisor.ADS",
+            "--io",
+            "examples/motivating-example/map.toml",
+            "--mode",
+            mode,
+            "--table",
+        ]);
+        insta::assert_snapshot!(format!("table_{mode}"), answer.output);
+    }
+}
