@@ -31,7 +31,7 @@ const FLOORS: &[&[&str]] = &[
         "understudy-verification",
     ],
     &["understudy-bus", "understudy-network", "understudy-simulator"],
-    &["understudy-scenarios"],
+    &["understudy-model-checking", "understudy-scenarios"],
     &["understudy", "understudy-fuzz"],
 ];
 

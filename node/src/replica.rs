@@ -16,7 +16,7 @@ use understudy_wire::{
 use crate::settings::Program;
 
 /// How much a copy may be trusted to speak.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Standing {
     /// There is no copy, or none that the program's remote I/O knows.
     Lost,
@@ -29,7 +29,7 @@ pub(crate) enum Standing {
 }
 
 /// A station's copy of one program.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) struct Replica {
     id: ProgramId,
     standing: Standing,
@@ -44,7 +44,7 @@ pub(crate) struct Replica {
     history: usize,
 }
 
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 struct State {
     bits: Image,
     lineage: Lineage,
@@ -53,7 +53,7 @@ struct State {
     digest: Digest,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 struct Copied {
     born: Moment,
     state: State,

@@ -16,6 +16,7 @@ mod repair;
 mod turn;
 
 use std::collections::VecDeque;
+use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
 use smallvec::SmallVec;
@@ -57,7 +58,7 @@ pub struct Station {
 }
 
 /// What a station remembers of the current cycle only.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 struct CycleNotes {
     spoken: bool,
     asked: bool,
@@ -72,7 +73,7 @@ struct CycleNotes {
 }
 
 /// What a controller has said of its own program.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 struct Said {
     program: ProgramId,
     lineage: Lineage,
@@ -265,6 +266,33 @@ impl Station {
         if planned <= now {
             self.pace(now, planned);
         }
+    }
+}
+
+/// Two stations of equal settings that are drained and hash alike go on alike.
+impl Hash for Station {
+    fn hash<H: Hasher>(&self, hasher: &mut H) {
+        let Self {
+            settings: _,
+            reception,
+            clock,
+            attendance,
+            replicas,
+            scratch: _,
+            copies,
+            outbox: _,
+            cycle,
+            started,
+            asked,
+            stalled,
+            paces,
+            wanted,
+            joining,
+            differed,
+        } = self;
+        (reception, clock, attendance, replicas, copies).hash(hasher);
+        (cycle, started, asked, stalled, paces, wanted).hash(hasher);
+        (joining, differed).hash(hasher);
     }
 }
 

@@ -4,12 +4,12 @@
 ///
 /// Its own supply is endless and puts the next part when the place has been free for `pause_cycles`; parts from another plant
 /// are placed at once, and those that come while the place is taken are the model's concern.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Hash)]
 pub(crate) struct Feeder {
     supply: Supply,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Hash)]
 enum Supply {
     Own { pause_cycles: u32, free_cycles: u32 },
     OtherPlant,

@@ -5,6 +5,8 @@
 //! plant hands over (parts that come together follow each other every other scan, so that each is an edge); the outputs `finished`, `handed_over` and
 //! `mishap` are counted at their rising edges. Without `finished`, what is handed over counts as finished.
 
+use std::hash::{Hash, Hasher};
+
 use smallvec::SmallVec;
 use understudy_logic::{Circuit, Scan, Scratch};
 use understudy_wire::Image;
@@ -52,8 +54,16 @@ pub(crate) struct LadderModel {
     mishap: Counter,
 }
 
+/// Two of one program that hash alike go on alike.
+impl Hash for LadderModel {
+    fn hash<H: Hasher>(&self, hasher: &mut H) {
+        (&self.state, &self.inputs, &self.outputs, self.queue).hash(hasher);
+        (&self.finished, &self.handed_over, &self.mishap).hash(hasher);
+    }
+}
+
 /// Rising edges of an output, if the program has it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Hash)]
 struct Counter {
     place: Option<usize>,
     last: bool,

@@ -1,5 +1,7 @@
 //! A model bound to its controller's signals.
 
+use std::hash::{Hash, Hasher};
+
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 use understudy_logic::Circuit;
@@ -25,7 +27,7 @@ pub(crate) trait Model {
 }
 
 /// Since the start of the plant; none ever falls.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub(crate) struct Counts {
     pub(crate) handed_over: u64,
     pub(crate) finished: u64,
@@ -135,11 +137,18 @@ pub struct Plant {
     position_names: Vec<String>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Hash)]
 enum Inside {
     Robot(Robot),
     Press(Press),
     Ladder(Box<LadderModel>),
+}
+
+/// Two of one binding that hash alike go on alike.
+impl Hash for Plant {
+    fn hash<H: Hasher>(&self, hasher: &mut H) {
+        (&self.inside, &self.seen, &self.actuators, &self.sensors).hash(hasher);
+    }
 }
 
 impl Inside {

@@ -11,7 +11,7 @@ use crate::model::{Counts, Model};
 use crate::robot::{moved, shown};
 
 /// How far and how fast.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, Hash)]
 pub struct PressParameters {
     /// Cycles from up to down; at least 1.
     pub ram_cycles: u32,
@@ -34,7 +34,7 @@ pub(crate) const SENSORS: [&str; 3] = ["part_present", "ram_up", "ram_down"];
 pub(crate) const ACTUATORS: [&str; 2] = ["move_down", "move_up"];
 pub(crate) const POSITIONS: [&str; 1] = ["ram"];
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Hash)]
 pub(crate) struct Press {
     parameters: PressParameters,
     feeder: Feeder,
@@ -44,7 +44,7 @@ pub(crate) struct Press {
     counts: Counts,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 enum Part {
     Raw,
     Pressed,

@@ -16,7 +16,7 @@ use crate::feeder::Feeder;
 use crate::model::{Counts, Model, SHOWN};
 
 /// How far and how fast.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, Hash)]
 pub struct RobotParameters {
     /// Cycles from left to right; at least 1.
     pub horizontal_cycles: u32,
@@ -49,7 +49,7 @@ pub(crate) const SENSORS: [&str; 5] = [
 pub(crate) const ACTUATORS: [&str; 5] = ["move_right", "move_left", "move_down", "move_up", "grip"];
 pub(crate) const POSITIONS: [&str; 3] = ["horizontal", "vertical", "gripper"];
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Hash)]
 pub(crate) struct Robot {
     parameters: RobotParameters,
     feeder: Feeder,

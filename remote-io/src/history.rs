@@ -17,7 +17,7 @@ use smallvec::SmallVec;
 use understudy_wire::{Image, Lineage, Moment, ProgramHash};
 
 /// The last samples of a program and their lineages.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) struct History {
     born: Moment,
     base: Lineage,

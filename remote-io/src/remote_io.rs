@@ -17,6 +17,7 @@ mod deadline;
 mod sampling;
 
 use std::collections::VecDeque;
+use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
 use understudy_wire::{
@@ -64,7 +65,7 @@ pub struct RemoteIo {
     outbox: VecDeque<Output<Event>>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 enum Phase {
     /// The history is not known: cycles listened for so far.
     Listening { cycles: u32 },
@@ -250,6 +251,37 @@ impl RemoteIo {
         let passed = now.since(self.decides_at()).as_nanos() / period.as_nanos();
         let passed = u32::try_from(passed).unwrap_or(u32::MAX);
         self.idle = self.idle.saturating_add(1).saturating_add(passed);
+    }
+}
+
+/// Two remote I/Os of equal settings that are drained and hash alike go on alike.
+impl Hash for RemoteIo {
+    fn hash<H: Hasher>(&self, hasher: &mut H) {
+        let Self {
+            settings: _,
+            reception,
+            clock,
+            attendance,
+            witnesses,
+            phase,
+            field,
+            released,
+            turns,
+            decided,
+            idle,
+            missed,
+            applied,
+            asked,
+            stalled,
+            last_true,
+            trust,
+            differed,
+            copies,
+            outbox: _,
+        } = self;
+        (reception, clock, attendance, witnesses, phase, field).hash(hasher);
+        (released, turns, decided, idle, missed, applied).hash(hasher);
+        (asked, stalled, last_true, trust, differed, copies).hash(hasher);
     }
 }
 

@@ -14,7 +14,7 @@ use understudy_wire::StationSet;
 use crate::votes::{Finding, Vote, find};
 
 /// Kept from cycle to cycle; a remote I/O that restarts trusts everybody again.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub(crate) struct Trust {
     excluded: StationSet,
     accused: StationSet,

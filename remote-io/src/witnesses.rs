@@ -5,13 +5,13 @@
 use understudy_wire::{Holding, ProgramId, StationId};
 
 /// One entry for each station that can hold the program's state.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) struct Witnesses {
     entries: Vec<Witness>,
     living_for: u32,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 struct Witness {
     station: StationId,
     holding: Option<Holding>,

@@ -50,6 +50,13 @@ pub enum Action {
         /// Who hears it again.
         to: Party,
     },
+    /// Its frames reach one other party so much later from now on, and are overtaken by later ones of others; zero ends this.
+    Delay {
+        /// Who hears it later.
+        to: Party,
+        /// By this.
+        by: Duration,
+    },
     /// Bits of its next frames flip on their way.
     Corrupt {
         /// So many frames.
@@ -96,6 +103,7 @@ impl Action {
             Self::Release => "release",
             Self::Cut { .. } => "cut",
             Self::Heal { .. } => "heal",
+            Self::Delay { .. } => "delay",
             Self::Corrupt { .. } => "corrupt",
             Self::Replay { .. } => "replay",
             Self::FlipState { .. } => "flip-state",

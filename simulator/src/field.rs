@@ -1,5 +1,7 @@
 //! The plants behind the remote I/Os, and the wires between them.
 
+use std::hash::{Hash, Hasher};
+
 use understudy_plant::{Followed, Plant};
 use understudy_wire::{Field, Image, ProgramId};
 
@@ -15,6 +17,13 @@ pub(crate) struct Plants {
     follows: Vec<Vec<Followed>>,
     /// Parts of its feeder that each plant has seen.
     taken: Vec<u64>,
+}
+
+/// By where the plants are now; how they start and are fed is given.
+impl Hash for Plants {
+    fn hash<H: Hasher>(&self, hasher: &mut H) {
+        (&self.running, &self.shown, &self.taken).hash(hasher);
+    }
 }
 
 impl Plants {

@@ -4,6 +4,7 @@
 //! checksum that refuses it. What flips before a checksum is made, or after it was read, arrives: that is a value fault.
 
 use std::collections::VecDeque;
+use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -17,7 +18,7 @@ use crate::fault::Action;
 use crate::network::{Disturbance, Network};
 use crate::queue::{Delivery, Queue};
 
-/// Frames of each party that can be said again, at most; older ones are forgotten.
+/// Frames of each party that can be said again, at most; older ones are forgotten. The last one is always remembered.
 const REMEMBERED: usize = 1024;
 
 /// All links of a cluster.
@@ -47,14 +48,18 @@ struct Sender {
     /// Who does not hear it.
     deaf_stations: StationSet,
     deaf_remote_ios: ProgramSet,
+    /// Who hears it later, by place, and by how much.
+    delays: Vec<(usize, Duration)>,
     corrupt: u16,
     samples: Flips,
     words: Flips,
+    /// Frames that it has sent.
+    frames: u64,
     sent: VecDeque<Arc<Frame>>,
 }
 
 /// One bit, in so many frames more.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 struct Flips {
     bit: u16,
     frames: u16,
@@ -90,6 +95,12 @@ impl Links {
         }
     }
 
+    /// Frames that a party has sent so far; none for one that is not of the cluster.
+    pub(crate) fn sent(&self, party: Party) -> u64 {
+        self.place(party)
+            .map_or(0, |place| self.senders[place].frames)
+    }
+
     /// Frames that were changed on their way and refused for it.
     pub(crate) fn refused(&self) -> u64 {
         self.refused
@@ -105,7 +116,7 @@ impl Links {
 
     /// A fault of this kind is to come: frames have to be remembered for it from now on.
     pub(crate) fn expect(&mut self, action: Action) {
-        self.remembers |= matches!(action, Action::Replay { .. });
+        self.remembers |= matches!(action, Action::Replay { age } if age > 1);
     }
 
     /// From here on all chance comes from `seed`.
@@ -133,6 +144,17 @@ impl Links {
                     Party::RemoteIo(program) if cut => sender.deaf_remote_ios.insert(program),
                     Party::RemoteIo(program) => sender.deaf_remote_ios.remove(program),
                     Party::Plant(_) => {}
+                }
+            }
+            Action::Delay { to, by } => {
+                let Some(to) = self.place(to) else {
+                    return;
+                };
+                let delays = &mut self.senders[place].delays;
+                delays.retain(|&(receiver, _)| receiver != to);
+                if !by.is_zero() {
+                    delays.push((to, by));
+                    delays.sort_unstable();
                 }
             }
             Action::Corrupt { frames } => self.senders[place].corrupt = frames,
@@ -171,13 +193,12 @@ impl Links {
         let Some(frame) = self.leave(place, frame) else {
             return;
         };
-        if self.remembers {
-            let sent = &mut self.senders[place].sent;
-            if sent.len() == REMEMBERED {
-                sent.pop_front();
-            }
-            sent.push_back(Arc::clone(&frame));
+        let sender = &mut self.senders[place];
+        sender.frames += 1;
+        if sender.sent.len() == if self.remembers { REMEMBERED } else { 1 } {
+            sender.sent.pop_front();
         }
+        sender.sent.push_back(Arc::clone(&frame));
         self.carry(now, place, frame);
     }
 
@@ -247,30 +268,33 @@ impl Links {
             }
             _ => {}
         }
-        if self.network.is_even() && !self.anybody_late {
+        if self.network.is_even() && !self.anybody_late && sender.delays.is_empty() {
             let at = now + self.network.latency;
             self.queue.push(at, frame, stations, remote_ios);
             return;
         }
         for station in stations.iter() {
             let (only, none) = (StationSet::only(station), ProgramSet::EMPTY);
-            self.carry_to(now, station.index(), &frame, only, none);
+            self.carry_to(now, (place, station.index()), &frame, only, none);
         }
         for program in remote_ios.iter() {
             let (only, none) = (ProgramSet::only(program), StationSet::EMPTY);
-            let place = self.stations.len() + program.index();
-            self.carry_to(now, place, &frame, none, only);
+            let receiver = self.stations.len() + program.index();
+            self.carry_to(now, (place, receiver), &frame, none, only);
         }
     }
 
     fn carry_to(
         &mut self,
         now: Time,
-        receiver: usize,
+        (sender, receiver): (usize, usize),
         frame: &Arc<Frame>,
         stations: StationSet,
         remote_ios: ProgramSet,
     ) {
+        let delays = self.senders[sender].delays.iter();
+        let late = delays.filter(|(to, _)| *to == receiver).map(|(_, by)| *by);
+        let late = self.late[receiver] + late.sum::<Duration>();
         for delay in self.network.arrivals(&mut self.random) {
             let share = self.network.corruption;
             let frame = if share > 0.0 && self.random.random::<f64>() < share {
@@ -279,9 +303,36 @@ impl Links {
                 Some(Arc::clone(frame))
             };
             if let Some(frame) = frame {
-                let at = now + delay + self.late[receiver];
+                let at = now + delay + late;
                 self.queue.push(at, frame, stations, remote_ios);
             }
+        }
+    }
+}
+
+/// Links that hash alike go on alike, as long as the network leaves nothing to chance.
+impl Hash for Links {
+    fn hash<H: Hasher>(&self, hasher: &mut H) {
+        let Self {
+            usual: _,
+            disturbance: _,
+            network: _,
+            random: _,
+            queue,
+            stations: _,
+            remote_ios: _,
+            senders,
+            intakes,
+            late,
+            anybody_late: _,
+            remembers: _,
+            refused: _,
+        } = self;
+        (queue, intakes, late).hash(hasher);
+        for sender in senders {
+            (sender.deaf_stations, sender.deaf_remote_ios).hash(hasher);
+            (&sender.delays, sender.corrupt, sender.samples, sender.words).hash(hasher);
+            sender.sent.hash(hasher);
         }
     }
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use understudy_wire::{Moment, Time};
 
 /// Counts the cycles of a run. A period without any cycle, because nobody is there to pace, counts as one.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Hash)]
 pub(crate) struct Pace {
     period: Duration,
     newest: Moment,

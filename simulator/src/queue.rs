@@ -2,6 +2,7 @@
 
 use std::cmp::Ordering;
 use std::collections::{BinaryHeap, VecDeque};
+use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
 use understudy_wire::{Frame, ProgramSet, StationSet, Time};
@@ -83,6 +84,23 @@ impl PartialEq for Delivery {
 }
 
 impl Eq for Delivery {}
+
+/// By what arrives and in which order, however it was stored.
+impl Hash for Queue {
+    fn hash<H: Hasher>(&self, hasher: &mut H) {
+        let mut deliveries: Vec<&Delivery> = self.even.iter().chain(&self.uneven).collect();
+        deliveries.sort_unstable_by_key(|delivery| (delivery.at, delivery.order));
+        for delivery in deliveries {
+            (
+                delivery.at,
+                &delivery.frame,
+                delivery.stations,
+                delivery.remote_ios,
+            )
+                .hash(hasher);
+        }
+    }
+}
 
 #[cfg(test)]
 mod tests {

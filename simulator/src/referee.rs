@@ -6,6 +6,7 @@
 //! (*The plant decides history*): a program goes on only from a state that its own samples led to.
 
 use std::collections::VecDeque;
+use std::hash::{Hash, Hasher};
 
 use serde::{Deserialize, Serialize};
 use understudy_logic::{Scan, Scratch};
@@ -83,6 +84,14 @@ pub enum Violation {
         /// The lineage.
         lineage: Lineage,
     },
+}
+
+/// By its reference run; settings and program are given.
+impl Hash for Referee {
+    fn hash<H: Hasher>(&self, hasher: &mut H) {
+        (&self.states, &self.state, &self.truth).hash(hasher);
+        (&self.last_true, self.held).hash(hasher);
+    }
 }
 
 fn text(image: &Option<Image>) -> String {

@@ -5,6 +5,7 @@
 
 mod disturbance;
 
+use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -203,6 +204,26 @@ impl Simulation {
         Ok(())
     }
 
+    /// Goes on after [`Self::run`] until the next thing to happen is not before this place in this cycle.
+    pub fn go_to(&mut self, cycle: u64, phase: f64, observe: &mut Observe<'_>) {
+        let end = cycle as f64 + phase;
+        while self.cycle_of(self.next_at()).is_none_or(|next| next < end) {
+            self.advance(observe);
+        }
+    }
+
+    fn next_at(&self) -> Time {
+        let next = self.next_wakeup().0.min(self.pace.overdue_at());
+        let others = [self.links.next_at(), self.next_fault_at()];
+        let next = others.into_iter().flatten().fold(next, Time::min);
+        self.now.max(next)
+    }
+
+    fn cycle_of(&self, at: Time) -> Option<f64> {
+        let within = at.since(self.pace.started()).as_nanos() as f64;
+        Some(self.pace.cycle()? as f64 + within / self.period().as_nanos() as f64)
+    }
+
     /// Virtual time since the start.
     pub fn now(&self) -> Time {
         self.now
@@ -210,8 +231,7 @@ impl Simulation {
 
     /// Cycles of the scenario so far, with the part of this one that is over; none before its cycle 0.
     pub fn cycle_time(&self) -> Option<f64> {
-        let within = (self.now.0 - self.pace.started().0) as f64 / self.period().as_nanos() as f64;
-        Some(self.pace.cycle()? as f64 + within)
+        self.cycle_of(self.now)
     }
 
     /// What each remote I/O did since everybody was in step, by program.
@@ -227,6 +247,11 @@ impl Simulation {
     /// Frames that were changed on their way, and that their receivers refused for it.
     pub fn refused_frames(&self) -> u64 {
         self.links.refused()
+    }
+
+    /// Frames that a party has sent so far.
+    pub fn sent_frames(&self, party: Party) -> u64 {
+        self.links.sent(party)
     }
 
     /// What the plant of a program shows now.
@@ -405,5 +430,37 @@ impl Simulation {
             self.pace.saw(self.now, frame.header.moment);
         }
         self.links.send(self.now, self.pace.cycle(), frame);
+    }
+}
+
+/// Two simulations of equal parts on a network that leaves nothing to chance go on alike if they hash alike. What has happened in the past counts only as far as it acts on.
+impl Hash for Simulation {
+    fn hash<H: Hasher>(&self, hasher: &mut H) {
+        let Self {
+            parts: _,
+            links,
+            now: _,
+            stations,
+            remote_ios,
+            plants,
+            referees,
+            tallies: _,
+            ready,
+            violations,
+            faults,
+            pace,
+            founded,
+        } = self;
+        (links, stations, remote_ios, plants, referees).hash(hasher);
+        (ready, violations.len(), pace, founded).hash(hasher);
+        for fault in faults {
+            (
+                fault.at_cycle,
+                fault.phase.to_bits(),
+                fault.party,
+                fault.action,
+            )
+                .hash(hasher);
+        }
     }
 }

@@ -9,7 +9,7 @@ use understudy_wire::{Frame, Input, Machine, Time};
 /// Frames that wait for a stopped party, at most, as in a socket's buffer; later ones are lost.
 const WAITING_FRAMES: usize = 256;
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Hash)]
 pub(crate) struct Slot<M> {
     machine: Option<M>,
     stopped: bool,

@@ -7,7 +7,7 @@ use crate::identifier::StationId;
 use crate::set::StationSet;
 
 /// One party's view of all stations.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Attendance {
     flag_after: u32,
     /// Cycles of silence in a row, by rank; at `flag_after` a station is flagged, and the count stays there.

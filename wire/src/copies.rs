@@ -12,12 +12,12 @@ use crate::schedule::Schedule;
 use crate::time::Time;
 
 /// Frames of this cycle, each with the times at which it leaves again.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub struct Copies {
     pending: SmallVec<[Pending; 2]>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 struct Pending {
     due: Time,
     left: u32,

@@ -12,7 +12,7 @@ use crate::identifier::{Epoch, Moment};
 use crate::time::Time;
 
 /// The current cycle of one party.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub struct CycleClock {
     moment: Option<Moment>,
     anchor: Time,

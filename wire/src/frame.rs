@@ -23,7 +23,7 @@ use crate::set::{ProgramSet, StationSet};
 pub const MAXIMUM_HISTORY: usize = 32;
 
 /// One datagram.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Frame {
     /// Who, when, and of which cluster.
     pub header: Header,
@@ -32,7 +32,7 @@ pub struct Frame {
 }
 
 /// Stands before every body.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Header {
     /// The cluster it is meant for.
     pub cluster: ClusterHash,
@@ -47,7 +47,7 @@ pub struct Header {
 }
 
 /// The kinds of frames.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Body {
     /// The pacemaker starts a cycle.
     Sync,
@@ -66,7 +66,7 @@ pub enum Body {
 }
 
 /// u(i) of this and of the last few cycles, with the lineage before the oldest of them.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Sample {
     /// When this program was last started cold; its genesis lineage is a function of it.
     pub born: Moment,
@@ -83,7 +83,7 @@ pub struct Sample {
 }
 
 /// What a remote I/O drove at a deadline.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Applied {
     /// The cycle.
     pub moment: Moment,
@@ -108,7 +108,7 @@ pub enum Source {
 }
 
 /// What a station says when it holds the token.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Turn {
     /// Whom it heard in this cycle before it spoke.
     pub heard: StationSet,
@@ -119,7 +119,7 @@ pub struct Turn {
 }
 
 /// A copy of a program's state that a station has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Holding {
     /// Whose state.
     pub program: ProgramId,
@@ -134,7 +134,7 @@ pub struct Holding {
 }
 
 /// A sum of outputs over GF(2): of all members of its mask, (9) where the mask is every program.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Word {
     /// Never empty.
     pub members: ProgramSet,
@@ -143,7 +143,7 @@ pub struct Word {
 }
 
 /// Said in the rest of a cycle by a station that lacks a state or does not speak yet.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Join {
     /// The programs whose state it asks for.
     pub wants: ProgramSet,
@@ -152,7 +152,7 @@ pub struct Join {
 }
 
 /// x(i), from one who has it to one who asked.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Transfer {
     /// Who asked.
     pub to: StationId,
@@ -173,7 +173,7 @@ pub struct Transfer {
 }
 
 /// What a simulated plant's sensors see.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Field {
     /// u(i).
     pub sensors: Image,
@@ -188,7 +188,7 @@ pub struct Field {
 }
 
 /// What a remote I/O drives.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Actuation {
     /// y(i).
     pub outputs: Image,

@@ -1,20 +1,20 @@
 //! Whose frames are taken in at all.
 
-use std::collections::HashSet;
+use std::collections::BTreeSet;
 
 use crate::agreement::Agreement;
 use crate::frame::Header;
 use crate::identifier::{ClusterHash, ConfigurationHash, Party};
 
 /// Decides on headers alone. Remembers whom it has refused, at most once for each party of the cluster.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Reception {
     own: Party,
     cluster: ClusterHash,
     configuration: ConfigurationHash,
     stations: usize,
     programs: usize,
-    refused: HashSet<Party>,
+    refused: BTreeSet<Party>,
 }
 
 /// What becomes of a frame.
@@ -42,7 +42,7 @@ impl Reception {
             configuration: agreement.configuration,
             stations: agreement.schedule.stations(),
             programs: agreement.schedule.controllers(),
-            refused: HashSet::new(),
+            refused: BTreeSet::new(),
         }
     }
 

@@ -1,6 +1,7 @@
 //! Sets of programs and of stations, one 64-bit word each.
 
 use std::fmt;
+use std::hash::{Hash, Hasher};
 use std::marker::PhantomData;
 
 use serde::{Deserialize, Serialize};
@@ -143,6 +144,12 @@ impl<M: Member> FromIterator<M> for Set<M> {
 }
 
 // Written out, because a derive would ask the same of `M`, which is only a marker.
+impl<M> Hash for Set<M> {
+    fn hash<H: Hasher>(&self, hasher: &mut H) {
+        self.0.hash(hasher);
+    }
+}
+
 impl<M> Clone for Set<M> {
     fn clone(&self) -> Self {
         *self

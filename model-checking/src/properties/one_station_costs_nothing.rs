@@ -1,0 +1,17 @@
+//! Theorem 1 in time: with one station down at a time, whenever it goes and comes, and a network that delivers, no cycle is held.
+
+use understudy_simulator::Tally;
+use understudy_wire::Party;
+
+use super::Property;
+
+pub(super) const PROPERTY: Property = Property {
+    name: "one lost station costs no cycle",
+    holds: |_, world| {
+        let used = &world.used;
+        let quiet = used.losses + used.delays + used.duplicates == 0;
+        let one_station = matches!(world.was_down.as_slice(), [] | [Party::Station(_)]);
+        let untrue = |tally: &Tally| tally.held + tally.fail_safe > 0;
+        !(quiet && one_station && world.simulation.tallies().iter().any(untrue))
+    },
+};

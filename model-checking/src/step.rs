@@ -1,0 +1,132 @@
+//! What may be done between two slots, how often, and the faults of the simulator that it is.
+
+use std::time::Duration;
+
+use understudy_simulator::{Action, Fault};
+use understudy_wire::Party;
+
+/// Where slots begin, as shares of T. A frame that is sent in a slot arrives in the next one.
+pub(crate) const SLOTS: [f64; 8] = [0.025, 0.075, 0.125, 0.175, 0.225, 0.675, 0.725, 0.975];
+
+/// How late a frame may be, as shares of T: others overtake it; its cycle is over.
+pub(crate) const LATE_PER_MILLE: [u32; 2] = [150, 1000];
+
+/// How much may be done in one run, at most.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct Budget {
+    /// Links, or senders towards everybody, that lose all frames of one slot.
+    pub losses: u8,
+    /// Links that are late with all frames of one slot.
+    pub delays: u8,
+    /// Senders of which the last frame of a slot arrives once more, at everybody.
+    pub duplicates: u8,
+    /// Parties that crash; each may start again at any later slot.
+    pub crashes: u8,
+    /// Parties that stand still; each may go on at any later slot.
+    pub stops: u8,
+    /// All of them together.
+    pub total: u8,
+    /// Cycles in which anything may be done.
+    pub cycles: u64,
+}
+
+/// One step of the model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Step {
+    /// What a party sends in this slot does not reach one other.
+    Lose {
+        /// Who sends.
+        from: Party,
+        /// Who does not hear it.
+        to: Party,
+    },
+    /// What a party sends in this slot reaches nobody.
+    Mute {
+        /// Who sends.
+        from: Party,
+    },
+    /// What a party sends in this slot reaches one other late.
+    Late {
+        /// Who sends.
+        from: Party,
+        /// Who hears it late.
+        to: Party,
+        /// By so many thousandths of T.
+        per_mille: u32,
+    },
+    /// The last frame of a party comes once more, to everybody.
+    Twice {
+        /// Whose.
+        from: Party,
+    },
+    /// A party is gone, with all that it knew.
+    Crash(Party),
+    /// It starts again.
+    Restart(Party),
+    /// A party stands still.
+    Stop(Party),
+    /// It goes on.
+    Continue(Party),
+    /// The next slot begins.
+    Wait,
+}
+
+/// A place between two slots.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct Place {
+    pub(crate) cycle: u64,
+    pub(crate) slot: usize,
+}
+
+impl Place {
+    pub(crate) fn phase(self) -> f64 {
+        SLOTS[self.slot]
+    }
+
+    pub(crate) fn next(self) -> Self {
+        let slot = (self.slot + 1) % SLOTS.len();
+        let cycle = self.cycle + u64::from(slot == 0);
+        Self { cycle, slot }
+    }
+}
+
+/// The faults that a step at `place` is; nothing for waiting. `parties` are all of the cluster.
+pub(crate) fn faults(step: Step, place: Place, parties: &[Party], period: Duration) -> Vec<Fault> {
+    let fault = |place: Place, party, action| Fault {
+        at_cycle: place.cycle,
+        phase: place.phase(),
+        party,
+        action,
+    };
+    let for_a_slot = |party, during, after| {
+        vec![
+            fault(place, party, during),
+            fault(place.next(), party, after),
+        ]
+    };
+    match step {
+        Step::Lose { from, to } => for_a_slot(from, Action::Cut { to }, Action::Heal { to }),
+        Step::Mute { from } => {
+            let others = parties.iter().filter(|&&other| other != from);
+            others
+                .flat_map(|&to| for_a_slot(from, Action::Cut { to }, Action::Heal { to }))
+                .collect()
+        }
+        Step::Late {
+            from,
+            to,
+            per_mille,
+        } => {
+            let by = period * per_mille / 1000;
+            let on_time = Duration::ZERO;
+            let late = Action::Delay { to, by };
+            for_a_slot(from, late, Action::Delay { to, by: on_time })
+        }
+        Step::Twice { from } => vec![fault(place, from, Action::Replay { age: 1 })],
+        Step::Crash(party) => vec![fault(place, party, Action::Crash)],
+        Step::Restart(party) => vec![fault(place, party, Action::Restart)],
+        Step::Stop(party) => vec![fault(place, party, Action::Stop)],
+        Step::Continue(party) => vec![fault(place, party, Action::Continue)],
+        Step::Wait => Vec::new(),
+    }
+}

@@ -1,0 +1,261 @@
+//! The states of the model and the steps between them.
+
+use std::fmt;
+use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher, Hash, Hasher};
+use std::time::Duration;
+
+use stateright::Property as Checked;
+use understudy_simulator::{Fault, Network, NotReady, Parts, Simulation};
+use understudy_wire::{Party, ProgramId, StationId};
+
+use crate::properties::Property;
+use crate::step::{Budget, LATE_PER_MILLE, Place, Step, faults};
+
+/// Cycles that the undisturbed cluster gets to come into step.
+const PATIENCE_CYCLES: u64 = 200;
+
+/// A cluster in step, what may be done to it, and what must hold all the same.
+pub struct Model {
+    start: Simulation,
+    pub(crate) parties: Vec<Party>,
+    period: Duration,
+    pub(crate) budget: Budget,
+    properties: Vec<Property>,
+}
+
+/// A cluster between two slots.
+#[derive(Clone)]
+pub struct World {
+    pub(crate) simulation: Simulation,
+    pub(crate) place: Place,
+    /// What has been done so far.
+    pub(crate) used: Budget,
+    /// Who is down, and whether it has crashed.
+    pub(crate) down: Vec<(Party, bool)>,
+    /// Who has been down.
+    pub(crate) was_down: Vec<Party>,
+    /// The last step since the slot began: things that are done at one time are done in one order only.
+    last: Option<Step>,
+}
+
+impl Model {
+    /// A cluster of these parts, once it is in step on a quiet network.
+    ///
+    /// # Errors
+    /// [`NotReady`] where it does not come into step.
+    pub fn new(parts: Parts, budget: Budget, properties: &[Property]) -> Result<Self, NotReady> {
+        let stations = (0..parts.stations.len()).map(|rank| Party::Station(StationId(rank as u8)));
+        let programs = 0..parts.remote_ios.len();
+        let remote_ios = programs.map(|program| Party::RemoteIo(ProgramId(program as u8)));
+        let parties = stations.chain(remote_ios).collect();
+        let period = parts.stations[0].agreement.schedule.period();
+        let mut start = Simulation::new(parts, Self::network(period), 0);
+        start.run(1, PATIENCE_CYCLES, &mut |_, _, _, _| {})?;
+        Ok(Self {
+            start,
+            parties,
+            period,
+            budget,
+            properties: properties.to_vec(),
+        })
+    }
+
+    /// On which each frame takes T/20, and nothing is left to chance.
+    pub fn network(period: Duration) -> Network {
+        Network {
+            latency: period / 20,
+            ..Network::default()
+        }
+    }
+
+    /// A run from the same start in which `faults` are done.
+    pub fn replay(&self, faults: &[Fault]) -> Simulation {
+        let mut simulation = self.start.clone();
+        for &fault in faults {
+            simulation.schedule(fault);
+        }
+        simulation
+    }
+
+    /// The faults that a path of steps is, in the order in which they have to be scheduled.
+    pub fn faults(&self, steps: &[Step]) -> Vec<Fault> {
+        let mut place = FIRST;
+        let mut all = Vec::new();
+        for &step in steps {
+            all.extend(faults(step, place, &self.parties, self.period));
+            if step == Step::Wait {
+                place = place.next();
+            }
+        }
+        all
+    }
+
+    /// Parties that send anything in the slot that begins here if nothing is done.
+    fn senders(&self, world: &World) -> Vec<Party> {
+        let mut ahead = world.simulation.clone();
+        let next = world.place.next();
+        ahead.go_to(next.cycle, next.phase(), &mut |_, _, _, _| {});
+        let sends =
+            |party: &&Party| ahead.sent_frames(**party) > world.simulation.sent_frames(**party);
+        self.parties.iter().filter(sends).copied().collect()
+    }
+}
+
+const FIRST: Place = Place { cycle: 1, slot: 0 };
+
+impl World {
+    fn spend(&mut self, step: Step) {
+        let used = &mut self.used;
+        let spent = match step {
+            Step::Lose { .. } | Step::Mute { .. } => &mut used.losses,
+            Step::Late { .. } => &mut used.delays,
+            Step::Twice { .. } => &mut used.duplicates,
+            Step::Crash(_) => &mut used.crashes,
+            Step::Stop(_) => &mut used.stops,
+            Step::Restart(_) | Step::Continue(_) | Step::Wait => return,
+        };
+        *spent += 1;
+        used.total += 1;
+    }
+
+    /// Whether nothing more is done in this run.
+    pub(crate) fn is_over(&self, budget: &Budget) -> bool {
+        self.place.cycle >= FIRST.cycle + budget.cycles
+    }
+}
+
+impl stateright::Model for Model {
+    type State = World;
+    type Action = Step;
+
+    fn init_states(&self) -> Vec<World> {
+        let mut simulation = self.start.clone();
+        simulation.go_to(FIRST.cycle, FIRST.phase(), &mut |_, _, _, _| {});
+        vec![World {
+            simulation,
+            place: FIRST,
+            used: Budget::default(),
+            down: Vec::new(),
+            was_down: Vec::new(),
+            last: None,
+        }]
+    }
+
+    fn actions(&self, world: &World, steps: &mut Vec<Step>) {
+        let (budget, used) = (&self.budget, &world.used);
+        if world.is_over(budget) {
+            return;
+        }
+        let is_down = |party: Party| world.down.iter().any(|&(down, _)| down == party);
+        for &(party, crashed) in &world.down {
+            steps.push(if crashed {
+                Step::Restart(party)
+            } else {
+                Step::Continue(party)
+            });
+        }
+        if used.total < budget.total {
+            let senders = self.senders(world);
+            for &from in &senders {
+                for &to in self.parties.iter().filter(|&&to| to != from) {
+                    if used.losses < budget.losses {
+                        steps.push(Step::Lose { from, to });
+                    }
+                    if used.delays < budget.delays {
+                        steps.extend(LATE_PER_MILLE.map(|per_mille| Step::Late {
+                            from,
+                            to,
+                            per_mille,
+                        }));
+                    }
+                }
+                if used.losses < budget.losses {
+                    steps.push(Step::Mute { from });
+                }
+            }
+            if used.duplicates < budget.duplicates {
+                steps.extend(self.parties.iter().map(|&from| Step::Twice { from }));
+            }
+            for &party in self.parties.iter().filter(|&&party| !is_down(party)) {
+                if used.crashes < budget.crashes {
+                    steps.push(Step::Crash(party));
+                }
+                if used.stops < budget.stops {
+                    steps.push(Step::Stop(party));
+                }
+            }
+        }
+        steps.retain(|&step| world.last.is_none_or(|last| step > last));
+        steps.push(Step::Wait);
+    }
+
+    fn next_state(&self, world: &World, step: Step) -> Option<World> {
+        let mut next = world.clone();
+        next.spend(step);
+        next.last = Some(step);
+        for fault in faults(step, world.place, &self.parties, self.period) {
+            next.simulation.schedule(fault);
+        }
+        match step {
+            Step::Crash(party) | Step::Stop(party) => {
+                next.down.push((party, matches!(step, Step::Crash(_))));
+                next.was_down.push(party);
+            }
+            Step::Restart(party) | Step::Continue(party) => {
+                next.down.retain(|&(down, _)| down != party);
+            }
+            Step::Wait => {
+                next.last = None;
+                next.place = world.place.next();
+                let Place { cycle, .. } = next.place;
+                next.simulation
+                    .go_to(cycle, next.place.phase(), &mut |_, _, _, _| {});
+            }
+            _ => {}
+        }
+        Some(next)
+    }
+
+    fn properties(&self) -> Vec<Checked<Self>> {
+        let properties = self.properties.iter();
+        properties
+            .map(|property| Checked::always(property.name, property.holds))
+            .collect()
+    }
+}
+
+impl Hash for World {
+    fn hash<H: Hasher>(&self, hasher: &mut H) {
+        let Self {
+            simulation,
+            place,
+            used,
+            down,
+            was_down,
+            last,
+        } = self;
+        (simulation, place, used, down, was_down, last).hash(hasher);
+        let untrue = |tally: &understudy_simulator::Tally| tally.held + tally.fail_safe > 0;
+        simulation.tallies().iter().any(untrue).hash(hasher);
+    }
+}
+
+/// As far as 64 bits of their hashes tell.
+impl PartialEq for World {
+    fn eq(&self, other: &Self) -> bool {
+        let hasher = BuildHasherDefault::<DefaultHasher>::default();
+        hasher.hash_one(self) == hasher.hash_one(other)
+    }
+}
+
+impl fmt::Debug for World {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter
+            .debug_struct("World")
+            .field("place", &self.place)
+            .field("used", &self.used)
+            .field("down", &self.down)
+            .field("violations", &self.simulation.violations())
+            .finish_non_exhaustive()
+    }
+}
