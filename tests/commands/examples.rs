@@ -72,6 +72,7 @@ fn every_cluster_scenario_and_ladder_is_right() {
 
 #[test]
 fn every_scenario_comes_out_as_it_expects() {
+    let mut run = 0;
     for folder in folders() {
         let cluster = folder.join("cluster.toml");
         if !cluster.exists() {
@@ -80,8 +81,61 @@ fn every_scenario_comes_out_as_it_expects() {
         for scenario in scenarios(&folder) {
             let (cluster, scenario) = (text(&cluster), text(&scenario));
             succeeds(&["simulate", cluster, "--scenario", scenario, "--seed", "1"]);
+            run += 1;
         }
     }
+    assert!(run >= 3, "{run} scenarios");
+}
+
+/// The signals of a ladder that are declared with this word, in order.
+fn declared(ladder: &str, word: &str) -> Vec<String> {
+    let lines = ladder.lines();
+    let names = lines.filter_map(|line| line.strip_prefix(word)?.split_whitespace().next());
+    names.map(str::to_owned).collect()
+}
+
+/// Signals that differ between two images of at most 64 bits: `+` for those that have become 1.
+fn changes(names: &[String], before: u64, now: u64) -> Vec<String> {
+    let changed = names.iter().enumerate().map(|(bit, name)| {
+        let sign = if now >> bit & 1 == 1 { '+' } else { '-' };
+        ((before ^ now) >> bit & 1 == 1).then(|| format!("{sign}{name}"))
+    });
+    changed.flatten().collect()
+}
+
+/// What the second boiler's controller does and sees while it is killed, and everybody else: its laps of four kinds, in order.
+#[test]
+fn the_complete_controller_lights_burns_and_shuts_down() {
+    let out = empty_folder("examples_boiler_run");
+    let folder = "examples/boiler";
+    let (cluster, scenario) = (
+        format!("{folder}/cluster.toml"),
+        format!("{folder}/kill-each.toml"),
+    );
+    let run = ["simulate", &cluster, "--scenario", &scenario, "--seed", "1"];
+    succeeds(&[&run[..], &["--out", text(&out)]].concat());
+    let ladder = format!("{}/{folder}/complete.ladder", env!("CARGO_MANIFEST_DIR"));
+    let ladder = fs::read_to_string(ladder).expect("a ladder");
+    let (inputs, outputs) = (declared(&ladder, "input "), declared(&ladder, "output "));
+    let journal = fs::read_to_string(out.join("latest/journal.jsonl")).expect("a journal");
+    let mut before = (0, 0);
+    let mut story = Vec::new();
+    for line in journal.lines() {
+        let record: Value = serde_json::from_str(line).expect("JSON");
+        let event = &record["event"];
+        if record["name"] != "second-boiler" || event["event"] != "stepped" {
+            continue;
+        }
+        let word = |image: &Value| image["words"][0].as_u64().expect("a word");
+        let now = (word(&event["outputs"]), word(&event["field"]["sensors"]));
+        let mut signals = changes(&outputs, before.0, now.0);
+        signals.extend(changes(&inputs, before.1, now.1));
+        if !signals.is_empty() {
+            story.push(signals.join(" "));
+        }
+        before = now;
+    }
+    insta::assert_snapshot!(story.join("\n"));
 }
 
 #[test]
