@@ -21,6 +21,7 @@ mod measure;
 mod overrides;
 mod parity;
 mod party;
+mod petri;
 mod proxy;
 mod reliability;
 mod run;
@@ -69,6 +70,7 @@ enum Command {
     Des(des::Arguments),
     Synth(synth::Arguments),
     SupervisorToLadder(supervisor_to_ladder::Arguments),
+    Petri(petri::Arguments),
     Reliability(reliability::Arguments),
     Measure(measure::Arguments),
     Campaign(campaign::Arguments),
@@ -95,6 +97,7 @@ impl Command {
             Self::Des(_) => "des",
             Self::Synth(_) => "synth",
             Self::SupervisorToLadder(_) => "supervisor-to-ladder",
+            Self::Petri(_) => "petri",
             Self::Reliability(_) => "reliability",
             Self::Measure(_) => "measure",
             Self::Campaign(_) => "campaign",
@@ -121,6 +124,7 @@ impl Command {
             Self::Des(arguments) => des::run(&arguments),
             Self::Synth(arguments) => synth::run(&arguments),
             Self::SupervisorToLadder(arguments) => supervisor_to_ladder::run(&arguments),
+            Self::Petri(arguments) => petri::run(&arguments),
             Self::Reliability(arguments) => reliability::run(&arguments),
             Self::Measure(arguments) => measure::run(&arguments),
             Self::Campaign(arguments) => campaign::run(&arguments, console),

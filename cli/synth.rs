@@ -43,6 +43,9 @@ pub(crate) struct Arguments {
     /// Merge the states of each supervisor after which the same can happen
     #[arg(long, conflicts_with = "reduce")]
     minstate: bool,
+    /// The supervisor's name, in place of SUPER; of several the beginning of their names
+    #[arg(long, value_name = "NAME")]
+    name: Option<String>,
     /// A file to write to: .toml is the model with its supervisors; .ADS, .dot and .svg take a single supervisor
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -106,6 +109,7 @@ fn explicit(arguments: &Arguments, model: Model, bounds: Bounds) -> Result<Answe
         .map_err(|error| failed(error.code(), error.to_string()))?;
     let findings = synthesis_findings(&model, &result);
     let supervisor = reduced(arguments, &model.plants(), result.supervisor, bounds)?;
+    let supervisor = named(arguments, supervisor);
     let mut value = description(&supervisor);
     value["engine"] = json!("explicit");
     value["product_states"] = json!(result.product_states);
@@ -160,7 +164,8 @@ fn modular(arguments: &Arguments, model: Model, bounds: Bounds) -> Result<Answer
             .iter()
             .map(|&plant| &model.plants[plant])
             .collect();
-        let name = format!("SUPER_{}", specification.unwrap_or(plants[0].name()));
+        let name = arguments.name.as_deref().unwrap_or("SUPER");
+        let name = format!("{name}_{}", specification.unwrap_or(plants[0].name()));
         let supervisor =
             reduced(arguments, &plants, local.result.supervisor.clone(), bounds)?.with_name(name);
         let mut value = description(&supervisor);
@@ -220,12 +225,20 @@ fn symbolic(arguments: &Arguments, model: &Model, bounds: Bounds) -> Result<Answ
     let listed = made
         .to_automaton(bounds)
         .map_err(|error| failed(error.code(), error.to_string()))?;
-    let supervisor = reduced(arguments, &plants, listed, bounds)?;
+    let supervisor = named(arguments, reduced(arguments, &plants, listed, bounds)?);
     let mut value = description(&supervisor);
     value["engine"] = json!("symbolic");
     answer.text = format!("{}\n{}", answer.text, summary(&supervisor));
     answer.result = value;
     written(arguments, model.clone(), vec![supervisor], answer)
+}
+
+/// The supervisor under the name that was asked for.
+fn named(arguments: &Arguments, supervisor: Automaton) -> Automaton {
+    match &arguments.name {
+        Some(name) => supervisor.with_name(name.clone()),
+        None => supervisor,
+    }
 }
 
 fn reduced(

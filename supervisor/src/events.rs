@@ -24,6 +24,7 @@ pub(crate) struct Events {
 /// An event as far as it was read.
 struct Declared {
     name: String,
+    place: Place,
     label: Option<u32>,
     controllable: bool,
     signal: Option<Name>,
@@ -61,6 +62,13 @@ impl Events {
         let mut next = [0, 1];
         for event in declared {
             let known = events.labels.get(&event.name).copied();
+            if let Some(known) = known
+                && (known.is_controllable() != event.controllable
+                    || event.label.is_some_and(|label| label != known.number()))
+            {
+                let message = format!("`{}` is event {known} of a net", event.name);
+                form.error("U0827", message, event.place);
+            }
             let label = event.label.or(known.map(Label::number)).unwrap_or_else(|| {
                 let next = &mut next[usize::from(event.controllable)];
                 while taken.contains_key(next) || others.contains(Label::new(*next)) {
@@ -148,6 +156,7 @@ impl Declared {
         let when = form.optional(entry, "when");
         Some(Self {
             name,
+            place: key.span(),
             label,
             controllable,
             signal: form.optional(entry, "signal"),

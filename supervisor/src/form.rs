@@ -286,6 +286,21 @@ pub(crate) fn split(text: &str, span: Place) -> Vec<Word<'_>> {
     words.collect()
 }
 
+/// A word as TOML writes it.
+pub(crate) fn quoted(word: &str) -> String {
+    toml::Value::from(word).to_string()
+}
+
+/// A key as TOML writes it.
+pub(crate) fn key(word: &str) -> String {
+    let is_bare = |letter: char| letter.is_ascii_alphanumeric() || letter == '_' || letter == '-';
+    if !word.is_empty() && word.chars().all(is_bare) {
+        word.to_owned()
+    } else {
+        quoted(word)
+    }
+}
+
 /// The known name that is near to `name`.
 pub(crate) fn nearest<'n>(name: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
     let distance = |other: &str| strsim::damerau_levenshtein(name, other);

@@ -25,7 +25,7 @@ mod positions;
 mod read;
 pub(crate) mod rung;
 
-pub use addresses::Located;
+pub use addresses::{Located, locate};
 pub use avalanche::{Repetition, avalanche_events, repetitions};
 pub use convert::{Conversion, Correspondence, convert};
 pub use map::{
@@ -37,4 +37,4 @@ pub use partition::{Meaning, Modules, Partition};
 pub use read::{ReadMap, read_map};
 
 pub(crate) use addresses::{check_signals, read_addresses};
-pub(crate) use names::Names;
+pub(crate) use names::{ILLEGAL_NAME, Names, is_legal};

@@ -19,6 +19,7 @@ mod modular;
 pub mod operations;
 pub mod petri;
 pub mod proof;
+mod schema;
 mod symbolic;
 mod synthesis;
 
@@ -34,6 +35,7 @@ pub use model::{Model, ReadModel, Signal, read_model, write_model};
 pub use modular::{
     LocalSupervisor, ModularSupervisor, Together, coordinator, synthesise_modularly,
 };
+pub use schema::{map_schema, model_schema, net_schema};
 pub use symbolic::{
     SymbolicBounds, SymbolicSupervisor, TooComplex, Verdict, nonconflicting_symbolically,
     synthesise_symbolically,

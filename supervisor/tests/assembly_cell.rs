@@ -5,91 +5,17 @@
 
 use std::time::Duration;
 
-use understudy_ladder::{Interpreter, Name, check, print};
-use understudy_supervisor::ladder::{When, avalanche_events};
+use understudy_ladder::{Element, Interpreter, check, print};
+use understudy_supervisor::ladder::avalanche_events;
 use understudy_supervisor::operations::{condat, supreduce, sync};
-use understudy_supervisor::petri::{
-    Action, Arc, Condition, HybridLadder, Net, NetTransition, Place, buffers, reduce, to_ladder,
-};
-use understudy_supervisor::{Automaton, Bounds, Event, Label, State, Transition, synthesise};
+use understudy_supervisor::petri::{HybridLadder, Net, read_net, to_ladder};
+use understudy_supervisor::proof::{HybridDeviation, HybridVerdict, ProofSettings, prove_hybrid};
+use understudy_supervisor::{Automaton, Bounds, Label, State, read_model, synthesise};
 
-const PICK: u32 = 11;
-const PLACED: u32 = 10;
-const FEED: u32 = 21;
-const FED: u32 = 20;
-const ASSEMBLE: u32 = 31;
 const DONE: u32 = 30;
 
-/// Steps 1 and 2: three machines, each idle or busy.
-fn net() -> Net {
-    let place = |name: &str, initial: u32, action: Option<&str>| Place {
-        name: name.into(),
-        initial,
-        actions: action
-            .map(|signal| Action::Level(Name::from(signal)))
-            .into_iter()
-            .collect(),
-        ..Place::default()
-    };
-    let places = vec![
-        place("robot_idle", 1, None),
-        place("robot_busy", 0, Some("robot_runs")),
-        place("feeder_idle", 1, None),
-        place("feeder_busy", 0, Some("feeder_runs")),
-        place("assembler_idle", 1, None),
-        place("assembler_busy", 0, Some("assembler_runs")),
-    ];
-    let step =
-        |name: &str, label: u32, from: usize, to: usize, condition: Condition| NetTransition {
-            name: name.into(),
-            label: Some(Label::new(label)),
-            takes: vec![Arc {
-                place: from,
-                weight: 1,
-            }],
-            gives: vec![Arc {
-                place: to,
-                weight: 1,
-            }],
-            condition,
-            ..NetTransition::default()
-        };
-    let signal = |name: &str, when| Condition::Signal(Name::from(name), when);
-    let transitions = vec![
-        step("placed", PLACED, 1, 0, signal("body_placed", When::Rising)),
-        step("fed", FED, 3, 2, signal("lid_there", When::Rising)),
-        NetTransition {
-            delay: Some(Duration::from_millis(30)),
-            ..step("done", DONE, 5, 4, Condition::Always)
-        },
-        step("pick", PICK, 0, 1, signal("body_present", When::High)),
-        step("feed", FEED, 2, 3, Condition::Always),
-        step("assemble", ASSEMBLE, 4, 5, Condition::Always),
-    ];
-    Net::new("assembly_cell", places, transitions).expect("a net")
-}
-
-/// A store that `fills` fill and `empties` empties.
-fn store(name: &str, fills: u32, empties: u32, room: u32) -> Automaton {
-    let steps = (0..room).flat_map(|held| {
-        let (source, target) = (State::new(held), State::new(held + 1));
-        let label = Label::new;
-        [
-            Transition {
-                source,
-                label: label(fills),
-                target,
-            },
-            Transition {
-                source: target,
-                label: label(empties),
-                target: source,
-            },
-        ]
-    });
-    let marked = (0..=room).map(|held| held == 0).collect();
-    Automaton::new(name, [], marked, steps.collect()).expect("deterministic")
-}
+const NET: &str = include_str!("../../examples/assembly-cell/net.toml");
+const MODEL: &str = include_str!("../../examples/assembly-cell/model.toml");
 
 struct Cell {
     net: Net,
@@ -100,44 +26,121 @@ struct Cell {
 }
 
 fn cell() -> Cell {
-    let (net, _) = reduce(&net());
+    let net = read_net(NET).file.expect("a net").net;
     let exploration = net.explore(1_000).expect("bounded");
     assert!(exploration.bounds().iter().all(|&bound| bound == 1));
-    let parts = buffers(&net, &exploration.bounds()).expect("an event each");
-    let plant = sync(&parts.iter().collect::<Vec<_>>(), Bounds::default()).expect("small");
-    let specifications = vec![
-        store("bodies", PLACED, ASSEMBLE, 2),
-        store("lids", FED, ASSEMBLE, 1),
-    ];
-    let made = synthesise(
-        &[&plant],
-        &specifications.iter().collect::<Vec<_>>(),
-        Bounds::default(),
-    )
-    .expect("small")
-    .supervisor;
-    let reduced = supreduce(&plant, &made, Bounds::default())
-        .expect("small")
-        .with_name("keeper");
-    let events: Vec<Event> = net
-        .transitions()
-        .iter()
-        .filter_map(|step| {
-            Some(Event {
-                label: step.label?,
-                name: step.name.clone(),
-            })
-        })
-        .collect();
-    let reduced = reduced.with_event_names(&understudy_supervisor::Alphabet::new(events));
+    let model = read_model(MODEL, |_| Ok(NET.to_owned()));
+    let model = model.model.expect("a model");
+    let plant = sync(&model.plants(), Bounds::default()).expect("small");
+    let made = synthesise(&[&plant], &model.specifications(), Bounds::default());
+    let made = made.expect("small").supervisor;
+    let reduced = supreduce(&plant, &made, Bounds::default()).expect("small");
+    let reduced = reduced.with_name("keeper");
     let ladder = to_ladder(&net, std::slice::from_ref(&reduced), 1_000).expect("a ladder");
     Cell {
         net,
         plant,
-        specifications,
+        specifications: model.specifications,
         reduced,
         ladder,
     }
+}
+
+fn verdict(cell: &Cell) -> HybridVerdict {
+    let supervisors = std::slice::from_ref(&cell.reduced);
+    prove_hybrid(
+        &cell.net,
+        supervisors,
+        &cell.ladder,
+        ProofSettings::default(),
+    )
+    .expect("a verdict")
+}
+
+#[test]
+fn the_ladder_is_proved() {
+    let HybridVerdict::Proved(proof) = verdict(&cell()) else {
+        panic!("the ladder is refuted");
+    };
+    assert_eq!(proof.markings, 8);
+    assert_eq!(proof.never_fired, Vec::<String>::new());
+}
+
+/// A part of a rung, in short.
+fn shown(element: &Element) -> String {
+    match element {
+        Element::Contact(contact) => format!("{:?} {}", contact.kind, contact.operand),
+        _ => "block".to_owned(),
+    }
+}
+
+/// Whatever coil or element is taken from a rung, the proof finds it, unless the ladder can do without: tokens are fresh to no
+/// rung above the one that gives them, and where `placed` stands in the keeper, no rung below uses its bit once more.
+#[test]
+fn what_is_missing_from_the_ladder_is_found() {
+    let whole = cell();
+    let supervisors = std::slice::from_ref(&whole.reduced);
+    let mut unnoticed = Vec::new();
+    for (number, rung) in whole.ladder.program.rungs.iter().enumerate() {
+        let title = rung.title.clone().unwrap_or_default();
+        for part in 0..rung.coils.len() + rung.network.len() {
+            let mut damaged = whole.ladder.clone();
+            let rung = &mut damaged.program.rungs[number];
+            let what = match part.checked_sub(rung.coils.len()) {
+                None => format!("({})", rung.coils.remove(part).target),
+                Some(place) => shown(&rung.network.remove(place)),
+            };
+            let settings = ProofSettings::default();
+            // A rung without its only coil is none.
+            let found = prove_hybrid(&whole.net, supervisors, &damaged, settings);
+            if let Ok(HybridVerdict::Proved(_)) = found {
+                unnoticed.push(format!("{title}: {what}"));
+            }
+        }
+    }
+    insta::assert_snapshot!(unnoticed.join("\n"), @r#"
+delay of done: NormallyClosed done.fired
+placed: NormallyClosed robot_busy.fresh
+keeper: 1 -- placed --> 3: (placed.keeper)
+keeper: 4 -- placed --> 5: (placed.keeper)
+keeper: 4 -- placed --> 5: NormallyOpen keeper.q4
+fed: NormallyClosed feeder_busy.fresh
+done: (done.fired)
+done: NormallyOpen assembler_busy
+done: NormallyClosed assembler_busy.fresh
+pick: (robot_busy.fresh)
+feed: (feeder_busy.fresh)
+events that moved no supervisor are gone: (placed.keeper)
+"#);
+}
+
+/// A supervisor that forbids what the net does by itself is none.
+#[test]
+fn an_uncontrollable_supervisor_is_found() {
+    let mut cell = cell();
+    let steps = cell.reduced.transitions();
+    let kept: Vec<_> = steps
+        .filter(|step| step.label != Label::new(DONE))
+        .collect();
+    let marked = cell.reduced.states().map(|_| true).collect();
+    let events = cell.reduced.alphabet().events().to_vec();
+    cell.reduced = Automaton::new("keeper", events, marked, kept).expect("deterministic");
+    let supervisors = std::slice::from_ref(&cell.reduced);
+    cell.ladder = to_ladder(&cell.net, supervisors, 1_000).expect("a ladder");
+    let HybridVerdict::Refuted(found) = verdict(&cell) else {
+        panic!("it is proved");
+    };
+    assert!(matches!(
+        found.deviation,
+        HybridDeviation::Uncontrollable { .. }
+    ));
+    insta::assert_snapshot!(found.to_string(), @r#"
+scan 1: events pick feed, outputs robot_runs feeder_runs, in robot_busy feeder_busy assembler_idle keeper:0
+scan 2: events placed fed pick assemble, outputs robot_runs assembler_runs, in robot_busy feeder_idle assembler_busy keeper:0
+scan 3: events feed, outputs robot_runs feeder_runs assembler_runs, in robot_busy feeder_busy assembler_busy keeper:0
+scan 4: events done, outputs robot_runs feeder_runs, in robot_busy feeder_busy assembler_idle keeper:0
+keeper would have to forbid done, and cannot
+"#);
 }
 
 #[test]

@@ -8,10 +8,11 @@ use understudy_ladder::{Interpreter, Name};
 use understudy_supervisor::ladder::When;
 use understudy_supervisor::operations::{isomorph, sync};
 use understudy_supervisor::petri::{
-    Action, Arc, Condition, ExplorationError, Net, NetTransition, Place, Reduction, buffers,
-    reduce, to_ladder,
+    Action, Arc, Condition, ExplorationError, Net, NetFile, NetTransition, Place, Reduction,
+    buffers, read_net, reduce, to_ladder, write_net,
 };
-use understudy_supervisor::{Bounds, Label};
+use understudy_supervisor::proof::{HybridVerdict, ProofSettings, prove_hybrid};
+use understudy_supervisor::{Alphabet, Automaton, Bounds, Event, Label, State, Transition};
 
 fn place(name: &str, initial: u32) -> Place {
     Place {
@@ -309,6 +310,17 @@ proptest! {
     #![proptest_config(settings())]
 
     #[test]
+    fn what_is_written_is_read_again(net in net(3)) {
+        let file = NetFile { net, events: Alphabet::default(), addresses: Vec::new() };
+        let text = write_net(&file);
+        let read = read_net(&text);
+        prop_assert_eq!(&read.diagnostics, &[]);
+        let again = read.file.expect("right");
+        prop_assert_eq!(again.net.places(), file.net.places());
+        prop_assert_eq!(write_net(&again), text);
+    }
+
+    #[test]
     fn buffers_in_step_are_the_net(net in net(2)) {
         let exploration = net.explore(10_000).expect("bounded by its capacities");
         let buffers = buffers(&net, &exploration.bounds()).expect("every transition is an event");
@@ -339,6 +351,62 @@ proptest! {
         samples in proptest::collection::vec(any::<[bool; 3]>(), 1..40),
     ) {
         follow(&net, &samples)?;
+    }
+}
+
+/// The same net, every transition a command that a supervisor of up to three states knows, and delays where no edge is waited
+/// for.
+fn supervised(net: Net, delayed: &[bool], targets: &[Option<u32>]) -> (Net, Automaton) {
+    let mut transitions = net.transitions().to_vec();
+    for (number, transition) in transitions.iter_mut().enumerate() {
+        transition.label = Some(Label::new(2 * number as u32 + 1));
+        let waits = Some(Duration::from_millis(20)).filter(|_| delayed[number]);
+        let late = NetTransition {
+            delay: waits,
+            ..transition.clone()
+        };
+        // A condition on an edge takes no delay.
+        if Net::new("one", net.places().to_vec(), vec![late.clone()]).is_ok() {
+            *transition = late;
+        }
+    }
+    let labels = transitions.iter().filter_map(|transition| transition.label);
+    let events: Vec<Event> = labels.map(Event::unnamed).collect();
+    let steps = (0..3).flat_map(|state| events.iter().map(move |event| (state, event.label)));
+    let steps = steps.zip(targets).filter_map(|((source, label), target)| {
+        Some(Transition {
+            source: State::new(source),
+            label,
+            target: State::new((*target)?),
+        })
+    });
+    let supervisor = Automaton::new("keeper", events.clone(), vec![true; 3], steps.collect());
+    let net = Net::new(net.name(), net.places().to_vec(), transitions).expect("a net");
+    (net, supervisor.expect("deterministic"))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 96, ..settings() })]
+
+    #[test]
+    fn ladders_of_nets_are_proved(
+        net in prop_oneof![net(1), net(2)],
+        delayed in any::<[bool; 4]>(),
+        targets in proptest::array::uniform12(proptest::option::weighted(0.7, 0..3_u32)),
+        is_supervised in any::<bool>(),
+    ) {
+        let (net, keeper) = supervised(net, &delayed, &targets);
+        let keepers = if is_supervised { vec![keeper] } else { Vec::new() };
+        let ladder = to_ladder(&net, &keepers, 10_000).expect("a bounded net");
+        let settings = ProofSettings { maximum_states: 3_000, ..ProofSettings::default() };
+        match prove_hybrid(&net, &keepers, &ladder, settings) {
+            Ok(HybridVerdict::Proved(proof)) => prop_assert!(proof.markings > 0),
+            Ok(HybridVerdict::Refuted(found)) => {
+                let printed = understudy_ladder::print(&ladder.program);
+                return Err(TestCaseError::fail(format!("{found}{printed}")));
+            }
+            Err(error) => prop_assert_eq!(error.code(), "U0874"),
+        }
     }
 }
 

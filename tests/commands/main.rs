@@ -6,6 +6,7 @@ mod des;
 mod examples;
 mod help;
 mod others;
+mod petri;
 mod reliability;
 
 use std::path::{Path, PathBuf};

@@ -59,7 +59,7 @@ pub(crate) fn read_addresses(form: &mut Form<'_>, table: &DeTable) -> Vec<Locate
 ///
 /// # Errors
 /// U0866 a signal that the program does not have, U0867 an address of the wrong area or of two signals.
-pub(crate) fn locate(program: &mut Program, addresses: &[Located]) -> Result<(), Vec<Diagnostic>> {
+pub fn locate(program: &mut Program, addresses: &[Located]) -> Result<(), Vec<Diagnostic>> {
     let mut diagnostics = Vec::new();
     for (number, located) in addresses.iter().enumerate() {
         let Located { signal, address } = located;

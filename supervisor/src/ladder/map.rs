@@ -175,6 +175,11 @@ impl When {
         ("low", Self::Low),
     ];
 
+    /// Whether it is a change of the signal, which holds for one scan.
+    pub fn is_edge(self) -> bool {
+        matches!(self, Self::Rising | Self::Falling)
+    }
+
     /// Its word in a file.
     pub fn word(self) -> &'static str {
         let found = Self::WORDS.into_iter().find(|(_, when)| *when == self);

@@ -112,11 +112,19 @@ fn build(
     let mut names = states.names;
     names.swap(0, initial as usize);
     marked.swap(0, initial as usize);
-    let texts = names.iter().map(|(name, _)| (*name).to_owned()).collect();
+    let texts: Vec<String> = names.iter().map(|(name, _)| (*name).to_owned()).collect();
     match Automaton::new(name, own, marked, transitions) {
         Ok(automaton) => {
             warn_of_unreached(form, &automaton, &names);
-            Some(automaton.named_states(texts))
+            // Numbers are the names of states that have none.
+            let has_names = (0_u32..)
+                .zip(&texts)
+                .any(|(number, text)| *text != number.to_string());
+            Some(if has_names {
+                automaton.named_states(texts)
+            } else {
+                automaton
+            })
         }
         Err(error) => {
             let place = names[0].1.clone();

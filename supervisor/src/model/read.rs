@@ -1,3 +1,5 @@
+use std::collections::HashMap;
+
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 use understudy_diagnostic::{Diagnostic, Report, has_errors};
@@ -8,8 +10,9 @@ use crate::ads::read_ads;
 use crate::alphabet::Alphabet;
 use crate::automaton::Automaton;
 use crate::events::Events;
-use crate::form::{self, Codes, Form};
+use crate::form::{self, Codes, Form, Place};
 use crate::ladder::{check_signals, read_addresses};
+use crate::petri::{Net, NetFile, buffers, read_net, reduce};
 
 /// What was read from a model file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -29,6 +32,9 @@ const CODES: Codes = Codes {
     wrong_type: "U0823",
     no_word: "U0823",
 };
+
+/// Nets of more markings need capacities to be plants.
+const MAXIMUM_MARKINGS: usize = 1_000_000;
 
 const ROLES: [&str; 3] = ["plant", "specification", "supervisor"];
 
@@ -71,6 +77,18 @@ impl Loader<'_> {
         }
     }
 
+    /// The net of a file, with its file's name and its errors as a report.
+    fn net(&mut self, form: &mut Form<'_>, value: &Spanned<DeValue>) -> Option<NetFile> {
+        let (path, text) = self.text(form, value)?;
+        let read = read_net(&text);
+        self.files.push(Report {
+            name: path,
+            text,
+            diagnostics: read.diagnostics,
+        });
+        read.file
+    }
+
     /// The automaton of a file of TCT.
     pub(super) fn automaton(
         &mut self,
@@ -106,12 +124,24 @@ fn model(form: &mut Form<'_>, table: &DeTable, loader: &mut Loader<'_>) -> Model
     form.check_keys(table, &known, "a model");
     let name = form.optional(table, "name").unwrap_or_default();
     let keys = ["controllable", "label", "signal", "when"];
-    let events = Events::read(form, table, &keys, &Alphabet::default());
+    let nets = nets(form, table, loader);
+    let others = Alphabet::default().union(nets.values().map(|net| &net.events));
+    let events = Events::read(form, table, &keys, &others);
     check_signals(form, &events.signals);
     let addresses = read_addresses(form, table);
     let [plants, specifications, supervisors] = ROLES.map(|role| {
         let read = form.list(table, role, |form, component, place| {
-            read_component(form, component, place, &events, loader)
+            match component.get("net").filter(|_| role == plant) {
+                Some(value) => {
+                    form.check_keys(component, &["net"], "a plant that is a net");
+                    let net = nets.get(&value.span().start);
+                    net.map_or_else(Vec::new, |net| plants_of(form, net, value.span()))
+                }
+                None => {
+                    let read = read_component(form, component, place, &events, loader);
+                    read.into_iter().collect()
+                }
+            }
         });
         read.into_iter().flatten().collect::<Vec<_>>()
     });
@@ -134,5 +164,56 @@ fn model(form: &mut Form<'_>, table: &DeTable, loader: &mut Loader<'_>) -> Model
         specifications: named(specifications),
         supervisors: named(supervisors),
         alphabet,
+    }
+}
+
+/// The nets that are plants, by the place of their key.
+fn nets(form: &mut Form<'_>, table: &DeTable, loader: &mut Loader<'_>) -> HashMap<usize, NetFile> {
+    let plants = table
+        .get("plant")
+        .and_then(|plants| plants.get_ref().as_array());
+    let mut nets = HashMap::new();
+    for plant in plants.into_iter().flatten() {
+        let value = plant
+            .get_ref()
+            .as_table()
+            .and_then(|plant| plant.get("net"));
+        if let Some(value) = value
+            && let Some(net) = loader.net(form, value)
+        {
+            nets.insert(value.span().start, net);
+        }
+    }
+    nets
+}
+
+/// The places of a net, reduced, as buffers: steps 2 to 4 of the hybrid method. U0889 where that cannot be.
+fn plants_of(form: &mut Form<'_>, file: &NetFile, place: Place) -> Vec<Automaton> {
+    let (net, _) = reduce(&file.net);
+    let made = bounds(&net).and_then(|bounds| {
+        if let Some(silent) = net.transitions().iter().find(|one| one.label.is_none()) {
+            return Err(format!("its transition `{}` is no event", silent.name));
+        }
+        buffers(&net, &bounds).map_err(|error| error.to_string())
+    });
+    match made {
+        Ok(plants) => plants,
+        Err(error) => {
+            let message = format!("the net `{}` is no plant: {error}", net.name());
+            form.error("U0889", message, place);
+            Vec::new()
+        }
+    }
+}
+
+/// The most that each place can hold: its capacity where all have one, and else what the markings show.
+fn bounds(net: &Net) -> Result<Vec<u32>, String> {
+    let capacities: Option<Vec<u32>> = net.places().iter().map(|place| place.capacity).collect();
+    match capacities {
+        Some(capacities) => Ok(capacities),
+        None => match net.explore(MAXIMUM_MARKINGS) {
+            Ok(exploration) => Ok(exploration.bounds()),
+            Err(error) => Err(error.to_string()),
+        },
     }
 }

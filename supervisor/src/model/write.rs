@@ -3,6 +3,7 @@ use std::fmt::Write as _;
 use super::Model;
 use crate::alphabet::Label;
 use crate::automaton::Automaton;
+use crate::form::{key, quoted};
 
 /// The text of a model, as [`read_model`](super::read_model) reads it.
 pub fn write_model(model: &Model) -> String {
@@ -12,7 +13,7 @@ pub fn write_model(model: &Model) -> String {
         let _ = write!(
             text,
             "{} = {{ controllable = {controllable}, label = {}",
-            quoted(&event.name),
+            key(&event.name),
             event.label
         );
         if let Some(signal) = model
@@ -30,7 +31,7 @@ pub fn write_model(model: &Model) -> String {
     if !model.addresses.is_empty() {
         text.push_str("\n[addresses]\n");
         for located in &model.addresses {
-            let (signal, address) = (quoted(&located.signal), located.address.to_string());
+            let (signal, address) = (key(&located.signal), located.address.to_string());
             let _ = writeln!(text, "{signal} = {}", quoted(&address));
         }
     }
@@ -87,8 +88,4 @@ fn write_automaton(text: &mut String, automaton: &Automaton, event_name: &dyn Fn
         let _ = writeln!(text, "    {},", quoted(&line.join(" ")));
     }
     text.push_str("]\n");
-}
-
-fn quoted(word: &str) -> String {
-    toml::Value::from(word).to_string()
 }

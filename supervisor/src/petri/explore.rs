@@ -27,6 +27,16 @@ pub enum ExplorationError {
     },
 }
 
+impl ExplorationError {
+    /// Stable code for people.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Unbounded { .. } => "U0895",
+            Self::TooLarge { .. } => "U0896",
+        }
+    }
+}
+
 /// All markings that a net can reach, whatever its conditions are.
 #[derive(Debug, Clone)]
 pub struct Exploration<'a> {
@@ -132,6 +142,29 @@ impl Exploration<'_> {
         places.map(|place| most(place).unwrap_or(0)).collect()
     }
 
+    /// The transitions that no marking enables.
+    pub fn dead_transitions(&self) -> Vec<&str> {
+        let mut fires = vec![false; self.net.transitions().len()];
+        for &(_, transition, _) in &self.firings {
+            fires[transition] = true;
+        }
+        let transitions = self.net.transitions().iter().zip(fires);
+        let dead = transitions.filter(|(_, fires)| !fires);
+        dead.map(|(transition, _)| transition.name.as_str())
+            .collect()
+    }
+
+    /// Markings that enable nothing, whatever the conditions are.
+    pub fn dead_markings(&self) -> Vec<&[u32]> {
+        let mut goes_on = vec![false; self.markings.len()];
+        for &(source, _, _) in &self.firings {
+            goes_on[source] = true;
+        }
+        let markings = self.markings.iter().zip(goes_on);
+        let dead = markings.filter(|(_, goes_on)| !goes_on);
+        dead.map(|(marking, _)| &**marking).collect()
+    }
+
     /// The markings as states, M0 marked; the transitions' events as its events.
     ///
     /// # Errors
@@ -149,19 +182,10 @@ impl Exploration<'_> {
             });
         let mut marked = vec![false; self.markings.len()];
         marked[0] = true;
-        let names = self.markings.iter().map(|marking| {
-            let places = marking.iter().zip(self.net.places());
-            let held = places
-                .filter(|(tokens, _)| **tokens > 0)
-                .map(|(tokens, place)| {
-                    if *tokens == 1 {
-                        place.name.clone()
-                    } else {
-                        format!("{}{tokens}", place.name)
-                    }
-                });
-            held.collect::<Vec<_>>().join("_")
-        });
+        let names = self
+            .markings
+            .iter()
+            .map(|marking| self.net.name_of(marking));
         let automaton = Automaton::new(
             self.net.name(),
             events.iter().cloned(),
@@ -173,6 +197,17 @@ impl Exploration<'_> {
 }
 
 impl Net {
+    /// A marking in one word: the places that hold tokens, and how many where there are several.
+    pub fn name_of(&self, marking: &[u32]) -> String {
+        let places = marking.iter().zip(self.places());
+        let held = places.filter(|(tokens, _)| **tokens > 0);
+        let names = held.map(|(tokens, place)| match tokens {
+            1 => place.name.clone(),
+            _ => format!("{}{tokens}", place.name),
+        });
+        names.collect::<Vec<_>>().join("_")
+    }
+
     /// The event of each transition.
     pub(crate) fn events(&self) -> Vec<Event> {
         let labels = self

@@ -1,7 +1,7 @@
 //! Automation Petri nets, (1) and (2).
 //!
-//! Invariant of a [`Net`]: arcs end at places that exist and weigh at least 1, names are given once, and M0 keeps the
-//! capacities.
+//! Invariant of a [`Net`]: arcs end at places that exist and weigh at least 1, names are given once, M0 keeps the capacities, and
+//! no delay waits for an edge.
 
 use std::collections::HashSet;
 use std::time::Duration;
@@ -52,7 +52,7 @@ pub enum Condition {
     Signal(Name, When),
     /// All of them.
     All(Vec<Condition>),
-    /// One of them.
+    /// One of them, of which there is one at least.
     Any(Vec<Condition>),
 }
 
@@ -136,6 +136,14 @@ pub enum NetError {
         /// The place.
         place: String,
     },
+    /// A delay lasts while its condition holds, and an edge holds for one scan.
+    #[error(
+        "U0890: `{transition}` has a delay and a condition on an edge, which holds for one scan only"
+    )]
+    EdgeWithDelay {
+        /// The transition.
+        transition: String,
+    },
     /// More tokens at first than the capacity.
     #[error("U0894: `{place}` begins with {initial} tokens, its capacity is {capacity}")]
     Overfull {
@@ -146,6 +154,19 @@ pub enum NetError {
         /// The capacity.
         capacity: u32,
     },
+}
+
+impl NetError {
+    /// Stable code for people.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::EdgeWithDelay { .. } => "U0890",
+            Self::Duplicate { .. } => "U0891",
+            Self::NoSuchPlace { .. } => "U0892",
+            Self::Weightless { .. } => "U0893",
+            Self::Overfull { .. } => "U0894",
+        }
+    }
 }
 
 /// An automation Petri net.
@@ -200,6 +221,20 @@ impl Net {
                     }),
                     Some(_) => {}
                 }
+            }
+        }
+        for transition in transitions
+            .iter()
+            .filter(|transition| transition.delay.is_some())
+        {
+            let mut has_edge = false;
+            transition
+                .condition
+                .visit(&mut |_, when| has_edge |= when.is_edge());
+            if has_edge {
+                errors.push(NetError::EdgeWithDelay {
+                    transition: transition.name.clone(),
+                });
             }
         }
         for place in &places {

@@ -2,6 +2,8 @@
 //!
 //! Only what has no part in control is taken away: no place with an action, no transition with an event, condition or delay.
 
+use std::fmt;
+
 use super::net::{Condition, Net, NetTransition, Place};
 
 /// What was taken away.
@@ -20,6 +22,27 @@ pub enum Reduction {
     },
     /// A transition that does the same as another one.
     ParallelTransition(String),
+}
+
+impl fmt::Display for Reduction {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::ParallelPlace(place) => {
+                write!(formatter, "place {place} holds what another one holds")
+            }
+            Self::ImpliedPlace(place) => write!(formatter, "place {place} never disables anything"),
+            Self::Series { transition, place } => write!(
+                formatter,
+                "transition {transition} only hands on what comes to place {place}"
+            ),
+            Self::ParallelTransition(transition) => {
+                write!(
+                    formatter,
+                    "transition {transition} does what another one does"
+                )
+            }
+        }
+    }
 }
 
 /// Applies the rules until none applies.

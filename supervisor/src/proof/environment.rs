@@ -110,23 +110,7 @@ impl Environment {
                 choices.push(place);
             }
         }
-        let mut images = vec![rest.clone()];
-        let mut begin = 0;
-        // Images with one change more than those of the round before; places ascend, so none comes twice.
-        let mut highest = vec![0_usize];
-        for _ in 0..self.simultaneous {
-            let end = images.len();
-            for index in begin..end {
-                for (rank, &place) in choices.iter().enumerate().skip(highest[index]) {
-                    let mut image = images[index].clone();
-                    image[place] = !rest[place];
-                    images.push(image);
-                    highest.push(rank + 1);
-                }
-            }
-            begin = end;
-        }
-        images
+        images(&rest, &choices, self.simultaneous)
     }
 
     /// What the change from `last` to `now` means.
@@ -163,4 +147,25 @@ impl Environment {
             .map(|(kind, &value)| value && !matches!(kind, Kind::Momentary))
             .collect()
     }
+}
+
+/// `rest`, and every image that differs from it in at most `simultaneous` of the places `choices`.
+pub(super) fn images(rest: &[bool], choices: &[usize], simultaneous: usize) -> Vec<Vec<bool>> {
+    let mut images = vec![rest.to_vec()];
+    let mut begin = 0;
+    // Images with one change more than those of the round before; places ascend, so none comes twice.
+    let mut highest = vec![0_usize];
+    for _ in 0..simultaneous {
+        let end = images.len();
+        for index in begin..end {
+            for (rank, &place) in choices.iter().enumerate().skip(highest[index]) {
+                let mut image = images[index].clone();
+                image[place] = !rest[place];
+                images.push(image);
+                highest.push(rank + 1);
+            }
+        }
+        begin = end;
+    }
+    images
 }

@@ -422,7 +422,7 @@ fn bit(words: &[u64], place: usize) -> bool {
 }
 
 /// One lane of words that hold a bit of 64 runs each.
-fn pack(lanes: &[u64], lane: usize) -> Box<[u64]> {
+pub(super) fn pack(lanes: &[u64], lane: usize) -> Box<[u64]> {
     let words = lanes.chunks(64).map(|chunk| {
         let bits = chunk.iter().enumerate();
         bits.fold(0, |word, (place, value)| {

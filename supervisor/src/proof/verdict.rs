@@ -86,30 +86,7 @@ pub enum Deviation {
 
 impl fmt::Display for Counterexample {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let line = |record: &ScanRecord| {
-            let or_none = |names: &[String]| {
-                if names.is_empty() {
-                    "-".to_owned()
-                } else {
-                    names.join(" ")
-                }
-            };
-            format!(
-                "events {}, outputs {}, in {}",
-                or_none(&record.events),
-                or_none(&record.outputs),
-                or_none(&record.states)
-            )
-        };
-        for (number, record) in (1..).zip(&self.scans) {
-            writeln!(formatter, "scan {number}: {}", line(record))?;
-        }
-        writeln!(
-            formatter,
-            "scan {}: {}",
-            self.scans.len() + 1,
-            line(&self.last)
-        )?;
+        write_scans(formatter, self.scans.iter().chain([&self.last]))?;
         match &self.deviation {
             Deviation::StateLost { automaton } => {
                 writeln!(formatter, "no state of {automaton} is on")?;
@@ -138,6 +115,30 @@ impl fmt::Display for Counterexample {
         }
         Ok(())
     }
+}
+
+/// A line for each scan.
+pub(super) fn write_scans<'s>(
+    formatter: &mut fmt::Formatter<'_>,
+    scans: impl IntoIterator<Item = &'s ScanRecord>,
+) -> fmt::Result {
+    let or_none = |names: &[String]| {
+        if names.is_empty() {
+            "-".to_owned()
+        } else {
+            names.join(" ")
+        }
+    };
+    for (number, record) in (1..).zip(scans) {
+        writeln!(
+            formatter,
+            "scan {number}: events {}, outputs {}, in {}",
+            or_none(&record.events),
+            or_none(&record.outputs),
+            or_none(&record.states)
+        )?;
+    }
+    Ok(())
 }
 
 /// Why there is no verdict.

@@ -1,0 +1,204 @@
+//! Shapes, arrows and texts as SVG.
+
+use std::fmt::Write as _;
+
+use super::layout::Point;
+
+/// Pixels that a letter and a line of text take.
+const LETTER: f64 = 7.0;
+pub(crate) const LINE: f64 = 15.0;
+
+/// The width and height of lines of text.
+pub(crate) fn text_size(lines: &[String]) -> Point {
+    let letters = lines.iter().map(|line| line.chars().count()).max();
+    let width = letters.unwrap_or(0) as f64 * LETTER;
+    (width, lines.len() as f64 * LINE)
+}
+
+/// How an arrow is drawn.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Style {
+    pub(crate) dashed: bool,
+    /// A circle in place of the head.
+    pub(crate) round: bool,
+}
+
+/// The edge of a node: what an arrow meets.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Shape {
+    /// By half its width and half its height.
+    Ellipse(f64, f64),
+    Rectangle(f64, f64),
+}
+
+impl Shape {
+    /// The point of the edge around `centre` towards `other`.
+    fn edge(self, centre: Point, other: Point) -> Point {
+        let (dx, dy) = (other.0 - centre.0, other.1 - centre.1);
+        let scale = match self {
+            Self::Ellipse(rx, ry) => (dx / rx).hypot(dy / ry),
+            Self::Rectangle(rx, ry) => (dx / rx).abs().max((dy / ry).abs()),
+        };
+        if scale < 1e-6 {
+            return centre;
+        }
+        (centre.0 + dx / scale, centre.1 + dy / scale)
+    }
+}
+
+/// What has been drawn, and how far it reaches.
+pub(crate) struct Picture {
+    shapes: String,
+    low: Point,
+    high: Point,
+}
+
+impl Default for Picture {
+    fn default() -> Self {
+        Self {
+            shapes: String::new(),
+            low: (-40.0, -40.0),
+            high: (40.0, 40.0),
+        }
+    }
+}
+
+impl Picture {
+    fn reach(&mut self, (x, y): Point, (dx, dy): Point) {
+        self.low = (self.low.0.min(x - dx), self.low.1.min(y - dy));
+        self.high = (self.high.0.max(x + dx), self.high.1.max(y + dy));
+    }
+
+    pub(crate) fn shape(&mut self, (x, y): Point, shape: Shape, fill: &str) {
+        let (Shape::Ellipse(rx, ry) | Shape::Rectangle(rx, ry)) = shape;
+        let _ = match shape {
+            Shape::Ellipse(..) => writeln!(
+                self.shapes,
+                "<ellipse cx=\"{x:.1}\" cy=\"{y:.1}\" rx=\"{rx:.1}\" ry=\"{ry:.1}\" fill=\"{fill}\" stroke=\"black\"/>"
+            ),
+            Shape::Rectangle(..) => writeln!(
+                self.shapes,
+                "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"{fill}\" stroke=\"black\"/>",
+                x - rx,
+                y - ry,
+                2.0 * rx,
+                2.0 * ry
+            ),
+        };
+        self.reach((x, y), (rx + 8.0, ry + 8.0));
+    }
+
+    /// Lines of text around a point.
+    pub(crate) fn text(&mut self, (x, y): Point, lines: &[String]) {
+        let (width, height) = text_size(lines);
+        for (number, line) in lines.iter().enumerate() {
+            let line = escaped(line);
+            let y = y - height / 2.0 + LINE * number as f64 + LINE / 2.0 + 4.0;
+            let _ = writeln!(self.shapes, "<text x=\"{x:.1}\" y=\"{y:.1}\">{line}</text>");
+        }
+        self.reach((x, y), (width / 2.0 + 6.0, height / 2.0 + 6.0));
+    }
+
+    /// A smooth arrow from one shape by some points to another, with its label at the middle of it.
+    pub(crate) fn arrow(
+        &mut self,
+        (from, from_shape): (Point, Shape),
+        bends: &[Point],
+        (to, to_shape): (Point, Shape),
+        style: Style,
+        label: &[String],
+    ) {
+        let first = bends.first().copied().unwrap_or(to);
+        let last = bends.last().copied().unwrap_or(from);
+        let start = from_shape.edge(from, first);
+        let end = to_shape.edge(to, last);
+        let mut path = format!("M {}", point(start));
+        // Through the middles between the bends, each bend a control point; a lone bend is passed by half.
+        for (number, &bend) in bends.iter().enumerate() {
+            let next = bends.get(number + 1);
+            let stop = next.map_or(end, |next| middle(bend, *next));
+            let _ = write!(path, " Q {} {}", point(bend), point(stop));
+        }
+        if bends.is_empty() {
+            let _ = write!(path, " L {}", point(end));
+        }
+        self.line(&path, style);
+        let at = match bends {
+            [] => middle(start, end),
+            [bend] => middle(*bend, middle(start, end)),
+            _ if bends.len() % 2 == 0 => middle(bends[bends.len() / 2 - 1], bends[bends.len() / 2]),
+            _ => {
+                let number = bends.len() / 2;
+                let sides = middle(bends[number - 1], bends[number + 1]);
+                middle(bends[number], middle(bends[number], sides))
+            }
+        };
+        self.text(at, label);
+        for bend in bends {
+            self.reach(*bend, (8.0, 8.0));
+        }
+    }
+
+    /// An arrow from the top of a shape to itself; `rise` is how far it goes up.
+    pub(crate) fn self_loop(
+        &mut self,
+        (x, y): Point,
+        half_height: f64,
+        rise: f64,
+        style: Style,
+        label: &[String],
+    ) {
+        let bottom = y - half_height + 2.0;
+        let top = bottom - rise * 4.0 / 3.0;
+        let path = format!(
+            "M {} C {} {} {}",
+            point((x - 9.0, bottom)),
+            point((x - 24.0, top)),
+            point((x + 24.0, top)),
+            point((x + 9.0, bottom))
+        );
+        self.line(&path, style);
+        let (_, height) = text_size(label);
+        self.text((x, bottom - rise - height / 2.0 + 4.0), label);
+    }
+
+    fn line(&mut self, path: &str, style: Style) {
+        let dash = if style.dashed {
+            " stroke-dasharray=\"5 3\""
+        } else {
+            ""
+        };
+        let head = if style.round { "circle" } else { "arrow" };
+        let _ = writeln!(
+            self.shapes,
+            "<path d=\"{path}\" fill=\"none\" stroke=\"black\"{dash} marker-end=\"url(#{head})\"/>"
+        );
+    }
+
+    pub(crate) fn finish(self) -> String {
+        let (width, height) = (self.high.0 - self.low.0, self.high.1 - self.low.1);
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" viewBox=\"{:.1} {:.1} {width:.1} {height:.1}\">\n\
+             <defs><marker id=\"arrow\" markerWidth=\"9\" markerHeight=\"7\" refX=\"8\" refY=\"3.5\" orient=\"auto\"><path d=\"M 0 0 L 9 3.5 L 0 7 z\"/></marker>\n\
+             <marker id=\"circle\" markerWidth=\"9\" markerHeight=\"9\" refX=\"8\" refY=\"4.5\"><circle cx=\"4.5\" cy=\"4.5\" r=\"3.5\" fill=\"white\" stroke=\"black\"/></marker></defs>\n\
+             <rect x=\"{:.1}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" fill=\"white\"/>\n\
+             <style>text {{ font: 12px sans-serif; text-anchor: middle; paint-order: stroke; stroke: white; stroke-width: 4px; stroke-linejoin: round; }}</style>\n\
+             {}</svg>\n",
+            self.low.0, self.low.1, self.low.0, self.low.1, self.shapes
+        )
+    }
+}
+
+pub(crate) fn middle(one: Point, other: Point) -> Point {
+    ((one.0 + other.0) / 2.0, (one.1 + other.1) / 2.0)
+}
+
+fn point((x, y): Point) -> String {
+    format!("{x:.1} {y:.1}")
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+}

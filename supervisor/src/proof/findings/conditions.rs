@@ -1,0 +1,179 @@
+//! Conditions on the closed loop, each with what breaks it.
+
+use std::collections::BTreeMap;
+
+use super::closed_loop::ClosedLoop;
+use super::{Finding, FindingKind, FindingSeverity};
+use crate::{Label, State};
+
+impl ClosedLoop {
+    pub(super) fn blocking(&self) -> Option<Finding> {
+        let reaching = self.reaching(self.automaton.marked(), |_, _| true);
+        let states = self.unreached(&reaching);
+        let first = *states.first()?;
+        let message = format!(
+            "from {} of {} states no marked state can be reached; state {first} is one",
+            states.len(),
+            self.automaton.state_count()
+        );
+        Some(self.finding(
+            FindingKind::Blocking,
+            FindingSeverity::Error,
+            message,
+            states,
+            Vec::new(),
+        ))
+    }
+
+    /// Confluence: of two commands that are enabled together the order makes no difference.
+    pub(super) fn choices(&self) -> Vec<Finding> {
+        let mut pairs: BTreeMap<(Label, Label), Vec<State>> = BTreeMap::new();
+        for state in self.automaton.states() {
+            let enabled: Vec<_> = self.edges(state, true).collect();
+            for (index, &(first, after_first)) in enabled.iter().enumerate() {
+                for &(second, after_second) in &enabled[index + 1..] {
+                    let one = self.automaton.step(after_first, second);
+                    let other = self.automaton.step(after_second, first);
+                    if one.is_none() || one != other {
+                        pairs.entry((first, second)).or_default().push(state);
+                    }
+                }
+            }
+        }
+        let findings = pairs.into_iter().map(|((first, second), states)| {
+            let message = format!(
+                "in {} states, {} the first, {} and {} are both enabled, and which of them comes first makes a difference; in automatic mode it is the one whose rung comes first",
+                states.len(),
+                states[0],
+                self.name(first),
+                self.name(second)
+            );
+            self.finding(
+                FindingKind::Choice,
+                FindingSeverity::Warning,
+                message,
+                states,
+                vec![first, second],
+            )
+        });
+        findings.collect()
+    }
+
+    /// The longest run of commands alone, and of events alone; `None` where there is no longest.
+    pub(super) fn longest(&self, controllable: bool) -> Result<usize, Vec<State>> {
+        let count = self.automaton.state_count();
+        let mut arriving = vec![0_usize; count];
+        for state in self.automaton.states() {
+            for (_, target) in self.edges(state, controllable) {
+                arriving[target.index()] += 1;
+            }
+        }
+        let mut pending: Vec<State> = self
+            .automaton
+            .states()
+            .filter(|state| arriving[state.index()] == 0)
+            .collect();
+        let mut length = vec![0_usize; count];
+        let mut ordered = 0;
+        while let Some(state) = pending.pop() {
+            ordered += 1;
+            let longer = length[state.index()] + 1;
+            for (_, target) in self.edges(state, controllable) {
+                let longest = &mut length[target.index()];
+                *longest = (*longest).max(longer);
+                arriving[target.index()] -= 1;
+                if arriving[target.index()] == 0 {
+                    pending.push(target);
+                }
+            }
+        }
+        if ordered == count {
+            return Ok(length.into_iter().max().unwrap_or(0));
+        }
+        let states = self.automaton.states();
+        Err(states.filter(|state| arriving[state.index()] > 0).collect())
+    }
+
+    pub(super) fn response(&self) -> Option<Finding> {
+        let states = self.longest(true).err()?;
+        let first = *states.first()?;
+        let events: Vec<Label> = self.edges(first, true).map(|(label, _)| label).collect();
+        let message = format!(
+            "commands can follow each other without end, as from state {first}; in automatic mode the PLC generates them for ever"
+        );
+        Some(self.finding(
+            FindingKind::Response,
+            FindingSeverity::Warning,
+            message,
+            states,
+            events,
+        ))
+    }
+
+    /// A controlled run generates commands wherever it can; it has come to rest where it cannot.
+    pub(super) fn blocking_under_control(&self) -> Option<Finding> {
+        let rests = |state: State| self.edges(state, true).next().is_none();
+        let goals = self.automaton.marked().filter(|&state| rests(state));
+        let reaching = self.reaching(goals, |source, label| {
+            label.is_controllable() || rests(source)
+        });
+        let states = self.unreached(&reaching);
+        let first = *states.first()?;
+        let message = format!(
+            "a PLC that generates every command at once never rests in a marked state after {} of {} states, {first} the first",
+            states.len(),
+            self.automaton.state_count()
+        );
+        Some(self.finding(
+            FindingKind::BlockingUnderControl,
+            FindingSeverity::Warning,
+            message,
+            states,
+            Vec::new(),
+        ))
+    }
+
+    pub(super) fn simultaneity(&self) -> Vec<Finding> {
+        let mut pairs: BTreeMap<(Label, Label, &str), Vec<State>> = BTreeMap::new();
+        for state in self.automaton.states() {
+            let enabled: Vec<_> = self.edges(state, false).collect();
+            for (index, &(first, after_first)) in enabled.iter().enumerate() {
+                for &(second, after_second) in &enabled[index + 1..] {
+                    let one = self.automaton.step(after_first, second);
+                    let other = self.automaton.step(after_second, first);
+                    let reason = match (one, other) {
+                        (Some(one), Some(other)) if one == other => continue,
+                        (Some(_), Some(_)) => {
+                            "lead to different states by their order, which one scan cannot see"
+                        }
+                        (None, None) => {
+                            "forbid each other; where both come in one scan, one of them is lost"
+                        }
+                        _ => "can occur together in one order only; that one is taken",
+                    };
+                    pairs
+                        .entry((first, second, reason))
+                        .or_default()
+                        .push(state);
+                }
+            }
+        }
+        let findings = pairs.into_iter().map(|((first, second, reason), states)| {
+            let message = format!(
+                "in {} states, {} the first, {} and {} {reason}",
+                states.len(),
+                states[0],
+                self.name(first),
+                self.name(second)
+            );
+            self.finding(
+                FindingKind::Simultaneity,
+                FindingSeverity::Warning,
+                message,
+                states,
+                vec![first, second],
+            )
+        });
+        findings.collect()
+    }
+}
