@@ -13,11 +13,14 @@ mod check;
 mod console;
 mod demo;
 mod des;
+mod doctor;
 mod draw;
 mod files;
 mod init;
+mod keys;
 mod lab;
 mod measure;
+mod operate;
 mod overrides;
 mod parity;
 mod party;
@@ -75,6 +78,9 @@ enum Command {
     Measure(measure::Arguments),
     Campaign(campaign::Arguments),
     Init(init::Arguments),
+    Keys(keys::Arguments),
+    Operate(operate::Arguments),
+    Doctor(doctor::Arguments),
     Node(party::Arguments),
     RemoteIo(party::RemoteIoArguments),
     Plant(party::PlantArguments),
@@ -102,6 +108,9 @@ impl Command {
             Self::Measure(_) => "measure",
             Self::Campaign(_) => "campaign",
             Self::Init(_) => "init",
+            Self::Keys(_) => "keys",
+            Self::Operate(_) => "operate",
+            Self::Doctor(_) => "doctor",
             Self::Node(_) => "node",
             Self::RemoteIo(_) => "remote-io",
             Self::Plant(_) => "plant",
@@ -129,6 +138,9 @@ impl Command {
             Self::Measure(arguments) => measure::run(&arguments),
             Self::Campaign(arguments) => campaign::run(&arguments, console),
             Self::Init(arguments) => init::run(&arguments),
+            Self::Keys(arguments) => keys::run(&arguments),
+            Self::Operate(arguments) => operate::run(&arguments),
+            Self::Doctor(arguments) => doctor::run(&arguments),
             Self::Node(arguments) => party::run_station(&arguments),
             Self::RemoteIo(arguments) => party::run_remote_io(&arguments.common),
             Self::Plant(arguments) => party::run_plant(&arguments.common),

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use understudy_bus::LinkKind;
-use understudy_cluster::{Cluster, Link, Overrides};
+use understudy_cluster::{Cluster, Link, Overrides, Security};
 use understudy_wire::Mode;
 
 #[derive(Debug, Clone, Default, Args)]
@@ -15,6 +15,9 @@ pub(crate) struct OverrideArguments {
     /// What carries the frames, in place of the cluster file's
     #[arg(long, value_enum)]
     link: Option<LinkArgument>,
+    /// Who may speak, in place of the cluster file's
+    #[arg(long, value_enum)]
+    security: Option<SecurityArgument>,
     /// How many failures are masked, in place of the cluster file's
     #[arg(long, value_enum)]
     mode: Option<ModeArgument>,
@@ -26,6 +29,14 @@ enum LinkArgument {
     Zenoh,
     /// Plain UDP
     Udp,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum SecurityArgument {
+    /// Whoever has the keys of the cluster
+    Keys,
+    /// Everybody on the network
+    Off,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -43,6 +54,10 @@ impl OverrideArguments {
             link: self.link.map(|link| match link {
                 LinkArgument::Zenoh => Link::Zenoh,
                 LinkArgument::Udp => Link::Udp,
+            }),
+            security: self.security.map(|security| match security {
+                SecurityArgument::Keys => Security::Keys,
+                SecurityArgument::Off => Security::Off,
             }),
             mode: self.mode.map(|mode| match mode {
                 ModeArgument::Full => Mode::Full,
@@ -65,6 +80,11 @@ impl OverrideArguments {
         word(
             "--link",
             self.link.and_then(|link| link.to_possible_value()),
+        );
+        word(
+            "--security",
+            self.security
+                .and_then(|security| security.to_possible_value()),
         );
         word(
             "--mode",

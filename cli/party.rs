@@ -11,10 +11,11 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::json;
 use understudy_bus::{
-    Commands, Endpoints, FieldDriver, LinkKind, NoField, NoObserver, PartySettings, Peer,
-    SimulatedField, ZENOH_RUNTIME, run_party,
+    Admitted, ChannelSettings, Commands, Endpoints, FieldDriver, Guard, LinkKind, NoField,
+    NoObserver, PartySettings, Peer, SimulatedField, ZENOH_RUNTIME, hold_back_signals, run_party,
 };
-use understudy_cluster::Cluster;
+use understudy_cluster::{Cluster, Security};
+use understudy_keys::{Date, PartyKeys, RevocationWatch};
 use understudy_node::Station;
 use understudy_plant::PlantMachine;
 use understudy_remote_io::RemoteIo;
@@ -42,6 +43,9 @@ pub(crate) struct Arguments {
     /// A JSON list of parties, names and addresses, in place of the addresses of the cluster file
     #[arg(long, value_name = "FILE")]
     endpoints: Option<PathBuf>,
+    /// The folder of this party's keys; needed unless the cluster file says `security = "off"`
+    #[arg(long, value_name = "DIR")]
+    keys: Option<PathBuf>,
     /// End with standard input and with the process that started this one
     #[arg(long)]
     in_laboratory: bool,
@@ -133,19 +137,20 @@ fn with_cluster(
         Ok(read) => read,
         Err(answer) => return answer,
     };
-    let Some(party) = cluster.party(&arguments.name) else {
+    let answer = find(&cluster, &arguments.name).and_then(|party| run(&cluster, party));
+    answer.unwrap_or_else(|answer| answer)
+}
+
+/// The party of a name.
+pub(crate) fn find(cluster: &Cluster, name: &str) -> Result<Party, Answer> {
+    cluster.party(name).ok_or_else(|| {
         let names: Vec<&str> = cluster
             .parties()
             .filter_map(|party| cluster.party_name(party))
             .collect();
-        let message = format!(
-            "the cluster has no `{}`; it has {}",
-            arguments.name,
-            names.join(", ")
-        );
-        return Answer::failed(Status::BadInput, "U0605", message);
-    };
-    run(&cluster, party).unwrap_or_else(|answer| answer)
+        let message = format!("the cluster has no `{name}`; it has {}", names.join(", "));
+        Answer::failed(Status::BadInput, "U0605", message)
+    })
 }
 
 fn wrong_kind(arguments: &Arguments, wanted: &str, command: &str) -> Answer {
@@ -170,17 +175,17 @@ where
 {
     let link = link_kind(cluster);
     start_again_for_zenoh(link);
-    let parties = match &arguments.endpoints {
-        Some(path) => listed(path)?,
-        None => addressed(cluster)?,
-    };
+    let parties = peers(cluster, arguments.endpoints.as_deref())?;
     let neighbours = cluster.neighbours();
     let endpoints = Endpoints::new(cluster.agreement().cluster, party, parties, neighbours);
     let endpoints = endpoints
         .map_err(|error| Answer::failed(Status::BadInput, error.code(), error.to_string()))?;
+    let keys = read_keys(arguments, cluster, party)?;
     let settings = PartySettings {
         endpoints,
         link,
+        guard: keys.guard,
+        channel: keys.channel,
         field,
         observer: Box::new(NoObserver),
         commands: if arguments.in_laboratory {
@@ -199,6 +204,67 @@ where
             error.code(),
             error.to_string(),
         )),
+    }
+}
+
+/// What a party seals and opens with, and what follows its list of revoked keys.
+struct Held {
+    guard: Guard,
+    channel: Option<ChannelSettings>,
+    _watch: Option<RevocationWatch>,
+}
+
+fn read_keys(arguments: &Arguments, cluster: &Cluster, party: Party) -> Result<Held, Answer> {
+    let folder = match (&arguments.keys, cluster.security()) {
+        (_, Security::Off) => {
+            return Ok(Held {
+                guard: Guard::Off,
+                channel: None,
+                _watch: None,
+            });
+        }
+        (None, Security::Keys) => {
+            let message = "the cluster wants keys: name this party's folder with --keys (`understudy keys init` makes them), or write `security = \"off\"` in the cluster file";
+            return Err(Answer::failed(Status::BadInput, "U0620", message));
+        }
+        (Some(folder), Security::Keys) => folder,
+    };
+    let now = Date::of(SystemTime::now());
+    // Whoever follows the list of revoked keys is a thread.
+    hold_back_signals()
+        .map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))?;
+    let keys = PartyKeys::load(folder, cluster, party, now);
+    let keys = keys.map_err(|errors| crate::keys::failed(&errors))?;
+    let seal = keys.begin_life(now);
+    let watch = keys.watch();
+    match (seal, watch) {
+        (Ok(seal), Ok(watch)) => Ok(Held {
+            guard: Guard::with_keys(seal, keys.opener()),
+            // In a laboratory standard input is the operator.
+            channel: (!arguments.in_laboratory).then(|| channel(keys, cluster)),
+            _watch: Some(watch),
+        }),
+        (Err(error), _) | (_, Err(error)) => Err(crate::keys::failed(&[error])),
+    }
+}
+
+fn channel(keys: PartyKeys, cluster: &Cluster) -> ChannelSettings {
+    let tls = keys.tls().clone();
+    ChannelSettings {
+        keys: crate::operate::tls_keys(&tls),
+        admitted: Box::new(move || {
+            let (operators, members) = keys.admitted();
+            Admitted { operators, members }
+        }),
+        configuration: cluster.canonical_text().to_owned(),
+    }
+}
+
+/// All parties and where they listen, from a list or from the cluster file.
+pub(crate) fn peers(cluster: &Cluster, list: Option<&Path>) -> Result<Vec<Peer>, Answer> {
+    match list {
+        Some(path) => listed(path),
+        None => addressed(cluster),
     }
 }
 

@@ -30,7 +30,12 @@ const FLOORS: &[&[&str]] = &[
         "understudy-reconfiguration",
         "understudy-verification",
     ],
-    &["understudy-bus", "understudy-network", "understudy-simulator"],
+    &[
+        "understudy-bus",
+        "understudy-keys",
+        "understudy-network",
+        "understudy-simulator",
+    ],
     &["understudy-model-checking", "understudy-scenarios"],
     &["understudy", "understudy-fuzz"],
 ];

@@ -27,6 +27,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         cycles: 3000,
         period: Duration::from_millis(4),
         real_time: true,
+        sealed: true,
     };
     let run = |carrier| {
         measure(carrier, settings, |part| {

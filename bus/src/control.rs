@@ -25,16 +25,28 @@ pub enum Commands {
 /// A line without an end is cut here.
 const LINE_BYTES: usize = 256;
 
-/// SIGINT and SIGTERM as a file descriptor. Made before any other thread starts, because threads inherit the mask and one that
-/// does not have it would die of the signal.
-pub(crate) fn ending_signals() -> Result<SignalFd, BusError> {
+/// Holds SIGINT and SIGTERM back from the calling thread, and from all that it starts. To be called before any other thread
+/// starts: one that does not hold them back dies of them, and the process with it.
+///
+/// # Errors
+/// [`BusError::System`].
+pub fn hold_back_signals() -> Result<(), BusError> {
+    ending()
+        .thread_block()
+        .map_err(BusError::system("to hold back SIGINT and SIGTERM"))
+}
+
+fn ending() -> SigSet {
     let mut signals = SigSet::empty();
     signals.add(Signal::SIGINT);
     signals.add(Signal::SIGTERM);
     signals
-        .thread_block()
-        .map_err(BusError::system("to hold back SIGINT and SIGTERM"))?;
-    SignalFd::with_flags(&signals, SfdFlags::SFD_CLOEXEC | SfdFlags::SFD_NONBLOCK)
+}
+
+/// SIGINT and SIGTERM as a file descriptor.
+pub(crate) fn ending_signals() -> Result<SignalFd, BusError> {
+    hold_back_signals()?;
+    SignalFd::with_flags(&ending(), SfdFlags::SFD_CLOEXEC | SfdFlags::SFD_NONBLOCK)
         .map_err(BusError::system("a signalfd"))
 }
 

@@ -1,18 +1,9 @@
-//! Who is where, and who is to hear whom.
-//!
-//! Invariant: a party hears another one on one topic at most, so that one subscription for each peer is enough.
-//!
-//! | topic | said by | heard by |
-//! |---|---|---|
-//! | cycle | stations | all other stations and all remote I/Os; a Transfer only by the station that asked, where the link can choose |
-//! | cycle | remote I/Os | all stations |
-//! | field | plant i | remote I/O i, and the plants that plant i feeds |
-//! | actuation | remote I/O i | plant i |
+//! Who is where; who is to hear whom is said by [`Topic::between`].
 
 use std::net::SocketAddr;
 
 use serde::{Deserialize, Serialize};
-use understudy_wire::{Body, ClusterHash, Party, ProgramId};
+use understudy_wire::{ClusterHash, Party, ProgramId, Topic};
 
 use crate::error::BusError;
 
@@ -33,33 +24,12 @@ pub struct Endpoints {
     cluster: ClusterHash,
     own: Peer,
     others: Vec<Peer>,
-    feeds: Vec<(ProgramId, ProgramId)>,
-}
-
-/// What a frame is about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) enum Topic {
-    Cycle,
-    Field,
-    Actuation,
-}
-
-impl Topic {
-    pub(crate) const ALL: [Self; 3] = [Self::Cycle, Self::Field, Self::Actuation];
-
-    pub(crate) fn of(body: &Body) -> Self {
-        match body {
-            Body::Sync | Body::Sample(_) | Body::Turn(_) | Body::Join(_) | Body::Transfer(_) => {
-                Self::Cycle
-            }
-            Body::Field(_) => Self::Field,
-            Body::Actuation(_) => Self::Actuation,
-        }
-    }
+    neighbours: Vec<(ProgramId, ProgramId)>,
 }
 
 impl Endpoints {
-    /// `parties` are all of the cluster, `own` among them; a pair (i, j) in `feeds` says that plant i hands its parts to plant j.
+    /// `parties` are all of the cluster, `own` among them; a pair (i, j) in `neighbours` says that plant j hears
+    /// plant i.
     ///
     /// # Errors
     /// [`BusError::NoAddress`] where `own` is not among the parties; [`BusError::SharedAddress`] where two have one address.
@@ -67,7 +37,7 @@ impl Endpoints {
         cluster: ClusterHash,
         own: Party,
         parties: Vec<Peer>,
-        feeds: Vec<(ProgramId, ProgramId)>,
+        neighbours: Vec<(ProgramId, ProgramId)>,
     ) -> Result<Self, BusError> {
         for (place, first) in parties.iter().enumerate() {
             let same = |second: &&Peer| second.address == first.address;
@@ -86,7 +56,7 @@ impl Endpoints {
             cluster,
             own,
             others,
-            feeds,
+            neighbours,
         })
     }
 
@@ -107,26 +77,7 @@ impl Endpoints {
 
     /// On which topic `listener` hears `speaker`, if at all.
     pub(crate) fn topic(&self, speaker: Party, listener: Party) -> Option<Topic> {
-        if speaker == listener {
-            return None;
-        }
-        match (speaker, listener) {
-            // What a remote I/O samples concerns no other one.
-            (Party::RemoteIo(_), Party::RemoteIo(_)) => None,
-            (Party::Station(_) | Party::RemoteIo(_), Party::Station(_) | Party::RemoteIo(_)) => {
-                Some(Topic::Cycle)
-            }
-            (Party::RemoteIo(program), Party::Plant(plant)) => {
-                (program == plant).then_some(Topic::Actuation)
-            }
-            (Party::Plant(plant), Party::RemoteIo(program)) => {
-                (program == plant).then_some(Topic::Field)
-            }
-            (Party::Plant(feeder), Party::Plant(fed)) => {
-                self.feeds.contains(&(feeder, fed)).then_some(Topic::Field)
-            }
-            (Party::Station(_), Party::Plant(_)) | (Party::Plant(_), Party::Station(_)) => None,
-        }
+        Topic::between(speaker, listener, &self.neighbours)
     }
 
     /// Whether this party and `other` have something to say to each other, in either direction.

@@ -60,6 +60,28 @@ pub enum BusError {
         /// What the panic said.
         message: String,
     },
+    /// Nobody is there, or one side does not believe the other's certificate.
+    #[error("U0509: {name} does not take a call at {address}: {reason}")]
+    Uncalled {
+        /// Who was called.
+        name: String,
+        /// Where.
+        address: SocketAddr,
+        /// What Zenoh said.
+        reason: String,
+    },
+    /// A call was taken, and what was asked is not answered.
+    #[error(
+        "U0510: {name} at {address} does not answer `{request}`: this certificate is not admitted to it, or is revoked"
+    )]
+    Unanswered {
+        /// Who was asked.
+        name: String,
+        /// Where.
+        address: SocketAddr,
+        /// What.
+        request: &'static str,
+    },
     /// A process of a benchmark did not do its part.
     #[error("U0508: {party:?} of the benchmark {reason}")]
     Benchmark {
@@ -82,6 +104,8 @@ impl BusError {
             Self::System { .. } => "U0506",
             Self::Panicked { .. } => "U0507",
             Self::Benchmark { .. } => "U0508",
+            Self::Uncalled { .. } => "U0509",
+            Self::Unanswered { .. } => "U0510",
         }
     }
 

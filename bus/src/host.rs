@@ -10,17 +10,17 @@ use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, ppoll};
 use nix::sys::time::TimeSpec;
 use serde::{Deserialize, Serialize};
-use understudy_wire::{
-    Body, Frame, FrameError, Input, Machine, Moment, Output, Time, decode, encode,
-};
+use understudy_wire::{Body, Frame, Input, Machine, Moment, Output, Time, encode};
 
 use crate::clock::Clock;
 use crate::error::BusError;
 use crate::field::FieldDriver;
+use crate::guard::Guard;
 use crate::journal::{EventSink, HostEvent, Noted};
 use crate::link::{Link, LinkCounters};
 use crate::observer::Observer;
 use crate::orders::{Order, Orders};
+use crate::trouble::Refusals;
 
 /// Datagrams taken before the party's own times are looked at again.
 const INPUTS_IN_A_ROW: usize = 64;
@@ -38,7 +38,7 @@ pub struct Summary {
     pub frames_said: u64,
     /// Frames that it heard, copies included.
     pub frames_heard: u64,
-    /// Datagrams that were no frames.
+    /// Datagrams that were no frames, or did not count.
     pub refused: u64,
     /// Frames that broke a bound of the wire and were not sent.
     pub unsendable: u64,
@@ -54,6 +54,8 @@ pub struct Host<'a, M: Machine> {
     pub machine: &'a mut M,
     /// Carries its frames.
     pub link: &'a mut dyn Link,
+    /// Closes and opens them.
+    pub guard: &'a mut Guard,
     /// Its sensors and actuators.
     pub field: &'a mut dyn FieldDriver,
     /// Takes what it reports.
@@ -66,22 +68,22 @@ pub struct Host<'a, M: Machine> {
     pub clock: Clock,
 }
 
-/// Things that went wrong and are not yet reported.
+/// Frames that could not be sent and are not yet reported.
 #[derive(Debug, Default)]
-struct Trouble {
+struct Unsendable {
     count: u64,
-    last: Option<FrameError>,
+    last: Option<String>,
 }
 
-impl Trouble {
-    fn note(&mut self, error: FrameError) {
+impl Unsendable {
+    fn note(&mut self, reason: String) {
         self.count += 1;
-        self.last = Some(error);
+        self.last = Some(reason);
     }
 
     fn take(&mut self) -> Option<(u64, String)> {
         let last = self.last.take()?;
-        Some((std::mem::take(&mut self.count), last.to_string()))
+        Some((std::mem::take(&mut self.count), last))
     }
 }
 
@@ -92,8 +94,8 @@ struct Round {
     encoded: Vec<u8>,
     moment: Moment,
     wakeups_in_a_row: u32,
-    refused: Trouble,
-    unsendable: Trouble,
+    refused: Refusals,
+    unsendable: Unsendable,
     reported: Time,
     summary: Summary,
 }
@@ -120,6 +122,7 @@ impl<M: Machine> Host<'_, M> {
                 if due > Time::default() {
                     round.summary.latest_wakeup_ns = round.summary.latest_wakeup_ns.max(late_ns);
                 }
+                self.observer.woken(now);
                 self.machine.handle_input(now, Input::Wakeup);
                 self.drain(now, &mut round);
             } else if heard < INPUTS_IN_A_ROW {
@@ -162,8 +165,10 @@ impl<M: Machine> Host<'_, M> {
                 return taken;
             }
             let now = self.clock.now();
-            match decode(&round.received) {
-                Ok(frame) => {
+            match self.guard.open(&mut round.received) {
+                // In order, and for another station.
+                Ok(None) => {}
+                Ok(Some(frame)) => {
                     let frame = Arc::new(frame);
                     round.summary.frames_heard += 1;
                     self.observer.frame(now, &frame);
@@ -181,9 +186,9 @@ impl<M: Machine> Host<'_, M> {
                     self.machine.handle_input(now, input);
                     self.drain(now, round);
                 }
-                Err(error) => {
+                Err(refused) => {
                     round.summary.refused += 1;
-                    round.refused.note(error);
+                    round.refused.note(refused);
                 }
             }
         }
@@ -209,15 +214,17 @@ impl<M: Machine> Host<'_, M> {
 
     fn say(&mut self, now: Time, frame: &Frame, round: &mut Round) {
         round.encoded.clear();
-        match encode(frame, &mut round.encoded) {
-            Ok(()) => {
+        let encoded = encode(frame, &mut round.encoded).map_err(|error| error.to_string());
+        let datagram = encoded.and_then(|()| self.guard.close(frame, &round.encoded));
+        match datagram {
+            Ok(datagram) => {
                 round.summary.frames_said += 1;
                 self.observer.frame(now, frame);
-                self.link.send(frame, &round.encoded);
+                self.link.send(frame, datagram);
             }
-            Err(error) => {
+            Err(reason) => {
                 round.summary.unsendable += 1;
-                round.unsendable.note(error);
+                round.unsendable.note(reason);
             }
         }
     }
@@ -241,13 +248,11 @@ impl<M: Machine> Host<'_, M> {
         if now.since(round.reported) < period {
             return;
         }
-        let refused = round.refused.take();
         let unsendable = round.unsendable.take();
-        if refused.is_some() || unsendable.is_some() {
+        if !round.refused.is_empty() || unsendable.is_some() {
             round.reported = now;
         }
-        if let Some((datagrams, reason)) = refused {
-            let event = HostEvent::RefusedBytes { datagrams, reason };
+        for event in round.refused.take() {
             self.sink.record(now, Noted::Host(event));
         }
         if let Some((frames, reason)) = unsendable {

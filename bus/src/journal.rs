@@ -69,6 +69,29 @@ pub enum HostEvent {
         /// Why the last one is none.
         reason: String,
     },
+    /// Frames arrived that do not count, since the last such record: somebody on the network does what he should not.
+    RefusedFrames {
+        /// How many.
+        datagrams: u64,
+        /// Why.
+        refused_as: RefusedAs,
+        /// In whose name they came, where they bear one.
+        sender: Option<Party>,
+        /// The same in words.
+        reason: String,
+    },
+    /// Operators can call, by mutual TLS.
+    ChannelOpened {
+        /// Where.
+        address: SocketAddr,
+        /// The common names of those who may command.
+        operators: Vec<String>,
+    },
+    /// Operators cannot call; it is tried again.
+    ChannelFailed {
+        /// Why.
+        reason: String,
+    },
     /// The party said frames that break a bound of the wire, since the last such record: a mistake in this program.
     UnsendableFrames {
         /// How many.
@@ -90,6 +113,24 @@ pub enum HostEvent {
     Exchange(crate::exchange::Exchange),
     /// The party ends as it was told to.
     Stopped(Summary),
+}
+
+/// Why a datagram does not count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RefusedAs {
+    /// Nothing that could be a frame.
+    NoFrame,
+    /// A frame without an authenticator.
+    Unsealed,
+    /// In the name of somebody who has nothing to say here.
+    Foreign,
+    /// The authenticator is not the sender's: made by somebody else, or changed on its way.
+    Forged,
+    /// It counted before, or is too late.
+    Replayed,
+    /// The sender's keys are revoked.
+    Revoked,
 }
 
 /// Takes what is reported; never blocks.

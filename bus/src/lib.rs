@@ -4,32 +4,43 @@
 //! a link to its peers ([`LinkKind`]: Zenoh or plain UDP) and a journal, and runs it ([`Host`], or [`run_party`] for a process
 //! of its own). Nothing here decides anything about the cycle.
 
+mod channel;
 mod clock;
 mod control;
+pub mod doctor;
 mod doorbell;
 mod endpoints;
 mod error;
 pub mod exchange;
 mod field;
+mod guard;
 mod host;
 mod journal;
 mod link;
 mod observer;
+mod operator;
 mod orders;
 mod party;
 mod rights;
+mod trouble;
 mod udp;
+mod watchdog;
 mod zenoh_link;
 
+pub use channel::{Admitted, ChannelSettings, TlsKeys};
 pub use clock::Clock;
-pub use control::Commands;
+pub use control::{Commands, hold_back_signals};
 pub use endpoints::{Endpoints, Peer};
 pub use error::BusError;
 pub use field::{FieldDriver, NoField, SimulatedField};
+pub use guard::{Guard, Keys};
 pub use host::{Host, Summary};
-pub use journal::{EventSink, HostEvent, JOURNAL_RECORDS, Journal, JournalSender, Noted, Record};
+pub use journal::{
+    EventSink, HostEvent, JOURNAL_RECORDS, Journal, JournalSender, Noted, Record, RefusedAs,
+};
 pub use link::{Link, LinkCounters, LinkKind, NoSuchLink};
 pub use observer::{NoObserver, Observer};
+pub use operator::{Call, Request};
 pub use orders::{Control, Order, Orders, orders};
 pub use party::{PartySettings, run_party};
 pub use rights::Rights;

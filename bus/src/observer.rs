@@ -9,6 +9,9 @@ pub trait Observer: Send {
     /// One frame: before it is sent, or before the party is told.
     fn frame(&mut self, now: Time, frame: &Frame);
 
+    /// The party was woken for one of its own times.
+    fn woken(&mut self, _now: Time) {}
+
     /// Whether it has seen all that it came for; the party stops then.
     fn satisfied(&self) -> bool {
         false

@@ -10,17 +10,20 @@ use nix::sys::signal::Signal;
 use serde::Serialize;
 use understudy_wire::Machine;
 
+use crate::channel::{Channel, ChannelSettings, followed};
 use crate::clock::Clock;
 use crate::control::{Commands, ending_signals, watch};
 use crate::endpoints::Endpoints;
 use crate::error::BusError;
 use crate::field::FieldDriver;
+use crate::guard::Guard;
 use crate::host::{Host, Summary};
 use crate::journal::{EventSink, HostEvent, JOURNAL_RECORDS, Journal, Noted};
 use crate::link::LinkKind;
 use crate::observer::Observer;
 use crate::orders::{Order, orders};
 use crate::rights::{CYCLE_PRIORITY, Rights, run_in_real_time, sleep_exactly};
+use crate::watchdog::{Watchdog, Watched};
 
 /// What a process needs to know besides its party.
 pub struct PartySettings {
@@ -28,6 +31,10 @@ pub struct PartySettings {
     pub endpoints: Endpoints,
     /// What carries the frames.
     pub link: LinkKind,
+    /// Closes and opens the frames.
+    pub guard: Guard,
+    /// Where operators can call; nowhere without it.
+    pub channel: Option<ChannelSettings>,
     /// Sensors and actuators.
     pub field: Box<dyn FieldDriver>,
     /// Who looks on.
@@ -62,6 +69,8 @@ where
     let PartySettings {
         endpoints,
         link: kind,
+        mut guard,
+        channel,
         mut field,
         mut observer,
         commands,
@@ -77,6 +86,13 @@ where
     let finished = EventFd::from_flags(EfdFlags::EFD_CLOEXEC)
         .map_err(BusError::system("an eventfd for the end"))?;
     let own = endpoints.own().clone();
+    let (output, telemetry): (Box<dyn Write + Send>, _) = match channel {
+        Some(settings) => {
+            let (output, telemetry) = followed(output);
+            (Box::new(output), Some((settings, telemetry)))
+        }
+        None => (Box::new(output), None),
+    };
     // The journal's thread starts before the rights are claimed, so that it inherits none.
     let (mut sink, journal) =
         Journal::start::<M::Event>(JOURNAL_RECORDS, clock, own.party, own.name, output)?;
@@ -96,8 +112,20 @@ where
         link: kind,
         rights,
     };
+    if let Some(watchdog) = Watchdog::of_environment() {
+        watchdog.ready();
+        observer = Box::new(Watched::new(observer, watchdog));
+    }
+    let status = serde_json::to_string(&ready).unwrap_or_default();
     sink.record(clock.now(), Noted::Host(ready));
     let (control, orders) = orders()?;
+    let channel = telemetry.map(|(settings, telemetry)| {
+        let (control, sink) = (control.clone(), sink.clone());
+        Channel::start(
+            settings, &endpoints, status, control, telemetry, sink, clock,
+        )
+    });
+    let channel = channel.transpose()?;
     let mut noted = sink.clone();
     let finished_here = &finished;
     let summary = std::thread::scope(|scope| {
@@ -112,6 +140,7 @@ where
                 Host {
                     machine: &mut machine,
                     link: link.as_mut(),
+                    guard: &mut guard,
                     field: field.as_mut(),
                     sink: &mut sink,
                     observer: observer.as_mut(),
@@ -139,6 +168,9 @@ where
         watched.and(ran)
     });
     drop(noted);
+    if let Some(channel) = &channel {
+        channel.stop();
+    }
     journal.finish();
     summary
 }

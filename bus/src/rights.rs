@@ -9,8 +9,8 @@ use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit};
 use nix::unistd::geteuid;
 use serde::{Deserialize, Serialize};
 use thread_priority::{
-    RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
-    set_thread_priority_and_policy, thread_native_id,
+    NormalThreadSchedulePolicy, RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue,
+    ThreadSchedulePolicy, set_thread_priority_and_policy, thread_native_id,
 };
 
 /// Of SCHED_FIFO, for the thread of the cycle.
@@ -50,7 +50,7 @@ impl Rights {
             Ok(()) => true,
             Err(error) => {
                 lacking.push(format!(
-                    "no SCHED_FIFO ({error}): other programs delay the cycle; grant it with `ulimit -r 50` or CAP_SYS_NICE"
+                    "no SCHED_FIFO ({error}): other programs delay the cycle; grant it with CAP_SYS_NICE or `ulimit -r 50`; root is not needed"
                 ));
                 false
             }
@@ -105,13 +105,23 @@ pub(crate) fn run_in_real_time(priority: u8) -> Result<(), String> {
     .map_err(|error| error.to_string())
 }
 
+/// Takes the calling thread out of real time: what it does has time.
+pub(crate) fn run_in_background() {
+    let policy = ThreadSchedulePolicy::Normal(NormalThreadSchedulePolicy::Other);
+    let normal = set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Min, policy);
+    if let Err(error) = normal {
+        tracing::warn!(%error, "a thread in the background keeps its priority");
+    }
+}
+
 /// Without SCHED_FIFO the system may add 50 µs to every sleep so as to wake several threads at once.
 pub(crate) fn sleep_exactly() {
     // It can only fail on kernels that do not know it, and costs exactness there, nothing else.
     let _ = set_timerslack(1);
 }
 
-fn lock_memory() -> Result<(), String> {
+/// All that the process has, and all that it will have.
+pub(crate) fn lock_memory() -> Result<(), String> {
     // Under a limit the call may succeed and every later allocation past the limit fail, so it is not tried.
     let (limit, _) = getrlimit(Resource::RLIMIT_MEMLOCK).map_err(|error| error.to_string())?;
     if limit != RLIM_INFINITY && !geteuid().is_root() {

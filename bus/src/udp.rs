@@ -7,9 +7,10 @@ use std::net::{SocketAddr, UdpSocket};
 use std::os::fd::{AsFd, BorrowedFd};
 
 use nix::sys::socket::{setsockopt, sockopt};
-use understudy_wire::{Body, Frame, MAXIMUM_FRAME_BYTES, Party};
+use understudy_seal::OVERHEAD_BYTES;
+use understudy_wire::{Body, Frame, MAXIMUM_FRAME_BYTES, Party, Topic};
 
-use crate::endpoints::{Endpoints, Topic};
+use crate::endpoints::Endpoints;
 use crate::error::BusError;
 use crate::link::{Link, LinkCounters};
 
@@ -40,8 +41,8 @@ impl UdpLink {
             address: socket.local_addr().map_err(failed)?,
             socket,
             audiences: Topic::ALL.map(audience),
-            // One byte more than a frame may have, so that what is too long is seen to be.
-            datagram: vec![0; MAXIMUM_FRAME_BYTES + 1].into(),
+            // One byte more than a sealed frame may have, so that what is too long is seen to be.
+            datagram: vec![0; MAXIMUM_FRAME_BYTES + OVERHEAD_BYTES + 1].into(),
             unsent: 0,
         })
     }

@@ -15,14 +15,14 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
-use understudy_wire::{ClusterHash, Frame, Party};
+use understudy_wire::{ClusterHash, Frame, Party, Topic};
 use zenoh::Wait;
 use zenoh::key_expr::KeyExpr;
 use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::{CongestionControl, Priority};
 
 use crate::doorbell::{Inbox, Outbox, doorbell};
-use crate::endpoints::{Endpoints, Topic};
+use crate::endpoints::Endpoints;
 use crate::error::BusError;
 use crate::link::{Link, LinkCounters, LinkKind};
 use crate::rights::raise_link_thread;

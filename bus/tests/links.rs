@@ -16,7 +16,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use parties::{Chat, Chatter, agreement, endpoints, peers, plant, remote_io, station};
+use parties::{Chat, Chatter, agreement, endpoints, guard, peers, plant, remote_io, station};
 use understudy_bus::{
     Clock, Control, EventSink, FieldDriver, Host, HostEvent, LinkKind, NoField, NoObserver, Noted,
     Order, Peer, SimulatedField, Summary, orders,
@@ -52,6 +52,7 @@ impl Running {
         reports: &Sender<(Party, Noted<Chat>)>,
     ) -> Self {
         let mut link = link.open(&endpoints(own, peers)).expect("a free port");
+        let mut guard = guard(own, life, peers);
         let (control, orders) = orders().expect("an eventfd");
         let mut sink = Sink {
             own,
@@ -65,6 +66,7 @@ impl Running {
             Host {
                 machine: &mut Chatter::new(own, life),
                 link: link.as_mut(),
+                guard: &mut guard,
                 field: field.as_mut(),
                 sink: &mut sink,
                 observer: &mut NoObserver,

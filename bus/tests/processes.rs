@@ -25,8 +25,8 @@ use nix::unistd::Pid;
 use parties::{Chat, Chatter, agreement, endpoints, peers, plant, remote_io, station};
 use serde::{Deserialize, Serialize};
 use understudy_bus::{
-    Commands, FieldDriver, HostEvent, LinkKind, NoField, NoObserver, Noted, PartySettings, Peer,
-    Record, SimulatedField, ZENOH_RUNTIME, run_party,
+    Commands, FieldDriver, Guard, HostEvent, LinkKind, NoField, NoObserver, Noted, PartySettings,
+    Peer, Record, SimulatedField, ZENOH_RUNTIME, run_party,
 };
 use understudy_wire::Party;
 
@@ -95,6 +95,8 @@ fn act(part: &Part) -> ExitCode {
         _ => Box::new(NoField),
     };
     let settings = PartySettings {
+        guard: Guard::Off,
+        channel: None,
         endpoints: endpoints(part.own, &part.peers),
         link: part.link,
         field,

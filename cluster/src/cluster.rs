@@ -24,6 +24,17 @@ pub enum Link {
     Udp,
 }
 
+/// Who may speak.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Security {
+    /// Whoever has the keys of this cluster: frames carry authenticators.
+    #[default]
+    Keys,
+    /// Everybody on the network.
+    Off,
+}
+
 /// One of the N.
 #[derive(Debug, Clone)]
 pub struct Controller {
@@ -94,6 +105,7 @@ pub struct PlantPlace {
 pub struct Cluster {
     pub(crate) name: String,
     pub(crate) link: Link,
+    pub(crate) security: Security,
     pub(crate) agreement: Arc<Agreement>,
     pub(crate) canonical_text: String,
     pub(crate) controllers: Vec<Controller>,
@@ -113,6 +125,11 @@ impl Cluster {
     /// What carries the frames.
     pub fn link(&self) -> Link {
         self.link
+    }
+
+    /// Who may speak.
+    pub fn security(&self) -> Security {
+        self.security
     }
 
     /// What all parties agree on.

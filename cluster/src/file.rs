@@ -41,6 +41,8 @@ pub(crate) struct ClusterSection {
     pub(crate) listen_cycles: u32,
     /// Index into [`crate::format::LINKS`].
     pub(crate) link: usize,
+    /// Index into [`crate::format::SECURITIES`].
+    pub(crate) security: usize,
 }
 
 #[derive(Debug)]
@@ -196,6 +198,7 @@ fn cluster(root: &DeTable<'_>, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
         shadow_cycles: fields.count("shadow_cycles", diagnostics),
         listen_cycles: fields.count("listen_cycles", diagnostics),
         link: fields.word("link", diagnostics),
+        security: fields.word("security", diagnostics),
     })
 }
 

@@ -88,6 +88,7 @@ const MANY_CYCLES: u32 = 100_000;
 
 pub(crate) const MODES: [&str; 2] = ["full", "paper"];
 pub(crate) const LINKS: [&str; 2] = ["zenoh", "udp"];
+pub(crate) const SECURITIES: [&str; 2] = ["keys", "off"];
 pub(crate) const RELEASES: [&str; 2] = ["automatic", "operator"];
 pub(crate) const VALUE_FAULTS: [&str; 3] = ["hold", "alarm", "fail-safe"];
 pub(crate) const MODELS: [&str; 2] = ["robot", "press"];
@@ -151,6 +152,14 @@ pub(crate) static CLUSTER: Section = Section {
                 default: true,
             },
             "what carries the frames",
+        ),
+        key(
+            "security",
+            Kind::Word {
+                words: &SECURITIES,
+                default: true,
+            },
+            "who may speak: `keys`, whoever has the keys of this cluster, see `understudy keys`; `off`, everybody on the network. The laboratory makes keys of its own for each run",
         ),
     ],
 };

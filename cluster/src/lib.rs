@@ -18,7 +18,7 @@ mod read;
 mod schema;
 mod template;
 
-pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Understudy};
+pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Security, Understudy};
 pub use fields::MAXIMUM_NAME_LENGTH;
 pub use read::{Loaded, MAXIMUM_TEXT_BYTES, Overrides, read, read_with};
 pub use schema::schema;

@@ -46,7 +46,7 @@ use understudy_wire::{
 use self::ladders::Ladders;
 use self::names::Names;
 use crate::canonical::program_hash;
-use crate::cluster::{Cluster, Controller, Link, RemoteIo, Understudy};
+use crate::cluster::{Cluster, Controller, Link, RemoteIo, Security, Understudy};
 use crate::configuration::configuration_text;
 use crate::fields::{MAXIMUM_MISFITS, suggestion};
 use crate::file::{self, ClusterFile, ControllerSection};
@@ -70,6 +70,8 @@ pub struct Overrides {
     pub period: Option<Duration>,
     /// In place of `link`.
     pub link: Option<Link>,
+    /// In place of `security`.
+    pub security: Option<Security>,
     /// In place of `mode`.
     pub mode: Option<Mode>,
 }
@@ -206,6 +208,9 @@ fn build(
     let mut cluster = Cluster {
         name,
         link,
+        security: overrides
+            .security
+            .unwrap_or([Security::Keys, Security::Off][cluster.security]),
         agreement: Arc::new(agreement.clone()),
         canonical_text: String::new(),
         controllers,

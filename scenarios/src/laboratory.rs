@@ -4,6 +4,7 @@
 //! for, and ends everything that it started, whatever happens. It decides nothing about the cycle.
 
 mod error;
+mod keys;
 mod patience;
 mod ports;
 mod process;
@@ -32,6 +33,7 @@ use crate::scenario::{Scenario, action_word};
 pub use error::LaboratoryError;
 pub use site::{HostKind, NetworkSettings};
 
+use keys::RunKeys;
 use patience::Waits;
 use process::{Process, Said, Saying};
 use site::Site;
@@ -131,6 +133,8 @@ pub fn run_laboratory(
     )?;
     let journal = Journal::create(&directory.file("journal.jsonl"))
         .map_err(system("to write journal.jsonl"))?;
+    let keys = RunKeys::make(cluster, directory.file("keys"))
+        .map_err(|errors| LaboratoryError::Keys { errors })?;
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()
@@ -138,6 +142,7 @@ pub fn run_laboratory(
     let (sender, receiver) = channel(UNREAD_LINES);
     let laboratory = Laboratory {
         settings,
+        keys,
         site,
         account: Account::new(Terms::of(cluster), scenario, OriginRule::Found),
         journal: Some(journal),
@@ -180,6 +185,7 @@ fn refuse_what_is_simulated(scenario: &Scenario) -> Result<(), LaboratoryError> 
 
 struct Laboratory<'w> {
     settings: LaboratorySettings,
+    keys: RunKeys,
     site: Site,
     account: Account,
     journal: Option<Journal>,
@@ -300,6 +306,7 @@ impl Laboratory<'_> {
             .arg("--endpoints")
             .args(self.site.endpoints(party))
             .arg("--in-laboratory")
+            .args(self.keys.arguments(&name))
             .args(&self.settings.arguments)
             .env(ZENOH_RUNTIME.0, ZENOH_RUNTIME.1);
         let life = self

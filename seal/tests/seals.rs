@@ -11,7 +11,7 @@ use understudy_seal::{
 use understudy_wire::{
     Actuation, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Field, Frame,
     FrameError, Header, Image, Lineage, MAXIMUM_IMAGE_BITS, Moment, Party, ProgramHash, ProgramId,
-    Sample, StationId, Transfer, encode,
+    StationId, Transfer, encode,
 };
 
 const ROBOT: Party = Party::Station(StationId(0));
@@ -67,13 +67,7 @@ fn frame(sender: Party, cycle: u64) -> Frame {
     let image = Image::from_words(4, &[0b1010]).expect("it fits");
     let body = match sender {
         Party::Station(_) => Body::Sync,
-        Party::RemoteIo(_) => Body::Sample(Sample {
-            born: Moment::default(),
-            base: Lineage(5),
-            before: Lineage(6),
-            history: smallvec![image],
-            applied: None,
-        }),
+        Party::RemoteIo(_) => Body::Actuation(Actuation { outputs: image }),
         Party::Plant(_) => Body::Field(Field {
             sensors: image,
             handed_over: 1,

@@ -5,6 +5,7 @@
 
 mod agreement;
 mod attendance;
+mod audience;
 mod codec;
 mod copies;
 mod cycle_clock;
@@ -20,6 +21,7 @@ mod time;
 
 pub use agreement::{Agreement, Mode};
 pub use attendance::{Attendance, Change};
+pub use audience::Topic;
 pub use codec::{FrameError, MAXIMUM_FRAME_BYTES, decode, encode};
 pub use copies::Copies;
 pub use cycle_clock::{Arrival, CycleClock};

@@ -5,22 +5,25 @@
 use std::io::{self, BufRead, BufReader, Write};
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::process::{Child, ChildStdout, Command, Stdio};
+use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
 use nix::sys::prctl::set_pdeathsig;
 use nix::sys::signal::Signal;
 use serde::{Deserialize, Serialize};
-use understudy_wire::{ClusterHash, Machine, Party, ProgramId, StationId};
+use understudy_seal::{ClusterSecret, KEY_BYTES, Opener, Seal, Title};
+use understudy_wire::{ClusterHash, Machine, Party, ProgramId, StationId, Topic};
 
 use super::meter::{Exchange, ExchangeMeter};
 use super::pattern::{PACEMAKER, PROGRAMS, Pattern, STATIONS};
 use super::raw::play;
 use crate::clock::Clock;
 use crate::control::Commands;
-use crate::endpoints::{Endpoints, Peer, Topic};
+use crate::endpoints::{Endpoints, Peer};
 use crate::error::BusError;
 use crate::field::{FieldDriver, NoField};
+use crate::guard::Guard;
 use crate::journal::{EventSink, HostEvent, Journal, Noted, Record};
 use crate::link::LinkKind;
 use crate::observer::{NoObserver, Observer};
@@ -52,6 +55,8 @@ pub struct ExchangeSettings {
     pub period: Duration,
     /// Whether SCHED_FIFO is asked for.
     pub real_time: bool,
+    /// Whether the frames carry authenticators.
+    pub sealed: bool,
 }
 
 /// The part of one process, as it is handed to it.
@@ -189,9 +194,16 @@ where
             } else {
                 Box::new(NoObserver)
             };
+            let guard = if settings.sealed {
+                guard(&endpoints)
+            } else {
+                Guard::Off
+            };
             let party_settings = PartySettings {
                 endpoints,
                 link,
+                guard,
+                channel: None,
                 field,
                 observer,
                 commands: Commands::ReadAndEndWithInput,
@@ -201,6 +213,24 @@ where
             run_party(machine, party_settings, output).map(drop)
         }
     }
+}
+
+/// Keys that every process derives from nothing secret: what they cost is measured, not what they keep.
+fn guard(endpoints: &Endpoints) -> Guard {
+    let secret = ClusterSecret::new([0; KEY_BYTES]);
+    let key = |peer: &Peer| {
+        secret.frame_key(Title {
+            cluster: "exchange",
+            party: &peer.name,
+            generation: 1,
+        })
+    };
+    let own = endpoints.own();
+    let senders = endpoints.heard().map(|(peer, _)| (peer.party, key(peer)));
+    Guard::with_keys(
+        Seal::new(own.party, key(own), 1, []),
+        Opener::new(own.party, senders, [], Arc::default()),
+    )
 }
 
 fn run_raw_party(

@@ -6,11 +6,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
-use understudy_bus::{Endpoints, Peer};
+use understudy_bus::{Endpoints, Guard, Peer};
+use understudy_seal::{ClusterSecret, FrameKey, Opener, Seal, Title};
 use understudy_wire::{
     Agreement, Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Field, Frame, Header, Image,
-    Input, Lineage, Machine, Mode, Moment, Output, Party, ProgramId, Sample, Schedule, StationId, StationSet,
-    Time,
+    Input, Lineage, Machine, Mode, Moment, Output, Party, ProgramId, Sample, Schedule, StationId,
+    StationSet, Time, Topic,
 };
 
 /// How often each party says something.
@@ -176,6 +177,32 @@ pub(crate) fn peers(parties: &[Party]) -> Vec<Peer> {
             address: address(socket),
         })
         .collect()
+}
+
+/// The key of a party, in a cluster whose secret everybody knows.
+pub(crate) fn key(party: Party) -> FrameKey {
+    ClusterSecret::new([1; 32]).frame_key(Title {
+        cluster: "cell",
+        party: &format!("{party:?}"),
+        generation: 1,
+    })
+}
+
+/// The keys of one party in one of its lives.
+#[allow(dead_code, reason = "some tests have no keys")]
+pub(crate) fn guard(own: Party, life: u64, peers: &[Peer]) -> Guard {
+    let feeds = [(ProgramId(0), ProgramId(1))];
+    let heard = peers.iter().map(|peer| peer.party);
+    let heard = heard.filter(|&party| Topic::between(party, own, &feeds).is_some());
+    Guard::with_keys(
+        Seal::new(own, key(own), life as u32, []),
+        Opener::new(
+            own,
+            heard.map(|party| (party, key(party))),
+            [],
+            Arc::default(),
+        ),
+    )
 }
 
 pub(crate) fn endpoints(own: Party, peers: &[Peer]) -> Endpoints {

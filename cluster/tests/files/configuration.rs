@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crate::common::{load, load_with, split};
 use proptest::prelude::*;
-use understudy_cluster::{Cluster, Link, Overrides, press_cell};
+use understudy_cluster::{Cluster, Link, Overrides, Security, press_cell};
 use understudy_wire::ConfigurationHash;
 
 /// Loads the press cell with pieces of its files replaced; each piece has to be there.
@@ -158,10 +158,12 @@ fn the_command_line_replaces_what_the_file_says() {
     let loaded = replaced(Overrides {
         period,
         link: Some(Link::Udp),
+        security: Some(Security::Off),
         mode: None,
     });
     let loaded = loaded.cluster.expect("it is in bounds");
     assert_eq!(loaded.link(), Link::Udp);
+    assert_eq!(loaded.security(), Security::Off);
     let written = hash(&[(FILE, "10ms", "20ms")]);
     assert_eq!(loaded.agreement().configuration, written);
     for period in [

@@ -4,6 +4,7 @@ use std::io;
 use std::path::PathBuf;
 
 use understudy_bus::BusError;
+use understudy_keys::KeysError;
 use understudy_network::NetworkError;
 
 /// Everything that was started is stopped when one of these comes out. The codes are stable.
@@ -86,6 +87,12 @@ pub enum LaboratoryError {
     /// The addresses do not fit together.
     #[error(transparent)]
     Endpoints(BusError),
+    /// There are no keys for the run.
+    #[error("{}", errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
+    Keys {
+        /// All that is wrong.
+        errors: Vec<KeysError>,
+    },
     /// The system refused something that the laboratory needs.
     #[error("U0529: {what}: {source}")]
     System {
@@ -114,6 +121,7 @@ impl LaboratoryError {
             Self::OnlySimulated { .. } => "U0528",
             Self::Network(error) => error.code(),
             Self::Endpoints(error) => error.code(),
+            Self::Keys { errors } => errors.first().map_or("U0902", KeysError::code),
             Self::System { .. } => "U0529",
         }
     }

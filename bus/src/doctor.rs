@@ -1,0 +1,280 @@
+//! What a machine lacks that a party is to run on, each with its remedy.
+//!
+//! Nothing is changed, and no frame is sent: peers are found by listening for as long as they surely speak.
+
+use std::collections::BTreeMap;
+use std::net::{TcpListener, UdpSocket};
+use std::time::Duration;
+
+use nix::poll::{PollFd, PollFlags, ppoll};
+use nix::sys::resource::{Resource, getrlimit};
+use nix::sys::time::TimeSpec;
+use serde::Serialize;
+use understudy_wire::{ConfigurationHash, Party};
+
+use crate::clock::Clock;
+use crate::endpoints::Endpoints;
+use crate::error::BusError;
+use crate::guard::Guard;
+use crate::link::LinkKind;
+use crate::rights::{CYCLE_PRIORITY, lock_memory, run_in_real_time, sleep_exactly};
+
+/// Sleeps that are timed.
+const SLEEPS: u32 = 200;
+const SLEEP: Duration = Duration::from_millis(1);
+
+/// Clocks that take long to read, or are too coarse.
+const SLOW_CLOCKS: [&str; 4] = ["hpet", "acpi_pm", "jiffies", "refined-jiffies"];
+const CLOCK_SOURCE: &str = "/sys/devices/system/clocksource/clocksource0/current_clocksource";
+
+/// How something stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Health {
+    /// As it should be.
+    Good,
+    /// It works, and could be better.
+    Warning,
+    /// The party would not start, or not do its part.
+    Bad,
+}
+
+/// One thing that was looked at.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Finding {
+    /// What: `clock`, `scheduler`, `memory`, `ports`, `keys`, `configuration` or `peer`.
+    pub check: &'static str,
+    /// How it stands.
+    pub health: Health,
+    /// What was found, with the numbers and names concerned.
+    pub found: String,
+    /// What to do about it, where something is to be done.
+    pub remedy: Option<String>,
+}
+
+impl Finding {
+    /// As it should be.
+    pub fn good(check: &'static str, found: impl Into<String>) -> Self {
+        Self {
+            check,
+            health: Health::Good,
+            found: found.into(),
+            remedy: None,
+        }
+    }
+
+    /// Not as it should be.
+    pub fn trouble(
+        check: &'static str,
+        health: Health,
+        found: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Self {
+        Self {
+            check,
+            health,
+            found: found.into(),
+            remedy: Some(remedy.into()),
+        }
+    }
+}
+
+/// Clock, scheduler rights and memory, for cycles of `period`.
+pub fn examine_machine(period: Duration) -> Vec<Finding> {
+    vec![clock_source(), scheduler(), memory(), sleeps(period)]
+}
+
+fn clock_source() -> Finding {
+    let Ok(text) = std::fs::read_to_string(CLOCK_SOURCE) else {
+        return Finding::good("clock", "the kernel does not say which clock it uses");
+    };
+    let name = text.trim();
+    if SLOW_CLOCKS.contains(&name) {
+        Finding::trouble(
+            "clock",
+            Health::Warning,
+            format!("the clock source is {name}, which takes long to read"),
+            format!(
+                "boot with `clocksource=tsc`, or write `tsc` to {CLOCK_SOURCE} where it is listed as available"
+            ),
+        )
+    } else {
+        Finding::good("clock", format!("the clock source is {name}"))
+    }
+}
+
+fn scheduler() -> Finding {
+    // In a thread of its own: the rest of the examination is no real-time work.
+    let tried = std::thread::spawn(|| run_in_real_time(CYCLE_PRIORITY)).join();
+    match tried.unwrap_or_else(|_| Err("the attempt ended by itself".to_owned())) {
+        Ok(()) => Finding::good(
+            "scheduler",
+            format!("SCHED_FIFO {CYCLE_PRIORITY} is granted"),
+        ),
+        Err(error) => Finding::trouble(
+            "scheduler",
+            Health::Warning,
+            format!("no SCHED_FIFO ({error}): other programs delay the cycle"),
+            "grant CAP_SYS_NICE: `AmbientCapabilities=CAP_SYS_NICE` in the unit, or `setcap cap_sys_nice+ep` on the program; root is not needed",
+        ),
+    }
+}
+
+fn memory() -> Finding {
+    match lock_memory() {
+        Ok(()) => Finding::good("memory", "memory can be locked"),
+        Err(reason) => {
+            let limit = getrlimit(Resource::RLIMIT_MEMLOCK).map_or(0, |(soft, _)| soft);
+            Finding::trouble(
+                "memory",
+                Health::Warning,
+                format!(
+                    "memory is not locked ({reason}; the limit is {limit} bytes): paging may delay the cycle"
+                ),
+                "`LimitMEMLOCK=infinity` in the unit, or `ulimit -l unlimited`",
+            )
+        }
+    }
+}
+
+/// How late a sleeper is woken, which is what a cycle feels of everything above.
+fn sleeps(period: Duration) -> Finding {
+    let timed = std::thread::spawn(|| {
+        sleep_exactly();
+        // Whether it was granted is said elsewhere.
+        let _ = run_in_real_time(CYCLE_PRIORITY);
+        let clock = Clock::start();
+        let mut latest = Duration::ZERO;
+        for _ in 0..SLEEPS {
+            let due = clock.now() + SLEEP;
+            // Interrupted or not, what counts is when it comes back.
+            let _ = ppoll(&mut [], Some(TimeSpec::from_duration(SLEEP)), None);
+            latest = latest.max(clock.now().since(due));
+        }
+        latest
+    });
+    let latest = timed.join().unwrap_or(Duration::MAX);
+    let found = format!(
+        "of {SLEEPS} sleeps of 1 ms the latest ended {} µs late; a cycle has {} µs",
+        latest.as_micros(),
+        period.as_micros()
+    );
+    if latest < period / 5 {
+        Finding::good("clock", found)
+    } else {
+        Finding::trouble(
+            "clock",
+            Health::Warning,
+            found,
+            "a longer `period`, a kernel with PREEMPT_RT, processors kept free of other work (`isolcpus`), or a machine that is not virtual",
+        )
+    }
+}
+
+/// Whether a party can listen where it should: by UDP for its frames and by TCP for its operators.
+pub fn examine_ports(endpoints: &Endpoints) -> Vec<Finding> {
+    let address = endpoints.own().address;
+    let bound = [
+        ("UDP", UdpSocket::bind(address).map(drop)),
+        ("TCP", TcpListener::bind(address).map(drop)),
+    ];
+    let finding = |(protocol, bound): (&str, std::io::Result<()>)| match bound {
+        Ok(()) => Finding::good("ports", format!("{address} is free ({protocol})")),
+        Err(source) => match BusError::listen(address, source) {
+            BusError::PortInUse { .. } => Finding::trouble(
+                "ports",
+                Health::Warning,
+                format!("{address} is in use ({protocol})"),
+                format!(
+                    "none where this party runs already; otherwise `ss -lpn 'sport = :{}'` names who has it",
+                    address.port()
+                ),
+            ),
+            error => Finding::trouble(
+                "ports",
+                Health::Bad,
+                error.to_string(),
+                "`ip address` lists the addresses of this machine; the cluster file has to name one of them for this party",
+            ),
+        },
+    };
+    bound.into_iter().map(finding).collect()
+}
+
+/// Listens in the place of a party that does not run, for so long, and says of each peer whether it was heard.
+///
+/// # Errors
+/// As [`LinkKind::open`] has; [`BusError::PortInUse`] where the party runs.
+pub fn examine_peers(
+    endpoints: &Endpoints,
+    link: LinkKind,
+    guard: &mut Guard,
+    configuration: ConfigurationHash,
+    patience: Duration,
+) -> Result<Vec<Finding>, BusError> {
+    let mut link = link.open(endpoints)?;
+    let clock = Clock::start();
+    let end = clock.now() + patience;
+    let mut heard: BTreeMap<Party, ConfigurationHash> = BTreeMap::new();
+    let mut refused: BTreeMap<Option<Party>, String> = BTreeMap::new();
+    let expected = endpoints.heard().count();
+    let mut bytes = Vec::new();
+    while clock.now() < end && heard.len() < expected {
+        while link.receive(&mut bytes) {
+            match guard.open(&mut bytes) {
+                Ok(Some(frame)) if frame.header.cluster == endpoints.cluster() => {
+                    heard.insert(frame.header.sender, frame.header.configuration);
+                }
+                Ok(_) => {}
+                Err(reason) => {
+                    refused.insert(reason.sender, reason.reason);
+                }
+            }
+        }
+        let mut descriptors = [PollFd::new(link.readiness(), PollFlags::POLLIN)];
+        let left = TimeSpec::from_duration(end.since(clock.now()));
+        ppoll(&mut descriptors, Some(left), None)
+            .map(drop)
+            .or_else(|error| match error {
+                nix::errno::Errno::EINTR => Ok(()),
+                error => Err(BusError::system("to wait for frames")(error)),
+            })?;
+    }
+    Ok(endpoints
+        .heard()
+        .map(|(peer, _)| {
+            let name = format!("{} ({})", peer.name, peer.address);
+            match (heard.get(&peer.party), refused.get(&Some(peer.party))) {
+                (Some(theirs), _) if *theirs == configuration => {
+                    Finding::good("peer", format!("{name} is heard"))
+                }
+                (Some(theirs), _) => Finding::trouble(
+                    "configuration",
+                    Health::Bad,
+                    format!("{name} runs configuration {theirs}, and this is {configuration}"),
+                    "copy one cluster file and its ladders to every machine; `understudy check` shows the hash",
+                ),
+                (None, Some(reason)) => Finding::trouble(
+                    "peer",
+                    Health::Bad,
+                    format!("{name} is heard and not believed: {reason}"),
+                    "issue its keys again and copy the changed folders to every machine",
+                ),
+                (None, None) => Finding::trouble(
+                    "peer",
+                    Health::Warning,
+                    format!("{name} was not heard for {} ms", patience.as_millis()),
+                    format!("start it; where it runs, look at the way there (`ping {}`, a firewall for UDP and TCP port {})", peer.address.ip(), peer.address.port()),
+                ),
+            }
+        })
+        .chain(refused.get(&None).map(|reason| {
+            Finding::trouble(
+                "peer",
+                Health::Warning,
+                format!("something else arrives at {}: {reason}", endpoints.own().address),
+                "find who sends it; a party without keys, or another program",
+            )
+        }))
+        .collect())
+}

@@ -1,0 +1,156 @@
+//! The operator's end of the channel.
+
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use serde_json::json;
+use understudy_wire::ClusterHash;
+use zenoh::Wait;
+
+use crate::channel::{TlsKeys, insert, prefix, tls_config};
+use crate::error::BusError;
+
+/// Longer than it takes a party on a network that works.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Lines of a journal that wait to be taken.
+const WAITING_LINES: usize = 4096;
+
+/// What can be asked of a party.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Request {
+    /// The canonical text of its configuration.
+    Configuration,
+    /// What it said when it was ready, as JSON.
+    Status,
+    /// To release the outputs of a program that was started cold.
+    Release,
+    /// To end.
+    Stop,
+}
+
+impl Request {
+    fn key(self) -> &'static str {
+        match self {
+            Self::Configuration => "configuration",
+            Self::Status => "status",
+            Self::Release => "command/release",
+            Self::Stop => "command/stop",
+        }
+    }
+}
+
+/// A call to one party.
+pub struct Call {
+    session: zenoh::Session,
+    prefix: String,
+    address: SocketAddr,
+    name: String,
+}
+
+impl Call {
+    /// Calls the party `name` of a cluster, which listens at `address`.
+    ///
+    /// # Errors
+    /// [`BusError::Uncalled`] where nobody is there, or one side does not believe the other's certificate.
+    pub fn to(
+        address: SocketAddr,
+        cluster: ClusterHash,
+        name: &str,
+        keys: &TlsKeys,
+    ) -> Result<Self, BusError> {
+        let uncalled = |error: zenoh::Error| BusError::Uncalled {
+            name: name.to_owned(),
+            address,
+            reason: error.to_string(),
+        };
+        let config = || -> zenoh::Result<zenoh::Config> {
+            let mut config = tls_config("client", keys)?;
+            insert(
+                &mut config,
+                "connect/endpoints",
+                &json!([format!("tls/{address}")]),
+            )?;
+            insert(
+                &mut config,
+                "connect/timeout_ms",
+                &json!(PATIENCE.as_millis() as u64),
+            )?;
+            insert(&mut config, "connect/exit_on_failure", &json!(true))?;
+            Ok(config)
+        };
+        let session = zenoh::open(config().map_err(uncalled)?).wait();
+        Ok(Self {
+            session: session.map_err(uncalled)?,
+            prefix: prefix(cluster, name),
+            address,
+            name: name.to_owned(),
+        })
+    }
+
+    /// Asks, and waits for the answer.
+    ///
+    /// # Errors
+    /// [`BusError::Unanswered`] where none comes: this certificate is not admitted to what was asked.
+    pub fn ask(&self, request: Request) -> Result<String, BusError> {
+        let unanswered = || BusError::Unanswered {
+            name: self.name.clone(),
+            address: self.address,
+            request: request.key(),
+        };
+        let replies = self
+            .session
+            .get(format!("{}/{}", self.prefix, request.key()))
+            .timeout(PATIENCE)
+            .wait()
+            .map_err(|_| unanswered())?;
+        while let Ok(reply) = replies.recv() {
+            if let Ok(sample) = reply.result() {
+                let text = sample.payload().try_to_string();
+                return text.map(String::from).map_err(|_| unanswered());
+            }
+        }
+        Err(unanswered())
+    }
+
+    /// Gives each line of the party's journal to `take` until that says false, or `patience` passes without a line.
+    ///
+    /// # Errors
+    /// [`BusError::Unanswered`] where the journal cannot be followed.
+    pub fn follow(
+        &self,
+        patience: Duration,
+        mut take: impl FnMut(&str) -> bool,
+    ) -> Result<(), BusError> {
+        let unanswered = || BusError::Unanswered {
+            name: self.name.clone(),
+            address: self.address,
+            request: "journal",
+        };
+        let subscriber = self
+            .session
+            .declare_subscriber(format!("{}/journal", self.prefix))
+            .with(zenoh::handlers::FifoChannel::new(WAITING_LINES))
+            .wait()
+            .map_err(|_| unanswered())?;
+        loop {
+            match subscriber.recv_timeout(patience) {
+                Ok(Some(sample)) => {
+                    let line = sample.payload().to_bytes();
+                    if !take(String::from_utf8_lossy(&line).trim_end()) {
+                        return Ok(());
+                    }
+                }
+                Ok(None) | Err(_) => return Err(unanswered()),
+            }
+        }
+    }
+}
+
+impl Drop for Call {
+    fn drop(&mut self) {
+        if let Err(error) = self.session.close().wait() {
+            tracing::debug!(%error, "a call was not closed");
+        }
+    }
+}

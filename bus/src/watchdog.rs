@@ -1,0 +1,159 @@
+//! Signs of life for systemd: `Type=notify` and `WatchdogSec=` of a unit.
+//!
+//! Invariant: a sign is given from the loop of the cycle itself, and only after the party was woken for one of its own times since the
+//! last sign. A loop that hangs, or that is kept from its times by a flood, is not alive, and systemd starts the party again.
+//! Whether other parties are there makes no difference: a remote I/O that holds its outputs alone is well.
+
+use std::env;
+use std::io;
+use std::os::linux::net::SocketAddrExt;
+use std::os::unix::net::{SocketAddr, UnixDatagram};
+use std::time::Duration;
+
+use understudy_wire::{Frame, Time};
+
+use crate::journal::HostEvent;
+use crate::observer::Observer;
+
+/// Signs in the time after which systemd believes a party dead.
+const SIGNS: u32 = 4;
+
+/// Where signs go, and how often.
+#[derive(Debug)]
+pub(crate) struct Watchdog {
+    socket: UnixDatagram,
+    period: Option<Duration>,
+    last: Option<Time>,
+}
+
+impl Watchdog {
+    /// Of this process, where systemd started it and asks for signs.
+    pub(crate) fn of_environment() -> Option<Self> {
+        let path = env::var("NOTIFY_SOCKET").ok()?;
+        let microseconds = env::var("WATCHDOG_USEC").ok();
+        let microseconds = microseconds.and_then(|text| text.parse().ok());
+        Self::at(&path, microseconds.map(Duration::from_micros)).ok()
+    }
+
+    fn at(path: &str, timeout: Option<Duration>) -> io::Result<Self> {
+        let address = match path.strip_prefix('@') {
+            Some(name) => SocketAddr::from_abstract_name(name)?,
+            None => SocketAddr::from_pathname(path)?,
+        };
+        let socket = UnixDatagram::unbound()?;
+        socket.connect_addr(&address)?;
+        // A systemd that does not read must not stop a cycle.
+        socket.set_nonblocking(true)?;
+        let period = timeout.filter(|timeout| !timeout.is_zero());
+        Ok(Self {
+            socket,
+            period: period.map(|timeout| timeout / SIGNS),
+            last: None,
+        })
+    }
+
+    /// It listens, and its cycle starts.
+    pub(crate) fn ready(&self) {
+        self.say("READY=1\nSTATUS=the cycle runs");
+    }
+
+    fn woken(&mut self, now: Time) {
+        let Some(period) = self.period else {
+            return;
+        };
+        if self.last.is_none_or(|last| now.since(last) >= period) {
+            self.last = Some(now);
+            self.say("WATCHDOG=1");
+        }
+    }
+
+    fn say(&self, text: &str) {
+        // One that is not taken is missed like a cycle that did not run.
+        let _ = self.socket.send(text.as_bytes());
+    }
+}
+
+/// Another observer, with a watchdog beside it.
+pub(crate) struct Watched {
+    inner: Box<dyn Observer>,
+    watchdog: Watchdog,
+}
+
+impl Watched {
+    pub(crate) fn new(inner: Box<dyn Observer>, watchdog: Watchdog) -> Self {
+        Self { inner, watchdog }
+    }
+}
+
+impl Observer for Watched {
+    fn frame(&mut self, now: Time, frame: &Frame) {
+        self.inner.frame(now, frame);
+    }
+
+    fn woken(&mut self, now: Time) {
+        self.watchdog.woken(now);
+        self.inner.woken(now);
+    }
+
+    fn satisfied(&self) -> bool {
+        self.inner.satisfied()
+    }
+
+    fn finish(&mut self) -> Option<HostEvent> {
+        self.watchdog.say("STOPPING=1");
+        self.inner.finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observer::NoObserver;
+
+    fn systemd(name: &str) -> (String, UnixDatagram) {
+        let name = format!("understudy-watchdog-{name}-{}", std::process::id());
+        let address = SocketAddr::from_abstract_name(&name).expect("a short name");
+        let socket = UnixDatagram::bind_addr(&address).expect("nobody else has it");
+        socket.set_nonblocking(true).expect("it is a socket");
+        (format!("@{name}"), socket)
+    }
+
+    fn said(socket: &UnixDatagram) -> Vec<String> {
+        let mut said = Vec::new();
+        let mut bytes = [0; 256];
+        while let Ok(length) = socket.recv(&mut bytes) {
+            said.push(String::from_utf8_lossy(&bytes[..length]).into_owned());
+        }
+        said
+    }
+
+    #[test]
+    fn signs_are_given_while_the_party_is_woken_and_not_too_often() {
+        let (path, socket) = systemd("signs");
+        let timeout = Some(Duration::from_millis(400));
+        let watchdog = Watchdog::at(&path, timeout).expect("somebody listens");
+        watchdog.ready();
+        let mut watched = Watched::new(Box::new(NoObserver), watchdog);
+        // The system keeps some few datagrams only, so they are taken as they come.
+        let mut all = said(&socket);
+        for milliseconds in 0..1000 {
+            watched.woken(Time(0) + Duration::from_millis(milliseconds));
+            all.extend(said(&socket));
+        }
+        watched.finish();
+        all.extend(said(&socket));
+        assert_eq!(all.first().map(|text| &text[..7]), Some("READY=1"));
+        let signs = all.iter().filter(|text| *text == "WATCHDOG=1").count();
+        assert_eq!(signs, 10);
+        assert_eq!(all.last().map(String::as_str), Some("STOPPING=1"));
+    }
+
+    #[test]
+    fn without_a_timeout_no_signs_are_asked_for() {
+        let (path, socket) = systemd("none");
+        let mut watchdog = Watchdog::at(&path, None).expect("somebody listens");
+        watchdog.woken(Time(0));
+        assert_eq!(said(&socket), Vec::<String>::new());
+        assert!(Watchdog::at("@nobody-listens-here", None).is_err());
+    }
+}

@@ -1,0 +1,207 @@
+//! `understudy doctor`: whether a machine is ready for a party, and what to do where it is not.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::time::{Duration, SystemTime};
+
+use clap::Args;
+use serde::Serialize;
+use understudy_bus::doctor::{Finding, Health, examine_machine, examine_peers, examine_ports};
+use understudy_bus::{BusError, Endpoints, Guard};
+use understudy_cluster::{Cluster, Security};
+use understudy_keys::{Date, KeysError, PartyKeys};
+use understudy_wire::Party;
+
+use crate::answer::{Answer, Status};
+use crate::files;
+use crate::overrides::{OverrideArguments, link_kind};
+
+/// Look whether this machine is ready for a party of a cluster
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy doctor cell/cluster.toml
+  understudy doctor cell/cluster.toml --name robot --keys /etc/understudy/keys/robot
+
+Without --name it looks at the machine alone; with it also at ports, keys, and at the parties that this one is to hear. Exit status 1
+where something keeps the party from its work; what only could be better is a warning.")]
+pub(crate) struct Arguments {
+    /// The cluster file
+    #[arg(value_name = "CLUSTER.toml")]
+    cluster: PathBuf,
+    /// Which party of the cluster is to run here, by its name
+    #[arg(long, value_name = "NAME")]
+    name: Option<String>,
+    /// The folder of this party's keys
+    #[arg(long, value_name = "DIR", requires = "name")]
+    keys: Option<PathBuf>,
+    /// A JSON list of parties, names and addresses, in place of the addresses of the cluster file
+    #[arg(long, value_name = "FILE", requires = "name")]
+    endpoints: Option<PathBuf>,
+    /// For how many cycles the other parties are listened for
+    #[arg(long, value_name = "CYCLES", default_value_t = 100)]
+    listen: u32,
+    #[command(flatten)]
+    overrides: OverrideArguments,
+}
+
+/// Certificates that end sooner are worth a word.
+const SOON_DAYS: i64 = 30;
+
+/// However short the cycles are, sessions need their time.
+const LEAST_PATIENCE: Duration = Duration::from_secs(2);
+
+#[derive(Serialize)]
+struct Examined<'a> {
+    configuration: String,
+    findings: &'a [Finding],
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Answer {
+    match examined(arguments) {
+        Ok(answer) | Err(answer) => answer,
+    }
+}
+
+fn examined(arguments: &Arguments) -> Result<Answer, Answer> {
+    let (cluster, _) = files::cluster(&arguments.cluster, arguments.overrides.overrides())?;
+    let agreement = cluster.agreement();
+    let mut findings = examine_machine(agreement.schedule.period());
+    let hash = agreement.configuration;
+    findings.push(Finding::good(
+        "configuration",
+        format!("{hash}; it has to be the same on every machine"),
+    ));
+    if let Some(name) = &arguments.name {
+        let party = crate::party::find(&cluster, name)?;
+        findings.extend(of_party(arguments, &cluster, party)?);
+    }
+    let worst = findings.iter().map(|finding| finding.health).max();
+    let status = if worst == Some(Health::Bad) {
+        Status::Failed
+    } else {
+        Status::Done
+    };
+    let result = Examined {
+        configuration: hash.to_string(),
+        findings: &findings,
+    };
+    Ok(Answer::done(text(&findings), result).with_status(status))
+}
+
+fn of_party(
+    arguments: &Arguments,
+    cluster: &Cluster,
+    party: Party,
+) -> Result<Vec<Finding>, Answer> {
+    let parties = crate::party::peers(cluster, arguments.endpoints.as_deref())?;
+    let agreement = cluster.agreement();
+    let endpoints = Endpoints::new(agreement.cluster, party, parties, cluster.neighbours());
+    let endpoints = endpoints
+        .map_err(|error| Answer::failed(Status::BadInput, error.code(), error.to_string()))?;
+    let mut findings = examine_ports(&endpoints);
+    let (mut guard, of_keys) = keys(arguments, cluster, party);
+    findings.extend(of_keys);
+    let Some(guard) = &mut guard else {
+        return Ok(findings);
+    };
+    let patience = (agreement.schedule.period() * arguments.listen).max(LEAST_PATIENCE);
+    let heard = examine_peers(
+        &endpoints,
+        link_kind(cluster),
+        guard,
+        agreement.configuration,
+        patience,
+    );
+    match heard {
+        Ok(heard) => findings.extend(heard),
+        Err(BusError::PortInUse { .. }) => findings.push(Finding::good(
+            "peer",
+            "not looked for: where this party runs already, its journal names whom it hears",
+        )),
+        // What is wrong with the address was said with the ports.
+        Err(BusError::Listen { .. }) => {}
+        Err(error) => findings.push(Finding::trouble(
+            "peer",
+            Health::Bad,
+            error.to_string(),
+            "try again with `--link udp`, which needs nothing but the address",
+        )),
+    }
+    Ok(findings)
+}
+
+/// What is found about the keys, and what opens frames where they are good.
+fn keys(arguments: &Arguments, cluster: &Cluster, party: Party) -> (Option<Guard>, Vec<Finding>) {
+    let folder = match (cluster.security(), &arguments.keys) {
+        (Security::Off, _) => {
+            let finding = Finding::trouble(
+                "keys",
+                Health::Warning,
+                "the cluster file says `security = \"off\"`: whoever is on the network can drive the plant",
+                "leave `security` out, and `understudy keys init`",
+            );
+            return (Some(Guard::Off), vec![finding]);
+        }
+        (Security::Keys, None) => {
+            let finding = Finding::trouble(
+                "keys",
+                Health::Bad,
+                "no keys were named, and the party does not start without them",
+                "`--keys DIR`; `understudy keys init` makes them",
+            );
+            return (None, vec![finding]);
+        }
+        (Security::Keys, Some(folder)) => folder,
+    };
+    let now = Date::of(SystemTime::now());
+    let bad = |error: &KeysError| {
+        let text = error.to_string();
+        let (found, remedy) = text.split_once("; ").unwrap_or((
+            &text,
+            "copy the folder of this party anew from where keys are issued",
+        ));
+        Finding::trouble("keys", Health::Bad, found, remedy)
+    };
+    let keys = match PartyKeys::load(folder, cluster, party, now) {
+        Ok(keys) => keys,
+        Err(errors) => return (None, errors.iter().map(bad).collect()),
+    };
+    let days = now.days_until(keys.expires());
+    let found = format!("they hold until {}, {days} days", keys.expires());
+    let finding = if days < SOON_DAYS {
+        let remedy = "`understudy keys issue` makes new ones; then copy the changed folders";
+        Finding::trouble("keys", Health::Warning, found, remedy)
+    } else {
+        Finding::good("keys", found)
+    };
+    match keys.begin_life(now) {
+        Ok(seal) => (Some(Guard::with_keys(seal, keys.opener())), vec![finding]),
+        Err(error) => (None, vec![finding, bad(&error)]),
+    }
+}
+
+fn text(findings: &[Finding]) -> String {
+    let mut text = String::new();
+    for finding in findings {
+        let word = match finding.health {
+            Health::Good => "good",
+            Health::Warning => "warning",
+            Health::Bad => "BAD",
+        };
+        let _ = writeln!(text, "{word:8} {:14} {}", finding.check, finding.found);
+        if let Some(remedy) = &finding.remedy {
+            let _ = writeln!(text, "{:24}remedy: {remedy}", "");
+        }
+    }
+    let count = |health| {
+        findings
+            .iter()
+            .filter(|finding| finding.health == health)
+            .count()
+    };
+    let (bad, warnings) = (count(Health::Bad), count(Health::Warning));
+    let verdict = if bad == 0 { "ready" } else { "NOT READY" };
+    let _ = writeln!(text, "{verdict}: {bad} bad, {warnings} warnings");
+    text
+}

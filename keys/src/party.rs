@@ -1,0 +1,323 @@
+//! What one party runs with.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use understudy_cluster::Cluster;
+use understudy_seal::{FrameKey, KEY_BYTES, Opener, Revocations, Seal, TransferKey};
+use understudy_wire::{Party, StationId, Topic};
+
+use crate::date::Date;
+use crate::error::KeysError;
+use crate::files;
+use crate::register::Role;
+use crate::revoked::{RevocationWatch, RevokedFile, Sender3, senders};
+
+/// `keys.toml`.
+#[derive(Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct KeysFile {
+    pub(crate) cluster: String,
+    pub(crate) name: String,
+    pub(crate) role: Role,
+    pub(crate) generation: u32,
+    pub(crate) expires: Date,
+    /// Its frame key, hexadecimal; empty for an operator.
+    pub(crate) own: String,
+    /// Common names of all parties.
+    pub(crate) members: Vec<String>,
+    /// Common names of all operators.
+    pub(crate) operators: Vec<String>,
+    #[serde(default)]
+    pub(crate) heard: Vec<Heard>,
+    #[serde(default)]
+    pub(crate) shared: Vec<Shared>,
+}
+
+/// The key of a sender that it hears.
+#[derive(Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Heard {
+    pub(crate) name: String,
+    pub(crate) generation: u32,
+    pub(crate) key: String,
+}
+
+/// The keys of the states that it gives to another station, and takes from it.
+#[derive(Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Shared {
+    pub(crate) name: String,
+    pub(crate) to: String,
+    pub(crate) from: String,
+}
+
+/// Where the files of a holder's TLS lie, and whom it may talk to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TlsFiles {
+    /// The certificate of the authority.
+    pub authority: PathBuf,
+    /// Its own certificate.
+    pub certificate: PathBuf,
+    /// Its own private key.
+    pub private_key: PathBuf,
+    /// Common names of the parties whose certificates hold.
+    pub members: Vec<String>,
+    /// Common names of the operators whose certificates hold.
+    pub operators: Vec<String>,
+}
+
+/// The keys of a party, read and found good.
+#[derive(Debug)]
+pub struct PartyKeys {
+    folder: PathBuf,
+    own: Party,
+    expires: Date,
+    key: FrameKey,
+    heard: Vec<Sender3>,
+    heard_keys: Vec<(Party, FrameKey)>,
+    to: Vec<(StationId, TransferKey)>,
+    from: Vec<(StationId, TransferKey)>,
+    revoked: Arc<Revocations>,
+    tls: TlsFiles,
+}
+
+/// The keys of an operator, read and found good.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OperatorKeys {
+    /// Until when its certificate holds.
+    pub expires: Date,
+    /// Its certificate.
+    pub tls: TlsFiles,
+}
+
+impl PartyKeys {
+    /// Reads the folder of a party.
+    ///
+    /// # Errors
+    /// All that is wrong with it: [`KeysError::Read`], [`KeysError::Permissions`], [`KeysError::Damaged`],
+    /// [`KeysError::Others`], [`KeysError::Expired`], [`KeysError::Revoked`] and [`KeysError::NoKey`].
+    pub fn load(
+        folder: &Path,
+        cluster: &Cluster,
+        own: Party,
+        now: Date,
+    ) -> Result<Self, Vec<KeysError>> {
+        let name = cluster.party_name(own).unwrap_or_default();
+        let (file, revoked) = read(folder, cluster, name, Role::Party, now)?;
+        let mut errors = Vec::new();
+        let neighbours = cluster.neighbours();
+        let damaged = |whose: &str| KeysError::Damaged {
+            path: folder.join("keys.toml"),
+            reason: format!(
+                "the key of {whose} is not {} hexadecimal digits",
+                2 * KEY_BYTES
+            ),
+        };
+        let key = |text: &str, whose: &str, errors: &mut Vec<KeysError>| {
+            files::from_hexadecimal(text).unwrap_or_else(|| {
+                errors.push(damaged(whose));
+                [0; KEY_BYTES]
+            })
+        };
+        let own_key = FrameKey::new(key(&file.own, &file.name, &mut errors));
+        let (mut heard, mut heard_keys) = (Vec::new(), Vec::new());
+        let (mut to, mut from) = (Vec::new(), Vec::new());
+        for party in cluster.parties() {
+            let other = cluster.party_name(party).unwrap_or_default();
+            if Topic::between(party, own, &neighbours).is_none() {
+                continue;
+            }
+            let no_key = || KeysError::NoKey {
+                folder: folder.to_owned(),
+                name: other.to_owned(),
+            };
+            match file.heard.iter().find(|heard| heard.name == other) {
+                Some(found) => {
+                    heard_keys.push((party, FrameKey::new(key(&found.key, other, &mut errors))));
+                    heard.push((party, found.name.clone(), found.generation));
+                }
+                None => errors.push(no_key()),
+            }
+            if let (Party::Station(_), Party::Station(rank)) = (own, party) {
+                match file.shared.iter().find(|shared| shared.name == other) {
+                    Some(found) => {
+                        to.push((rank, TransferKey::new(key(&found.to, other, &mut errors))));
+                        from.push((rank, TransferKey::new(key(&found.from, other, &mut errors))));
+                    }
+                    None => errors.push(no_key()),
+                }
+            }
+        }
+        if !errors.is_empty() {
+            return Err(errors);
+        }
+        let revocations = Revocations::default();
+        revocations.set(senders(&revoked, &heard));
+        Ok(Self {
+            folder: folder.to_owned(),
+            own,
+            expires: file.expires,
+            key: own_key,
+            heard,
+            heard_keys,
+            to,
+            from,
+            revoked: Arc::new(revocations),
+            tls: tls(folder, &file, &revoked),
+        })
+    }
+
+    /// Until when its certificate holds.
+    pub fn expires(&self) -> Date {
+        self.expires
+    }
+
+    /// Of its TLS channel.
+    pub fn tls(&self) -> &TlsFiles {
+        &self.tls
+    }
+
+    /// The common names of the operators and of the parties whose certificates hold now, by the list of revoked keys as it is now;
+    /// by the one of the start where that cannot be read.
+    pub fn admitted(&self) -> (Vec<String>, Vec<String>) {
+        let TlsFiles {
+            operators, members, ..
+        } = &self.tls;
+        let gone = RevokedFile::read(&self.folder.join("revoked.toml")).unwrap_or_default();
+        (gone.without(operators), gone.without(members))
+    }
+
+    /// What opens the frames of others.
+    pub fn opener(&self) -> Opener {
+        let revoked = Arc::clone(&self.revoked);
+        let senders = self.heard_keys.iter().cloned();
+        Opener::new(self.own, senders, self.from.iter().cloned(), revoked)
+    }
+
+    /// What seals its own frames, in a life that it never had: one more than the last that was noted, and never before the clock,
+    /// so that neither a clock that is set back nor a folder that is restored brings a life again. It is noted before it is used.
+    ///
+    /// # Errors
+    /// [`KeysError::Read`], [`KeysError::Damaged`] or [`KeysError::Write`] where it cannot be noted.
+    pub fn begin_life(&self, now: Date) -> Result<Seal, KeysError> {
+        let path = self.folder.join("life");
+        let last: u32 = if path.exists() {
+            let text = files::read(&path)?;
+            text.trim().parse().map_err(|_| KeysError::Damaged {
+                path: path.clone(),
+                reason: "it is no whole number; issue this party new keys".to_owned(),
+            })?
+        } else {
+            0
+        };
+        let exhausted = || KeysError::Damaged {
+            path: path.clone(),
+            reason: "there is no further life; issue this party new keys".to_owned(),
+        };
+        let next = last.checked_add(1).ok_or_else(exhausted)?;
+        let life = next.max(u32::try_from(now.seconds()).unwrap_or(0));
+        files::write(&path, &format!("{life}\n"))?;
+        let to = self.to.iter().cloned();
+        Ok(Seal::new(self.own, self.key.clone(), life, to))
+    }
+
+    /// Follows the list of revoked keys for as long as the answer lives.
+    ///
+    /// # Errors
+    /// [`KeysError::Read`] where there is no thread to be had.
+    pub fn watch(&self) -> Result<RevocationWatch, KeysError> {
+        let path = self.folder.join("revoked.toml");
+        RevocationWatch::start(path, self.heard.clone(), Arc::clone(&self.revoked))
+    }
+}
+
+impl OperatorKeys {
+    /// Reads the folder of an operator.
+    ///
+    /// # Errors
+    /// As [`PartyKeys::load`].
+    pub fn load(folder: &Path, cluster: &Cluster, now: Date) -> Result<Self, Vec<KeysError>> {
+        let (file, revoked) = read(folder, cluster, "", Role::Operator, now)?;
+        Ok(Self {
+            expires: file.expires,
+            tls: tls(folder, &file, &revoked),
+        })
+    }
+}
+
+/// What holds for parties and operators alike; an operator may have any name.
+fn read(
+    folder: &Path,
+    cluster: &Cluster,
+    name: &str,
+    role: Role,
+    now: Date,
+) -> Result<(KeysFile, RevokedFile), Vec<KeysError>> {
+    let mut errors = Vec::new();
+    let keys = folder.join("keys.toml");
+    let private_key = folder.join("private-key.pem");
+    for path in [folder, &keys, &private_key] {
+        errors.extend(files::private(path).err());
+    }
+    for path in ["authority.pem", "certificate.pem"] {
+        errors.extend(files::read(&folder.join(path)).err());
+    }
+    let revoked = RevokedFile::read(&folder.join("revoked.toml"));
+    let revoked = revoked.map_err(|error| errors.push(error)).ok();
+    let file = match keys.exists().then(|| files::read_toml::<KeysFile>(&keys)) {
+        Some(Ok(file)) => Some(file),
+        Some(Err(error)) => {
+            errors.push(error);
+            None
+        }
+        // That it is away was said when its permissions were asked for.
+        None => None,
+    };
+    if let Some(file) = &file {
+        let others = |found: String, wanted: String| KeysError::Others {
+            folder: folder.to_owned(),
+            found,
+            wanted,
+        };
+        if file.cluster != cluster.name() {
+            let found = format!("the cluster {}", file.cluster);
+            errors.push(others(found, format!("the cluster {}", cluster.name())));
+        }
+        if file.role != role || (role == Role::Party && file.name != name) {
+            let wanted = match role {
+                Role::Party => name.to_owned(),
+                Role::Operator => "an operator".to_owned(),
+            };
+            errors.push(others(file.name.clone(), wanted));
+        }
+        if now >= file.expires {
+            errors.push(KeysError::Expired {
+                name: file.name.clone(),
+                expires: file.expires,
+            });
+        }
+        let is_revoked = |list: &RevokedFile| list.holds(&file.name, file.generation);
+        if revoked.as_ref().is_some_and(is_revoked) {
+            errors.push(KeysError::Revoked {
+                name: file.name.clone(),
+                generation: file.generation,
+            });
+        }
+    }
+    match (file, revoked) {
+        (Some(file), Some(revoked)) if errors.is_empty() => Ok((file, revoked)),
+        _ => Err(errors),
+    }
+}
+
+fn tls(folder: &Path, file: &KeysFile, revoked: &RevokedFile) -> TlsFiles {
+    TlsFiles {
+        authority: folder.join("authority.pem"),
+        certificate: folder.join("certificate.pem"),
+        private_key: folder.join("private-key.pem"),
+        members: revoked.without(&file.members),
+        operators: revoked.without(&file.operators),
+    }
+}

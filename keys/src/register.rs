@@ -1,0 +1,78 @@
+//! What was issued to whom.
+
+use serde::{Deserialize, Serialize};
+
+use crate::date::Date;
+
+/// The authority's book.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Register {
+    /// The name of the cluster.
+    pub cluster: String,
+    /// In the order in which they were first issued something.
+    #[serde(rename = "holder", default)]
+    pub holders: Vec<Holder>,
+}
+
+/// One who holds keys.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Holder {
+    /// A party's name in the cluster file, or an operator's.
+    pub name: String,
+    /// What it may do.
+    pub role: Role,
+    /// Which of its keys are the present ones, from 1; all earlier ones no longer count.
+    pub generation: u32,
+    /// Of the present certificate, hexadecimal.
+    pub serial: String,
+    /// When the present ones were made.
+    pub issued: Date,
+    /// Until when the present certificate holds.
+    pub expires: Date,
+    /// Since when the present ones no longer count.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub revoked: Option<Date>,
+}
+
+/// What a holder may do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Role {
+    /// Be a party of the cluster.
+    Party,
+    /// Command the parties, and read what they say of themselves.
+    Operator,
+}
+
+impl Holder {
+    /// The common name of its certificate.
+    pub fn common_name(&self) -> String {
+        common_name(&self.name, self.generation)
+    }
+}
+
+/// Names have no dots, so that a name and a generation are told apart.
+pub(crate) fn common_name(name: &str, generation: u32) -> String {
+    format!("{name}.{generation}")
+}
+
+impl Register {
+    pub(crate) fn find(&self, name: &str) -> Option<&Holder> {
+        self.holders.iter().find(|holder| holder.name == name)
+    }
+
+    /// Who there is, in words.
+    pub(crate) fn known(&self) -> String {
+        let names: Vec<&str> = self
+            .holders
+            .iter()
+            .map(|holder| holder.name.as_str())
+            .collect();
+        match names.as_slice() {
+            [] => "nothing was issued yet".to_owned(),
+            names => format!("there are {}", names.join(", ")),
+        }
+    }
+}

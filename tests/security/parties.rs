@@ -1,0 +1,201 @@
+//! A party that runs with keys: an operator's calls, a machine's examination.
+
+use std::path::Path;
+use std::process::Stdio;
+use std::time::Instant;
+
+use super::{
+    DEADLINE, ONE_AT_A_TIME, Running, addressed_cell, answer, codes, empty_folder, text, understudy,
+};
+
+fn doctor<'a>(document: &'a serde_json::Value, check: &str, health: &str) -> Vec<&'a str> {
+    let findings = document["result"]["findings"].as_array().expect("a list");
+    findings
+        .iter()
+        .filter(|finding| finding["check"] == check && finding["health"] == health)
+        .filter_map(|finding| finding["found"].as_str())
+        .collect()
+}
+
+#[test]
+fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
+    let _one = ONE_AT_A_TIME
+        .lock()
+        .unwrap_or_else(|poisoned| poisoned.into_inner());
+    let folder = empty_folder("operator");
+    let cluster = addressed_cell(&folder);
+    let keys = folder.join("keys");
+    let (cluster, keys) = (text(&cluster), text(&keys));
+    let (status, made) = answer(&["keys", "init", cluster, "--folder", keys]);
+    assert_eq!(status, 0, "{made:#}");
+    let second = [
+        "keys",
+        "issue",
+        cluster,
+        "--operator",
+        "guest",
+        "--folder",
+        keys,
+    ];
+    assert_eq!(answer(&second).0, 0);
+    let of = |name: &str| format!("{keys}/parties/{name}");
+    let common = ["--link", "udp", "--no-real-time"];
+    let robot_io = of("robot-io");
+    let start = [
+        "remote-io",
+        cluster,
+        "--name",
+        "robot-io",
+        "--keys",
+        &robot_io,
+    ];
+    let _running = Running::start(&[&start[..], &common].concat());
+    let operate = |keys: &str, what: &[&str]| {
+        let call = ["operate", cluster, "--name", "robot-io", "--keys", keys];
+        answer(&[&call[..], what].concat())
+    };
+    let operator = of("operator");
+    let started = Instant::now();
+    let status = loop {
+        let (status, document) = operate(&operator, &["status"]);
+        if status == 0 {
+            break document;
+        }
+        assert!(started.elapsed() < DEADLINE, "{document:#}");
+    };
+    assert_eq!(status["result"]["event"], "ready", "{status:#}");
+    let (code, configuration) = operate(&operator, &["configuration"]);
+    assert_eq!(code, 0, "{configuration:#}");
+    let canonical = configuration["result"]["text"].as_str().expect("a text");
+    assert!(canonical.contains("cluster press-cell"), "{canonical}");
+    assert_eq!(operate(&operator, &["release"]).0, 0);
+
+    let lines = understudy(&[
+        "operate", cluster, "--name", "robot-io", "--keys", &operator,
+    ])
+    .args(["journal", "--lines", "3"])
+    .stderr(Stdio::inherit())
+    .output()
+    .expect("the binary is built");
+    assert!(lines.status.success());
+    assert_eq!(String::from_utf8_lossy(&lines.stdout).lines().count(), 3);
+
+    // Keys of a party are no operator's, and keys of another cluster of the same name are nobody's.
+    let refused = operate(&of("robot"), &["stop"]);
+    assert_eq!((refused.0, codes(&refused.1)), (2, vec!["U0910"]));
+    let theirs = folder.join("theirs");
+    assert_eq!(
+        answer(&["keys", "init", cluster, "--folder", text(&theirs)]).0,
+        0
+    );
+    let stranger = theirs.join("parties/operator");
+    let refused = operate(text(&stranger), &["stop"]);
+    assert_eq!((refused.0, codes(&refused.1)), (1, vec!["U0509"]));
+
+    // A party that runs learns who is revoked; the revoked one does not.
+    let guest = of("guest");
+    let kept = folder.join("kept");
+    copy(Path::new(&guest), &kept);
+    assert_eq!(operate(text(&kept), &["status"]).0, 0);
+    assert_eq!(answer(&["keys", "revoke", "guest", "--folder", keys]).0, 0);
+    let started = Instant::now();
+    loop {
+        let (code, document) = operate(text(&kept), &["status"]);
+        if code == 1 && codes(&document) == ["U0510"] {
+            break;
+        }
+        assert!(started.elapsed() < DEADLINE, "still answered: {document:#}");
+    }
+    let started = Instant::now();
+    while operate(&operator, &["stop"]).0 != 0 {
+        assert!(
+            started.elapsed() < DEADLINE,
+            "the operator is answered no more"
+        );
+    }
+}
+
+fn copy(from: &Path, to: &Path) {
+    use std::os::unix::fs::DirBuilderExt;
+    std::fs::DirBuilder::new()
+        .mode(0o700)
+        .create(to)
+        .expect("a folder");
+    for entry in std::fs::read_dir(from).expect("it is ours") {
+        let path = entry.expect("it is ours").path();
+        let name = path.file_name().expect("a file");
+        std::fs::copy(&path, to.join(name)).expect("it is ours");
+    }
+}
+
+#[test]
+fn doctor_names_what_is_wrong_with_its_remedy() {
+    let _one = ONE_AT_A_TIME
+        .lock()
+        .unwrap_or_else(|poisoned| poisoned.into_inner());
+    let folder = empty_folder("doctor");
+    let cluster = addressed_cell(&folder);
+    let keys = folder.join("keys");
+    let (cluster, keys) = (text(&cluster), text(&keys));
+    let (status, machine) = answer(&["doctor", cluster]);
+    assert_eq!(status, 0, "{machine:#}");
+    for check in ["clock", "scheduler", "memory", "configuration"] {
+        let findings = machine["result"]["findings"].as_array().expect("a list");
+        assert!(
+            findings.iter().any(|finding| finding["check"] == check),
+            "{machine:#}"
+        );
+    }
+    let of = |name: &str| format!("{keys}/parties/{name}");
+    let robot = [
+        "doctor", cluster, "--name", "robot", "--link", "udp", "--listen", "20",
+    ];
+    let (status, without) = answer(&robot);
+    assert_eq!(status, 1);
+    assert_eq!(doctor(&without, "keys", "bad").len(), 1, "{without:#}");
+
+    assert_eq!(
+        answer(&["keys", "init", cluster, "--folder", keys, "--days", "9"]).0,
+        0
+    );
+    let own = of("robot");
+    let with_keys = [&robot[..], &["--keys", &own]].concat();
+    let (status, alone) = answer(&with_keys);
+    assert_eq!(status, 0, "{alone:#}");
+    assert_eq!(
+        doctor(&alone, "keys", "warning").len(),
+        1,
+        "they hold for nine days: {alone:#}"
+    );
+    assert_eq!(doctor(&alone, "ports", "good").len(), 2, "{alone:#}");
+    assert_eq!(
+        doctor(&alone, "peer", "warning").len(),
+        4,
+        "nobody runs: {alone:#}"
+    );
+
+    // One that speaks in every cycle, also when nobody else is there.
+    let press = of("press");
+    let start = [
+        "node", cluster, "--name", "press", "--link", "udp", "--keys", &press,
+    ];
+    let _running = Running::start(&[&start[..], &["--no-real-time"]].concat());
+    let started = Instant::now();
+    loop {
+        let (_, document) = answer(&with_keys);
+        let heard = doctor(&document, "peer", "good");
+        if heard.iter().any(|found| found.starts_with("press ")) {
+            break;
+        }
+        assert!(started.elapsed() < DEADLINE, "{document:#}");
+    }
+    let here = [
+        "doctor", cluster, "--name", "press", "--link", "udp", "--keys", &press,
+    ];
+    let (_, document) = answer(&here);
+    assert_eq!(
+        doctor(&document, "ports", "warning").len(),
+        2,
+        "it runs here: {document:#}"
+    );
+}
