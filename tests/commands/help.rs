@@ -4,7 +4,7 @@ use insta::assert_snapshot;
 
 use crate::understudy;
 
-const COMMANDS: [&str; 19] = [
+const COMMANDS: [&str; 22] = [
     "campaign",
     "demo",
     "lab",
@@ -16,6 +16,9 @@ const COMMANDS: [&str; 19] = [
     "reliability",
     "measure",
     "init",
+    "keys",
+    "operate",
+    "doctor",
     "node",
     "remote-io",
     "plant",
