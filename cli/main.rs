@@ -26,6 +26,7 @@ mod parity;
 mod party;
 mod petri;
 mod proxy;
+mod reconfigure;
 mod reliability;
 mod run;
 mod schema;
@@ -74,6 +75,7 @@ enum Command {
     Synth(synth::Arguments),
     SupervisorToLadder(supervisor_to_ladder::Arguments),
     Petri(petri::Arguments),
+    Reconfigure(reconfigure::Arguments),
     Reliability(reliability::Arguments),
     Measure(measure::Arguments),
     Campaign(campaign::Arguments),
@@ -104,6 +106,7 @@ impl Command {
             Self::Synth(_) => "synth",
             Self::SupervisorToLadder(_) => "supervisor-to-ladder",
             Self::Petri(_) => "petri",
+            Self::Reconfigure(_) => "reconfigure",
             Self::Reliability(_) => "reliability",
             Self::Measure(_) => "measure",
             Self::Campaign(_) => "campaign",
@@ -134,6 +137,7 @@ impl Command {
             Self::Synth(arguments) => synth::run(&arguments),
             Self::SupervisorToLadder(arguments) => supervisor_to_ladder::run(&arguments),
             Self::Petri(arguments) => petri::run(&arguments),
+            Self::Reconfigure(arguments) => reconfigure::run(&arguments),
             Self::Reliability(arguments) => reliability::run(&arguments),
             Self::Measure(arguments) => measure::run(&arguments),
             Self::Campaign(arguments) => campaign::run(&arguments, console),

@@ -4,7 +4,7 @@ use insta::assert_snapshot;
 
 use crate::understudy;
 
-const COMMANDS: [&str; 22] = [
+const COMMANDS: [&str; 23] = [
     "campaign",
     "demo",
     "lab",
@@ -13,6 +13,7 @@ const COMMANDS: [&str; 22] = [
     "parity",
     "draw",
     "supervisor-to-ladder",
+    "reconfigure",
     "reliability",
     "measure",
     "init",
