@@ -15,6 +15,7 @@ mod demo;
 mod des;
 mod doctor;
 mod draw;
+mod field;
 mod files;
 mod init;
 mod keys;
@@ -26,7 +27,6 @@ mod parity;
 mod party;
 mod petri;
 mod proxy;
-mod reconfigure;
 mod reliability;
 mod run;
 mod schema;
@@ -75,7 +75,6 @@ enum Command {
     Synth(synth::Arguments),
     SupervisorToLadder(supervisor_to_ladder::Arguments),
     Petri(petri::Arguments),
-    Reconfigure(reconfigure::Arguments),
     Reliability(reliability::Arguments),
     Measure(measure::Arguments),
     Campaign(campaign::Arguments),
@@ -106,7 +105,6 @@ impl Command {
             Self::Synth(_) => "synth",
             Self::SupervisorToLadder(_) => "supervisor-to-ladder",
             Self::Petri(_) => "petri",
-            Self::Reconfigure(_) => "reconfigure",
             Self::Reliability(_) => "reliability",
             Self::Measure(_) => "measure",
             Self::Campaign(_) => "campaign",
@@ -137,7 +135,6 @@ impl Command {
             Self::Synth(arguments) => synth::run(&arguments),
             Self::SupervisorToLadder(arguments) => supervisor_to_ladder::run(&arguments),
             Self::Petri(arguments) => petri::run(&arguments),
-            Self::Reconfigure(arguments) => reconfigure::run(&arguments),
             Self::Reliability(arguments) => reliability::run(&arguments),
             Self::Measure(arguments) => measure::run(&arguments),
             Self::Campaign(arguments) => campaign::run(&arguments, console),

@@ -19,9 +19,10 @@ use understudy_keys::{Date, PartyKeys, RevocationWatch};
 use understudy_node::Station;
 use understudy_plant::PlantMachine;
 use understudy_remote_io::RemoteIo;
-use understudy_wire::{Epoch, Machine, Party, Time};
+use understudy_wire::{Epoch, Image, Machine, Party, ProgramId, Time};
 
 use crate::answer::{Answer, Status};
+use crate::field::Equipment;
 use crate::files;
 use crate::overrides::{OverrideArguments, link_kind};
 
@@ -101,15 +102,38 @@ pub(crate) fn run_remote_io(arguments: &Arguments) -> Answer {
             return Err(wrong());
         };
         let settings = cluster.remote_io_settings(program).ok_or_else(wrong)?;
-        let field = SimulatedField::new(program, cluster.agreement().clone());
+        let field = field_of(arguments, cluster, program, settings.fail_safe.clone())?;
         play(
             arguments,
             cluster,
             party,
             RemoteIo::new(Time::default(), settings),
-            Box::new(field),
+            field,
         )
     })
+}
+
+/// Its device where it has one, and its simulated plant otherwise.
+fn field_of(
+    arguments: &Arguments,
+    cluster: &Cluster,
+    program: ProgramId,
+    fail_safe: Image,
+) -> Result<Box<dyn FieldDriver>, Answer> {
+    let agreement = cluster.agreement();
+    let remote_io = cluster.remote_ios().get(program.index());
+    let Some(device) = remote_io.and_then(|remote_io| remote_io.field.clone()) else {
+        return Ok(Box::new(SimulatedField::new(program, agreement.clone())));
+    };
+    let period = agreement.schedule.period();
+    let equipment = Equipment::start(device, fail_safe, period, !arguments.no_real_time);
+    match equipment {
+        Ok(equipment) => Ok(Box::new(equipment)),
+        Err(error) => {
+            let message = format!("a thread for the device: {error}");
+            Err(Answer::failed(Status::Failed, "U0506", message))
+        }
+    }
 }
 
 pub(crate) fn run_plant(arguments: &Arguments) -> Answer {
@@ -137,6 +161,8 @@ fn with_cluster(
         Ok(read) => read,
         Err(answer) => return answer,
     };
+    // Before anything else is started, which would be lost.
+    start_again_for_zenoh(link_kind(&cluster));
     let answer = find(&cluster, &arguments.name).and_then(|party| run(&cluster, party));
     answer.unwrap_or_else(|answer| answer)
 }
@@ -174,7 +200,6 @@ where
     M::Event: Serialize + Send + 'static,
 {
     let link = link_kind(cluster);
-    start_again_for_zenoh(link);
     let parties = peers(cluster, arguments.endpoints.as_deref())?;
     let neighbours = cluster.neighbours();
     let endpoints = Endpoints::new(cluster.agreement().cluster, party, parties, neighbours);

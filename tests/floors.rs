@@ -32,6 +32,7 @@ const FLOORS: &[&[&str]] = &[
     ],
     &[
         "understudy-bus",
+        "understudy-field",
         "understudy-keys",
         "understudy-network",
         "understudy-simulator",

@@ -11,6 +11,20 @@ pub trait FieldDriver: Send {
 
     /// u(i), where `frame` comes from this field.
     fn sense<'frame>(&mut self, frame: &'frame Frame) -> Option<&'frame Image>;
+
+    /// What is new since the last look, where the field is reached by another way than the link.
+    fn look(&mut self) -> Option<Look> {
+        None
+    }
+}
+
+/// What is new of a field that is not reached over the link.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Look {
+    /// u(i).
+    Sensors(Image),
+    /// The sensors cannot be seen, and why.
+    Lost(String),
 }
 
 /// Of a station or a plant: there is no field.

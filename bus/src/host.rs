@@ -14,7 +14,7 @@ use understudy_wire::{Body, Frame, Input, Machine, Moment, Output, Time, encode}
 
 use crate::clock::Clock;
 use crate::error::BusError;
-use crate::field::FieldDriver;
+use crate::field::{FieldDriver, Look};
 use crate::guard::Guard;
 use crate::journal::{EventSink, HostEvent, Noted};
 use crate::link::{Link, LinkCounters};
@@ -94,6 +94,7 @@ struct Round {
     encoded: Vec<u8>,
     moment: Moment,
     wakeups_in_a_row: u32,
+    field_lost: bool,
     refused: Refusals,
     unsendable: Unsendable,
     reported: Time,
@@ -112,6 +113,7 @@ impl<M: Machine> Host<'_, M> {
             if self.obey(&mut round) || self.observer.satisfied() {
                 break;
             }
+            self.look(&mut round);
             let heard = self.listen(&mut round);
             let now = self.clock.now();
             let due = self.machine.wakeup();
@@ -156,6 +158,27 @@ impl<M: Machine> Host<'_, M> {
             }
         }
         false
+    }
+
+    /// Tells the party what its field shows, where that comes by another way than the link.
+    fn look(&mut self, round: &mut Round) {
+        let Some(look) = self.field.look() else {
+            return;
+        };
+        let now = self.clock.now();
+        let (input, event) = match &look {
+            Look::Sensors(sensors) => (Input::Field(sensors), HostEvent::FieldRegained),
+            Look::Lost(reason) => {
+                let reason = reason.clone();
+                (Input::FieldLost, HostEvent::FieldLost { reason })
+            }
+        };
+        let lost = matches!(look, Look::Lost(_));
+        if lost != std::mem::replace(&mut round.field_lost, lost) {
+            self.sink.record(now, Noted::Host(event));
+        }
+        self.machine.handle_input(now, input);
+        self.drain(now, round);
     }
 
     /// Takes what has arrived, and says how many datagrams that were.

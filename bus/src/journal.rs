@@ -99,6 +99,13 @@ pub enum HostEvent {
         /// Which bound, for the last one.
         reason: String,
     },
+    /// The equipment of a remote I/O cannot be seen any more.
+    FieldLost {
+        /// Why.
+        reason: String,
+    },
+    /// The equipment can be seen again.
+    FieldRegained,
     /// Records were lost because the journal was too slow, since the last such record.
     JournalLost {
         /// How many.

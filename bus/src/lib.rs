@@ -32,7 +32,7 @@ pub use clock::Clock;
 pub use control::{Commands, hold_back_signals};
 pub use endpoints::{Endpoints, Peer};
 pub use error::BusError;
-pub use field::{FieldDriver, NoField, SimulatedField};
+pub use field::{FieldDriver, Look, NoField, SimulatedField};
 pub use guard::{Guard, Keys};
 pub use host::{Host, Summary};
 pub use journal::{

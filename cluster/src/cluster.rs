@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::net::SocketAddr;
 use std::sync::Arc;
 
+use crate::device::FieldDevice;
 use serde::{Deserialize, Serialize};
 use understudy_ladder::Program as LadderProgram;
 use understudy_logic::Circuit;
@@ -72,6 +73,8 @@ pub struct RemoteIo {
     pub fail_safe: Image,
     /// Who releases the outputs after a cold start.
     pub release: Release,
+    /// The equipment behind it; without one its plant is simulated, or absent.
+    pub field: Option<FieldDevice>,
     /// What is driven while nobody can say which of two stations is right.
     pub value_fault: ValueFault,
     /// Where it listens, if the file says so.

@@ -12,7 +12,7 @@ use understudy_plant::{PressParameters, RobotParameters};
 
 use crate::fields::{Fields, Placed, unknown_key, wrong_type};
 use crate::format::{
-    CLUSTER, CONTROLLER, LADDER_PARAMETERS, MODELS, PLANT, PRESS_PARAMETERS, REMOTE_IO,
+    CLUSTER, CONTROLLER, FIELD, LADDER_PARAMETERS, MODELS, PLANT, PRESS_PARAMETERS, REMOTE_IO,
     ROBOT_PARAMETERS, SECTIONS, Section, UNDERSTUDY,
 };
 
@@ -69,7 +69,21 @@ pub(crate) struct RemoteIoSection {
     pub(crate) release: usize,
     /// Index into [`crate::format::VALUE_FAULTS`].
     pub(crate) value_fault: usize,
+    pub(crate) field: Option<FieldSection>,
     pub(crate) address: Option<Placed<SocketAddr>>,
+}
+
+#[derive(Debug)]
+pub(crate) struct FieldSection {
+    pub(crate) span: Range<usize>,
+    pub(crate) address: Option<Placed<SocketAddr>>,
+    pub(crate) unit: u8,
+    pub(crate) timeout: Duration,
+    pub(crate) stale_after: Duration,
+    /// By signal: where the signal stands, and its place in the device.
+    pub(crate) inputs: BTreeMap<String, (Range<usize>, Placed<String>)>,
+    /// As `inputs`.
+    pub(crate) outputs: BTreeMap<String, (Range<usize>, Placed<String>)>,
 }
 
 #[derive(Debug)]
@@ -145,6 +159,7 @@ pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
             fail_safe: fields.bits("fail_safe", diagnostics),
             release: fields.word("release", diagnostics),
             value_fault: fields.word("value_fault", diagnostics),
+            field: field(fields, &empty, diagnostics),
             address: fields.address("address", diagnostics),
         })
         .collect();
@@ -222,6 +237,26 @@ fn tables<'a, 't>(
         }
     };
     Some(entries.iter().filter_map(table).collect())
+}
+
+fn field<'a, 't>(
+    fields: &Fields<'a, 't>,
+    empty: &'a DeTable<'t>,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<FieldSection> {
+    if !fields.has("field") {
+        return None;
+    }
+    let fields = fields.table("field", &FIELD, empty, diagnostics);
+    Some(FieldSection {
+        span: fields.span.clone(),
+        address: fields.address("modbus", diagnostics),
+        unit: fields.count("unit", diagnostics) as u8,
+        timeout: fields.time("timeout", diagnostics),
+        stale_after: fields.time("stale_after", diagnostics),
+        inputs: fields.names("inputs", diagnostics),
+        outputs: fields.names("outputs", diagnostics),
+    })
 }
 
 fn model<'a, 't>(

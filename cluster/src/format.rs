@@ -55,6 +55,10 @@ pub(crate) enum Kind {
     Names,
     /// A table whose keys depend on the model.
     Parameters,
+    /// The table of a device.
+    Device,
+    /// A table from signals to places in a device.
+    Points,
 }
 
 const fn key(name: &'static str, kind: Kind, meaning: &'static str) -> Key {
@@ -230,7 +234,54 @@ pub(crate) static REMOTE_IO: Section = Section {
             },
             "what is driven while two stations say different outputs from one history and no third one says which is right: `hold`, the last true outputs and then the fail-safe ones, until they agree or the operator releases them; `alarm`, the outputs of the controller itself; `fail-safe`, the fail-safe outputs at once, until the operator releases them",
         ),
+        key(
+            "field",
+            Kind::Device,
+            "real equipment behind it, see below; without it its plant is simulated",
+        ),
         key("address", Kind::Address, "as for a controller"),
+    ],
+};
+
+pub(crate) static FIELD: Section = Section {
+    name: "remote_io.field",
+    repeated: false,
+    meaning: "a device that the remote I/O reads and drives by Modbus TCP, below its `[[remote_io]]`",
+    keys: &[
+        required("modbus", Kind::Address, "where the device listens"),
+        key(
+            "unit",
+            count(0, 255, 1),
+            "the unit behind that address, where it is a gateway",
+        ),
+        key(
+            "timeout",
+            Kind::Time {
+                least: Duration::from_millis(1),
+                most: Duration::from_secs(10),
+                default: Duration::from_millis(100),
+            },
+            "how long one exchange with the device may take; then the connection is made anew",
+        ),
+        key(
+            "stale_after",
+            Kind::Time {
+                least: Duration::from_millis(1),
+                most: Duration::from_secs(60),
+                default: Duration::from_millis(200),
+            },
+            "the age at which its last answer is worth nothing any more: the outputs are held, and then fail-safe",
+        ),
+        key(
+            "inputs",
+            Kind::Points,
+            "where the inputs of the program come from; one that is not named stays 0",
+        ),
+        key(
+            "outputs",
+            Kind::Points,
+            "where the outputs of the program go to; registers that are named belong to the remote I/O as a whole",
+        ),
     ],
 };
 
@@ -388,6 +439,11 @@ impl Kind {
             Self::Bits => "a table from names to true or false, such as { grip = true }".into(),
             Self::Names => "a table from names to names in quotes".into(),
             Self::Parameters => "a table, [plant.parameters]".into(),
+            Self::Device => "a table, [remote_io.field]".into(),
+            Self::Points => {
+                "a table from signals to places in quotes, such as { start = \"discrete:0\" }"
+                    .into()
+            }
         }
     }
 
@@ -413,7 +469,7 @@ mod tests {
     #[test]
     fn the_documentation_has_every_key_with_its_bounds() {
         let page = include_str!("../../docs/cluster-file.md");
-        let parameters = [&ROBOT_PARAMETERS, &PRESS_PARAMETERS];
+        let parameters = [&ROBOT_PARAMETERS, &PRESS_PARAMETERS, &FIELD];
         for section in SECTIONS.into_iter().chain(parameters) {
             assert!(page.contains(&section.header()), "{}", section.header());
             for key in section.keys {

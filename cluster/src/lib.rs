@@ -10,6 +10,7 @@
 mod canonical;
 mod cluster;
 mod configuration;
+mod device;
 mod duration;
 mod fields;
 mod file;
@@ -19,6 +20,7 @@ mod schema;
 mod template;
 
 pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Security, Understudy};
+pub use device::{FieldDevice, NoPoint, Point};
 pub use fields::MAXIMUM_NAME_LENGTH;
 pub use read::{Loaded, MAXIMUM_TEXT_BYTES, Overrides, read, read_with};
 pub use schema::schema;

@@ -19,11 +19,14 @@
 //! | U0215 | a plant that feeds or follows itself |
 //! | U0216 | two sensors of a plant on one input |
 //! | U0217 | a terminal of a plant that two things drive |
+//! | U0221 | a remote I/O with both a device and a simulated plant |
+//! | U0222 | a place that no device has, or that an output cannot go to |
 //! | U0251 | warning: an input that no sensor drives |
 //! | U0252 | warning: an output that moves nothing |
 //! | U0253 | warning: not one understudy where the mode wants one |
 //! | U0254 | warning: parts that never come |
 
+mod devices;
 mod follows;
 mod ladders;
 mod limits;
@@ -152,6 +155,12 @@ fn build(
     let members = members(file.controllers, period, ladders, &mut names, diagnostics);
     let understudies = understudies(file.understudies, &mut names, diagnostics);
     let remote_ios = remote_ios(file.remote_ios, &members, &mut names, diagnostics);
+    let simulated: Vec<_> = file
+        .plants
+        .iter()
+        .filter_map(|plant| plant.controller.clone())
+        .collect();
+    devices::check_simulated(&simulated, &members, &remote_ios, diagnostics);
     let plants = plants::place(
         file.plants,
         period,
@@ -332,6 +341,10 @@ fn remote_ios(
             hold_cycles: section.hold_cycles,
             fail_safe,
             release: [Release::Automatic, Release::Operator][section.release],
+            field: section
+                .field
+                .as_ref()
+                .and_then(|field| devices::device(field, member, diagnostics)),
             value_fault: [ValueFault::Hold, ValueFault::Alarm, ValueFault::FailSafe]
                 [section.value_fault],
             address: section.address.map(|address| address.value),
@@ -353,6 +366,7 @@ fn remote_ios(
                 hold_cycles: crate::format::REMOTE_IO.default_count("hold_cycles"),
                 fail_safe: fail_safe(member, &[], diagnostics),
                 release: Release::default(),
+                field: None,
                 value_fault: ValueFault::default(),
                 address: None,
             }

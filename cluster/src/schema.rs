@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 
 use crate::fields::MAXIMUM_NAME_LENGTH;
 use crate::format::{
-    CLUSTER, CONTROLLER, Key, Kind, PRESS_PARAMETERS, ROBOT_PARAMETERS, SECTIONS, Section,
+    CLUSTER, CONTROLLER, FIELD, Key, Kind, PRESS_PARAMETERS, ROBOT_PARAMETERS, SECTIONS, Section,
 };
 
 /// JSON Schema 2020-12 of the data of a `cluster.toml`.
@@ -73,6 +73,14 @@ fn property(key: &Key) -> Value {
         }
         Kind::Word { words, .. } => json!({ "enum": words }),
         Kind::Bits => json!({ "type": "object", "additionalProperties": { "type": "boolean" } }),
+        Kind::Device => table(&FIELD),
+        Kind::Points => json!({
+            "type": "object",
+            "additionalProperties": {
+                "type": "string",
+                "pattern": "^((discrete|coil):[0-9]{1,5}|(input|holding):[0-9]{1,5}\\.[0-9]{1,2})$",
+            },
+        }),
         Kind::Names => json!({ "type": "object", "additionalProperties": { "type": "string" } }),
         Kind::Parameters => {
             json!({ "anyOf": [table(&ROBOT_PARAMETERS), table(&PRESS_PARAMETERS)] })

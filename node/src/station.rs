@@ -304,7 +304,7 @@ impl Machine for Station {
         match input {
             Input::Wakeup => self.wake(now),
             Input::Frame(frame) => self.receive(now, frame),
-            Input::Field(_) | Input::Release => {}
+            Input::Field(_) | Input::FieldLost | Input::Release => {}
         }
         self.asked = self.next_wakeup();
     }

@@ -244,7 +244,7 @@ impl Machine for PlantMachine {
         match input {
             Input::Wakeup => self.wake(now),
             Input::Frame(frame) => self.hear(now, frame),
-            Input::Field(_) | Input::Release => {}
+            Input::Field(_) | Input::FieldLost | Input::Release => {}
         }
     }
 

@@ -53,14 +53,6 @@ pub enum Event {
         /// Who has it.
         from: StationId,
     },
-    /// After a restart: living stations hold different states of one cycle. The operator decides, by releasing the outputs, for
-    /// the first of them.
-    Disputed {
-        /// In this cycle.
-        moment: Moment,
-        /// Who holds them.
-        stations: StationSet,
-    },
     /// Samples that nobody heard are void: the program goes on from an older state that a station still has.
     Voided {
         /// In this cycle.
@@ -144,6 +136,8 @@ pub enum Missing {
     NoCycle,
     /// The host woke this remote I/O more than a period after the deadline.
     TooLate,
+    /// The sensors cannot be seen: their device is lost, or refuses.
+    BadQuality,
     /// This remote I/O does not know its program's history yet.
     NoHistory,
     /// The operator has not released the outputs after a cold start, or after a value fault.

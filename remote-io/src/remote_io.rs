@@ -9,8 +9,7 @@
 //!
 //! ```text
 //!   Listening ── a living station holds a state ──► Running from its lineage
-//!      ▲    ├─── nobody holds one ────────────────► Running from the initial state (cold start)
-//!      │    └─── they hold different ones of one cycle ── the operator decides ── Running
+//!      ▲    └─── nobody holds one ────────────────► Running from the initial state (cold start)
 //!      └──────── living stations, none of them on this history, for `listen_cycles` ── Running
 //! ```
 
@@ -44,6 +43,8 @@ pub struct RemoteIo {
     witnesses: Witnesses,
     phase: Phase,
     field: Image,
+    /// The sensors cannot be seen: there is no u(i), and the program stands still.
+    field_lost: bool,
     released: bool,
     /// The turns of this cycle, by rank.
     turns: Vec<Option<Arc<Frame>>>,
@@ -69,24 +70,13 @@ pub struct RemoteIo {
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 enum Phase {
     /// The history is not known: cycles listened for so far.
-    Listening {
-        cycles: u32,
-        /// Whether the operator has been asked from which state to go on.
-        disputed: bool,
-    },
+    Listening { cycles: u32 },
     /// The history, whether it has this cycle's sample, and the cycles for which no living station was on it.
     Running {
         history: History,
         sampled: bool,
         unfollowed: u32,
     },
-}
-
-impl Phase {
-    const LISTENING: Self = Self::Listening {
-        cycles: 0,
-        disputed: false,
-    };
 }
 
 impl RemoteIo {
@@ -107,8 +97,9 @@ impl RemoteIo {
                 stations,
                 agreement.flag_after,
             ),
-            phase: Phase::LISTENING,
+            phase: Phase::Listening { cycles: 0 },
             field: Image::zero(settings.inputs),
+            field_lost: false,
             released: true,
             turns: vec![None; stations],
             decided: false,
@@ -277,6 +268,7 @@ impl Hash for RemoteIo {
             witnesses,
             phase,
             field,
+            field_lost,
             released,
             turns,
             decided,
@@ -291,7 +283,10 @@ impl Hash for RemoteIo {
             copies,
             outbox: _,
         } = self;
-        (reception, clock, attendance, witnesses, phase, field).hash(hasher);
+        (
+            reception, clock, attendance, witnesses, phase, field, field_lost,
+        )
+            .hash(hasher);
         (released, turns, decided, idle, missed, applied).hash(hasher);
         (asked, stalled, last_true, trust, differed, copies).hash(hasher);
     }
@@ -308,14 +303,10 @@ impl Machine for RemoteIo {
             Input::Field(sensors) => {
                 if sensors.width() == self.settings.inputs {
                     self.field.clone_from(sensors);
+                    self.field_lost = false;
                 }
             }
-            Input::Release if matches!(self.phase, Phase::Listening { disputed: true, .. }) => {
-                self.report(Event::Released {
-                    moment: self.moment(),
-                });
-                self.start(self.moment());
-            }
+            Input::FieldLost => self.field_lost = true,
             Input::Release => {
                 if !self.released || !self.trust.is_complete() {
                     self.released = true;

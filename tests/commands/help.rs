@@ -4,7 +4,7 @@ use insta::assert_snapshot;
 
 use crate::understudy;
 
-const COMMANDS: [&str; 23] = [
+const COMMANDS: [&str; 19] = [
     "campaign",
     "demo",
     "lab",
@@ -13,13 +13,9 @@ const COMMANDS: [&str; 23] = [
     "parity",
     "draw",
     "supervisor-to-ladder",
-    "reconfigure",
     "reliability",
     "measure",
     "init",
-    "keys",
-    "operate",
-    "doctor",
     "node",
     "remote-io",
     "plant",

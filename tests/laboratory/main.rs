@@ -5,7 +5,7 @@
     reason = "what is waited for has a deadline on the real clock"
 )]
 
-mod boiler;
+mod field;
 mod hosts;
 
 use std::collections::BTreeSet;
@@ -188,8 +188,17 @@ fn the_demo_at_a_shorter_length() {
 
 /// Starts a laboratory and waits until its cycles run.
 fn running(out: &Path, more: &[&str]) -> (Child, BufReader<std::process::ChildStderr>) {
+    running_cluster(Path::new(PRESS_CELL), out, more)
+}
+
+fn running_cluster(
+    cluster: &Path,
+    out: &Path,
+    more: &[&str],
+) -> (Child, BufReader<std::process::ChildStderr>) {
+    let cluster = cluster.to_str().expect("text");
     let mut child = understudy(&[
-        "lab", PRESS_CELL, "--link", "udp", "--period", PERIOD, "--cycles", "100000", "--out",
+        "lab", cluster, "--link", "udp", "--period", PERIOD, "--cycles", "100000", "--out",
     ])
     .arg(out)
     .args(more)

@@ -19,6 +19,8 @@ pub enum Input<'a> {
     Frame(&'a Arc<Frame>),
     /// What the sensors of a remote I/O see now; ignored by everybody else.
     Field(&'a Image),
+    /// What the sensors of a remote I/O see is not known; ignored by everybody else.
+    FieldLost,
     /// The operator releases the outputs of a program that was started cold; ignored by all but its remote I/O.
     Release,
 }

@@ -149,7 +149,6 @@ fn sample() -> Body {
         born: moment(),
         base: Lineage(u64::MAX),
         before: Lineage(u64::MAX),
-        after: Lineage(u64::MAX),
         history: (0..8).map(|_| Image::zero(WIDTH)).collect(),
         applied: None,
         excluded: StationSet::EMPTY,

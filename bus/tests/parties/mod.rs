@@ -103,6 +103,7 @@ impl Machine for Chatter {
                 });
             }
             Input::Field(_) => self.report_once(Chat::Sensed),
+            Input::FieldLost => {}
             Input::Release => self.said.push_back(Output::Report(Chat::Released)),
         }
     }
@@ -121,7 +122,6 @@ fn sample() -> Sample {
         born: Moment::default(),
         base: Lineage(1),
         before: Lineage(1),
-        after: Lineage(2),
         history: [Image::zero(3)].into_iter().collect(),
         applied: None,
         excluded: StationSet::EMPTY,

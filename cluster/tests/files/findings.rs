@@ -301,3 +301,29 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn devices_and_their_places() {
+    insta::assert_snapshot!(check(&format!(
+        r#"{HEAD}
+[[controller]]
+name = "press"
+ladder = "press.ladder"
+[[remote_io]]
+controller = "robot"
+[remote_io.field]
+unit = 300
+timeout = "0s"
+inputs = {{ ther = "discrete:0", lost = "relay:1" }}
+outputs = {{ go = "discrete:7" }}
+[[remote_io]]
+controller = "press"
+[remote_io.field]
+modbus = "127.0.0.1:502"
+outputs = {{ down = "holding:1.15" }}
+[[plant]]
+controller = "press"
+model = "press"
+"#
+    )));
+}

@@ -24,6 +24,9 @@ impl RemoteIo {
         let mut accusation = None;
         let (selection, sampled) = match &self.phase {
             Phase::Listening { .. } => (Selection::Missing(Missing::NoHistory), None),
+            Phase::Running { sampled: false, .. } if self.field_lost => {
+                (Selection::Missing(Missing::BadQuality), None)
+            }
             Phase::Running { sampled: false, .. } => (Selection::Missing(Missing::NoCycle), None),
             Phase::Running { history, .. } if late => {
                 let sampled = self.field_sampled(history);

@@ -28,22 +28,15 @@ impl RemoteIo {
                     *unfollowed + 1
                 };
                 if *unfollowed > listen_cycles {
-                    self.phase = Phase::LISTENING;
+                    self.phase = Phase::Listening { cycles: 0 };
                 }
             }
-            Phase::Listening { cycles, disputed } => {
+            Phase::Listening { cycles } => {
                 *cycles += u32::from(self.witnesses.anybody());
                 // One who could hold the state and is not there gets longer: it may be the only one that does.
                 let patience = if self.witnesses.everybody() { 1 } else { 5 };
-                if *cycles < listen_cycles * patience {
-                    return;
-                }
-                match self.witnesses.disputed() {
-                    None => self.start(moment),
-                    Some(stations) if !std::mem::replace(disputed, true) => {
-                        self.report(Event::Disputed { moment, stations });
-                    }
-                    Some(_) => {}
+                if *cycles >= listen_cycles * patience {
+                    self.start(moment);
                 }
             }
         }
@@ -84,8 +77,12 @@ impl RemoteIo {
         };
     }
 
-    /// Takes u(i)(t) and says it.
+    /// Takes u(i)(t) and says it. Where it is not known nothing is said, so that nobody steps the program: it goes on from
+    /// its state when the sensors can be seen again.
     pub(super) fn sample(&mut self, now: Time) {
+        if self.field_lost {
+            return;
+        }
         let moment = self.moment();
         let Phase::Running {
             history, sampled, ..
@@ -105,7 +102,6 @@ impl RemoteIo {
             born: history.born(),
             base,
             before: history.before(),
-            after: history.head(),
             history: history.samples(),
             applied: self.applied.clone(),
             excluded: self.trust.excluded(),

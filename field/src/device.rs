@@ -1,0 +1,264 @@
+//! The thread of one device, and what the cycle sees of it.
+//!
+//! ```text
+//!   connecting ── there ──► exchanging ── one went well ──► good
+//!       ▲                      │  ▲                          │
+//!       │                      │  └── an exception: bad ◄────┤
+//!       └──── bad: no answer in time, or the connection broke ┘
+//! ```
+//!
+//! When the remote I/O ends in order, the device is driven to the fail-safe values; when it dies, that is for the device's own
+//! watchdog to do.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::SigSet;
+use thread_priority::{
+    RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
+    set_thread_priority_and_policy, thread_native_id,
+};
+use tokio::sync::Notify;
+use tokio::time::{sleep, timeout};
+use understudy_cluster::FieldDevice;
+use understudy_wire::Image;
+
+use crate::exchange::{Trouble, connect, exchange};
+use crate::plan::Plan;
+
+/// Of SCHED_FIFO: behind the cycle and the link, before programs that are not in real time.
+const PRIORITY: u8 = 20;
+
+/// From a connection that failed to the next try.
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// What the cycle sees of the device.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Look {
+    /// u(i), as the device gave it.
+    Sensors(Image),
+    /// Nothing that counts, and why.
+    Lost(String),
+}
+
+/// A device and the thread that exchanges with it. It ends when it is dropped.
+#[derive(Debug)]
+pub struct Device {
+    shared: Arc<Shared>,
+    stale_after: Duration,
+    /// The newest state that was looked at.
+    looked_at: u64,
+    stale: bool,
+    thread: Option<JoinHandle<()>>,
+}
+
+#[derive(Debug)]
+struct Shared {
+    state: Mutex<State>,
+    /// Outputs are new, or it is over.
+    changed: Notify,
+}
+
+#[derive(Debug)]
+struct State {
+    /// Grows with each answer and each trouble.
+    number: u64,
+    seen: Look,
+    seen_at: Instant,
+    outputs: Option<Image>,
+    ending: bool,
+}
+
+impl Device {
+    /// Starts to exchange with the device: whenever it is driven, and once a `period` at least; before the other programs of
+    /// this machine where `real_time` is wanted and granted.
+    ///
+    /// # Errors
+    /// Where the system gives no thread.
+    pub fn start(
+        settings: FieldDevice,
+        fail_safe: Image,
+        period: Duration,
+        real_time: bool,
+    ) -> std::io::Result<Self> {
+        let shared = Arc::new(Shared {
+            state: Mutex::new(State {
+                number: 1,
+                seen: Look::Lost("no answer yet".into()),
+                seen_at: Instant::now(),
+                outputs: None,
+                ending: false,
+            }),
+            changed: Notify::new(),
+        });
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()?;
+        let stale_after = settings.stale_after;
+        let worker = Arc::clone(&shared);
+        let thread = std::thread::Builder::new()
+            .name("field".into())
+            .spawn(move || {
+                prepare(real_time);
+                runtime.block_on(
+                    Worker {
+                        inputs: Plan::new(&settings.inputs),
+                        outputs: Plan::new(&settings.outputs),
+                        settings,
+                        fail_safe,
+                        period,
+                        shared: worker,
+                    }
+                    .run(),
+                );
+            })?;
+        Ok(Self {
+            shared,
+            stale_after,
+            looked_at: 0,
+            stale: false,
+            thread: Some(thread),
+        })
+    }
+
+    /// Drives y(i) as soon as the device takes it; never waits for that.
+    pub fn drive(&self, outputs: &Image) {
+        self.shared.lock().outputs = Some(outputs.clone());
+        self.shared.changed.notify_one();
+    }
+
+    /// What is new since the last look; never waits for the device.
+    pub fn look(&mut self) -> Option<Look> {
+        let state = self.shared.lock();
+        if state.number == self.looked_at {
+            let age = state.seen_at.elapsed();
+            let fresh = age <= self.stale_after || matches!(state.seen, Look::Lost(_));
+            if fresh || self.stale {
+                return None;
+            }
+            self.stale = true;
+            let age_ms = age.as_millis();
+            return Some(Look::Lost(format!("the last answer is {age_ms} ms old")));
+        }
+        self.looked_at = state.number;
+        self.stale = false;
+        Some(state.seen.clone())
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        self.shared.lock().ending = true;
+        self.shared.changed.notify_one();
+        if let Some(thread) = self.thread.take() {
+            // One that panicked has said so on standard error.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        // Nothing can panic while it is held.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn see(&self, look: Look) {
+        let mut state = self.lock();
+        state.number += 1;
+        state.seen = look;
+        state.seen_at = Instant::now();
+    }
+}
+
+/// Signals are for the thread that waits for them.
+fn prepare(real_time: bool) {
+    // It fails only for a set that does not exist.
+    let _ = SigSet::all().thread_block();
+    if !real_time {
+        return;
+    }
+    let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
+    let set = ThreadPriorityValue::try_from(PRIORITY).and_then(|value| {
+        let priority = ThreadPriority::Crossplatform(value);
+        set_thread_priority_and_policy(thread_native_id(), priority, policy)
+            .map_err(|error| error.to_string())
+    });
+    if let Err(error) = set {
+        tracing::debug!(error, "the device waits behind other programs");
+    }
+}
+
+struct Worker {
+    settings: FieldDevice,
+    inputs: Plan,
+    outputs: Plan,
+    fail_safe: Image,
+    period: Duration,
+    shared: Arc<Shared>,
+}
+
+impl Worker {
+    async fn run(self) {
+        let address = self.settings.address;
+        while !self.shared.lock().ending {
+            let patience = self.settings.timeout;
+            match timeout(patience, connect(address, self.settings.unit)).await {
+                Ok(Ok(device)) => self.serve(device).await,
+                Ok(Err(error)) => {
+                    self.lose(format!("{address} does not take a connection: {error}"))
+                }
+                Err(_) => self.lose(format!("{address} takes no connection within {patience:?}")),
+            }
+            if !self.shared.lock().ending {
+                sleep(PAUSE).await;
+            }
+        }
+    }
+
+    /// Exchanges until the connection is of no use, or it is over.
+    async fn serve(&self, mut device: tokio_modbus::client::Context) {
+        loop {
+            let (outputs, ending) = {
+                let state = self.shared.lock();
+                if state.ending {
+                    (Some(self.fail_safe.clone()), true)
+                } else {
+                    (state.outputs.clone(), false)
+                }
+            };
+            let driven = outputs.as_ref().map(|outputs| (&self.outputs, outputs));
+            let patience = self.settings.timeout;
+            let exchanged = timeout(patience, exchange(&mut device, driven, &self.inputs)).await;
+            if ending {
+                return;
+            }
+            match exchanged {
+                Ok(Ok(sensors)) => self.shared.see(Look::Sensors(sensors)),
+                Ok(Err(trouble)) => {
+                    let spared = trouble.spares_the_connection();
+                    self.lose(self.said(&trouble));
+                    if !spared {
+                        return;
+                    }
+                }
+                Err(_) => {
+                    let address = self.settings.address;
+                    self.lose(format!("{address} does not answer within {patience:?}"));
+                    return;
+                }
+            }
+            // Woken early by new outputs and by the end.
+            let _ = timeout(self.period, self.shared.changed.notified()).await;
+        }
+    }
+
+    fn said(&self, trouble: &Trouble) -> String {
+        format!("{}: {trouble}", self.settings.address)
+    }
+
+    fn lose(&self, reason: String) {
+        self.shared.see(Look::Lost(reason));
+    }
+}

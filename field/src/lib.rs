@@ -1,0 +1,16 @@
+//! Real sensors and actuators behind a remote I/O: a device that speaks Modbus TCP. The only crate that names tokio-modbus.
+//!
+//! The cycle never waits for the device: a thread of its own exchanges with it, takes the newest outputs, and leaves the newest
+//! answer, which the cycle looks at ([`Device::look`]). Invariant: an answer that is looked at as good is whole, no older than
+//! configured, and nothing has gone wrong with the device since.
+
+#![allow(
+    clippy::disallowed_methods,
+    reason = "the age of an answer is counted on the real clock"
+)]
+
+mod device;
+mod exchange;
+mod plan;
+
+pub use device::{Device, Look};

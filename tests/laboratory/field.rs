@@ -1,0 +1,190 @@
+//! Equipment that another project's Modbus server plays, where this machine has it: `UNDERSTUDY_PYTHON` names a Python with pymodbus.
+
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::time::Instant;
+
+use serde_json::Value;
+
+use super::{DEADLINE, answer, empty_folder, no_orphan, one_at_a_time, running_cluster, signal};
+
+/// What the device is written for.
+const PYMODBUS: &str = "3.16.1";
+
+/// A device on a port of its own. It ends with its standard input.
+struct Device {
+    child: Child,
+    input: Option<ChildStdin>,
+    output: BufReader<ChildStdout>,
+    port: u16,
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        self.input = None;
+        // One that does not end by itself is made to.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Device {
+    /// Nothing where this machine has no pymodbus; says so then.
+    fn start(port: Option<u16>) -> Option<Self> {
+        let python = std::env::var("UNDERSTUDY_PYTHON").unwrap_or_else(|_| "python3".into());
+        let version = Command::new(&python)
+            .args(["-c", "import pymodbus; print(pymodbus.__version__)"])
+            .output()
+            .ok()?;
+        let version = String::from_utf8_lossy(&version.stdout).trim().to_owned();
+        if version != PYMODBUS {
+            eprintln!(
+                "skipped: {python} has pymodbus {version:?} and not {PYMODBUS}: pip install pymodbus=={PYMODBUS}"
+            );
+            return None;
+        }
+        let port = port.unwrap_or_else(|| {
+            let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+            listener.local_addr().expect("bound").port()
+        });
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/modbus-cell/device.py");
+        let mut child = Command::new(&python)
+            .arg(script)
+            .arg(port.to_string())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("it ran a moment ago");
+        let mut device = Self {
+            input: child.stdin.take(),
+            output: BufReader::new(child.stdout.take().expect("piped")),
+            child,
+            port,
+        };
+        assert_eq!(device.line(), "ready");
+        Some(device)
+    }
+
+    fn line(&mut self) -> String {
+        let mut line = String::new();
+        self.output.read_line(&mut line).expect("text");
+        line.trim_end().to_owned()
+    }
+
+    fn mood(&mut self, mood: &str) {
+        let input = self.input.as_mut().expect("it runs");
+        writeln!(input, "{mood}").expect("it listens");
+    }
+}
+
+/// The example, with the device's own port.
+fn cluster(out: &Path, port: u16) -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    let text = fs::read_to_string(root.join("modbus-cell/cluster.toml")).expect("text");
+    assert!(text.contains("127.0.0.1:5020"));
+    let text = text.replace("127.0.0.1:5020", &format!("127.0.0.1:{port}"));
+    let text = text.replace("../press-cell/", "");
+    fs::write(out.join("cluster.toml"), text).expect("written");
+    for file in ["modbus-cell/tank.ladder", "press-cell/press.ladder"] {
+        let name = Path::new(file).file_name().expect("a file");
+        fs::copy(root.join(file), out.join(name)).expect("copied");
+    }
+    out.join("cluster.toml")
+}
+
+#[test]
+fn a_device_of_another_project_is_driven_while_its_controller_is_dead() {
+    let _one = one_at_a_time();
+    let out = empty_folder("modbus");
+    let Some(mut device) = Device::start(None) else {
+        return;
+    };
+    let file = cluster(&out, device.port);
+    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/modbus-cell/kill.toml");
+    let runs = out.join("runs");
+    let (_, document, errors) = answer(&[
+        "lab",
+        file.to_str().expect("text"),
+        "--scenario",
+        scenario.to_str().expect("text"),
+        "--link",
+        "udp",
+        "--out",
+        runs.to_str().expect("text"),
+    ]);
+    no_orphan(&out);
+    let summary = &document["result"]["summary"];
+    assert_eq!(summary["violation_count"], 0, "{summary:#}\n{errors}");
+    assert_eq!(summary["cycles_run"], summary["cycles_asked"], "{errors}");
+    let counts = &summary["remote_ios"][0]["counts"];
+    assert!(counts["reconstructed"].as_u64() > Some(0), "{counts:#}");
+    // The device saw the valve move, between its marks.
+    assert!(device.line().starts_with("level 0 valve 1"));
+}
+
+/// Waits for what the tank's remote I/O says from record `from` on, and answers with the number of records until then.
+fn wait_for(journal: &Path, from: usize, what: &str, test: impl Fn(&Value) -> bool) -> usize {
+    let deadline = Instant::now() + DEADLINE;
+    loop {
+        let text = fs::read_to_string(journal).unwrap_or_default();
+        let found = text.lines().enumerate().skip(from).find(|(_, line)| {
+            serde_json::from_str::<Value>(line)
+                .is_ok_and(|record| record["name"] == "tank-io" && test(&record["event"]))
+        });
+        if let Some((place, _)) = found {
+            return place;
+        }
+        assert!(Instant::now() < deadline, "waited for: {what}");
+        std::thread::yield_now();
+    }
+}
+
+#[test]
+fn a_device_that_refuses_is_silent_or_gone_means_fail_safe_and_comes_back() {
+    let _one = one_at_a_time();
+    let out = empty_folder("modbus_troubles");
+    let Some(mut device) = Device::start(None) else {
+        return;
+    };
+    let port = device.port;
+    let file = cluster(&out, port);
+    let runs = out.join("runs");
+    let (mut child, _errors) = running_cluster(&file, &runs, &[]);
+    let journal = runs.join("latest/journal.jsonl");
+    let lost = |reason: &'static str| {
+        move |event: &Value| {
+            let said = event["reason"].as_str().unwrap_or_default();
+            event["event"] == "field-lost" && said.contains(reason)
+        }
+    };
+    let source = |wanted: &'static str| {
+        move |event: &Value| event["event"] == "applied" && event["source"] == wanted
+    };
+    let bad = |event: &Value| {
+        event["event"] == "applied"
+            && event["source"] == "fail-safe"
+            && event["missing"] == "bad-quality"
+    };
+    let mut at = wait_for(&journal, 0, "driven", source("direct"));
+    for (mood, reason) in [("refuse", "refuses"), ("silent", "does not answer")] {
+        device.mood(mood);
+        at = wait_for(&journal, at, reason, lost(reason));
+        at = wait_for(&journal, at, "fail-safe by bad quality", bad);
+        device.mood("well");
+        at = wait_for(&journal, at, "driven again", source("direct"));
+    }
+    drop(device);
+    at = wait_for(&journal, at, "fail-safe without a device", bad);
+    let device = Device::start(Some(port)).expect("it was there before");
+    wait_for(&journal, at, "driven by the new device", source("direct"));
+    signal(child.id(), nix::sys::signal::Signal::SIGINT);
+    child.wait().expect("it ends");
+    drop(device);
+    no_orphan(&out);
+    let summary = fs::read_to_string(runs.join("latest/summary.json")).expect("written");
+    let summary: Value = serde_json::from_str(&summary).expect("JSON");
+    assert_eq!(summary["violation_count"], 0, "{summary:#}");
+}
