@@ -7,8 +7,8 @@ use serde_json::{Value, json};
 use understudy_diagnostic::Severity;
 use understudy_supervisor::operations::{minstate, supreduce, sync};
 use understudy_supervisor::{
-    Automaton, Bounds, Finding, Model, SymbolicBounds, Together, model_findings, modular_findings,
-    specification_findings, synthesis_findings, synthesise, synthesise_modularly,
+    Automaton, Bounds, Finding, Model, SymbolicBounds, Together, empty_finding, model_findings,
+    modular_findings, specification_findings, synthesis_findings, synthesise, synthesise_modularly,
     synthesise_symbolically, write_model,
 };
 
@@ -213,11 +213,11 @@ fn symbolic(arguments: &Arguments, model: &Model, bounds: Bounds) -> Result<Answ
         made.node_count()
     );
     let mut answer = Answer::done(text, value);
-    if made.is_empty() {
-        let message =
-            "there is no supervisor; the explicit engine shows why, where the product fits"
-                .to_owned();
-        answer = answer.and_failure(Status::Failed, "U0841", message);
+    let why = made
+        .explanation(plants.len())
+        .map_err(|error| failed(error.code(), error.to_string()))?;
+    if let Some(why) = &why {
+        answer = with_findings(answer, &[empty_finding(model, why)], Status::Failed);
     }
     if arguments.output.is_none() && !arguments.reduce && !arguments.minstate {
         return Ok(answer);

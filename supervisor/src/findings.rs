@@ -79,9 +79,7 @@ pub fn synthesis_findings(model: &Model, result: &Supcon) -> Vec<Finding> {
         findings.push(Finding::warning("U0842", message));
     }
     match (&result.explanation, &result.violation) {
-        (Some(explanation), _) => {
-            findings.push(Finding::error("U0841", empty(model, explanation)));
-        }
+        (Some(explanation), _) => findings.push(empty_finding(model, explanation)),
         (None, Some(violation)) => {
             let message = format!(
                 "{}; the supervisor keeps away from there",
@@ -101,6 +99,11 @@ pub fn specification_findings(result: &Supcon) -> Option<Finding> {
         "the specifications are no supervisors by themselves: with the plants they have {all} states, and a supervisor keeps to {kept} of them"
     );
     (!result.is_as_specified()).then(|| Finding::error("U0846", message))
+}
+
+/// U0841: there is no supervisor, and why.
+pub fn empty_finding(model: &Model, explanation: &Explanation) -> Finding {
+    Finding::error("U0841", empty(model, explanation))
 }
 
 /// What local-modular synthesis found: as for each local supervisor, and U0845 where they conflict.

@@ -29,7 +29,8 @@ pub use automaton::{Automaton, AutomatonError, Edge, State, Transition};
 pub use drawing::{TooLargeToDraw, draw_automaton_svg, draw_dot};
 pub use explicit::{Bounds, TooLarge};
 pub use findings::{
-    Finding, model_findings, modular_findings, specification_findings, synthesis_findings,
+    Finding, empty_finding, model_findings, modular_findings, specification_findings,
+    synthesis_findings,
 };
 pub use model::{Model, ReadModel, Signal, read_model, write_model};
 pub use modular::{

@@ -12,6 +12,7 @@
     reason = "what a diagram is never changes; what changes inside counts its users"
 )]
 
+mod explain;
 mod order;
 mod saturation;
 mod space;

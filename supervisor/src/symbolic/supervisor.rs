@@ -14,15 +14,17 @@ use crate::explicit::{Bounds, TooLarge};
 
 /// A supervisor that is not listed but asked.
 pub struct SymbolicSupervisor<'a> {
-    parts: Vec<&'a Automaton>,
-    alphabet: Alphabet,
-    space: Space,
+    pub(super) parts: Vec<&'a Automaton>,
+    pub(super) alphabet: Alphabet,
+    pub(super) space: Space,
     /// The component on each level.
-    order: Vec<usize>,
+    pub(super) order: Vec<usize>,
     /// By the place of the event in the alphabet.
-    events: Vec<Moves>,
+    pub(super) events: Vec<Moves>,
     states: Diagram,
-    bounds: SymbolicBounds,
+    /// Tuples that are not good by themselves: where a specification is violated, or from which no marked one is reached.
+    pub(super) causes: Diagram,
+    pub(super) bounds: SymbolicBounds,
 }
 
 /// What the supervisor says about an event.
@@ -80,7 +82,7 @@ impl<'a> SymbolicSupervisor<'a> {
         let parts: Vec<&Automaton> = plants.iter().chain(specifications).copied().collect();
         let mut made = Self::prepare(&parts, bounds)?;
         if made.parts.iter().all(|part| !part.is_empty()) {
-            made.states = made.fixed_point(plants.len())?;
+            (made.states, made.causes) = made.fixed_point(plants.len())?;
         }
         Ok(made)
     }
@@ -100,7 +102,7 @@ impl<'a> SymbolicSupervisor<'a> {
             .labels()
             .map(|label| moves(&parts, &order, label))
             .collect();
-        let states = space.nothing();
+        let (states, causes) = (space.nothing(), space.nothing());
         Ok(Self {
             parts,
             alphabet,
@@ -108,6 +110,7 @@ impl<'a> SymbolicSupervisor<'a> {
             order,
             events,
             states,
+            causes,
             bounds,
         })
     }
@@ -126,11 +129,13 @@ impl<'a> SymbolicSupervisor<'a> {
         Saturation::new(&self.space, self.reversed(|_| true)).closure(&marked, within)
     }
 
-    fn fixed_point(&self, plants: usize) -> Result<Diagram, BddError> {
+    /// What is good and reached, and the causes of all that is not.
+    fn fixed_point(&self, plants: usize) -> Result<(Diagram, Diagram), BddError> {
         let space = &self.space;
         let tuples = space.tuples()?;
         let violated = self.violated(plants)?;
         let violated = space.and(&violated, &tuples)?;
+        let mut causes = violated.clone();
         let mut bad = self
             .uncontrollably_backwards()
             .closure(&violated, &tuples)?;
@@ -141,8 +146,9 @@ impl<'a> SymbolicSupervisor<'a> {
             let blocked = space.without(&reached, &live)?;
             // Each round removes at least one state.
             if blocked.is_constant(false) {
-                return Ok(reached);
+                return Ok((reached, causes));
             }
+            causes = space.or(&causes, &blocked)?;
             let mut drawn = self.uncontrollably_backwards();
             bad = space.or(&bad, &drawn.closure(&blocked, &reached)?)?;
         }

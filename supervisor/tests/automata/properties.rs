@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use proptest::prelude::*;
 use understudy_supervisor::operations::{
-    allevents, condat, control_equivalent, isomorph, lift, meet, minstate, mutex, nonconflict,
-    project, selfloop, supcon, supreduce, sync, trim,
+    Explanation, Violation, allevents, condat, control_equivalent, isomorph, lift, meet, minstate,
+    mutex, nonconflict, project, selfloop, supcon, supreduce, sync, trim,
 };
 use understudy_supervisor::{
     Automaton, Bounds, Event, Label, State, SymbolicBounds, Transition, draw_automaton_svg,
@@ -251,6 +251,26 @@ proptest! {
         prop_assert_eq!(symbolic.state_count(), Some(expected.state_count() as u128));
         prop_assert_eq!(symbolic.transition_count(), Ok(Some(expected.transition_count() as u128)));
         prop_assert_eq!(nonconflict(&[&explicit.supervisor], bounds), Ok(None));
+        let why = symbolic.explanation(plants.len()).unwrap();
+        prop_assert_eq!(why.is_some(), expected.is_empty());
+        let length = |why: &Option<Explanation>| match why {
+            Some(Explanation::Violated(violation)) => violation.word.len(),
+            Some(Explanation::Blocked { word, .. }) => word.len(),
+            Some(Explanation::EmptyPart { .. }) | None => 0,
+        };
+        // The explicit engine counts as blocked what is reached through places that are not good, too.
+        prop_assert!(length(&explicit.explanation) <= length(&why));
+        if let Some(Explanation::Violated(Violation { word, event, specification })) = why {
+            let mut states = vec![State::INITIAL; parts.len()];
+            for label in word {
+                prop_assert!(!label.is_controllable());
+                states = naive.next(&states, label).expect("it is possible");
+            }
+            let allows = |place: usize| {
+                !parts[place].alphabet().contains(event) || parts[place].step(states[place], event).is_some()
+            };
+            prop_assert!((0..plants.len()).all(allows) && !allows(plants.len() + specification));
+        }
     }
 
     #[test]
