@@ -27,6 +27,7 @@ mod parity;
 mod party;
 mod petri;
 mod proxy;
+mod reconfigure;
 mod reliability;
 mod run;
 mod schema;
@@ -75,6 +76,7 @@ enum Command {
     Synth(synth::Arguments),
     SupervisorToLadder(supervisor_to_ladder::Arguments),
     Petri(petri::Arguments),
+    Reconfigure(reconfigure::Arguments),
     Reliability(reliability::Arguments),
     Measure(measure::Arguments),
     Campaign(campaign::Arguments),
@@ -105,6 +107,7 @@ impl Command {
             Self::Synth(_) => "synth",
             Self::SupervisorToLadder(_) => "supervisor-to-ladder",
             Self::Petri(_) => "petri",
+            Self::Reconfigure(_) => "reconfigure",
             Self::Reliability(_) => "reliability",
             Self::Measure(_) => "measure",
             Self::Campaign(_) => "campaign",
@@ -135,6 +138,7 @@ impl Command {
             Self::Synth(arguments) => synth::run(&arguments),
             Self::SupervisorToLadder(arguments) => supervisor_to_ladder::run(&arguments),
             Self::Petri(arguments) => petri::run(&arguments),
+            Self::Reconfigure(arguments) => reconfigure::run(&arguments),
             Self::Reliability(arguments) => reliability::run(&arguments),
             Self::Measure(arguments) => measure::run(&arguments),
             Self::Campaign(arguments) => campaign::run(&arguments, console),

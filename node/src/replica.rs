@@ -68,6 +68,8 @@ pub(crate) enum Followed {
     FromGenesis(Lineage),
     /// It does not find itself in the history.
     Lost,
+    /// The history does not lead where its remote I/O says that it does: it has been changed, and says nothing.
+    Changed,
 }
 
 impl Replica {
@@ -150,6 +152,9 @@ impl Replica {
             return Followed::InStep;
         }
         let newest = &sample.history[sample.history.len() - 1];
+        if sample.before.after(newest) != sample.after {
+            return Followed::Changed;
+        }
         if self
             .copy
             .as_ref()
@@ -159,6 +164,9 @@ impl Replica {
             return self.in_step(shadow_cycles);
         }
         let lineages = lineages_of(sample);
+        if lineages.last() != Some(&sample.after) {
+            return Followed::Changed;
+        }
         if let Some(place) = self.find(&lineages) {
             self.replay(program, scratch, sample, place, moment);
             return self.in_step(shadow_cycles);

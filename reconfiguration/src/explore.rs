@@ -127,8 +127,7 @@ pub fn explore(
     let names = remembered
         .iter()
         .map(|&place| registers[place].name.clone());
-    let quotient = quotient(signals, names.collect(), &seen, &hidden, &remembers, &edges);
-    let controller = quotient.controller;
+    let controller = quotient(signals, names.collect(), &seen, &hidden, &remembers, &edges);
     if let Some(&state) = controller.deadlocks().first() {
         let way = controller.way_to(state);
         let name = |events: &Vec<_>| match events.as_slice() {

@@ -7,17 +7,25 @@
 //! of states in which the plant may be, each with an output command that is safe for all of them. [`module_two`] writes it as
 //! rungs below the ladder, and [`proof`] holds the whole to the relation without a line of what made it.
 
+mod advice;
+mod analysis;
 pub mod command;
 mod controller;
+mod drawing;
 pub mod explore;
 mod mega;
 pub mod module_two;
+pub mod project;
 pub mod proof;
 mod quotient;
+pub mod record;
 mod relation;
+mod report;
 mod settle;
 mod signals;
 
+pub use advice::{ChannelAdvice, Effect};
+pub use analysis::{Failure, Outcome, analyse};
 pub use controller::{Controller, Move, State};
 pub use mega::{Analysis, Label, MegaController, MegaState, Question, Unbuilt, failed_channels};
 pub use relation::{Feedback, Relation, Row, feedback, joint_feedback};

@@ -8,13 +8,15 @@
 //! unseen events from happening where outputs can ([`crate::settle`]), reads a repaired channel's value (*disaggregation*), and
 //! sees all inputs of a scan at once. They differ in how much may have happened unseen before a failure is known.
 
+use std::collections::BTreeSet;
+
 use rustc_hash::FxHashMap;
 
 use crate::command::Objective;
 use crate::controller::{Controller, Move, reach};
 use crate::relation::{Feedback, Relation, joint_feedback};
 use crate::settle::{Command, Ground, NoCommand};
-use crate::signals::Event;
+use crate::signals::{Bits, Event};
 
 /// How the observation is analysed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -130,8 +132,10 @@ impl MegaController {
         let marked = controller.marked();
         let mut backward = vec![Vec::new(); builder.states.len()];
         for (source, edges) in builder.edges.iter().enumerate() {
-            for (_, target) in edges {
-                backward[*target].push(source);
+            for (label, target) in edges {
+                if builder.can_happen(source, label) {
+                    backward[*target].push(source);
+                }
             }
         }
         let home = builder.states.iter().enumerate().filter(|(_, state)| {
@@ -146,6 +150,22 @@ impl MegaController {
             places: builder.places,
             seeds: builder.seeds,
         })
+    }
+
+    /// Outputs that are safe wherever the plant may be.
+    ///
+    /// # Errors
+    /// There are none.
+    pub fn outputs_for_any(
+        controller: &Controller,
+        relation: &Relation,
+        question: &Question,
+    ) -> Result<Bits, NoCommand> {
+        let mut ground = Ground::new(controller, relation, &question.objective);
+        let all: Vec<u32> = (0..controller.states().len() as u32).collect();
+        let blocked = BTreeSet::new();
+        let only_prevented = ground.prevented(&all, &blocked);
+        ground.answer(&all, only_prevented)
     }
 
     /// The state of these members and failed channels.
@@ -216,6 +236,32 @@ impl Builder<'_> {
                 .iter()
                 .position(|&known| known == input);
             bit.is_some_and(|bit| failed >> bit & 1 == 1)
+        })
+    }
+
+    /// Whether the command of a state lets its plant do what `label` says. What it prevents is followed all the same, should
+    /// it be seen, but is no way to come back.
+    fn can_happen(&self, place: usize, label: &Label) -> bool {
+        let state = &self.states[place];
+        let (Label::Seen(events), Some(command)) = (label, &state.command) else {
+            return true;
+        };
+        state.members.iter().any(|&member| {
+            let mut moves = self.ground.controller.moves(member as usize).iter();
+            moves.any(|step| {
+                let mut seen = step.events.clone();
+                seen.retain(|&event| !self.is_unseen(state.failed, event));
+                let is_let = |&event: &Event| {
+                    self.ground
+                        .relation
+                        .allows(member as usize, event, &command.outputs)
+                };
+                let is_this = match self.question.analysis {
+                    Analysis::Section2 => events.iter().all(|event| seen.contains(event)),
+                    Analysis::Prompt | Analysis::Late => seen == *events,
+                };
+                is_this && step.events.iter().all(is_let)
+            })
         })
     }
 

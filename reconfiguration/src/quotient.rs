@@ -20,21 +20,6 @@ pub(crate) struct Seen {
 /// What tells scans of one vector apart, from the coarsest to the finest.
 pub(crate) type Hidden = Vec<u64>;
 
-/// Two scans of one state that go on differently, though nothing known tells them apart.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Unexplained {
-    pub(crate) first: usize,
-    pub(crate) second: usize,
-}
-
-/// What came of merging.
-pub(crate) struct Quotient {
-    pub(crate) controller: Controller,
-    /// The state of each node.
-    pub(crate) state_of: Vec<usize>,
-    pub(crate) unexplained: Vec<Unexplained>,
-}
-
 /// Merges `nodes`, of which the first is the first scan; `edges` go from a scan to the next. `hidden` has, for each node,
 /// equally many keys. `memory` are the bits of [`State::memory`], one per node, or none.
 pub(crate) fn quotient(
@@ -44,7 +29,7 @@ pub(crate) fn quotient(
     hidden: &[Hidden],
     memory: &[Bits],
     edges: &[(u32, u32)],
-) -> Quotient {
+) -> Controller {
     let mut vectors: FxHashMap<&Seen, usize> = FxHashMap::default();
     let vector_of: Vec<usize> = nodes
         .iter()
@@ -55,14 +40,13 @@ pub(crate) fn quotient(
         .collect();
     let depth = hidden.first().map_or(0, Vec::len);
     let mut finesse = vec![0_usize; vectors.len()];
-    let (blocks, unexplained) = loop {
+    let blocks = loop {
         let blocks = blocks(&vector_of, hidden, &finesse);
-        let conflicts = conflicts(nodes, edges, &blocks);
         let mut grew = false;
-        let mut split = BTreeSet::new();
-        for conflict in &conflicts {
-            split.insert(vector_of[conflict.first]);
-        }
+        let split: BTreeSet<usize> = conflicts(nodes, edges, &blocks)
+            .into_iter()
+            .map(|node| vector_of[node])
+            .collect();
         for vector in split {
             if finesse[vector] < depth {
                 finesse[vector] += 1;
@@ -70,7 +54,7 @@ pub(crate) fn quotient(
             }
         }
         if !grew {
-            break (blocks, conflicts);
+            break blocks;
         }
     };
     let count = blocks.iter().copied().max().map_or(0, |last| last + 1);
@@ -99,11 +83,7 @@ pub(crate) fn quotient(
         .iter()
         .map(|&(from, to)| (blocks[from as usize], blocks[to as usize]))
         .collect();
-    Quotient {
-        controller: Controller::new(signals, memory_names, states, pairs),
-        state_of: blocks,
-        unexplained,
-    }
+    Controller::new(signals, memory_names, states, pairs)
 }
 
 /// Numbers the blocks in the order in which their first nodes come.
@@ -122,23 +102,18 @@ fn blocks(vector_of: &[usize], hidden: &[Hidden], finesse: &[usize]) -> Vec<usiz
         .collect()
 }
 
-/// For each state and new inputs with different outputs to come, the first two scans that differ.
-fn conflicts(nodes: &[Seen], edges: &[(u32, u32)], blocks: &[usize]) -> Vec<Unexplained> {
-    let mut first: FxHashMap<(usize, &Bits), (usize, usize)> = FxHashMap::default();
+/// The scans of states that, on the same new inputs, go on to different ones.
+fn conflicts(nodes: &[Seen], edges: &[(u32, u32)], blocks: &[usize]) -> Vec<usize> {
+    let mut first: FxHashMap<(usize, &Bits), usize> = FxHashMap::default();
     let mut found = Vec::new();
     for &(from, to) in edges {
         let (from, to) = (from as usize, to as usize);
         if blocks[from] == blocks[to] {
             continue;
         }
-        let known = *first
-            .entry((blocks[from], &nodes[to].inputs))
-            .or_insert((from, to));
-        if blocks[known.1] != blocks[to] {
-            found.push(Unexplained {
-                first: known.0,
-                second: from,
-            });
+        let known = *first.entry((blocks[from], &nodes[to].inputs)).or_insert(to);
+        if blocks[known] != blocks[to] {
+            found.push(from);
         }
     }
     found

@@ -171,6 +171,24 @@ impl<'a> Ground<'a> {
         posed
     }
 
+    /// Only what must not happen.
+    pub(crate) fn prevented(
+        &self,
+        members: &[u32],
+        blocked: &BTreeSet<(u32, Event)>,
+    ) -> Vec<Posed> {
+        let mut posed = self.posed(members, blocked);
+        posed.retain(|posed| !posed.demand.enable);
+        posed
+    }
+
+    /// Outputs that do what is posed.
+    pub(crate) fn answer(&mut self, members: &[u32], posed: Vec<Posed>) -> Result<Bits, NoCommand> {
+        let weights = self.weights(members);
+        let solved = self.solver.solve(&posed, &weights);
+        solved.map_err(|unsolved| no_command(members, 0, &posed, unsolved))
+    }
+
     /// A command for `members`; where not all may happen that should, as much of it as fits in the order of the events.
     pub(crate) fn command(
         &mut self,

@@ -53,6 +53,14 @@ pub enum Event {
         /// Who has it.
         from: StationId,
     },
+    /// After a restart: living stations hold different states of one cycle. The operator decides, by releasing the outputs, for
+    /// the first of them.
+    Disputed {
+        /// In this cycle.
+        moment: Moment,
+        /// Who holds them.
+        stations: StationSet,
+    },
     /// Samples that nobody heard are void: the program goes on from an older state that a station still has.
     Voided {
         /// In this cycle.

@@ -9,7 +9,8 @@
 //!
 //! ```text
 //!   Listening ── a living station holds a state ──► Running from its lineage
-//!      ▲    └─── nobody holds one ────────────────► Running from the initial state (cold start)
+//!      ▲    ├─── nobody holds one ────────────────► Running from the initial state (cold start)
+//!      │    └─── they hold different ones of one cycle ── the operator decides ── Running
 //!      └──────── living stations, none of them on this history, for `listen_cycles` ── Running
 //! ```
 
@@ -70,13 +71,24 @@ pub struct RemoteIo {
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 enum Phase {
     /// The history is not known: cycles listened for so far.
-    Listening { cycles: u32 },
+    Listening {
+        cycles: u32,
+        /// Whether the operator has been asked from which state to go on.
+        disputed: bool,
+    },
     /// The history, whether it has this cycle's sample, and the cycles for which no living station was on it.
     Running {
         history: History,
         sampled: bool,
         unfollowed: u32,
     },
+}
+
+impl Phase {
+    const LISTENING: Self = Self::Listening {
+        cycles: 0,
+        disputed: false,
+    };
 }
 
 impl RemoteIo {
@@ -97,7 +109,7 @@ impl RemoteIo {
                 stations,
                 agreement.flag_after,
             ),
-            phase: Phase::Listening { cycles: 0 },
+            phase: Phase::LISTENING,
             field: Image::zero(settings.inputs),
             field_lost: false,
             released: true,
@@ -305,6 +317,12 @@ impl Machine for RemoteIo {
                     self.field.clone_from(sensors);
                     self.field_lost = false;
                 }
+            }
+            Input::Release if matches!(self.phase, Phase::Listening { disputed: true, .. }) => {
+                self.report(Event::Released {
+                    moment: self.moment(),
+                });
+                self.start(self.moment());
             }
             Input::FieldLost => self.field_lost = true,
             Input::Release => {

@@ -2,7 +2,7 @@
 //!
 //! Living means heard in the last few cycles, speaking or asking to join.
 
-use understudy_wire::{Holding, ProgramId, StationId};
+use understudy_wire::{Holding, ProgramId, StationId, StationSet};
 
 /// One entry for each station that can hold the program's state.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -74,11 +74,23 @@ impl Witnesses {
     }
 
     /// What the living hold.
-    pub(crate) fn holdings(&self) -> impl Iterator<Item = (StationId, &Holding)> {
+    pub(crate) fn holdings(&self) -> impl Iterator<Item = (StationId, &Holding)> + Clone {
         self.entries
             .iter()
             .filter(|entry| self.lives(entry))
             .filter_map(|entry| Some((entry.station, entry.holding.as_ref()?)))
+    }
+
+    /// Those who hold the state that was stepped last, where they hold different ones: nobody can say which the plant has seen.
+    pub(crate) fn disputed(&self) -> Option<StationSet> {
+        let (_, newest) = self.newest()?;
+        let equal = self
+            .holdings()
+            .filter(|(_, other)| other.stepped == newest.stepped);
+        let differ = equal
+            .clone()
+            .any(|(_, other)| other.lineage != newest.lineage);
+        differ.then(|| equal.map(|(station, _)| station).collect())
     }
 
     /// The state that was stepped last. A later sample is a newer history, because only one remote I/O makes samples.

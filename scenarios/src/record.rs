@@ -125,6 +125,7 @@ pub(crate) fn moment(event: &Happening) -> Option<Moment> {
             | RemoteIo::Syndrome { moment, .. }
             | RemoteIo::DigestDiffers { moment, .. }
             | RemoteIo::ValueFault { moment, .. }
+            | RemoteIo::Disputed { moment, .. }
             | RemoteIo::Stalled { moment, .. } => Some(*moment),
             RemoteIo::StartedCold { born, .. } => Some(*born),
             RemoteIo::Refused { .. } => None,

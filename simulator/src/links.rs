@@ -214,12 +214,17 @@ impl Links {
     }
 
     fn place(&self, party: Party) -> Option<usize> {
-        let place = match party {
-            Party::Station(station) => station.index(),
-            Party::RemoteIo(program) => self.stations.len() + program.index(),
-            Party::Plant(_) => return None,
-        };
-        (place < self.senders.len()).then_some(place)
+        match party {
+            Party::Station(station) => {
+                let is_there = self.stations.contains(station);
+                is_there.then_some(station.index())
+            }
+            Party::RemoteIo(program) => {
+                let is_there = self.remote_ios.contains(program);
+                is_there.then(|| self.stations.len() + program.index())
+            }
+            Party::Plant(_) => None,
+        }
     }
 
     /// The frame as it leaves its sender; nothing where every receiver refuses it.

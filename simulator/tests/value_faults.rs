@@ -237,9 +237,9 @@ fn two_understudies_mask_a_flipped_word() {
     }
 }
 
-/// Lineages name inputs, so a changed input is another history: nobody believes it, and the next sample heals it.
+/// A sample says the lineage that it leads to, so one that was changed is as one that was lost.
 #[test]
-fn a_flipped_sample_is_another_history() {
+fn a_flipped_sample_is_a_lost_one() {
     for understudies in 0..3 {
         for party in [0, 1, 2, 3]
             .map(station)
@@ -250,17 +250,16 @@ fn a_flipped_sample_is_another_history() {
                 continue;
             }
             for bit in 0..10 {
-                for frames in [1, 2, 7] {
+                for frames in [1, 2, 7, 40] {
                     let action = Action::FlipSample { bit, frames };
                     let outcome = run(understudies, ValueFault::Hold, &[(AT, 0.0, party, action)]);
                     assert_eq!(outcome.violations, [], "{party:?} {action:?}");
                     assert_eq!(outcome.accusations, [], "{party:?} {action:?}");
                     let held: u64 = outcome.tallies.iter().map(untrue).sum();
                     let masked = understudies > 0 && matches!(party, Party::Station(_));
-                    assert!(
-                        held <= if masked { 0 } else { 7 },
-                        "{party:?} {action:?} {held}"
-                    );
+                    // A copy serves where one frame was changed.
+                    let most = if masked { 0 } else { u64::from(frames) / 2 };
+                    assert!(held <= most, "{party:?} {action:?} {held}");
                     let mut simulation = outcome.simulation;
                     let back = simulation.run(1, 20, &mut |_, _, _, _| {});
                     assert_eq!(back, Ok(()), "{party:?} {action:?}");

@@ -4,7 +4,7 @@ use insta::assert_snapshot;
 
 use crate::understudy;
 
-const COMMANDS: [&str; 19] = [
+const COMMANDS: [&str; 23] = [
     "campaign",
     "demo",
     "lab",
@@ -13,9 +13,13 @@ const COMMANDS: [&str; 19] = [
     "parity",
     "draw",
     "supervisor-to-ladder",
+    "reconfigure",
     "reliability",
     "measure",
     "init",
+    "keys",
+    "operate",
+    "doctor",
     "node",
     "remote-io",
     "plant",

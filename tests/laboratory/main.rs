@@ -5,6 +5,7 @@
     reason = "what is waited for has a deadline on the real clock"
 )]
 
+mod boiler;
 mod field;
 mod hosts;
 

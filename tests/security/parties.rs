@@ -1,5 +1,8 @@
 //! A party that runs with keys: an operator's calls, a machine's examination.
 
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::os::unix::net::UnixDatagram;
 use std::path::Path;
 use std::process::Stdio;
 use std::time::Instant;
@@ -113,6 +116,82 @@ fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
             "the operator is answered no more"
         );
     }
+}
+
+/// It runs, because its own list is an old one; the others have the new one.
+#[test]
+fn a_party_whose_keys_were_revoked_is_named_and_not_heard() {
+    let _one = ONE_AT_A_TIME
+        .lock()
+        .unwrap_or_else(|poisoned| poisoned.into_inner());
+    let folder = empty_folder("revoked_party");
+    let cluster = addressed_cell(&folder);
+    let keys = folder.join("keys");
+    let (cluster, keys) = (text(&cluster), text(&keys));
+    assert_eq!(answer(&["keys", "init", cluster, "--folder", keys]).0, 0);
+    let stolen = folder.join("stolen");
+    copy(Path::new(&format!("{keys}/parties/press")), &stolen);
+    let common = ["--link", "udp", "--no-real-time"];
+    let press = ["node", cluster, "--name", "press", "--keys", text(&stolen)];
+    let _stolen = Running::start(&[&press[..], &common].concat());
+    let own = format!("{keys}/parties/robot");
+    let robot = ["node", cluster, "--name", "robot", "--keys", &own];
+    let mut robot = understudy(&[&robot[..], &common].concat())
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the binary is built");
+    let output = BufReader::new(robot.stdout.take().expect("it is piped"));
+    let _robot = Running(robot);
+    let mut revoked = false;
+    let started = Instant::now();
+    for line in output.lines().map_while(Result::ok) {
+        assert!(started.elapsed() < DEADLINE, "not yet named: {line}");
+        if !revoked {
+            // It is heard first, and then no more.
+            assert_eq!(answer(&["keys", "revoke", "press", "--folder", keys]).0, 0);
+            revoked = true;
+        }
+        if line.contains(r#""refused_as":"revoked""#) {
+            assert!(line.contains(r#""sender":{"station":1}"#), "{line}");
+            return;
+        }
+    }
+    panic!("the robot has ended");
+}
+
+/// What systemd is told, of a party that runs and of one that stands still.
+#[test]
+fn signs_of_life_come_from_a_cycle_that_runs() {
+    let _one = ONE_AT_A_TIME
+        .lock()
+        .unwrap_or_else(|poisoned| poisoned.into_inner());
+    let folder = empty_folder("watchdog");
+    let cluster = addressed_cell(&folder);
+    let path = std::env::temp_dir().join(format!("understudy-{}.notify", std::process::id()));
+    let socket = UnixDatagram::bind(&path).expect("nobody else has it");
+    socket
+        .set_read_timeout(Some(DEADLINE))
+        .expect("it is not zero");
+    let party = ["node", text(&cluster), "--name", "robot", "--link", "udp"];
+    let party = understudy(&[&party[..], &["--security", "off", "--no-real-time"]].concat())
+        .env("NOTIFY_SOCKET", &path)
+        .env("WATCHDOG_USEC", "400000")
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .spawn();
+    let party = Running(party.expect("the binary is built"));
+    let mut bytes = [0; 256];
+    let mut next = || {
+        let length = socket.recv(&mut bytes).expect("a sign in time");
+        String::from_utf8_lossy(&bytes[..length]).into_owned()
+    };
+    assert!(next().starts_with("READY=1"));
+    for _ in 0..3 {
+        assert_eq!(next(), "WATCHDOG=1");
+    }
+    drop(party);
+    fs::remove_file(&path).expect("it is ours");
 }
 
 fn copy(from: &Path, to: &Path) {

@@ -74,6 +74,8 @@ pub struct Sample {
     pub base: Lineage,
     /// The lineage before this cycle's sample, the last of `history`: L(i)(t).
     pub before: Lineage,
+    /// The lineage after it, L(i)(t+1): what does not lead there has been changed since it was sampled.
+    pub after: Lineage,
     /// Oldest first; the last is u(i)(t). Never empty.
     pub history: SmallVec<[Image; 2]>,
     /// What was applied last; nothing before the first deadline.

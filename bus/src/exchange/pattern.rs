@@ -149,6 +149,7 @@ fn sample() -> Body {
         born: moment(),
         base: Lineage(u64::MAX),
         before: Lineage(u64::MAX),
+        after: Lineage(u64::MAX),
         history: (0..8).map(|_| Image::zero(WIDTH)).collect(),
         applied: None,
         excluded: StationSet::EMPTY,

@@ -122,6 +122,7 @@ fn sample() -> Sample {
         born: Moment::default(),
         base: Lineage(1),
         before: Lineage(1),
+        after: Lineage(2),
         history: [Image::zero(3)].into_iter().collect(),
         applied: None,
         excluded: StationSet::EMPTY,

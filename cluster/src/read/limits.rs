@@ -137,6 +137,7 @@ mod tests {
                     born: LATE,
                     base: Lineage(u64::MAX),
                     before: Lineage(u64::MAX),
+                    after: Lineage(u64::MAX),
                     history: std::iter::repeat_n(ones(bits), history).collect(),
                     applied: Some(Applied {
                         moment: LATE,

@@ -104,6 +104,7 @@ impl Truth {
                 born: self.born,
                 base: self.lineages[first],
                 before: self.lineages[self.inputs.len() - 1],
+                after: self.lineages[self.inputs.len()],
                 history: self.inputs[first..].iter().cloned().collect(),
                 applied: None,
                 excluded: StationSet::EMPTY,

@@ -28,15 +28,22 @@ impl RemoteIo {
                     *unfollowed + 1
                 };
                 if *unfollowed > listen_cycles {
-                    self.phase = Phase::Listening { cycles: 0 };
+                    self.phase = Phase::LISTENING;
                 }
             }
-            Phase::Listening { cycles } => {
+            Phase::Listening { cycles, disputed } => {
                 *cycles += u32::from(self.witnesses.anybody());
                 // One who could hold the state and is not there gets longer: it may be the only one that does.
                 let patience = if self.witnesses.everybody() { 1 } else { 5 };
-                if *cycles >= listen_cycles * patience {
-                    self.start(moment);
+                if *cycles < listen_cycles * patience {
+                    return;
+                }
+                match self.witnesses.disputed() {
+                    None => self.start(moment),
+                    Some(stations) if !std::mem::replace(disputed, true) => {
+                        self.report(Event::Disputed { moment, stations });
+                    }
+                    Some(_) => {}
                 }
             }
         }
@@ -102,6 +109,7 @@ impl RemoteIo {
             born: history.born(),
             base,
             before: history.before(),
+            after: history.head(),
             history: history.samples(),
             applied: self.applied.clone(),
             excluded: self.trust.excluded(),
