@@ -35,6 +35,7 @@ mod shell;
 mod simulate;
 mod supervisor_to_ladder;
 mod synth;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -71,6 +72,7 @@ enum Command {
     Simulate(simulate::Arguments),
     Check(check::Arguments),
     Parity(parity::Arguments),
+    Verify(verify::Arguments),
     Draw(draw::Arguments),
     Des(des::Arguments),
     Synth(synth::Arguments),
@@ -102,6 +104,7 @@ impl Command {
             Self::Simulate(_) => "simulate",
             Self::Check(_) => "check",
             Self::Parity(_) => "parity",
+            Self::Verify(_) => "verify",
             Self::Draw(_) => "draw",
             Self::Des(_) => "des",
             Self::Synth(_) => "synth",
@@ -133,6 +136,7 @@ impl Command {
             Self::Simulate(arguments) => simulate::run(&arguments),
             Self::Check(arguments) => check::run(&arguments),
             Self::Parity(arguments) => parity::run(&arguments),
+            Self::Verify(arguments) => verify::run(&arguments, console),
             Self::Draw(arguments) => draw::run(&arguments),
             Self::Des(arguments) => des::run(&arguments),
             Self::Synth(arguments) => synth::run(&arguments),

@@ -8,6 +8,7 @@ mod help;
 mod others;
 mod petri;
 mod reliability;
+mod verify;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -6,5 +6,7 @@ pub mod program;
 pub mod property;
 pub mod smv;
 pub mod symbolic;
+mod table;
 
+pub use table::scan_table;
 pub use parity::{Assignment, Place, Proof, Refutation, prove_parity, prove_parity_within};

@@ -17,7 +17,7 @@ mod sentence;
 use std::fmt;
 use std::ops::Range;
 
-pub use parse::{Properties, read, read_one};
+pub use parse::{Properties, not_of_one_scan, read, read_one};
 
 /// Scans that a bounded property may look ahead.
 pub const MAXIMUM_SCANS: u32 = 10_000;

@@ -44,23 +44,27 @@ pub fn read(text: &str) -> Properties {
         let Some(mut property) = read_at(body, start, &mut found.diagnostics) else {
             continue;
         };
-        if name == Some("fair") {
-            if !property.formula.is_of_one_scan() {
-                let message = "a condition of fairness speaks of one scan only";
-                let span = start..start + body.trim_end().len();
-                let help =
-                    "leave out AG, EF and the like: `fair: p` means that p comes again and again";
-                found
-                    .diagnostics
-                    .push(Diagnostic::error("U0434", message, span).with_help(help));
-            }
-            found.fair.push(property);
-        } else {
+        if name != Some("fair") {
             property.name = name.map(str::to_owned);
             found.properties.push(property);
+        } else if property.formula.is_of_one_scan() {
+            found.fair.push(property);
+        } else {
+            let place = start + body.len() - body.trim_start().len();
+            found
+                .diagnostics
+                .push(not_of_one_scan(place..start + body.trim_end().len()));
         }
     }
     found
+}
+
+/// A condition of fairness that looks at other scans.
+pub fn not_of_one_scan(span: std::ops::Range<usize>) -> Diagnostic {
+    let message = "a condition of fairness speaks of one scan only";
+    Diagnostic::error("U0434", message, span).with_help(
+        "leave out AG, EF and the like: a condition p means that p comes again and again",
+    )
 }
 
 /// Reads one property; what is wrong comes with places in `text`.

@@ -1,0 +1,296 @@
+//! `understudy verify`: ladders against their properties, and against what everybody wants of a ladder.
+
+mod answer;
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use clap::{Args, ValueEnum};
+use serde_json::json;
+use understudy_cluster::{Cluster, Overrides};
+use understudy_diagnostic::{Report, has_errors};
+use understudy_ladder::{Program, parse, parse_time};
+use understudy_logic::Circuit;
+use understudy_verification::induction::{Induction, invariant, prove_always};
+use understudy_verification::program::{Answer as Proof, Bounds, Subject};
+use understudy_verification::property::{Properties, Property, not_of_one_scan, read, read_one};
+use understudy_verification::symbolic::Resolved;
+use understudy_verification::{prove_parity, smv};
+
+use crate::answer::{Answer, Status};
+use crate::console::Console;
+use crate::files;
+use answer::{Finding, ProgramAnswer};
+
+/// Prove properties of a ladder, or show a run that breaks them
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy verify examples/press-cell/press.ladder
+  understudy verify press.ladder --property \"never ram_down and ram_up\" --property \"AG EF ram_down\"
+  understudy verify press.ladder --properties press.properties --period 20ms
+  understudy verify press.ladder --smv scan --output press.smv
+  understudy verify examples/press-cell/cluster.toml
+
+Without a property it asks what is asked of every ladder: can each output be switched on and off, again and again? Of a cluster also
+whether the understudy equals the sum of its members. docs/properties.md describes formulas, sentences and files of them.
+
+Exit status: 0 when everything was proved, 1 when something does not hold or is undecided, 2 for bad input.")]
+pub(crate) struct Arguments {
+    /// A ladder program, or a cluster file
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// A file of properties, a line each
+    #[arg(long, value_name = "FILE")]
+    properties: Option<PathBuf>,
+    /// A property, as a formula of CTL or a sentence; may be given more than once
+    #[arg(long, value_name = "TEXT")]
+    property: Vec<String>,
+    /// What comes again and again in every run that is looked at; may be given more than once
+    #[arg(long, value_name = "TEXT")]
+    fair: Vec<String>,
+    /// From one scan to the next; timers are so many scans long
+    #[arg(long, value_name = "TIME", default_value = "10ms", value_parser = time)]
+    period: Duration,
+    /// Nodes of decision diagrams alive at once
+    #[arg(long, value_name = "NUMBER", default_value_t = 4_000_000)]
+    nodes: usize,
+    /// For what stays undecided: induction over at most so many scans
+    #[arg(long, value_name = "SCANS", default_value_t = 20)]
+    induction: u32,
+    /// Write the program and its properties for NuSMV, and prove nothing
+    #[arg(long, value_enum)]
+    smv: Option<Smv>,
+    /// A file for --smv, in place of standard output
+    #[arg(long, short, value_name = "FILE", requires = "smv")]
+    output: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Smv {
+    /// One step a scan, as the program runs
+    Scan,
+    /// One module a rung, as in the paper on the deployment of controllers
+    Rungs,
+}
+
+fn time(text: &str) -> Result<Duration, String> {
+    let time = parse_time(text).filter(|time| !time.is_zero());
+    time.ok_or_else(|| format!("{text:?} is no time such as 10ms"))
+}
+
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
+    let is_cluster = arguments
+        .file
+        .extension()
+        .is_some_and(|extension| extension == "toml");
+    if is_cluster {
+        return cluster(arguments);
+    }
+    let source = match files::text(&arguments.file) {
+        Ok(source) => source,
+        Err(answer) => return answer,
+    };
+    let parsed = parse(&source);
+    let program = parsed.program;
+    let report = Report {
+        name: arguments.file.display().to_string(),
+        text: source,
+        diagnostics: parsed.diagnostics,
+    };
+    if report.has_errors() {
+        return Answer::bad_files(vec![report]);
+    }
+    let subject = match Subject::new(&program, arguments.period) {
+        Ok(subject) => subject,
+        Err(error) => return Answer::failed(Status::BadInput, "U0436", error.to_string()),
+    };
+    let asked = match asked(arguments, &subject) {
+        Ok(asked) => asked,
+        Err(mut answer) => {
+            answer.reports.insert(0, report);
+            return answer;
+        }
+    };
+    let answer = match arguments.smv {
+        Some(form) => text_for_nusmv(arguments, form, &program, &subject, &asked),
+        None => proved(arguments, &subject, &asked, console),
+    };
+    answer.with_reports(vec![report])
+}
+
+/// Properties and conditions that were asked for, over the program's signals.
+#[derive(Default)]
+struct Asked {
+    properties: Vec<(Property, Resolved)>,
+    fair: Vec<Resolved>,
+}
+
+fn asked(arguments: &Arguments, subject: &Subject) -> Result<Asked, Answer> {
+    let mut asked = Asked::default();
+    let mut reports = Vec::new();
+    if let Some(path) = &arguments.properties {
+        let text = files::text(path)?;
+        let found = read(&text);
+        reports.push((path.display().to_string(), text, found));
+    }
+    for (text, fair) in arguments
+        .property
+        .iter()
+        .map(|text| (text, false))
+        .chain(arguments.fair.iter().map(|text| (text, true)))
+    {
+        let name = if fair { "--fair" } else { "--property" };
+        let mut found = Properties::default();
+        match read_one(text) {
+            Ok(property) if fair => found.fair.push(property),
+            Ok(property) => found.properties.push(property),
+            Err(wrong) => found.diagnostics = wrong,
+        }
+        reports.push((name.to_owned(), text.clone(), found));
+    }
+    let mut wrong = Vec::new();
+    for (name, text, found) in reports {
+        let mut diagnostics = found.diagnostics;
+        for property in found.properties {
+            match subject.resolve(&property) {
+                Ok(formula) => asked.properties.push((property, formula)),
+                Err(unknown) => diagnostics.extend(unknown),
+            }
+        }
+        for condition in found.fair {
+            match subject.resolve(&condition) {
+                Ok(formula) if formula.is_of_one_scan() => asked.fair.push(formula),
+                Ok(_) => diagnostics.push(not_of_one_scan(0..text.len())),
+                Err(unknown) => diagnostics.extend(unknown),
+            }
+        }
+        if has_errors(&diagnostics) {
+            diagnostics.sort_by_key(|found| found.span.start);
+            wrong.push(Report {
+                name,
+                text,
+                diagnostics,
+            });
+        }
+    }
+    if wrong.is_empty() {
+        Ok(asked)
+    } else {
+        Err(Answer::bad_files(wrong))
+    }
+}
+
+fn text_for_nusmv(
+    arguments: &Arguments,
+    form: Smv,
+    program: &Program,
+    subject: &Subject,
+    asked: &Asked,
+) -> Answer {
+    let formulas: Vec<Resolved> = asked
+        .properties
+        .iter()
+        .map(|(_, formula)| formula.clone())
+        .collect();
+    let text = match form {
+        Smv::Scan => smv::of_circuit(subject.circuit(), &formulas, &asked.fair),
+        Smv::Rungs => smv::of_rungs(program),
+    };
+    match &arguments.output {
+        None => Answer::done(text.clone(), json!({ "text": text })),
+        Some(path) => match files::write(path, &text) {
+            Ok(()) => {
+                let name = path.display().to_string();
+                Answer::done(format!("written to {name}"), json!({ "file": name }))
+            }
+            Err(answer) => answer,
+        },
+    }
+}
+
+fn proved(
+    arguments: &Arguments,
+    subject: &Subject,
+    asked: &Asked,
+    console: &mut Console,
+) -> Answer {
+    let bounds = Bounds {
+        nodes: arguments.nodes,
+    };
+    let mut program = ProgramAnswer::of(subject, bounds);
+    let formulas: Vec<Resolved> = asked
+        .properties
+        .iter()
+        .map(|(_, formula)| formula.clone())
+        .collect();
+    let mut last_told = Instant::now();
+    let mut told = |place: usize, _: &Proof| {
+        if last_told.elapsed() > Duration::from_secs(1) {
+            last_told = Instant::now();
+            console.note(&format!("{} of {} properties", place + 1, formulas.len()));
+        }
+    };
+    let answers = subject.check(&formulas, asked.fair.clone(), bounds, &mut told);
+    for ((property, formula), proof) in asked.properties.iter().zip(answers) {
+        // Induction knows no fairness; what it proves of all runs holds of the fair ones, and its counterexample may be unfair.
+        let proof = match (&proof, invariant(formula)) {
+            (Proof::Undecided(_), Some(kept)) => {
+                match prove_always(subject.circuit(), kept, arguments.induction) {
+                    Some(Induction::Holds(_)) => Proof::Holds(None),
+                    Some(Induction::Fails(trace)) if asked.fair.is_empty() => {
+                        Proof::Fails(Some(trace))
+                    }
+                    _ => proof,
+                }
+            }
+            _ => proof,
+        };
+        program
+            .properties
+            .push(Finding::new(subject.circuit(), property, formula, proof));
+    }
+    answer::of_programs(vec![program], None)
+}
+
+/// Every program of a cluster against what is asked of all, and the understudy against its members.
+fn cluster(arguments: &Arguments) -> Answer {
+    if !(arguments.property.is_empty() && arguments.properties.is_none() && arguments.smv.is_none())
+    {
+        let message = "properties and --smv are of one ladder; name the ladder of the cluster's program instead of the cluster";
+        return Answer::failed(Status::BadInput, "U0437", message);
+    }
+    let (cluster, reports) = match files::cluster(&arguments.file, Overrides::default()) {
+        Ok(read) => read,
+        Err(answer) => return answer,
+    };
+    let bounds = Bounds {
+        nodes: arguments.nodes,
+    };
+    let mut programs = Vec::new();
+    for controller in cluster.controllers() {
+        let period = cluster.agreement().schedule.period();
+        let subject = match Subject::new(&controller.program, period) {
+            Ok(subject) => subject,
+            Err(error) => return Answer::failed(Status::BadInput, "U0436", error.to_string()),
+        };
+        programs.push(ProgramAnswer::of(&subject, bounds));
+    }
+    answer::of_programs(programs, Some(parity(&cluster))).with_reports(reports)
+}
+
+/// What the proof of the understudy says.
+fn parity(cluster: &Cluster) -> Result<String, String> {
+    let members: Vec<Circuit> = cluster
+        .controllers()
+        .iter()
+        .map(|controller| controller.circuit.clone())
+        .collect();
+    match prove_parity(&members, cluster.parity().circuit()) {
+        Ok(proof) => Ok(format!(
+            "the understudy equals the sum of its members: {} registers and {} outputs compared",
+            proof.registers, proof.outputs
+        )),
+        Err(refutation) => Err(refutation.to_string()),
+    }
+}

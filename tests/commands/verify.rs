@@ -1,0 +1,67 @@
+//! Proofs of ladders as a person meets them.
+
+use std::fs;
+
+use insta::assert_snapshot;
+use serde_json::json;
+
+use crate::{empty_folder, understudy};
+
+const PRESS: &str = "examples/press-cell/press.ladder";
+
+#[test]
+fn what_is_proved_and_what_fails_with_a_run() {
+    let answer = understudy(&[
+        "verify",
+        PRESS,
+        "--property",
+        "move_down only while stop",
+        "--property",
+        "AG EF move_down",
+        "--property",
+        "pressing is followed by raising",
+    ]);
+    assert_snapshot!(answer.shown());
+}
+
+#[test]
+fn a_ladder_alone_and_a_cluster_are_asked_what_all_are_asked() {
+    let ladder = understudy(&["verify", PRESS]);
+    assert_eq!(ladder.status, 0, "{}", ladder.shown());
+    let cluster = understudy(&["verify", "examples/press-cell/cluster.toml", "--json"]);
+    assert_eq!(cluster.status, 0, "{}", cluster.shown());
+    let result = &cluster.json()["result"];
+    assert_eq!(result["proved"], json!(true));
+    assert_eq!(result["programs"].as_array().map(Vec::len), Some(2));
+}
+
+#[test]
+fn every_wrong_line_of_a_file_is_said_and_nothing_is_proved() {
+    let folder = empty_folder("verify");
+    let file = folder.join("press.properties");
+    fs::write(
+        &file,
+        "AG (move_dwn\nright: AG EF move_down\nnever oops and stop\nfair: AG stop\n",
+    )
+    .expect("written");
+    let answer = understudy(&["verify", PRESS, "--properties", &file.display().to_string()]);
+    let shown = answer
+        .shown()
+        .replace(&folder.display().to_string(), "FOLDER");
+    assert_snapshot!(shown);
+}
+
+#[test]
+fn a_bound_that_is_too_small_leaves_it_undecided_or_to_induction() {
+    let check = |property: &str| {
+        let robot = "examples/press-cell/robot.ladder";
+        let few = ["verify", robot, "--nodes", "20", "--json", "--property"];
+        let answer = understudy(&[&few[..], &[property]].concat());
+        answer.json()["result"]["programs"][0]["properties"][0]["verdict"].clone()
+    };
+    assert_eq!(check("never move_down and stop"), json!("holds"));
+    assert_eq!(
+        check("AG (move_up -> EF (grip & EF move_left))"),
+        json!("undecided")
+    );
+}
