@@ -189,10 +189,9 @@ fn read_signals(
     };
     // Places in the model would be looked for in the map.
     let signals: Vec<Signal> = signals.into_iter().map(Signal::without_place).collect();
-    let mut map = map.with_signals(&signals, &alphabet);
-    map.addresses
-        .extend(addresses.into_iter().map(Located::without_place));
-    Ok((map, report))
+    let located: Vec<Located> = addresses.into_iter().map(Located::without_place).collect();
+    let map = map.with_signals(&signals, &alphabet);
+    Ok((map.with_addresses(&located), report))
 }
 
 fn bad_map(mut report: Report, diagnostics: Vec<Diagnostic>) -> Answer {

@@ -209,6 +209,8 @@ fn signals_of_a_model_are_a_map() {
     let switch = "program = \"ram\"\n[[switch]]\noff = \"stop\"\npositions = [{ event = \"start\", signal = \"lower\" }]\n";
     let map = read_map(switch).map.expect("a map");
     let both = map.with_signals(&model.signals, &modules.alphabet());
+    // The map has no signal `motor`.
+    let both = both.with_addresses(&model.addresses);
     insta::assert_snapshot!(program(&both), @r"
     down  plant: done when it becomes 1; lifted when it becomes 0
     lower  on from start

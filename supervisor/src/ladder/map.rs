@@ -113,6 +113,25 @@ impl InputOutputMap {
         self
     }
 
+    /// This map with the `addresses` of a model, but for signals that it does not have or has located itself.
+    #[must_use]
+    pub fn with_addresses(mut self, addresses: &[Located]) -> Self {
+        let requests = self.requests.iter().map(|request| &request.signal);
+        let inputs = self.inputs.iter().map(|input| &input.signal);
+        let pulses = self.pulses.iter().map(|pulse| &pulse.signal);
+        let positions = self.switches.iter().flat_map(|switch| &switch.positions);
+        let positions = positions.map(|position| &position.signal);
+        let signals = requests.chain(inputs).chain(pulses).chain(positions);
+        let signals: BTreeSet<&str> = signals.chain(&self.start).map(Name::as_str).collect();
+        let is_free = |located: &&Located| {
+            let known = |own: &Located| own.signal == located.signal;
+            signals.contains(located.signal.as_str()) && !self.addresses.iter().any(known)
+        };
+        let more: Vec<Located> = addresses.iter().filter(is_free).cloned().collect();
+        self.addresses.extend(more);
+        self
+    }
+
     /// The events to which the map gives a meaning.
     fn event_names(&self) -> impl Iterator<Item = &Name> {
         let inputs = self.inputs.iter().map(|input| &input.event);
