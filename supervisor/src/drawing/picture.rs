@@ -126,7 +126,9 @@ impl Picture {
         let at = match bends {
             [] => middle(start, end),
             [bend] => middle(*bend, middle(start, end)),
-            _ if bends.len() % 2 == 0 => middle(bends[bends.len() / 2 - 1], bends[bends.len() / 2]),
+            _ if bends.len().is_multiple_of(2) => {
+                middle(bends[bends.len() / 2 - 1], bends[bends.len() / 2])
+            }
             _ => {
                 let number = bends.len() / 2;
                 let sides = middle(bends[number - 1], bends[number + 1]);

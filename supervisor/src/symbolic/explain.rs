@@ -9,6 +9,12 @@ use crate::alphabet::Label;
 use crate::automaton::State;
 use crate::operations::{Explanation, Violation};
 
+/// Events, and the tuple to which they lead.
+struct Way {
+    word: Vec<Label>,
+    states: Vec<State>,
+}
+
 impl SymbolicSupervisor<'_> {
     /// Why it is empty, where it is; `plants` are the first so many components. The sequence is a shortest one to where a
     /// specification is violated or no marked state can be reached, found backwards, set by set.
@@ -24,9 +30,9 @@ impl SymbolicSupervisor<'_> {
         if !self.is_empty() {
             return Ok(None);
         }
-        let word = self.word_to_a_cause();
-        let word = word.map_err(|error| TooComplex::of(&error, self.bounds))?;
-        Ok(word.map(|(word, states)| {
+        let way = self.way_to_a_cause();
+        let way = way.map_err(|error| TooComplex::of(&error, self.bounds))?;
+        Ok(way.map(|Way { word, states }| {
             let is_violated = |&event: &Label| {
                 Some((event, self.violated_specification(&states, event, plants)?))
             };
@@ -46,7 +52,7 @@ impl SymbolicSupervisor<'_> {
     }
 
     /// Uncontrollable events from the initial tuple to a tuple that is not good by itself.
-    fn word_to_a_cause(&self) -> Result<Option<(Vec<Label>, Vec<State>)>, BddError> {
+    fn way_to_a_cause(&self) -> Result<Option<Way>, BddError> {
         let mut states = vec![State::INITIAL; self.parts.len()];
         let within = self.space.tuples()?;
         let mut seen = self.space.and(&self.causes, &within)?;
@@ -85,7 +91,7 @@ impl SymbolicSupervisor<'_> {
             word.push(label);
             states = next;
         }
-        Ok(Some((word, states)))
+        Ok(Some(Way { word, states }))
     }
 
     fn holds(&self, set: &Diagram, states: &[State]) -> bool {
