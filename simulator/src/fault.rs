@@ -26,6 +26,11 @@ pub enum Action {
     Crash,
     /// It starts again, knowing nothing.
     Restart,
+    /// It starts again on a host whose wall clock has jumped: the epoch that it founds where nobody is there is this one.
+    RestartInEpoch {
+        /// The epoch.
+        epoch: u64,
+    },
     /// It starts again with another configuration, as after a wrong download: it and the others refuse each other.
     RestartMisconfigured,
     /// It stands still, and frames wait for it (SIGSTOP).
@@ -67,6 +72,8 @@ pub enum Action {
         /// So many frames ago; 1 is its last one.
         age: u16,
     },
+    /// A stranger says its last frame again in its name, with other outputs or inputs, and without its key.
+    Forge,
     /// One bit of x(i) flips in the memory of a station.
     FlipState {
         /// i.
@@ -96,6 +103,7 @@ impl Action {
         match self {
             Self::Crash => "crash",
             Self::Restart => "restart",
+            Self::RestartInEpoch { .. } => "restart-in-epoch",
             Self::RestartMisconfigured => "restart-misconfigured",
             Self::Stop => "stop",
             Self::Continue => "continue",
@@ -106,6 +114,7 @@ impl Action {
             Self::Delay { .. } => "delay",
             Self::Corrupt { .. } => "corrupt",
             Self::Replay { .. } => "replay",
+            Self::Forge => "forge",
             Self::FlipState { .. } => "flip-state",
             Self::FlipSample { .. } => "flip-sample",
             Self::FlipWord { .. } => "flip-word",

@@ -14,6 +14,7 @@ mod queue;
 mod referee;
 mod simulation;
 mod slot;
+mod stranger;
 mod tally;
 
 pub use fault::{Action, Fault};

@@ -17,6 +17,7 @@ use understudy_wire::{
 use crate::fault::Action;
 use crate::network::{Disturbance, Network};
 use crate::queue::{Delivery, Queue};
+use crate::stranger::forged;
 
 /// Frames of each party that can be said again, at most; older ones are forgotten. The last one is always remembered.
 const REMEMBERED: usize = 1024;
@@ -101,7 +102,7 @@ impl Links {
             .map_or(0, |place| self.senders[place].frames)
     }
 
-    /// Frames that were changed on their way and refused for it.
+    /// Frames that were changed on their way or forged, and refused for it.
     pub(crate) fn refused(&self) -> u64 {
         self.refused
     }
@@ -169,6 +170,15 @@ impl Links {
             Action::Slow { by } => {
                 self.late[place] = by;
                 self.anybody_late = self.late.iter().any(|late| !late.is_zero());
+            }
+            Action::Forge => {
+                let Some(last) = self.senders[place].sent.back() else {
+                    return;
+                };
+                match forged(last) {
+                    Some(frame) => self.carry(now, place, frame),
+                    None => self.refused += 1,
+                }
             }
             Action::Replay { age } => {
                 let sent = &self.senders[place].sent;

@@ -244,7 +244,7 @@ impl Simulation {
         &self.violations
     }
 
-    /// Frames that were changed on their way, and that their receivers refused for it.
+    /// Frames that were changed on their way or forged, and that their receivers refused for it.
     pub fn refused_frames(&self) -> u64 {
         self.links.refused()
     }

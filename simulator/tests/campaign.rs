@@ -47,6 +47,10 @@ fn action() -> impl Strategy<Value = (Action, Option<Action>)> {
         1 => late().prop_map(move |by| lasting(Action::Slow { by }, Action::Slow { by: on_time })),
         1 => (1..20_u16).prop_map(|frames| (Action::Corrupt { frames }, None)),
         2 => prop_oneof![1..8_u16, 8..500_u16].prop_map(|age| (Action::Replay { age }, None)),
+        1 => Just((Action::Forge, None)),
+        2 => (0..20_u64).prop_map(move |epoch| {
+            lasting(Action::Crash, Action::RestartInEpoch { epoch })
+        }),
         1 => (0..10_u16, 1..20_u16).prop_map(|(bit, frames)| (Action::FlipSample { bit, frames }, None)),
     ]
 }

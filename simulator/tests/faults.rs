@@ -188,3 +188,120 @@ fn a_restart_storm_costs_no_cycle() {
         }
     }
 }
+
+/// With keys a stranger is not heard, whatever it says in whose name.
+#[test]
+fn a_forged_frame_is_refused() {
+    for party in PARTIES {
+        let forged: Vec<_> = (0..40)
+            .map(|number| {
+                let phase = f64::from(number) / 40.0;
+                (60 + number as u64, phase, party, Action::Forge)
+            })
+            .collect();
+        let outcome = quiet(&forged);
+        assert_eq!(outcome.refused_frames, 40, "{party:?}");
+        assert_eq!(untrue(&outcome), 0, "{party:?}");
+    }
+}
+
+/// The wall clock gives a station the epoch that it founds when nobody is there. One that comes back with an epoch from the past or
+/// from the far future renumbers nobody; where all come back so, they agree on one again.
+#[test]
+fn a_wall_clock_that_jumps_renumbers_nobody() {
+    for epoch in [0, 1, 2, 1000, u64::MAX] {
+        let in_epoch = Action::RestartInEpoch { epoch };
+        for rank in 0..3 {
+            let party = Party::Station(StationId(rank));
+            let faults = [(50, 0.3, party, Action::Crash), (80, 0.6, party, in_epoch)];
+            let outcome = quiet(&faults);
+            assert_eq!(untrue(&outcome), 0, "{party:?} in epoch {epoch}");
+        }
+        let all = [0, 1, 2].map(|rank| Party::Station(StationId(rank)));
+        let crashes = all.map(|party| (50, 0.3, party, Action::Crash));
+        let restarts = [
+            (60, 0.6, all[0], in_epoch),
+            (64, 0.6, all[1], Action::RestartInEpoch { epoch: 7 }),
+            (60, 0.8, all[2], Action::Restart),
+        ];
+        quiet(&[crashes, restarts].concat());
+    }
+}
+
+/// The only holder of a state is stopped while the others start cold in an epoch before its own: what it knows is history.
+#[test]
+fn a_state_from_a_later_epoch_is_not_newer_for_it() {
+    let all = [0, 1, 2].map(|rank| Party::Station(StationId(rank)));
+    let early = Action::RestartInEpoch { epoch: 0 };
+    quiet(&[
+        (50, 0.3, all[2], Action::Stop),
+        (50, 0.4, all[0], Action::Crash),
+        (50, 0.4, all[1], Action::Crash),
+        (55, 0.0, all[0], early),
+        (55, 0.2, all[1], early),
+        (120, 0.0, all[2], Action::Continue),
+        (130, 0.0, ROBOT_IO, Action::Crash),
+        (131, 0.0, ROBOT_IO, Action::Restart),
+    ]);
+}
+
+/// A state that is corrupted while it is computed in shadow never speaks.
+#[test]
+fn a_fault_in_shadow_is_found_in_shadow() {
+    for party in [ROBOT, UNDERSTUDY] {
+        for cycle in 60..70 {
+            for bit in 0..8 {
+                let program = ProgramId(0);
+                let outcome = quiet(&[
+                    (50, 0.0, party, Action::Crash),
+                    (60, 0.0, party, Action::Restart),
+                    (cycle, 0.8, party, Action::FlipState { program, bit }),
+                    (100, 0.0, ROBOT_IO, Action::Release),
+                    (101, 0.0, party, Action::Crash),
+                    (101, 0.1, party, Action::Restart),
+                    (120, 0.0, ROBOT_IO, Action::Release),
+                ]);
+                // Later it speaks, and is found by comparison with the others.
+                if cycle < 63 {
+                    assert_eq!(untrue(&outcome), 0, "{party:?}, cycle {cycle}, bit {bit}");
+                }
+            }
+        }
+    }
+}
+
+/// A remote I/O whose samples are changed on their way, and which loses its history meanwhile: what nobody has sampled is no
+/// state of any program.
+#[test]
+fn a_changed_sample_is_no_history() {
+    for party in PARTIES {
+        for frames in [1, 3, 10, 30] {
+            for restarted in [51, 52, 55] {
+                let flip = Action::FlipSample { bit: 0, frames };
+                quiet(&[
+                    (50, 0.0, party, flip),
+                    (restarted, 0.4, ROBOT_IO, Action::Crash),
+                    (restarted, 0.5, ROBOT_IO, Action::Restart),
+                ]);
+            }
+        }
+    }
+}
+
+/// After a cold start the operator releases the outputs, and nobody else.
+#[test]
+fn a_cold_start_waits_for_the_operator() {
+    let mut parts = press_cell::parts(Mode::Full, 1);
+    for settings in &mut parts.remote_ios {
+        settings.release = understudy_remote_io::Release::Operator;
+    }
+    let mut simulation = Simulation::new(parts, Network::default(), 1);
+    let nobody = simulation.run(1, 100, &mut |_, _, _, _| {});
+    assert!(nobody.is_err(), "nothing is driven directly yet");
+    assert!(
+        simulation
+            .tallies()
+            .iter()
+            .all(|it| it.fail_safe > 90 && it.direct == 0)
+    );
+}

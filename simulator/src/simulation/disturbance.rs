@@ -38,10 +38,13 @@ impl Simulation {
     fn disturb_station(&mut self, station: StationId, action: Action, observe: &mut Observe<'_>) {
         let slot = &mut self.stations[station.index()];
         match action {
-            Action::Restart | Action::RestartMisconfigured => {
+            Action::Restart | Action::RestartMisconfigured | Action::RestartInEpoch { .. } => {
                 self.founded += 1;
                 let mut settings = self.parts.stations[station.index()].clone();
-                settings.epoch = Epoch(self.founded);
+                settings.epoch = match action {
+                    Action::RestartInEpoch { epoch } => Epoch(epoch),
+                    _ => Epoch(self.founded),
+                };
                 if action == Action::RestartMisconfigured {
                     settings.agreement = Arc::new(misconfigured(&settings.agreement));
                 }
@@ -65,7 +68,7 @@ impl Simulation {
         let party = Party::RemoteIo(program);
         let slot = &mut self.remote_ios[program.index()];
         match action {
-            Action::Restart | Action::RestartMisconfigured => {
+            Action::Restart | Action::RestartMisconfigured | Action::RestartInEpoch { .. } => {
                 let mut settings = self.parts.remote_ios[program.index()].clone();
                 if action == Action::RestartMisconfigured {
                     settings.agreement = Arc::new(misconfigured(&settings.agreement));
