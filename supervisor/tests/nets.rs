@@ -2,7 +2,7 @@
 
 use understudy_diagnostic::{Diagnostic, Report};
 use understudy_supervisor::Label;
-use understudy_supervisor::petri::{ReadNet, read_net, write_net};
+use understudy_supervisor::petri::{ReadNet, draw_net_dot, draw_net_svg, read_net, write_net};
 
 fn shown(text: &str, diagnostics: Vec<Diagnostic>) -> String {
     let report = Report {
@@ -140,4 +140,38 @@ door = "%IX"
     insta::assert_snapshot!(shown("", read_net("").diagnostics), @r#"
 1:1 U0863 a net needs "name"
 "#);
+}
+
+#[test]
+fn a_net_is_drawn() {
+    let net = read_net(NET).file.expect("right").net;
+    insta::assert_snapshot!(draw_net_dot(&net), @r#"
+digraph "store" {
+    rankdir=LR; edge [arrowsize=0.7];
+    p0 [shape=circle, label="●●●", xlabel="free"];
+    p1 [shape=circle, label="", xlabel="held ≤ 3\n/ full\n/ lamp\n/ bell once"];
+    t0 [shape=box, width=0.1, height=0.5, label="", xlabel="bring\nthere /stop [ +key | -door [ a | b ] c ]", style=filled, fillcolor=black];
+    p0 -> t0 [label="2" style=solid];
+    t0 -> p1 [label="2" style=solid];
+    p1 -> t0 [label="2" arrowhead=odot];
+    t1 [shape=box, width=0.1, height=0.5, label="", xlabel="fetch\narm\nafter 1s500ms"];
+    p1 -> t1 [style=solid];
+    t1 -> p0 [style=solid];
+    p1 -> t1 [style=dashed];
+    p0 -> t1 [label="2" style=dashed];
+}
+"#);
+    let picture = draw_net_svg(&net).expect("it fits");
+    // The page, and a bar for each transition; a circle for each place, and one in the head of an inhibitor arc.
+    assert_eq!(picture.matches("<rect").count(), 3);
+    assert_eq!(picture.matches("<ellipse").count(), 2);
+    for text in [
+        ">held ≤ 3<",
+        ">/ bell once<",
+        ">after 1s500ms<",
+        ">●●●<",
+        "url(#circle)",
+    ] {
+        assert!(picture.contains(text), "{text}\n{picture}");
+    }
 }
