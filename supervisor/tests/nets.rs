@@ -162,7 +162,7 @@ digraph "store" {
 }
 "#);
     let picture = draw_net_svg(&net).expect("it fits");
-    // The page, and a bar for each transition; a circle for each place, and one in the head of an inhibitor arc.
+    // The page, a bar for each transition, and a circle for each place.
     assert_eq!(picture.matches("<rect").count(), 3);
     assert_eq!(picture.matches("<ellipse").count(), 2);
     for text in [

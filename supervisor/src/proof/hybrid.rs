@@ -5,8 +5,10 @@
 //! be waited for: `IN` of each becomes an output, which must be 1 exactly while the delay is to last, and its `Q` is `IN` in
 //! any scan in which a new input says so. Every run of the real timer is one of these.
 
+mod compare;
 mod reference;
 mod verdict;
+mod waiting;
 
 use std::collections::{HashMap, HashSet};
 use std::time::Duration;

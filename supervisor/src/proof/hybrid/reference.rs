@@ -15,9 +15,9 @@ pub(super) struct Joint {
     pub(super) marking: Marking,
     pub(super) states: Box<[State]>,
     /// Transitions that have fired in the last scan.
-    fired: Box<[bool]>,
+    pub(super) fired: Box<[bool]>,
     /// For each place that is a counter, how many scans it has stood still, up to 2.
-    still: Box<[u8]>,
+    pub(super) still: Box<[u8]>,
 }
 
 /// What is to be seen of a ladder after a scan.
@@ -52,24 +52,24 @@ pub(super) fn actions(net: &Net) -> Vec<(Name, Vec<(usize, bool)>)> {
 
 /// The net and its supervisors.
 pub(super) struct Reference<'a> {
-    net: &'a Net,
-    supervisors: &'a [Automaton],
+    pub(super) net: &'a Net,
+    pub(super) supervisors: &'a [Automaton],
     inputs: &'a [String],
-    is_counter: Vec<bool>,
+    pub(super) is_counter: Vec<bool>,
     /// The input that ends each transition's delay.
     over: Vec<Option<usize>>,
-    actions: Vec<(Name, Vec<(usize, bool)>)>,
+    pub(super) actions: Vec<(Name, Vec<(usize, bool)>)>,
 }
 
 /// What has happened in a scan so far.
-struct Now<'s> {
-    marking: Marking,
-    states: Box<[State]>,
+pub(super) struct Now<'s> {
+    pub(super) marking: Marking,
+    pub(super) states: Box<[State]>,
     /// Of each place the tokens that were there before the scan.
-    old: Marking,
-    fired: Vec<usize>,
-    last: &'s [bool],
-    image: &'s [bool],
+    pub(super) old: Marking,
+    pub(super) fired: Vec<usize>,
+    pub(super) last: &'s [bool],
+    pub(super) image: &'s [bool],
 }
 
 impl<'a> Reference<'a> {
@@ -196,7 +196,7 @@ impl<'a> Reference<'a> {
     }
 
     /// Whether the condition holds now, and for a transition with a delay whether it is over.
-    fn condition(&self, now: &Now<'_>, number: usize, seen: &Seen) -> bool {
+    pub(super) fn condition(&self, now: &Now<'_>, number: usize, seen: &Seen) -> bool {
         let transition = &self.net.transitions()[number];
         match self.over[number] {
             Some(over) => seen.powers[number] == Some(true) && now.image[over],
@@ -204,7 +204,7 @@ impl<'a> Reference<'a> {
         }
     }
 
-    fn holds(&self, condition: &Condition, now: &Now<'_>) -> bool {
+    pub(super) fn holds(&self, condition: &Condition, now: &Now<'_>) -> bool {
         match condition {
             Condition::Always => true,
             Condition::Signal(name, when) => {
@@ -223,76 +223,18 @@ impl<'a> Reference<'a> {
         }
     }
 
-    /// A delay lasts while its transition has been enabled from the beginning of the scan, with its condition, by tokens that did
-    /// not come in the last one, and it has not just fired.
-    fn check_delay(
-        &self,
-        joint: &Joint,
-        now: &Now<'_>,
-        number: usize,
-        seen: &Seen,
-    ) -> Result<(), HybridDeviation> {
-        let Some(runs) = seen.powers[number] else {
-            return Ok(());
-        };
-        let transition = &self.net.transitions()[number];
-        let given = |place: usize, is_gain: bool| {
-            let transitions = self.net.transitions().iter().zip(&joint.fired);
-            let mut fired = transitions.filter(|(_, fired)| **fired);
-            fired.any(|(giver, _)| {
-                let taken = if is_gain { giver.taken(place) } else { 0 };
-                giver.given(place) > taken
-            })
-        };
-        let takes = |is_gain| transition.takes.iter().any(|arc| given(arc.place, is_gain));
-        let may_run = !joint.fired[number]
-            && self.net.fire(&joint.marking, transition).is_some()
-            && self.holds(&transition.condition, now)
-            && !takes(true);
-        let counts = |place| self.is_counter[place] && joint.still[place] < 2;
-        // A token that is taken and given back at once may begin the delay anew, or not.
-        let must_run = may_run && !takes(false) && !places(transition).any(counts);
-        if if runs { may_run } else { !must_run } {
-            return Ok(());
-        }
-        Err(HybridDeviation::Delay {
-            transition: transition.name.clone(),
-        })
-    }
-
     /// The supervisor that disables a transition in the states that they have now.
-    fn disabling(&self, now: &Now<'_>, transition: &NetTransition) -> Option<&Automaton> {
+    pub(super) fn disabling(
+        &self,
+        now: &Now<'_>,
+        transition: &NetTransition,
+    ) -> Option<&Automaton> {
         let label = transition.label?;
         let supervisors = self.supervisors.iter().zip(&now.states);
         let mut disabling = supervisors.filter(|(supervisor, state)| {
             supervisor.alphabet().contains(label) && supervisor.step(**state, label).is_none()
         });
         disabling.next().map(|(supervisor, _)| supervisor)
-    }
-
-    fn must_fire(&self, joint: &Joint, now: &Now<'_>, number: usize, seen: &Seen) -> bool {
-        let transition = &self.net.transitions()[number];
-        let came = |place: usize| {
-            let mut fired = now.fired.iter();
-            fired.any(|&giver| self.net.transitions()[giver].given(place) > 0)
-        };
-        let counts = |place: usize| {
-            let moves = |&other: &usize| {
-                let other = &self.net.transitions()[other];
-                other.taken(place) + other.given(place) > 0
-            };
-            self.is_counter[place] && (joint.still[place] == 0 || now.fired.iter().any(moves))
-        };
-        let waits = self.disabling(now, transition);
-        self.net.fire(&now.marking, transition).is_some()
-            && self.condition(now, number, seen)
-            && waits.is_none_or(|_| {
-                !transition
-                    .label
-                    .is_some_and(|label| label.is_controllable())
-            })
-            && !transition.takes.iter().any(|arc| came(arc.place))
-            && !places(transition).any(counts)
     }
 
     fn fire(&self, now: &mut Now<'_>, number: usize, seen: &Seen) -> Result<(), HybridDeviation> {
@@ -354,59 +296,6 @@ impl<'a> Reference<'a> {
             || taker.delay.is_some()
             || givers.any(|giver| !self::edges(giver).is_disjoint(&edges))
     }
-
-    fn compare(&self, now: &Now<'_>, seen: &Seen) -> Result<(), HybridDeviation> {
-        let places = self.net.places().iter().zip(&now.marking);
-        for ((place, &expected), tokens) in places.zip(&seen.tokens) {
-            if *tokens != Some(expected) {
-                return Err(HybridDeviation::Tokens {
-                    place: place.name.clone(),
-                    expected,
-                });
-            }
-        }
-        let supervisors = self.supervisors.iter().zip(&now.states);
-        for ((supervisor, &expected), bits) in supervisors.zip(&seen.states) {
-            if supervisor
-                .states()
-                .zip(bits)
-                .any(|(state, on)| (state == expected) != *on)
-            {
-                return Err(HybridDeviation::State {
-                    supervisor: supervisor.name().to_owned(),
-                    expected: supervisor.state_name(expected).into_owned(),
-                });
-            }
-        }
-        for ((signal, drivers), on) in self.actions.iter().zip(&seen.actions) {
-            let came = |place: usize| {
-                let mut fired = now.fired.iter();
-                fired.any(|&giver| self.net.transitions()[giver].given(place) > 0)
-            };
-            let drives = |&(place, is_level): &(usize, bool)| {
-                if is_level {
-                    now.marking[place] > 0
-                } else {
-                    came(place)
-                }
-            };
-            if *on != drivers.iter().any(drives) {
-                return Err(HybridDeviation::Action {
-                    signal: signal.to_string(),
-                });
-            }
-        }
-        Ok(())
-    }
-}
-
-/// The places that a transition touches or reads.
-fn places(transition: &NetTransition) -> impl Iterator<Item = usize> {
-    let arcs = transition.takes.iter().chain(&transition.gives);
-    let arcs = arcs
-        .chain(&transition.inhibitors)
-        .chain(&transition.enablers);
-    arcs.map(|arc| arc.place)
 }
 
 /// The edges that a transition waits for.
