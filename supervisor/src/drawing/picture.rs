@@ -182,7 +182,7 @@ impl Picture {
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" viewBox=\"{:.1} {:.1} {width:.1} {height:.1}\">\n\
              <defs><marker id=\"arrow\" markerWidth=\"9\" markerHeight=\"7\" refX=\"8\" refY=\"3.5\" orient=\"auto\"><path d=\"M 0 0 L 9 3.5 L 0 7 z\"/></marker>\n\
-             <marker id=\"circle\" markerWidth=\"9\" markerHeight=\"9\" refX=\"8\" refY=\"4.5\"><circle cx=\"4.5\" cy=\"4.5\" r=\"3.5\" fill=\"white\" stroke=\"black\"/></marker></defs>\n\
+             <marker id=\"circle\" markerWidth=\"9\" markerHeight=\"9\" refX=\"8\" refY=\"4.5\" orient=\"auto\"><circle cx=\"4.5\" cy=\"4.5\" r=\"3.5\" fill=\"white\" stroke=\"black\"/></marker></defs>\n\
              <rect x=\"{:.1}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" fill=\"white\"/>\n\
              <style>text {{ font: 12px sans-serif; text-anchor: middle; paint-order: stroke; stroke: white; stroke-width: 4px; stroke-linejoin: round; }}</style>\n\
              {}</svg>\n",
