@@ -65,18 +65,21 @@ impl Scenario {
 }
 
 /// Every action as scenario files write it, in the order in which they are explained.
-pub const ACTIONS: [&str; 14] = [
+pub const ACTIONS: [&str; 17] = [
     "crash",
     "restart",
     "restart-misconfigured",
+    "restart-in-epoch",
     "stop",
     "continue",
     "slow",
     "release",
     "cut",
     "heal",
+    "delay",
     "corrupt",
     "replay",
+    "forge",
     "flip-state",
     "flip-sample",
     "flip-word",
@@ -92,6 +95,8 @@ pub(crate) fn action_text(action: Action, parties: &Parties) -> String {
     let word = action_word(action);
     match action {
         Action::Cut { to } | Action::Heal { to } => format!("{word} to {}", parties.name(to)),
+        Action::Delay { to, by } => format!("{word} to {} by {by:?}", parties.name(to)),
+        Action::RestartInEpoch { epoch } => format!("{word} {epoch}"),
         Action::Slow { by } => format!("{word} by {by:?}"),
         Action::Corrupt { frames } => format!("{word} {frames} frames"),
         Action::Replay { age } => format!("{word} of {age} frames ago"),

@@ -41,6 +41,7 @@ pub fn scenario_schema() -> Schema {
                     "age": small(1),
                     "program": { "type": "string" },
                     "bit": small(0),
+                    "epoch": count(),
                 },
             } },
             "network": {

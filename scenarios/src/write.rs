@@ -62,6 +62,10 @@ fn write_step(text: &mut String, step: &Fault, parties: &Parties) {
     let _ = writeln!(text, "station = {}", name(step.party));
     let _ = match step.action {
         Action::Cut { to } | Action::Heal { to } => writeln!(text, "to = {}", name(to)),
+        Action::Delay { to, by } => {
+            writeln!(text, "to = {}\nby = {}", name(to), time(by))
+        }
+        Action::RestartInEpoch { epoch } => writeln!(text, "epoch = {epoch}"),
         Action::Slow { by } => writeln!(text, "by = {}", time(by)),
         Action::Corrupt { frames } => writeln!(text, "frames = {frames}"),
         Action::Replay { age } => writeln!(text, "age = {age}"),

@@ -95,7 +95,10 @@ impl Presences {
         };
         match action {
             Action::Crash | Action::Stop => self.changes.push((at, station, true)),
-            Action::Restart | Action::RestartMisconfigured | Action::Continue => {
+            Action::Restart
+            | Action::RestartMisconfigured
+            | Action::RestartInEpoch { .. }
+            | Action::Continue => {
                 self.changes.push((at, station, false));
             }
             _ => {}

@@ -52,6 +52,7 @@ impl Stalls {
             }
             Action::Restart
             | Action::RestartMisconfigured
+            | Action::RestartInEpoch { .. }
             | Action::Continue
             | Action::Slow { .. } => {
                 self.disturbed

@@ -13,7 +13,16 @@ use crate::fields::{Fields, Placed, suggest};
 use crate::scenario::{ACTIONS, action_word};
 
 /// Keys that only some actions have.
-const KEYS_OF_ACTIONS: [&str; 7] = ["to", "both_ways", "by", "frames", "age", "program", "bit"];
+const KEYS_OF_ACTIONS: [&str; 8] = [
+    "to",
+    "both_ways",
+    "by",
+    "frames",
+    "age",
+    "program",
+    "bit",
+    "epoch",
+];
 
 /// How late a slow party is, at most.
 const MAXIMUM_SLOWNESS: Duration = Duration::from_secs(1);
@@ -143,6 +152,11 @@ impl Reader<'_> {
             "crash" => one(Action::Crash),
             "restart" => one(Action::Restart),
             "restart-misconfigured" => one(Action::RestartMisconfigured),
+            "restart-in-epoch" => {
+                let epoch = fields.count("epoch", &mut self.diagnostics);
+                let epoch = fields.required("epoch", epoch, &mut self.diagnostics);
+                one(Action::RestartInEpoch { epoch: epoch?.0 })
+            }
             "stop" => one(Action::Stop),
             "continue" => one(Action::Continue),
             "release" => one(Action::Release),
@@ -151,6 +165,15 @@ impl Reader<'_> {
             }),
             "cut" => self.cut(fields, party, |to| Action::Cut { to }),
             "heal" => self.cut(fields, party, |to| Action::Heal { to }),
+            "delay" => {
+                let by = self.slowness(fields);
+                let links = self.cut(fields, party, |to| Action::Delay {
+                    to,
+                    by: by.unwrap_or_default(),
+                });
+                by.and(links)
+            }
+            "forge" => one(Action::Forge),
             "corrupt" => one(Action::Corrupt {
                 frames: self.number(fields, "frames", 1)?,
             }),
@@ -215,7 +238,7 @@ impl Reader<'_> {
         &mut self,
         fields: &mut Fields<'_, '_>,
         party: Option<Party>,
-        action: fn(Party) -> Action,
+        action: impl Fn(Party) -> Action,
     ) -> Option<Vec<(Option<Party>, Action)>> {
         let names = fields.texts("to", &mut self.diagnostics);
         let both_ways = fields.flag("both_ways", &mut self.diagnostics);
@@ -282,7 +305,7 @@ impl Reader<'_> {
             };
             // A process that was restarted runs, whatever it was restarted with.
             let action = match step.action {
-                Action::RestartMisconfigured => Action::Restart,
+                Action::RestartMisconfigured | Action::RestartInEpoch { .. } => Action::Restart,
                 Action::Crash | Action::Restart | Action::Stop | Action::Continue => step.action,
                 _ => continue,
             };
