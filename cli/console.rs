@@ -58,6 +58,19 @@ impl Console {
                     .get_or_insert_with(|| progress_bar(*cycles, words));
                 bar.set_position(*cycle);
             }
+            Progress::Failure { done, of } if bar => {
+                let words = "failure {pos} of {len}, {eta} left";
+                let bar = self
+                    .progress
+                    .get_or_insert_with(|| progress_bar(*of, words));
+                bar.set_position(*done);
+            }
+            Progress::Failure { done, of } => {
+                // Some ten lines, however many there are.
+                if done == of || done % of.div_ceil(10).max(1) == 0 {
+                    self.say(&format!("{done} of {of} failures"));
+                }
+            }
             Progress::Cycle { .. } if self.in_step => {}
             Progress::Cycle { .. } => {
                 self.in_step = true;

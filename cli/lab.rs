@@ -127,6 +127,26 @@ pub(crate) fn scenario_or_undisturbed(
     }
 }
 
+/// How the parties of a cluster are started: by this program, from its file.
+pub(crate) fn laboratory_settings(
+    cluster: &Cluster,
+    cluster_file: PathBuf,
+    overrides: &OverrideArguments,
+    network: NetworkSettings,
+) -> Result<LaboratorySettings, Answer> {
+    let program = std::env::current_exe().map_err(|error| {
+        let message = format!("this program does not know where it lies: {error}");
+        Answer::failed(Status::Failed, "U0604", message)
+    })?;
+    Ok(LaboratorySettings {
+        program,
+        cluster_file,
+        arguments: overrides.to_arguments(),
+        link: link_kind(cluster),
+        network,
+    })
+}
+
 /// Runs, writes the results and answers.
 pub(crate) fn in_laboratory(
     cluster: &Cluster,
@@ -136,19 +156,10 @@ pub(crate) fn in_laboratory(
     directory: &RunDirectory,
     console: &mut Console,
 ) -> Answer {
-    let program = match std::env::current_exe() {
-        Ok(program) => program,
-        Err(error) => {
-            let message = format!("this program does not know where it lies: {error}");
-            return Answer::failed(Status::Failed, "U0604", message);
-        }
-    };
-    let settings = LaboratorySettings {
-        program,
-        cluster_file,
-        arguments: arguments.overrides.to_arguments(),
-        link: link_kind(cluster),
-        network: arguments.network.settings(),
+    let network = arguments.network.settings();
+    let settings = match laboratory_settings(cluster, cluster_file, &arguments.overrides, network) {
+        Ok(settings) => settings,
+        Err(answer) => return answer,
     };
     let mut watch = |progress| console.show(&progress);
     let run = match run_laboratory(cluster, scenario, settings, directory, &mut watch) {

@@ -22,6 +22,7 @@ mod keys;
 mod lab;
 mod measure;
 mod operate;
+mod outlook;
 mod overrides;
 mod parity;
 mod party;
@@ -81,6 +82,7 @@ enum Command {
     Reconfigure(reconfigure::Arguments),
     Reliability(reliability::Arguments),
     Measure(measure::Arguments),
+    Outlook(outlook::Arguments),
     Campaign(campaign::Arguments),
     Init(init::Arguments),
     Keys(keys::Arguments),
@@ -113,6 +115,7 @@ impl Command {
             Self::Reconfigure(_) => "reconfigure",
             Self::Reliability(_) => "reliability",
             Self::Measure(_) => "measure",
+            Self::Outlook(_) => "outlook",
             Self::Campaign(_) => "campaign",
             Self::Init(_) => "init",
             Self::Keys(_) => "keys",
@@ -144,7 +147,8 @@ impl Command {
             Self::Petri(arguments) => petri::run(&arguments),
             Self::Reconfigure(arguments) => reconfigure::run(&arguments),
             Self::Reliability(arguments) => reliability::run(&arguments),
-            Self::Measure(arguments) => measure::run(&arguments),
+            Self::Measure(arguments) => measure::run(&arguments, console),
+            Self::Outlook(arguments) => outlook::run(&arguments),
             Self::Campaign(arguments) => campaign::run(&arguments, console),
             Self::Init(arguments) => init::run(&arguments),
             Self::Keys(arguments) => keys::run(&arguments),

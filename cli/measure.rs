@@ -2,45 +2,39 @@
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
+use std::time::{Duration, SystemTime};
 
 use clap::Args;
-use serde::Serialize;
 use understudy_cluster::Cluster;
-use understudy_reliability::{
-    AccelerationBias, Assessment, Hours, Interval, MAXIMUM_ACCELERATION, Options, System,
-    acceleration_bias, assess, grouped,
+use understudy_reliability::Hours;
+use understudy_scenarios::{
+    LaboratoryError, Measured, Planned, Progress, Question, QuestionError, RealCampaign, Speed,
+    hold_against_model, plan_campaign, run_campaign, run_real_campaign,
 };
-use understudy_scenarios::{CampaignPlan, Measured, run_campaign};
-use understudy_wire::Mode;
 
 use crate::answer::{Answer, Status};
+use crate::console::Console;
 use crate::files;
+use crate::lab::{NetworkArguments, laboratory_settings};
 use crate::overrides::OverrideArguments;
-use crate::reliability::{Times, boxes, refused, write_report};
+use crate::reliability::{Times, refused, write_report};
 use crate::simulate::seed_of_the_clock;
 
-/// Of all intervals.
-const CONFIDENCE: f64 = 0.95;
+/// Of a campaign on processes: no clock holds all of a time that can be written.
+const LONGEST_LIMIT: Duration = Duration::from_secs(365 * 24 * 3600);
 
-/// Cycles of a mean repair, where the command line does not say.
-const CYCLES_OF_A_REPAIR: f64 = 50.0;
-
-/// Cycles of a campaign, at most: above, more than an hour.
-const MAXIMUM_CAMPAIGN_CYCLES: f64 = 1e9;
-
-/// A replica that takes so many times its expectation is given up.
-const PATIENCE: f64 = 1000.0;
-
-/// Let stations fail and be repaired by chance, in the simulator, until the system fails, and hold the MTTF against the model
+/// Let stations fail and be repaired by chance, in the simulator or on processes, until the system fails, and hold the MTTF against the model
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  understudy measure examples/press-cell/cluster.toml --mtbf 25h --mttr 30min --failures 200 --seed 1 --force
+  understudy measure examples/press-cell/cluster.toml --mtbf 25h --mttr 30min --failures 200 --seed 1
+  understudy measure examples/press-cell/cluster.toml --real --mtbf 3s --mttr 200ms --failures 5 --link udp
 
-The protocol is the real one and its detection is not accelerated: the bias of that is calculated and printed. The system
-fails where a remote I/O comes to its fail-safe because nobody holds its program's state; in the paper's mode, at the second
-failure. Equal arguments and seeds give equal campaigns. Exit status 1 when the model lies outside of the 95 % interval, which
-one campaign in twenty does by chance.")]
+The protocol is the real one and its own time is not accelerated: what it needs to detect a failure and to take over states is
+measured, added to the repair in the model, and the bias of it is printed. The system fails where a remote I/O comes to its
+fail-safe because nobody holds its program's state; in the paper's mode, at the second failure. Equal arguments and seeds give
+equal campaigns in the simulator. Exit status 1 when the model lies outside of the 95 % interval, which one campaign in twenty
+does by chance.")]
 pub(crate) struct Arguments {
     /// The cluster file
     #[arg(value_name = "CLUSTER.toml")]
@@ -51,6 +45,9 @@ pub(crate) struct Arguments {
     /// Mean time to repair a station, from the detection on
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     mttr: String,
+    /// Stations that are repaired at the same time, at most; by default a crew for each
+    #[arg(long, value_name = "R")]
+    crews: Option<u32>,
     /// Failures of the system to wait for
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(2..=1_000_000))]
     failures: u64,
@@ -68,6 +65,21 @@ pub(crate) struct Arguments {
     /// The same, said by the cycles that a mean repair takes
     #[arg(long, value_name = "CYCLES", allow_hyphen_values = true)]
     cycles_per_mttr: Option<f64>,
+    /// Kill and restart processes of this machine (kill -9) in place of the simulator's stations; Ctrl-C ends it with what there is
+    #[arg(long)]
+    real: bool,
+    /// Until when the processes run at most
+    #[arg(
+        long,
+        value_name = "TIME",
+        default_value = "10min",
+        requires = "real",
+        allow_hyphen_values = true
+    )]
+    limit: String,
+    /// Where the journals of the processes are kept
+    #[arg(long, value_name = "DIR", default_value = "runs", requires = "real")]
+    out: PathBuf,
     /// Accelerate more than 10,000 times, and run for hours
     #[arg(long)]
     force: bool,
@@ -78,229 +90,128 @@ pub(crate) struct Arguments {
     report: Option<PathBuf>,
 }
 
-#[derive(Debug, Serialize)]
-struct Found<'a> {
-    /// The campaign.
-    plan: CampaignPlan,
-    /// Cycles that were run.
-    cycles: u64,
-    detection_cycles: Option<f64>,
-    reentry_cycles: Option<f64>,
-    /// MTTF by the model without detection and re-entry, in hours.
-    mttf_closed_form_hours: f64,
-    /// What the protocol's own time does to the MTTF, in the plant and in the campaign.
-    bias: AccelerationBias,
-    assessment: &'a Assessment,
-    violations: &'a [String],
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
+    measured(arguments, console).unwrap_or_else(|answer| answer)
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
-    measured(arguments).unwrap_or_else(|answer| answer)
-}
-
-fn measured(arguments: &Arguments) -> Result<Answer, Answer> {
+fn measured(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let mut times = Times::default();
     let mtbf = times.required("mtbf", Some(&arguments.mtbf));
     let mttr = times.required("mttr", Some(&arguments.mttr));
+    let limit = times.required("limit", Some(&arguments.limit));
     let (cluster, reports) = files::cluster(&arguments.cluster, arguments.overrides.overrides())?;
     times.finish(Vec::new())?;
-    let (Some(mtbf), Some(mttr)) = (mtbf, mttr) else {
+    let (Some(mtbf), Some(mttr), Some(limit)) = (mtbf, mttr, limit) else {
         return Err(refused(&[]));
     };
-    let mut options = Options::new(0, mtbf, mttr);
-    (options.controllers, options.spares) = boxes(&cluster);
-    let system = options.system().map_err(|errors| refused(&errors))?;
-    let system = match cluster.agreement().mode {
-        Mode::Full => system,
-        Mode::Paper => system.as_paper(),
-    };
-    let mttf = system
-        .chain()
-        .and_then(|chain| chain.mttf().map_err(|error| vec![error]))
-        .map_err(|errors| refused(&errors))?;
-    let period_hours = cluster.agreement().schedule.period().as_secs_f64() / 3600.0;
-    let factor = factor(arguments, mttr, period_hours);
-    let cycles = |hours: f64| hours / factor / period_hours;
-    let period = Hours::new("the period", period_hours).map_err(|error| refused(&[error]))?;
-    acceleration_bias(&system, period, factor, arguments.force)
-        .map_err(|errors| refused(&errors))?;
-    let expected = cycles(mttf) * arguments.failures as f64;
-    if expected > MAXIMUM_CAMPAIGN_CYCLES && !arguments.force {
-        let message = format!(
-            "this campaign needs about {} cycles, and more than {} take hours; ask for fewer failures, \
-             accelerate more, or take an MTBF nearer to the MTTR (force it if that is wanted)",
-            grouped(expected),
-            grouped(MAXIMUM_CAMPAIGN_CYCLES)
-        );
-        return Err(Answer::failed(Status::BadInput, "U0609", message));
-    }
-    let plan = CampaignPlan {
-        mtbf_cycles: cycles(mtbf.get()),
-        mttr_cycles: cycles(mttr.get()),
-        acceleration: factor,
+    let question = Question {
+        mtbf,
+        mttr,
+        crews: arguments.crews,
         failures: arguments.failures,
         seed: arguments.seed.unwrap_or_else(seed_of_the_clock),
-        maximum_cycles: (PATIENCE * cycles(mttf)).max(PATIENCE) as u64,
-        threads: std::thread::available_parallelism().map_or(1, usize::from),
+        speed: match (arguments.acceleration, arguments.cycles_per_mttr) {
+            (Some(factor), _) => Speed::Factor(factor),
+            (None, Some(cycles)) => Speed::CyclesPerRepair(cycles),
+            (None, None) => Speed::Usual,
+        },
+        forced: arguments.force,
     };
-    let measured = run_campaign(&cluster, &plan)
-        .map_err(|error| Answer::failed(Status::Failed, "U0530", error.to_string()))?;
-    // Nobody can be relied on before its failure is seen, nor before it is in step again: both are the protocol's own time.
-    let own_cycles =
-        measured.detection_cycles.unwrap_or(0.0) + measured.reentry_cycles.unwrap_or(0.0);
-    let own = Hours::new(
-        "the time of the protocol",
-        own_cycles.max(1e-3) * period_hours,
-    )
-    .map_err(|error| refused(&[error]))?;
-    let bias = acceleration_bias(&system, own, factor, arguments.force)
-        .map_err(|errors| refused(&errors))?;
-    let mut campaigned = system.clone();
-    campaigned.detection = Hours::new("the time of the protocol", own.get() * factor)
-        .map(Some)
-        .map_err(|error| refused(&[error]))?;
-    let assessment = assess(&measured.campaign, &campaigned, CONFIDENCE, plan.seed)
-        .map_err(|errors| refused(&errors))?;
-    let found = Found {
-        plan,
-        cycles: measured.cycles,
-        detection_cycles: measured.detection_cycles,
-        reentry_cycles: measured.reentry_cycles,
-        mttf_closed_form_hours: mttf,
-        bias,
-        assessment: &assessment,
-        violations: &measured.violations,
+    let planned = plan_campaign(&cluster, &question).map_err(|errors| not_begun(&errors))?;
+    let (measured, run) = if arguments.real {
+        on_processes(arguments, &cluster, &planned, limit, console)?
+    } else {
+        (in_the_simulator(&cluster, &planned, console)?, None)
     };
-    let mut text = text(&cluster, &found, &measured, &system);
-    let met = assessment.agrees && measured.violations.is_empty();
-    let status = if met { Status::Done } else { Status::Failed };
-    let answer = Answer::done("", &found)
+    let found =
+        hold_against_model(&cluster, &planned, measured).map_err(|errors| refused(&errors))?;
+    let status = if found.is_met() {
+        Status::Done
+    } else {
+        Status::Failed
+    };
+    let mut answer = Answer::done(found.to_text(), &found)
         .with_reports(reports)
         .with_status(status);
+    if let Some((directory, failure)) = run {
+        let _ = writeln!(answer.text, "journals: {}", directory.display());
+        if let Some(failure) = failure {
+            answer = answer.and_failure(Status::Failed, failure.code(), failure.to_string());
+        }
+    }
     if let Some(folder) = &arguments.report {
-        options.detection = campaigned.detection;
-        match write_report(folder, &options, Some(&cluster), Some(assessment)) {
-            Ok(said) => text.push_str(&said),
+        let written = write_report(
+            folder,
+            &planned.options,
+            Some(&cluster),
+            Some(found.assessment),
+        );
+        match written {
+            Ok(said) => answer.text.push_str(&said),
             Err(failed) => {
-                let failures = failed.failures.iter();
-                return Ok(failures.fold(Answer { text, ..answer }, |answer, failure| {
+                return Ok(failed.failures.iter().fold(answer, |answer, failure| {
                     answer.and_failure(Status::Failed, &failure.code, &failure.message)
                 }));
             }
         }
     }
-    Ok(Answer { text, ..answer })
+    Ok(answer)
 }
 
-/// How many times faster than the plant.
-fn factor(arguments: &Arguments, mttr: Hours, period_hours: f64) -> f64 {
-    let by_cycles = |cycles: f64| mttr.get() / (cycles * period_hours);
-    match (arguments.acceleration, arguments.cycles_per_mttr) {
-        (Some(factor), _) => factor,
-        (None, Some(cycles)) => by_cycles(cycles),
-        (None, None) => by_cycles(CYCLES_OF_A_REPAIR).clamp(1.0, MAXIMUM_ACCELERATION),
+fn in_the_simulator(
+    cluster: &Cluster,
+    planned: &Planned,
+    console: &mut Console,
+) -> Result<Measured, Answer> {
+    planned
+        .check_length()
+        .map_err(|error| not_begun(&[error]))?;
+    let of = planned.plan.failures;
+    let measured = run_campaign(cluster, &planned.plan, &mut |done| {
+        console.show(&Progress::Failure { done, of });
+    });
+    console.show(&Progress::Ending);
+    measured.map_err(|error| Answer::failed(Status::Failed, "U0530", error.to_string()))
+}
+
+/// Where the journals of a campaign on processes lie, and why it ended early.
+type OnProcesses = (PathBuf, Option<LaboratoryError>);
+
+fn on_processes(
+    arguments: &Arguments,
+    cluster: &Cluster,
+    planned: &Planned,
+    limit: Hours,
+    console: &mut Console,
+) -> Result<(Measured, Option<OnProcesses>), Answer> {
+    let real = RealCampaign {
+        laboratory: laboratory_settings(
+            cluster,
+            arguments.cluster.clone(),
+            &arguments.overrides,
+            NetworkArguments::default().settings(),
+        )?,
+        out: arguments.out.clone(),
+        now: SystemTime::now(),
+        limit: Duration::from_secs_f64((limit.get() * 3600.0).min(LONGEST_LIMIT.as_secs_f64())),
+    };
+    let failed = |code: &str, message: String| Answer::failed(Status::Failed, code, message);
+    let mut watch = |progress| console.show(&progress);
+    let run = run_real_campaign(cluster, &planned.plan, &real, &mut watch)
+        .map_err(|error| failed("U0602", error.to_string()))?;
+    match (run.measured, run.failure) {
+        (Some(measured), failure) => Ok((measured, Some((run.directory, failure)))),
+        (None, Some(failure)) => Err(failed(failure.code(), failure.to_string())),
+        (None, None) => Err(failed(
+            "U0531",
+            "it ended before everybody was in step: nothing was measured".to_owned(),
+        )),
     }
 }
 
-fn text(cluster: &Cluster, found: &Found<'_>, measured: &Measured, system: &System) -> String {
-    let assessment = found.assessment;
-    let mode = match cluster.agreement().mode {
-        Mode::Full => "full",
-        Mode::Paper => "paper",
-    };
-    let mut text = format!(
-        "seed {}\n{} failures of {} (mode {mode}) in {} simulated cycles, {} times faster than the plant: \
-         MTBF {} cycles, MTTR {} cycles\n\n",
-        found.plan.seed,
-        assessment.failures,
-        cluster.name(),
-        found.cycles,
-        grouped(found.plan.acceleration),
-        grouped(found.plan.mtbf_cycles),
-        grouped(found.plan.mttr_cycles),
-    );
-    let mut line = |name: &str, value: String| {
-        let _ = writeln!(text, "{name:<34} {value}");
-    };
-    line(
-        "MTTF measured, 95 % interval",
-        said(&assessment.mttf_hours, " h"),
-    );
-    let verdict = if assessment.agrees {
-        "inside"
-    } else {
-        "OUTSIDE"
-    };
-    line(
-        "  calculated for this campaign",
-        format!("{} h, {verdict}", grouped(assessment.model_hours)),
-    );
-    line(
-        "  without the protocol's own time",
-        format!("{} h", grouped(found.mttf_closed_form_hours)),
-    );
-    line(
-        "  in the plant, not accelerated",
-        format!(
-            "{} h; acceleration biases by {:.2} %",
-            grouped(found.bias.true_hours),
-            100.0 * found.bias.relative
-        ),
-    );
-    if let Some(coverage) = &assessment.coverage {
-        line(
-            "failures masked",
-            format!(
-                "{} of {}, coverage {}",
-                measured.campaign.masked,
-                measured.campaign.box_failures,
-                said(coverage, "")
-            ),
-        );
-    }
-    let cycles = |cycles: Option<f64>| {
-        cycles.map_or("none".to_owned(), |cycles| format!("{cycles:.3} cycles"))
-    };
-    line("detected after", cycles(found.detection_cycles));
-    line(
-        "in step again after the restart",
-        cycles(found.reentry_cycles),
-    );
-    if let Some(repair) = &assessment.repair_hours {
-        let given = grouped(system.understudies.mttr.get());
-        line(
-            "repaired after",
-            format!("{}, drawn from {given} h", said(repair, " h")),
-        );
-    }
-    if let Some(fit) = &assessment.fit {
-        line(
-            "fit to the law of the model",
-            format!("p = {:.3} (Anderson-Darling)", fit.anderson_darling_p),
-        );
-    }
-    if assessment.censored > 0 {
-        line("given up", format!("{} replicas", assessment.censored));
-    }
-    text.push_str("\ncauses\n");
-    for (cause, count) in &assessment.causes {
-        let _ = writeln!(text, "  {cause:<32} {count}");
-    }
-    for doubt in &assessment.doubts {
-        let _ = writeln!(text, "DOUBT: {doubt}");
-    }
-    for violation in measured.violations.iter().take(5) {
-        let _ = writeln!(text, "VIOLATION: {violation}");
-    }
-    text
-}
-
-fn said(interval: &Interval, unit: &str) -> String {
-    let number = |value: Option<f64>| value.map_or("unknown".to_owned(), grouped);
-    format!(
-        "{}{unit} ({} to {})",
-        number(interval.estimate),
-        grouped(interval.lower),
-        number(interval.upper)
+fn not_begun(errors: &[QuestionError]) -> Answer {
+    errors.iter().fold(
+        Answer::done("", ()).with_status(Status::BadInput),
+        |answer, error| answer.and_failure(Status::BadInput, error.code(), error.to_string()),
     )
 }

@@ -10,9 +10,10 @@ use understudy_cluster::{Cluster, Overrides};
 use understudy_diagnostic::Report;
 use understudy_reliability::{
     Answer as Calculated, Assessment, CommonCauseConvention, Hours, Options, Provenance,
-    ReliabilityError, answer_chain, calculate, read_chain, report, report_data,
+    ReliabilityError, SharedPart, UnequalBoxes, answer_chain, calculate, read_chain, report,
+    report_data,
 };
-use understudy_scenarios::time_name;
+use understudy_scenarios::{options_of, set_unequal, time_name};
 
 use crate::answer::{Answer, Status};
 use crate::files;
@@ -24,6 +25,7 @@ use crate::run::command_line;
 Example:
   understudy reliability --controllers 20 --mtbf 10000h --mttr 24h --mission 1000h
   understudy reliability examples/press-cell/cluster.toml --mtbf 10000h --mttr 24h --report reliability
+  understudy reliability --controllers 20 --mtbf 10000h --mttr 24h --box old*3=4000h,48h --shared power=200000h
   understudy reliability --chain plant.chain --mission 1y
 
 Times carry their unit: us, ms, s, min, h, d, y. What the numbers rest on: docs/reliability.md.")]
@@ -53,6 +55,12 @@ pub(crate) struct Arguments {
         allow_hyphen_values = true
     )]
     mttr: Option<String>,
+    /// Boxes with times of their own: NAME=MTBF,MTTR, a station of the cluster file; without one NAME*COUNT=..., and understudies=...
+    #[arg(long = "box", value_name = "BOX")]
+    boxes: Vec<String>,
+    /// A part whose first failure fails the system, such as power=200000h
+    #[arg(long, value_name = "NAME=MTBF")]
+    shared: Vec<String>,
     /// Boxes that are repaired at the same time, at most; by default a crew for each
     #[arg(long, value_name = "R")]
     crews: Option<u32>,
@@ -126,16 +134,22 @@ fn of_cluster(arguments: &Arguments) -> Result<Answer, Answer> {
     let mttr = times.required("mttr", arguments.mttr.as_deref());
     let detection = times.optional("detection", arguments.detection.as_deref());
     let mission = times.optional("mission", arguments.mission.as_deref());
+    let boxes: Vec<UnequalBoxes> = times.parsed("box", &arguments.boxes);
+    let shared: Vec<SharedPart> = times.parsed("shared", &arguments.shared);
     let cluster = match &arguments.cluster {
         Some(path) => Some(files::cluster(path, Overrides::default())?),
         None => None,
     };
     let options = |mtbf, mttr| {
-        let mut options = Options::new(arguments.controllers.unwrap_or_default(), mtbf, mttr);
-        options.spares = arguments.spares;
-        if let Some((cluster, _)) = &cluster {
-            (options.controllers, options.spares) = boxes(cluster);
-        }
+        let mut options = match &cluster {
+            Some((cluster, _)) => options_of(cluster, mtbf, mttr),
+            None => {
+                let mut options =
+                    Options::new(arguments.controllers.unwrap_or_default(), mtbf, mttr);
+                options.spares = arguments.spares;
+                options
+            }
+        };
         options.groups = arguments.groups;
         options.crews = arguments.crews;
         options.coverage = arguments.coverage;
@@ -146,12 +160,15 @@ fn of_cluster(arguments: &Arguments) -> Result<Answer, Answer> {
             ConventionWord::Split => CommonCauseConvention::Split,
         };
         options.mission = mission;
+        options.shared.clone_from(&shared);
         options
     };
     // What is wrong with the other options is said in the same run as what is wrong with a time.
     let any = Hours::new("any", 1.0).map_err(|error| refused(&[error]))?;
-    let options = options(mtbf.unwrap_or(any), mttr.unwrap_or(any));
-    times.finish(options.system().err().unwrap_or_default())?;
+    let mut options = options(mtbf.unwrap_or(any), mttr.unwrap_or(any));
+    let mut wrong = set_unequal(&mut options, cluster.as_ref().map(|read| &read.0), boxes);
+    wrong.extend(options.system().err().unwrap_or_default());
+    times.finish(wrong)?;
     let found = calculate(&options).map_err(|errors| refused(&errors))?;
     let (cluster, reports) = cluster.map_or((None, Vec::new()), |(cluster, reports)| {
         (Some(cluster), reports)
@@ -177,15 +194,6 @@ fn calculated(text: String, found: &Calculated, reports: Vec<Report>) -> Answer 
     answer.with_numbers(numbers)
 }
 
-/// N and S of a cluster.
-pub(crate) fn boxes(cluster: &Cluster) -> (u32, u32) {
-    let count = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
-    (
-        count(cluster.controllers().len()),
-        count(cluster.understudies().len()),
-    )
-}
-
 /// Everything that is wrong with a question.
 pub(crate) fn refused(errors: &[ReliabilityError]) -> Answer {
     errors.iter().fold(
@@ -209,13 +217,31 @@ impl Times {
         match text?.parse::<Hours>() {
             Ok(hours) => Some(hours),
             Err(error) => {
-                let message = error.to_string();
-                let code = error.code();
-                let message = message.strip_prefix(code).unwrap_or(&message);
-                self.wrong.push((code, format!("--{name}{message}")));
+                self.note(name, &error);
                 None
             }
         }
+    }
+
+    /// The texts of an option that may be given several times.
+    pub(crate) fn parsed<T>(&mut self, name: &str, texts: &[String]) -> Vec<T>
+    where
+        T: std::str::FromStr<Err = ReliabilityError>,
+    {
+        let mut found = Vec::new();
+        for text in texts {
+            match text.parse() {
+                Ok(value) => found.push(value),
+                Err(error) => self.note(name, &error),
+            }
+        }
+        found
+    }
+
+    fn note(&mut self, name: &str, error: &ReliabilityError) {
+        let (code, message) = (error.code(), error.to_string());
+        let message = message.strip_prefix(code).unwrap_or(&message);
+        self.wrong.push((code, format!("--{name}{message}")));
     }
 
     /// # Errors

@@ -66,13 +66,8 @@ pub struct Mission {
 /// Everything that is wrong with the options, or the first result that cannot be had.
 pub fn calculate(options: &Options) -> Result<Answer, Vec<ReliabilityError>> {
     let system = options.system()?;
-    let only_equal = || {
-        vec![ReliabilityError::OutOfRange {
-            what: "the number of boxes".into(),
-        }]
-    };
-    let duplex = system.as_copies(2).ok_or_else(only_equal)?;
-    let tmr = system.as_copies(3).ok_or_else(only_equal)?;
+    let duplex = system.copies_chain(2)?;
+    let tmr = system.copies_chain(3)?;
     let paper = system.as_paper();
     let simplex = system.as_simplex();
     let one = |error| vec![error];
@@ -104,7 +99,7 @@ pub fn calculate(options: &Options) -> Result<Answer, Vec<ReliabilityError>> {
                 .failed;
             let reliability_duplex = match equal_pairs(options)? {
                 Some(pair) => (f64::from(options.controllers) * pair.log_reliability(hours)).exp(),
-                None => reliability(&duplex)?,
+                None => duplex.reliability(hours).map_err(one)?,
             };
             Some(Mission {
                 mission_hours: hours,
@@ -114,7 +109,7 @@ pub fn calculate(options: &Options) -> Result<Answer, Vec<ReliabilityError>> {
                 reliability_cluster: cluster_chain.reliability(hours).map_err(one)?,
                 reliability_duplex,
                 reliability_simplex: reliability(&simplex)?,
-                reliability_tmr: reliability(&tmr)?,
+                reliability_tmr: tmr.reliability(hours).map_err(one)?,
                 unreliability_cluster: failed,
                 p0: states.p0,
                 p1: states.p1,
@@ -131,9 +126,9 @@ pub fn calculate(options: &Options) -> Result<Answer, Vec<ReliabilityError>> {
             None => mean(&paper)?,
         },
         mttf_cluster_hours: cluster_chain.mttf().map_err(one)?,
-        mttf_duplex_hours: mean(&duplex)?,
+        mttf_duplex_hours: duplex.mttf().map_err(one)?,
         mttf_simplex_hours: mean(&simplex)?,
-        mttf_tmr_hours: mean(&tmr)?,
+        mttf_tmr_hours: tmr.mttf().map_err(one)?,
         deviation_cluster_hours: moments.map(|moments| moments.variance_hours_squared.sqrt()),
         mission,
     })
@@ -141,7 +136,10 @@ pub fn calculate(options: &Options) -> Result<Answer, Vec<ReliabilityError>> {
 
 /// Whether the boxes fail by themselves and nothing else fails, so that the closed forms hold.
 fn plain(options: &Options) -> bool {
-    options.detection.is_none() && options.beta == 0.0 && options.shared.is_empty()
+    options.unequal.is_empty()
+        && options.detection.is_none()
+        && options.beta == 0.0
+        && options.shared.is_empty()
 }
 
 /// (15) to (20), with coverage.

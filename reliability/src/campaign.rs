@@ -47,8 +47,10 @@ pub struct Campaign {
     pub masked: u64,
     /// Times from a failure of a box to its detection, in hours of the machine (not scaled).
     pub detection_hours: Vec<f64>,
-    /// Times from there to its return, in hours of the plant.
+    /// Times of repairs that were finished, in hours of the plant.
     pub repair_hours: Vec<f64>,
+    /// How long repairs had lasted that the failure of the system cut off, in hours of the plant.
+    pub unfinished_repair_hours: Vec<f64>,
 }
 
 /// A campaign beside the model.
@@ -119,10 +121,10 @@ pub fn assess(
             .transpose()
             .map_err(one)
     };
-    let mean_of = |times: &[f64]| {
+    let mean_of = |times: &[f64], unfinished: &[f64]| {
         let total = (!times.is_empty()).then_some(times);
         total
-            .map(|times| times_to_failure(times, &[], confidence))
+            .map(|times| times_to_failure(times, unfinished, confidence))
             .transpose()
             .map_err(one)
     };
@@ -144,8 +146,8 @@ pub fn assess(
         agrees: mttf_hours.covers(law.mean()),
         mttf_hours,
         coverage,
-        detection_hours: mean_of(&campaign.detection_hours)?,
-        repair_hours: mean_of(&campaign.repair_hours)?,
+        detection_hours: mean_of(&campaign.detection_hours, &[])?,
+        repair_hours: mean_of(&campaign.repair_hours, &campaign.unfinished_repair_hours)?,
         fit: tested(Null::Specified, &mut random)?,
         shape_fit: tested(Null::ScaleFitted, &mut random)?,
         rare_event: rare_event(&chain, 100_000, confidence, &mut random).map_err(one)?,

@@ -149,6 +149,14 @@ pub enum ReliabilityError {
         /// Groups asked for.
         groups: u64,
     },
+    /// A text that is neither boxes nor a part with times.
+    #[error("U0720: {text:?} names no boxes with their times: {why}")]
+    BoxText {
+        /// As it was given.
+        text: String,
+        /// What is wrong with it.
+        why: String,
+    },
     /// A drawing that the plotting library refused, or a template that does not fit.
     #[error("U0719: the report could not be made: {why}")]
     Report {
@@ -180,6 +188,7 @@ impl ReliabilityError {
             Self::Acceleration { .. } => "U0717",
             Self::Groups { .. } => "U0718",
             Self::Report { .. } => "U0719",
+            Self::BoxText { .. } => "U0720",
         }
     }
 }

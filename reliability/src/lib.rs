@@ -11,9 +11,11 @@
 
 mod answer;
 mod birth_death;
+mod boxes;
 mod campaign;
 mod chain;
 mod chain_answer;
+mod copies;
 mod dense;
 mod drawing;
 mod elimination;
@@ -35,6 +37,7 @@ mod transient;
 
 pub use answer::{Answer, Mission, calculate};
 pub use birth_death::{Level, birth_death_mttf};
+pub use boxes::{UNDERSTUDIES, UnequalBoxes};
 pub use campaign::{Assessment, Campaign, SystemFailure, assess};
 pub use chain::{Chain, ChainBuilder, MAXIMUM_STATES};
 pub use chain_answer::{ChainAnswer, ChainMission, StateAnswer, answer_chain};

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::boxes::UnequalBoxes;
 use crate::error::ReliabilityError;
 use crate::quantity::{Hours, Probability};
 use crate::system::{BoxKind, CommonCause, CommonCauseConvention, Rule, SharedPart, System};
@@ -15,10 +16,14 @@ pub struct Options {
     pub spares: u32,
     /// Groups that share no understudy.
     pub groups: u32,
+    /// When a group has failed.
+    pub rule: Rule,
     /// Of each box.
     pub mtbf: Hours,
     /// Of each box, from its detection on.
     pub mttr: Hours,
+    /// Boxes with times of their own; the others have these.
+    pub unequal: Vec<UnequalBoxes>,
     /// Repair crews; nothing: one for each box.
     pub crews: Option<u32>,
     /// Probability that a failure is masked.
@@ -42,8 +47,10 @@ impl Options {
             controllers,
             spares: 1,
             groups: 1,
+            rule: Rule::AsBuilt,
             mtbf,
             mttr,
+            unequal: Vec::new(),
             crews: None,
             coverage: 1.0,
             detection: None,
@@ -65,17 +72,38 @@ impl Options {
             .into_iter()
             .filter_map(|found| found.clone().err())
             .collect();
-        let kind = |name: &str, count| BoxKind {
+        let kind = |name: &str, count, mtbf, mttr| BoxKind {
             name: name.into(),
             count,
-            mtbf: self.mtbf,
-            mttr: self.mttr,
+            mtbf,
+            mttr,
         };
+        let apart = || self.unequal.iter().filter(|boxes| !boxes.understudies);
+        let apart_count: u64 = apart().map(|boxes| u64::from(boxes.count)).sum();
+        if apart_count > u64::from(self.controllers) {
+            errors.push(ReliabilityError::Count {
+                what: "the number of controllers with times of their own".into(),
+                count: apart_count,
+                minimum: 0,
+                maximum: u64::from(self.controllers),
+            });
+        }
+        let alike = u64::from(self.controllers).saturating_sub(apart_count);
+        let mut controllers = Vec::new();
+        if alike > 0 || apart_count == 0 {
+            let alike = u32::try_from(alike).unwrap_or(u32::MAX);
+            controllers.push(kind("controllers", alike, self.mtbf, self.mttr));
+        }
+        controllers
+            .extend(apart().map(|boxes| kind(&boxes.name, boxes.count, boxes.mtbf, boxes.mttr)));
+        let of_understudies = self.unequal.iter().find(|boxes| boxes.understudies);
+        let (mtbf, mttr) =
+            of_understudies.map_or((self.mtbf, self.mttr), |boxes| (boxes.mtbf, boxes.mttr));
         let system = System {
-            controllers: vec![kind("controllers", self.controllers)],
-            understudies: kind("understudies", self.spares),
+            controllers,
+            understudies: kind("understudies", self.spares, mtbf, mttr),
             groups: self.groups,
-            rule: Rule::AsBuilt,
+            rule: self.rule,
             crews: self.crews,
             coverage: coverage.unwrap_or(Probability::ONE),
             detection: self.detection,
@@ -116,20 +144,5 @@ impl System {
         simplex.groups = 1;
         simplex.understudies.count = 0;
         simplex
-    }
-
-    /// Each controller with `copies` - 1 more of its kind, of which one may be down: 2 is the full duplex of (21), 3 is TMR. Nothing where
-    /// the controllers differ.
-    pub fn as_copies(&self, copies: u32) -> Option<Self> {
-        let [kind] = &self.controllers[..] else {
-            return None;
-        };
-        let mut copied = self.clone();
-        copied.rule = Rule::Paper;
-        copied.groups = kind.count;
-        copied.controllers[0].count = kind.count.checked_mul(copies - 1)?;
-        copied.understudies = kind.clone();
-        copied.understudies.count = 1;
-        Some(copied)
     }
 }

@@ -113,19 +113,14 @@ pub fn report_data(
         .max(answer.mttf_duplex_hours)
         .max(answer.mttf_paper_hours);
     let compared = [
-        ("this cluster", Some(system.clone())),
-        ("paper's model", Some(system.as_paper())),
-        ("full duplex", system.as_copies(2)),
-        ("no spare", Some(system.as_simplex())),
+        ("this cluster", system.chain()?),
+        ("paper's model", system.as_paper().chain()?),
+        ("full duplex", system.copies_chain(2)?),
+        ("no spare", system.as_simplex().chain()?),
     ];
     let (mut over_time, mut left_out) = (Vec::new(), Vec::new());
-    for (name, system) in compared {
-        let Some(system) = system else { continue };
-        match curve(
-            &system.chain()?,
-            answer.mttf_simplex_hours / 30.0,
-            3.0 * longest,
-        ) {
+    for (name, chain) in compared {
+        match curve(&chain, answer.mttf_simplex_hours / 30.0, 3.0 * longest) {
             Ok(points) => over_time.push(OverTime {
                 name: name.into(),
                 points,
@@ -207,6 +202,18 @@ fn assumptions(options: &Options) -> Vec<String> {
             format!("Repair starts when the failure is detected, after {latency} on average; it is masked from the first cycle on.")
         }
     });
+    for boxes in &options.unequal {
+        said.push(format!(
+            "{} fail after {} on average and are repaired in {}, unlike the others.",
+            if boxes.understudies || boxes.count == 1 {
+                format!("Boxes of {}", boxes.name)
+            } else {
+                format!("The {} boxes of {}", boxes.count, boxes.name)
+            },
+            boxes.mtbf,
+            boxes.mttr
+        ));
+    }
     if options.beta > 0.0 {
         said.push(match options.convention {
             crate::CommonCauseConvention::Additive => format!(

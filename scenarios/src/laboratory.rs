@@ -3,6 +3,7 @@
 //! The laboratory starts them, reads what they report, does the steps of the scenario when the cycles come that they are meant
 //! for, and ends everything that it started, whatever happens. It decides nothing about the cycle.
 
+mod conductor;
 mod error;
 mod keys;
 mod patience;
@@ -30,6 +31,7 @@ use crate::record::{Happening, Record, RunEvent};
 use crate::run_directory::RunDirectory;
 use crate::scenario::{Scenario, action_word};
 
+pub(crate) use conductor::Conductor;
 pub use error::LaboratoryError;
 pub use site::{HostKind, NetworkSettings};
 
@@ -91,6 +93,13 @@ pub enum Progress {
         /// What and to whom.
         what: String,
     },
+    /// A failure of the system was waited for, and has come.
+    Failure {
+        /// So many.
+        done: u64,
+        /// Of so many.
+        of: u64,
+    },
     /// What was started is stopped.
     Ending,
 }
@@ -122,6 +131,19 @@ pub fn run_laboratory(
     directory: &RunDirectory,
     watch: &mut dyn FnMut(Progress),
 ) -> Result<LaboratoryRun, LaboratoryError> {
+    let mut steps = Steps::new(scenario, cluster.agreement().schedule.period());
+    run_conducted(cluster, scenario, settings, directory, &mut steps, watch)
+}
+
+/// The same with a conductor in place of the scenario's steps.
+pub(crate) fn run_conducted(
+    cluster: &Cluster,
+    scenario: &Scenario,
+    settings: LaboratorySettings,
+    directory: &RunDirectory,
+    conductor: &mut dyn Conductor,
+    watch: &mut dyn FnMut(Progress),
+) -> Result<LaboratoryRun, LaboratoryError> {
     refuse_what_is_simulated(scenario)?;
     let system = |what| move |source| LaboratoryError::System { what, source };
     let site = Site::prepare(
@@ -150,7 +172,7 @@ pub fn run_laboratory(
         lives: BTreeMap::new(),
         ready: BTreeSet::new(),
         machine: BTreeSet::new(),
-        steps: Steps::new(scenario, cluster.agreement().schedule.period()),
+        conductor,
         sender,
         watch,
     };
@@ -194,7 +216,7 @@ struct Laboratory<'w> {
     /// Parties that have said that they listen.
     ready: BTreeSet<Party>,
     machine: BTreeSet<String>,
-    steps: Steps,
+    conductor: &'w mut dyn Conductor,
     sender: Sender<Said>,
     watch: &'w mut dyn FnMut(Progress),
 }
@@ -231,7 +253,7 @@ impl Laboratory<'_> {
         let mut waits = Waits::new();
         let mut tick = tokio::time::interval(TICK);
         loop {
-            let due = self.steps.next_due();
+            let due = self.conductor.next_due();
             let sleep =
                 tokio::time::sleep_until(due.unwrap_or_else(|| Instant::now() + TICK).into());
             tokio::select! {
@@ -247,11 +269,14 @@ impl Laboratory<'_> {
                 _ = tick.tick() => {}
             }
             let now = Instant::now();
-            self.steps.follow(self.account.cycle(), now);
-            while let Some(step) = self.steps.take_due(now) {
+            self.conductor.follow(self.account.cycle(), now);
+            while let Some(step) = self.conductor.take_due(now) {
                 self.do_step(&step).await?;
             }
             self.show_progress(&mut waits);
+            if self.conductor.is_over(now) {
+                return Ok(());
+            }
             // One cycle more, so that all remote I/Os have surely told of the last one.
             if self
                 .account
@@ -288,6 +313,7 @@ impl Laboratory<'_> {
             journal.write(record);
         }
         self.account.observe(record);
+        self.conductor.hear(record, Instant::now());
     }
 
     // ── processes ───────────────────────────────────────────────────────────────────────────────────────────────────

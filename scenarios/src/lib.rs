@@ -7,6 +7,8 @@ mod figure;
 mod injection;
 mod journal;
 mod laboratory;
+mod observed;
+mod outlook;
 mod parties;
 mod read;
 mod record;
@@ -21,7 +23,11 @@ mod terms;
 mod write;
 
 pub use account::{Account, Counts, Interval, OriginRule, Presence, Service, Stall, Terms};
-pub use campaign::{CampaignError, CampaignPlan, Measured, run_campaign};
+pub use campaign::{
+    CampaignError, CampaignPlan, Found, Measured, OwnTime, Planned, Question, QuestionError,
+    RealCampaign, RealCampaignRun, Speed, hold_against_model, options_of, plan_campaign,
+    run_campaign, run_real_campaign, set_unequal,
+};
 pub use figure::{FigureError, Signals, figure};
 pub use injection::{
     CoverageRow, Deadlines, Failure, Findings, FindingsError, InjectionPlan, Kind,
@@ -33,6 +39,8 @@ pub use laboratory::{
     HostKind, LaboratoryError, LaboratoryRun, LaboratorySettings, NetworkSettings, Progress,
     run_laboratory,
 };
+pub use observed::{JournalView, ObservationError, observe_journal};
+pub use outlook::{JournalOutlook, look_ahead};
 pub use parties::Parties;
 pub use read::{MAXIMUM_CYCLES, MAXIMUM_STEPS, ReadScenario, looks_like_a_scenario, read};
 pub use record::{Happening, LABORATORY, Record, RunEvent};

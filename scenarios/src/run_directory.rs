@@ -71,6 +71,19 @@ impl RunDirectory {
         Err(at(runs)(io::ErrorKind::AlreadyExists.into()))
     }
 
+    /// A new directory in it, for a part of the run.
+    ///
+    /// # Errors
+    /// [`RunDirectoryError::Write`].
+    pub fn inside(&self, name: &str) -> Result<Self, RunDirectoryError> {
+        let path = self.path.join(name);
+        fs::create_dir(&path).map_err(|source| RunDirectoryError::Write {
+            path: path.clone(),
+            source,
+        })?;
+        Ok(Self { path })
+    }
+
     /// Where it is.
     pub fn path(&self) -> &Path {
         &self.path

@@ -132,6 +132,11 @@ impl Simulation {
         self.faults.insert(place, fault);
     }
 
+    /// Faults of `party` that were scheduled and are not done yet will not be done.
+    pub fn forget(&mut self, party: Party) {
+        self.faults.retain(|fault| fault.party != party);
+    }
+
     /// From here on all chance comes from `seed`. A run on a quiet network has drawn nothing until its first fault.
     pub fn reseed(&mut self, seed: u64) {
         self.links.reseed(seed);

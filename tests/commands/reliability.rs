@@ -236,3 +236,110 @@ fn a_campaign_that_says_nothing_or_never_ends_is_refused() {
     check(&["--mtbf", "10000h", "--mttr", "24h"], "U0609");
     check(&["--mtbf", "10000", "--mttr", "x"], "U0705");
 }
+
+#[test]
+fn a_campaign_with_one_crew_is_held_against_the_model_with_one_crew() {
+    let measure = |crews: &str| {
+        let times = ["--mtbf", "3s", "--mttr", "500ms", "--failures", "30"];
+        let how = ["--seed", "1", "--json", "--crews", crews];
+        understudy(&[&["measure", PRESS_CELL][..], &times, &how].concat())
+    };
+    let (one, two) = (measure("1").json(), measure("2").json());
+    let model = |found: &Value| found["result"]["mttf_closed_form_hours"].as_f64();
+    assert!(model(&one) < model(&two));
+    assert_eq!(one["result"]["assessment"]["agrees"], Value::from(true));
+    let none = measure("0");
+    assert_eq!(none.status, 2);
+    assert!(none.errors.contains("U0704") || none.output.contains("U0704"));
+}
+
+#[test]
+fn what_belongs_to_processes_is_refused_without_them() {
+    let times = ["--mtbf", "10s", "--mttr", "500ms"];
+    for more in [["--limit", "1min"], ["--out", "somewhere"]] {
+        let answer = understudy(&[&["measure", PRESS_CELL][..], &times, &more].concat());
+        assert_eq!(answer.status, 2, "{more:?}: {}", answer.errors);
+    }
+}
+
+#[test]
+fn outlook_explains_itself() {
+    assert_snapshot!(understudy(&["outlook", "--help"]).shown());
+}
+
+#[test]
+fn a_journal_gives_the_hours_to_come() {
+    let folder = empty_folder("outlook");
+    let out = folder.to_str().expect("text");
+    let scenario = ["--scenario", "scenarios/kill-each.toml", "--seed", "1"];
+    let run = understudy(&[&["simulate", PRESS_CELL, "--out", out][..], &scenario].concat());
+    assert_eq!(run.status, 0, "{}", run.errors);
+    let latest = folder.join("latest");
+    let latest = latest.to_str().expect("text");
+    assert_snapshot!(understudy(&["outlook", latest, "--ahead", "10s"]).shown());
+    let found = understudy(&["outlook", latest, "--ahead", "10s", "--json"]).json();
+    let observed = &found["result"]["observed"];
+    assert_eq!(observed["asked"], observed["masked"]);
+    assert_eq!(observed["repairs"], Value::from(3));
+    let check = |arguments: &[&str], code: &str| {
+        let answer = understudy(&[&["outlook"], arguments].concat());
+        assert_eq!(answer.status, 2, "{arguments:?}");
+        assert!(answer.errors.contains(code), "{}", answer.errors);
+    };
+    check(&["absent"], "U0601");
+    check(&[latest, "--ahead", "10"], "U0705");
+    check(&["examples/press-cell/cluster.toml"], "U0532");
+}
+
+#[test]
+fn boxes_may_differ_and_parts_may_be_shared() {
+    let twenty = ["--controllers", "20", "--json"];
+    let hours = |more: &[&str]| {
+        let answer = reliability(&[&twenty, &RATES[..], more].concat());
+        assert_eq!(answer.status, 0, "{}", answer.errors);
+        answer.json()["mttf_cluster_hours"].as_f64().expect("hours")
+    };
+    let alike = hours(&[]);
+    assert_eq!(hours(&["--box", "same*3=10000h,24h"]), alike);
+    assert!(hours(&["--box", "old*3=4000h,48h"]) < alike);
+    assert!(hours(&["--box", "understudies=40000h,24h"]) > alike);
+    assert!(hours(&["--shared", "power=200000h"]) < alike);
+    let named = |more: &[&str]| reliability(&[&[PRESS_CELL], &RATES[..], more].concat());
+    assert_eq!(
+        named(&["--box", "robot=4000h,48h", "--box", "understudy=1y,1d"]).status,
+        0
+    );
+    let wrong = named(&[
+        "--box",
+        "robt=4000h,48h",
+        "--box",
+        "robot",
+        "--box",
+        "press*2=1h,1h",
+        "--shared",
+        "power=0h",
+    ]);
+    assert_snapshot!(wrong.shown());
+}
+
+#[test]
+fn the_papers_mode_of_a_cluster_file_is_calculated_as_such() {
+    let file = fs::read_to_string(PRESS_CELL).expect("the example");
+    let folder = empty_folder("paper_mode");
+    for name in ["robot.ladder", "press.ladder"] {
+        fs::copy(format!("examples/press-cell/{name}"), folder.join(name)).expect("copied");
+    }
+    let path = folder.join("cluster.toml");
+    let period = "period = \"10ms\"";
+    assert!(file.contains(period));
+    fs::write(
+        &path,
+        file.replace(period, &format!("{period}\nmode = \"paper\"")),
+    )
+    .expect("written");
+    let path = path.to_str().expect("text");
+    let found = reliability(&[&[path, "--json"], &RATES[..]].concat()).json();
+    let ratio = found["mttf_cluster_hours"].as_f64().expect("hours")
+        / found["mttf_paper_hours"].as_f64().expect("hours");
+    assert!((ratio - 1.0).abs() < 1e-12, "{ratio}");
+}

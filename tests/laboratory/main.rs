@@ -6,6 +6,7 @@
 )]
 
 mod boiler;
+mod campaigns;
 mod field;
 mod hosts;
 
@@ -198,18 +199,29 @@ fn running_cluster(
     more: &[&str],
 ) -> (Child, BufReader<std::process::ChildStderr>) {
     let cluster = cluster.to_str().expect("text");
-    let mut child = understudy(&[
+    let arguments = [
         "lab", cluster, "--link", "udp", "--period", PERIOD, "--cycles", "100000", "--out",
-    ])
-    .arg(out)
-    .args(more)
-    .stdout(Stdio::piped())
-    .stderr(Stdio::piped())
-    .spawn()
-    .expect("the binary is built");
+    ];
+    running_with(&arguments, out, more, "in step: ")
+}
+
+/// Starts a command and waits until it says `words`.
+fn running_with(
+    arguments: &[&str],
+    out: &Path,
+    more: &[&str],
+    words: &str,
+) -> (Child, BufReader<std::process::ChildStderr>) {
+    let mut child = understudy(arguments)
+        .arg(out)
+        .args(more)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the binary is built");
     let mut errors = BufReader::new(child.stderr.take().expect("piped"));
     let mut line = String::new();
-    while !line.contains("in step: ") {
+    while !line.contains(words) {
         line.clear();
         let length = errors.read_line(&mut line).expect("text");
         assert_ne!(length, 0, "it ended before it was in step");

@@ -24,7 +24,9 @@ pub struct Observed {
     pub working_hours: f64,
     /// When boxes failed, in hours since the first record, ascending.
     pub failures_at: Vec<f64>,
-    /// How many of these failures were masked.
+    /// How many of these failures the redundancy that was left should have masked.
+    pub asked: u64,
+    /// How many of those were masked.
     pub masked: u64,
     /// Repairs that were finished.
     pub repairs: u64,
@@ -69,7 +71,10 @@ pub fn outlook(
     let alpha = significance(confidence).map_err(one)?;
     check(observed, draws).map_err(one)?;
     let failures = observed.failures_at.len() as f64;
-    let (masked, unmasked) = (observed.masked as f64, failures - observed.masked as f64);
+    let (masked, unmasked) = (
+        observed.masked as f64,
+        observed.asked.saturating_sub(observed.masked) as f64,
+    );
     let detections = observed.detection_hours.len() as f64;
     let detecting: f64 = observed.detection_hours.iter().sum();
     let detected = detections > 0.0 && detecting > 0.0;
@@ -83,7 +88,7 @@ pub fn outlook(
         })
     };
     let coverage = Interval {
-        estimate: Some((masked + 0.5) / (failures + 1.0)),
+        estimate: Some((masked + 0.5) / (masked + unmasked + 1.0)),
         lower: beta(alpha / 2.0, masked + 0.5, unmasked + 0.5).map_err(one)?,
         upper: Some(beta(1.0 - alpha / 2.0, masked + 0.5, unmasked + 0.5).map_err(one)?),
         confidence,
@@ -176,10 +181,11 @@ fn check(observed: &Observed, draws: usize) -> Result<(), ReliabilityError> {
         });
     }
     let failures = &observed.failures_at;
-    if observed.masked > failures.len() as u64 {
+    if observed.masked > observed.asked || observed.asked > failures.len() as u64 {
         return Err(contradiction(format!(
-            "{} failures were masked and only {} were seen",
+            "{} failures were masked of {} that should have been, and {} were seen",
             observed.masked,
+            observed.asked,
             failures.len()
         )));
     }

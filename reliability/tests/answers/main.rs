@@ -202,6 +202,7 @@ fn campaign(acceleration: f64, mttr: f64, failures: usize) -> Campaign {
         masked: 5_000,
         detection_hours: vec![1e-5; 40],
         repair_hours: vec![200.0; 40],
+        unfinished_repair_hours: Vec::new(),
     }
 }
 

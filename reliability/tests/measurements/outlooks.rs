@@ -20,6 +20,7 @@ fn observed(failures_at: Vec<f64>) -> Observed {
         hours: 8_760.0,
         working_hours: 35_000.0,
         failures_at,
+        asked: count,
         masked: count,
         repairs: count,
         repairing_hours: 24.0 * (count as f64 + 0.5),

@@ -1,7 +1,7 @@
 use proptest::prelude::*;
 use understudy_reliability::{
-    AfterFailure, CommonCause, CommonCauseConvention, Level, Probability, ReliabilityError, Rule,
-    SharedPart, ThreeState, birth_death_mttf,
+    AfterFailure, CommonCause, CommonCauseConvention, Level, Options, Probability,
+    ReliabilityError, Rule, SharedPart, ThreeState, UnequalBoxes, birth_death_mttf,
 };
 
 use crate::support::{check, check_within, fixture, hours, kind, number, rows, system, whole};
@@ -329,4 +329,72 @@ fn without_coverage_another_spare_is_another_box_that_may_end_it() {
         system.chain().unwrap().mttf().unwrap()
     };
     assert!(mean(1) > mean(2) && mean(2) > mean(3));
+}
+
+/// Each pair by itself is the three-state model at N = 1, and with a crew for each box the pairs are independent.
+#[test]
+fn a_duplex_of_unequal_controllers_is_the_product_of_its_pairs() {
+    let mut options = Options::new(3, hours(1_000.0), hours(24.0));
+    options.unequal = vec!["old*2=400h,48h".parse().expect("boxes")];
+    let system = options.system().expect("a system");
+    assert_eq!(system.controller_count(), 3);
+    let duplex = system.copies_chain(2).expect("a chain");
+    let pair = |mtbf: f64, mttr: f64| ThreeState::new(1, 1.0 / mtbf, 1.0 / mttr).expect("a model");
+    for t in [1.0, 100.0, 5_000.0] {
+        let expected =
+            pair(1_000.0, 24.0).reliability(t) * pair(400.0, 48.0).reliability(t).powi(2);
+        let found = duplex.reliability(t).expect("R");
+        assert!(
+            (found / expected - 1.0).abs() < 1e-10,
+            "{t}: {found} {expected}"
+        );
+    }
+    let cluster = system.chain().expect("a chain").mttf().expect("a mean");
+    let alike = Options::new(3, hours(1_000.0), hours(24.0));
+    let alike = alike.system().expect("a system").chain().expect("a chain");
+    assert!(cluster < alike.mttf().expect("a mean"));
+    // TMR: two of three, and each of the three may be the first.
+    let one = Options::new(1, hours(1_000.0), hours(24.0));
+    let tmr = one
+        .system()
+        .expect("a system")
+        .copies_chain(3)
+        .expect("a chain");
+    let (l, m) = (1e-3, 1.0 / 24.0);
+    let expected = (5.0 * l + m) / (6.0 * l * l);
+    assert!((tmr.mttf().expect("a mean") / expected - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn boxes_of_their_own_are_read_or_refused() {
+    let read = |text: &str| text.parse::<UnequalBoxes>();
+    let boxes = read("old * 3 = 4000h, 48h").expect("boxes");
+    assert_eq!(
+        (boxes.name.as_str(), boxes.count, boxes.understudies),
+        ("old", 3, false)
+    );
+    assert!(read("understudies=1y,1d").expect("boxes").understudies);
+    let refused = [
+        ("", "U0720"),
+        ("old", "U0720"),
+        ("=1h,1h", "U0720"),
+        ("old=1h", "U0720"),
+        ("old*0=1h,1h", "U0720"),
+        ("old*-1=1h,1h", "U0720"),
+        ("old=1,1h", "U0705"),
+        ("old=1h,0h", "U0701"),
+    ];
+    for (text, code) in refused {
+        assert_eq!(read(text).expect_err(text).code(), code, "{text}");
+    }
+    assert_eq!(
+        "power".parse::<SharedPart>().expect_err("no time").code(),
+        "U0720"
+    );
+    let mut options = Options::new(2, boxes.mtbf, boxes.mttr);
+    options.unequal = vec![boxes];
+    assert_eq!(
+        options.system().expect_err("three of two")[0].code(),
+        "U0704"
+    );
 }

@@ -55,7 +55,7 @@ impl Laboratory<'_> {
             }
             return Ok(());
         };
-        if waits.cycle != Some(cycle) || self.steps.wait_for_time() {
+        if waits.cycle != Some(cycle) || self.conductor.wait_for_time() {
             waits.cycle = Some(cycle);
             waits.cycle_since = now;
         } else if over(waits.cycle_since, CYCLE_PATIENCE) {

@@ -9,6 +9,8 @@ use std::time::{Duration, Instant};
 
 use understudy_simulator::Fault;
 
+use super::Conductor;
+use crate::record::Record;
 use crate::scenario::Scenario;
 
 /// Periods without a report after which the clock counts.
@@ -35,9 +37,12 @@ impl Steps {
             newest: None,
         }
     }
+}
 
-    /// `cycle` is the newest that was decided, counted from the origin.
-    pub(super) fn follow(&mut self, cycle: Option<u64>, now: Instant) {
+impl Conductor for Steps {
+    fn hear(&mut self, _: &Record, _: Instant) {}
+
+    fn follow(&mut self, cycle: Option<u64>, now: Instant) {
         let Some(cycle) = cycle else {
             return;
         };
@@ -67,20 +72,21 @@ impl Steps {
         self.armed.sort_by_key(|(due, _)| *due);
     }
 
-    /// When the next armed step is due.
-    pub(super) fn next_due(&self) -> Option<Instant> {
+    fn next_due(&self) -> Option<Instant> {
         self.armed.first().map(|(due, _)| *due)
     }
 
-    /// The next step that is due.
-    pub(super) fn take_due(&mut self, now: Instant) -> Option<Fault> {
+    fn take_due(&mut self, now: Instant) -> Option<Fault> {
         let due = self.next_due()?;
         (due <= now).then(|| self.armed.remove(0).1)
     }
 
-    /// Whether steps are left that may bring the cycles back.
-    pub(super) fn wait_for_time(&self) -> bool {
+    fn wait_for_time(&self) -> bool {
         !self.waiting.is_empty() || !self.armed.is_empty()
+    }
+
+    fn is_over(&self, _: Instant) -> bool {
+        false
     }
 }
 

@@ -1,0 +1,83 @@
+//! Boxes that are not like the others, as they stand on a command line: `NAME=MTBF,MTTR` or `NAME*COUNT=MTBF,MTTR`.
+
+use std::str::FromStr;
+
+use serde::Serialize;
+
+use crate::error::ReliabilityError;
+use crate::quantity::Hours;
+
+/// The name that means the understudies, where there is no cluster file.
+pub const UNDERSTUDIES: &str = "understudies";
+
+/// Boxes with times of their own.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct UnequalBoxes {
+    /// Which: of a cluster file, a station; otherwise any name, [`UNDERSTUDIES`] being all of these.
+    pub name: String,
+    /// How many controllers; of understudies, all.
+    pub count: u32,
+    /// Whether they are understudies.
+    pub understudies: bool,
+    /// Of each.
+    pub mtbf: Hours,
+    /// Of each, from its detection on.
+    pub mttr: Hours,
+}
+
+impl FromStr for UnequalBoxes {
+    type Err = ReliabilityError;
+
+    fn from_str(text: &str) -> Result<Self, ReliabilityError> {
+        let wrong = |why: &str| ReliabilityError::BoxText {
+            text: text.to_owned(),
+            why: why.to_owned(),
+        };
+        let (which, times) = text.split_once('=').ok_or_else(|| wrong("it has no ="))?;
+        let (mtbf, mttr) = times
+            .split_once(',')
+            .ok_or_else(|| wrong("after = stand an MTBF and an MTTR with a comma between them"))?;
+        let (name, count) = match which.split_once('*') {
+            None => (which, 1),
+            Some((name, count)) => {
+                let count = count.trim().parse().ok().filter(|count| *count > 0);
+                (
+                    name,
+                    count.ok_or_else(|| wrong("after * stands how many there are"))?,
+                )
+            }
+        };
+        let name = name.trim();
+        if name.is_empty() {
+            return Err(wrong("it has no name"));
+        }
+        Ok(Self {
+            name: name.to_owned(),
+            count,
+            understudies: name == UNDERSTUDIES,
+            mtbf: mtbf.trim().parse()?,
+            mttr: mttr.trim().parse()?,
+        })
+    }
+}
+
+/// A shared part as it stands on a command line: `NAME=MTBF`.
+impl FromStr for crate::system::SharedPart {
+    type Err = ReliabilityError;
+
+    fn from_str(text: &str) -> Result<Self, ReliabilityError> {
+        let parts = text
+            .split_once('=')
+            .map(|(name, time)| (name.trim(), time.trim()));
+        match parts {
+            Some((name, mtbf)) if !name.is_empty() => Ok(Self {
+                name: name.to_owned(),
+                mtbf: mtbf.parse()?,
+            }),
+            _ => Err(ReliabilityError::BoxText {
+                text: text.to_owned(),
+                why: "it is written NAME=MTBF".to_owned(),
+            }),
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! What of the events of stations and remote I/Os concerns a campaign; the same in both worlds.
+
+use understudy_node::Event as StationEvent;
+use understudy_remote_io::Event as RemoteIoEvent;
+use understudy_wire::{ProgramId, Source, StationId, Time};
+
+/// What a campaign has to answer, in the order in which it was seen.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Seen {
+    Crashed(StationId),
+    Restarted(StationId),
+    Flagged(StationId),
+    Cleared(StationId),
+    Adopted(StationId, ProgramId),
+    InStep(StationId, ProgramId),
+    /// The first deadline of a remote I/O with nothing true to apply.
+    Missed,
+    /// A remote I/O is at its fail-safe; the first deadline with nothing true to apply.
+    Lost(Time),
+    /// The host stood still.
+    Stalled,
+    Violation(String),
+}
+
+/// Since when each remote I/O has had nothing true to apply.
+#[derive(Debug)]
+pub(super) struct Deadlines(Vec<Option<Time>>);
+
+impl Deadlines {
+    pub(super) fn new(programs: usize) -> Self {
+        Self(vec![None; programs])
+    }
+
+    /// What of an event of a remote I/O concerns a campaign.
+    pub(super) fn look(
+        &mut self,
+        now: Time,
+        program: ProgramId,
+        event: &RemoteIoEvent,
+    ) -> Option<Seen> {
+        let source = match event {
+            RemoteIoEvent::Flagged { station, .. } => return Some(Seen::Flagged(*station)),
+            RemoteIoEvent::Cleared { station, .. } => return Some(Seen::Cleared(*station)),
+            RemoteIoEvent::Stalled { .. } => return Some(Seen::Stalled),
+            RemoteIoEvent::Applied { source, .. } => *source,
+            _ => return None,
+        };
+        let since = &mut self.0[program.index()];
+        match source {
+            Source::Direct | Source::Reconstructed => {
+                *since = None;
+                None
+            }
+            Source::Held if since.is_some() => None,
+            Source::Held => {
+                *since = Some(now);
+                Some(Seen::Missed)
+            }
+            Source::FailSafe => Some(Seen::Lost(since.unwrap_or(now))),
+        }
+    }
+}
+
+/// What of an event of a station concerns a campaign.
+pub(super) fn of_station(station: StationId, event: &StationEvent) -> Option<Seen> {
+    match event {
+        StationEvent::Flagged { station, .. } => Some(Seen::Flagged(*station)),
+        StationEvent::Cleared { station, .. } => Some(Seen::Cleared(*station)),
+        StationEvent::Adopted { program, .. } => Some(Seen::Adopted(station, *program)),
+        StationEvent::InStep { program, .. } => Some(Seen::InStep(station, *program)),
+        StationEvent::Stalled { .. } => Some(Seen::Stalled),
+        _ => None,
+    }
+}
