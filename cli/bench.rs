@@ -14,7 +14,7 @@ use understudy_bus::LinkKind;
 use understudy_bus::exchange::{
     Carrier, Exchange, ExchangeParty, ExchangeSettings, measure, run_exchange_party,
 };
-use understudy_cluster::press_cell;
+use understudy_cluster::{Cluster, press_cell};
 use understudy_scenarios::{Action, Expectation, Fault, Network, Scenario, parts};
 use understudy_simulator::Simulation;
 use understudy_wire::{Party, StationId};
@@ -22,14 +22,17 @@ use understudy_wire::{Party, StationId};
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::demo::PressCell;
+use crate::failover;
 use crate::lab::RunArguments;
+use crate::memory;
 
 /// Measure speed on this machine
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy bench exchange --cycles 2000
-  understudy bench kills --count 100 --link udp")]
+  understudy bench kills --count 100 --link udp
+  understudy bench failover --figure failover.svg")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     what: What,
@@ -63,6 +66,10 @@ enum What {
         #[command(flatten)]
         run: RunArguments,
     },
+    /// The cluster beside hot-standby and active-active pairs: lost cycles, false take-overs, double masters, boxes, bytes
+    Failover(failover::Arguments),
+    /// Memory of a long simulated run with loss and failures
+    Memory(memory::Arguments),
     /// One process of the exchange
     #[command(hide = true)]
     Party {
@@ -94,6 +101,8 @@ pub(crate) fn run(arguments: Arguments, console: &mut Console) -> Answer {
         } => exchange(cycles, !no_real_time),
         What::Simulate { cycles } => simulated(cycles),
         What::Kills { count, seed, run } => kills(count, seed, &run, console),
+        What::Failover(arguments) => failover::run(&arguments, console),
+        What::Memory(arguments) => memory::run(&arguments),
         What::Party { part } => party(&part),
     }
 }
@@ -112,15 +121,23 @@ fn party(part: &str) -> Answer {
 /// Cycles a second that the simulator has to reach.
 const SIMULATED_BAR: f64 = 200_000.0;
 
-fn simulated(cycles: u64) -> Answer {
+/// The cluster of section V, without a folder.
+pub(crate) fn simulated_press_cell() -> Result<Cluster, Answer> {
     let files = press_cell();
     let loaded = understudy_cluster::read(files[0].name, files[0].text, &mut |name| {
         let file = files.iter().find(|file| file.name == name);
         let text = file.map(|file| file.text.to_owned());
         text.ok_or_else(|| "no such file".to_owned())
     });
-    let Some(cluster) = loaded.cluster else {
-        return Answer::bad_files(loaded.reports);
+    loaded
+        .cluster
+        .ok_or_else(|| Answer::bad_files(loaded.reports))
+}
+
+fn simulated(cycles: u64) -> Answer {
+    let cluster = match simulated_press_cell() {
+        Ok(cluster) => cluster,
+        Err(answer) => return answer,
     };
     let mut simulation = Simulation::new(parts(&cluster), Network::default(), 1);
     let start = Instant::now();
@@ -148,7 +165,12 @@ const PATIENCE_CYCLES: u64 = 1000;
 const KILL_EVERY: u64 = 60;
 const RESTART_AFTER: u64 = 20;
 
-fn kills(count: u64, seed: u64, arguments: &RunArguments, console: &mut Console) -> Answer {
+pub(crate) fn kills(
+    count: u64,
+    seed: u64,
+    arguments: &RunArguments,
+    console: &mut Console,
+) -> Answer {
     let cell = match PressCell::write(arguments) {
         Ok(cell) => cell,
         Err(answer) => return answer,

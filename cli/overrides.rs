@@ -66,6 +66,28 @@ impl OverrideArguments {
         }
     }
 
+    /// The same over the link that was asked for, or over each of them.
+    pub(crate) fn each_link(&self) -> Vec<(LinkKind, Self)> {
+        let links = [
+            (LinkKind::Udp, LinkArgument::Udp),
+            (LinkKind::Zenoh, LinkArgument::Zenoh),
+        ];
+        let asked = links
+            .into_iter()
+            .filter(|(_, link)| self.link.is_none_or(|asked| asked == *link));
+        let over = asked.map(|(kind, link)| {
+            let link = Some(link);
+            (
+                kind,
+                Self {
+                    link,
+                    ..self.clone()
+                },
+            )
+        });
+        over.collect()
+    }
+
     /// The same as arguments of another process.
     pub(crate) fn to_arguments(&self) -> Vec<String> {
         let mut arguments = Vec::new();

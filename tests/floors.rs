@@ -37,7 +37,11 @@ const FLOORS: &[&[&str]] = &[
         "understudy-network",
         "understudy-simulator",
     ],
-    &["understudy-model-checking", "understudy-scenarios"],
+    &[
+        "understudy-baselines",
+        "understudy-model-checking",
+        "understudy-scenarios",
+    ],
     &["understudy", "understudy-fuzz"],
 ];
 

@@ -18,6 +18,7 @@ mod stranger;
 mod tally;
 
 pub use fault::{Action, Fault};
+pub use links::Metered;
 pub use network::{Disturbance, Network};
 pub use parts::{Parts, parts};
 pub use referee::{Referee, Violation};

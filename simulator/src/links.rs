@@ -42,6 +42,16 @@ pub(crate) struct Links {
     anybody_late: bool,
     remembers: bool,
     refused: u64,
+    metered: Option<Metered>,
+}
+
+/// What is sent, counted for each receiver, whether it arrives or not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Metered {
+    /// Frames.
+    pub frames: u64,
+    /// Their encoded bytes.
+    pub bytes: u64,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -93,6 +103,7 @@ impl Links {
             anybody_late: false,
             remembers: false,
             refused: 0,
+            metered: None,
         }
     }
 
@@ -100,6 +111,15 @@ impl Links {
     pub(crate) fn sent(&self, party: Party) -> u64 {
         self.place(party)
             .map_or(0, |place| self.senders[place].frames)
+    }
+
+    /// Counts what is sent, from here on.
+    pub(crate) fn meter(&mut self) {
+        self.metered = Some(Metered::default());
+    }
+
+    pub(crate) fn metered(&self) -> Metered {
+        self.metered.unwrap_or_default()
     }
 
     /// Frames that were changed on their way or forged, and refused for it.
@@ -283,6 +303,14 @@ impl Links {
             }
             _ => {}
         }
+        if let Some(metered) = &mut self.metered {
+            let mut bytes = Vec::new();
+            // What cannot be encoded is no frame of a party.
+            let _ = encode(&frame, &mut bytes);
+            let receivers = (stations.len() + remote_ios.len()) as u64;
+            metered.frames += receivers;
+            metered.bytes += receivers * bytes.len() as u64;
+        }
         if self.network.is_even() && !self.anybody_late && sender.delays.is_empty() {
             let at = now + self.network.latency;
             self.queue.push(at, frame, stations, remote_ios);
@@ -342,6 +370,7 @@ impl Hash for Links {
             anybody_late: _,
             remembers: _,
             refused: _,
+            metered: _,
         } = self;
         (queue, intakes, late).hash(hasher);
         for sender in senders {

@@ -64,7 +64,7 @@ impl Network {
     }
 
     /// The delays with which a frame reaches one receiver: none if it is lost, two if it is duplicated.
-    pub(crate) fn arrivals(&self, random: &mut Pcg64Mcg) -> impl Iterator<Item = Duration> + use<> {
+    pub fn arrivals(&self, random: &mut Pcg64Mcg) -> impl Iterator<Item = Duration> + use<> {
         let mut arrival = |share: f64| {
             let arrives = random.random::<f64>() < share;
             let jitter = self.jitter.mul_f64(random.random::<f64>());

@@ -19,7 +19,7 @@ use understudy_wire::{
 
 use crate::fault::Fault;
 use crate::field::Plants;
-use crate::links::Links;
+use crate::links::{Links, Metered};
 use crate::network::{Disturbance, Network};
 use crate::pace::Pace;
 use crate::parts::Parts;
@@ -257,6 +257,16 @@ impl Simulation {
     /// Frames that a party has sent so far.
     pub fn sent_frames(&self, party: Party) -> u64 {
         self.links.sent(party)
+    }
+
+    /// Counts what is sent from here on, for [`Self::metered`].
+    pub fn meter(&mut self) {
+        self.links.meter();
+    }
+
+    /// What was sent since it is counted.
+    pub fn metered(&self) -> Metered {
+        self.links.metered()
     }
 
     /// What the plant of a program shows now.

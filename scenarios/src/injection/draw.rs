@@ -126,6 +126,12 @@ impl Draw<'_> {
                 let peer = self.other(party)?;
                 cuts(&[peer], party, phase, from, to)
             }
+            Kind::LateLink => {
+                let to = self.other(party)?;
+                let by = schedule.period() / 20 * self.random.random_range(1..=40);
+                let end = Duration::ZERO;
+                lasting(Action::Delay { to, by }, Action::Delay { to, by: end })
+            }
             Kind::Isolation => cuts(&self.others(party), party, phase, from, to),
             Kind::CorruptFrames => {
                 let frames = self.random.random_range(1..=8);
@@ -135,6 +141,7 @@ impl Draw<'_> {
                 let age = self.random.random_range(1..=16);
                 vec![step(from, Action::Replay { age })]
             }
+            Kind::Forgery => vec![step(from, Action::Forge)],
             Kind::FlippedState => {
                 let program = match (role, party) {
                     (Role::Controller, Party::Station(station)) => ProgramId(station.0),

@@ -24,12 +24,16 @@ pub enum Kind {
     OneWayCut,
     /// Two parties do not hear each other for a while.
     Cut,
+    /// What one party sends comes late to another for a while.
+    LateLink,
     /// A party hears nobody and is heard by nobody for a while.
     Isolation,
     /// Bits of some of its frames flip on their way.
     CorruptFrames,
     /// An old frame of it comes once more.
     Replay,
+    /// A stranger speaks in its name, without its key.
+    Forgery,
     /// A bit of a state flips in its memory.
     FlippedState,
     /// A bit of a sample flips where it is made or taken in.
@@ -48,7 +52,7 @@ pub enum Kind {
 
 impl Kind {
     /// In the order in which they are explained.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 19] = [
         Self::Crash,
         Self::RestartStorm,
         Self::Stop,
@@ -56,9 +60,11 @@ impl Kind {
         Self::Misconfiguration,
         Self::OneWayCut,
         Self::Cut,
+        Self::LateLink,
         Self::Isolation,
         Self::CorruptFrames,
         Self::Replay,
+        Self::Forgery,
         Self::FlippedState,
         Self::FlippedSample,
         Self::FlippedWord,
@@ -78,9 +84,11 @@ impl Kind {
             Self::Misconfiguration => "misconfiguration",
             Self::OneWayCut => "one-way-cut",
             Self::Cut => "cut",
+            Self::LateLink => "late-link",
             Self::Isolation => "isolation",
             Self::CorruptFrames => "corrupt-frames",
             Self::Replay => "replay",
+            Self::Forgery => "forgery",
             Self::FlippedState => "flipped-state",
             Self::FlippedSample => "flipped-sample",
             Self::FlippedWord => "flipped-word",

@@ -252,6 +252,10 @@ fn simpler_action(action: Action) -> Action {
         Action::Slow { by } if by.as_millis() > 1 => Action::Slow {
             by: Duration::from_millis(by.as_millis() as u64 / 2),
         },
+        Action::Delay { to, by } if by.as_millis() > 1 => Action::Delay {
+            to,
+            by: Duration::from_millis(by.as_millis() as u64 / 2),
+        },
         Action::Corrupt { frames } => Action::Corrupt {
             frames: frames.div_ceil(2),
         },
@@ -315,7 +319,7 @@ fn simpler_parties(faultload: &Faultload, schedule: &Schedule) -> Vec<Faultload>
     let mut used: BTreeMap<Party, Party> = BTreeMap::new();
     for step in faultload.steps() {
         used.entry(step.party).or_insert(step.party);
-        if let Action::Cut { to } | Action::Heal { to } = step.action {
+        if let Action::Cut { to } | Action::Heal { to } | Action::Delay { to, .. } = step.action {
             used.entry(to).or_insert(to);
         }
     }
@@ -343,6 +347,7 @@ fn simpler_parties(faultload: &Faultload, schedule: &Schedule) -> Vec<Faultload>
                 step.action = match step.action {
                     Action::Cut { to } => Action::Cut { to: swap(to) },
                     Action::Heal { to } => Action::Heal { to: swap(to) },
+                    Action::Delay { to, by } => Action::Delay { to: swap(to), by },
                     action => action,
                 };
             }
@@ -362,7 +367,9 @@ fn rank(faultload: &Faultload) -> Vec<(Party, Option<Party>)> {
         .flat_map(|injection| &injection.steps);
     steps
         .map(|step| match step.action {
-            Action::Cut { to } | Action::Heal { to } => (step.party, Some(to)),
+            Action::Cut { to } | Action::Heal { to } | Action::Delay { to, .. } => {
+                (step.party, Some(to))
+            }
             _ => (step.party, None),
         })
         .collect()
