@@ -1,13 +1,16 @@
 //! `understudy keys`: the keys and certificates of a cluster.
 
 use std::fmt::Write as _;
+use std::net::IpAddr;
 use std::path::PathBuf;
 use std::time::SystemTime;
 
 use clap::{Args, Subcommand};
 use serde::Serialize;
 use understudy_cluster::{Cluster, Overrides};
-use understudy_keys::{Authority, DEFAULT_OPERATOR, Date, Holder, Issued, KeysError, Role};
+use understudy_keys::{
+    Authority, DEFAULT_OPERATOR, Date, Holder, Issued, KeysError, Operators, Role,
+};
 
 use crate::answer::{Answer, Status};
 use crate::files;
@@ -51,6 +54,9 @@ enum What {
         /// An operator, who is no party and may command them; may be given more than once
         #[arg(long, value_name = "NAME")]
         operator: Vec<String>,
+        /// Where these operators are called, such as the router of a site
+        #[arg(long, value_name = "IP", requires = "operator")]
+        address: Option<IpAddr>,
         #[command(flatten)]
         folder: FolderArgument,
         #[command(flatten)]
@@ -99,18 +105,23 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
             let mut authority =
                 Authority::init(&folder.folder, &cluster, now).map_err(|error| failed(&[error]))?;
             let operators = [DEFAULT_OPERATOR.to_owned()];
-            let issued = authority.issue(&cluster, &names, &operators, days.days, now);
+            let issued = authority.issue(&cluster, &names, operators[..].into(), days.days, now);
             issued.map_err(|errors| failed(&errors))
         }),
         What::Issue {
             cluster,
             names,
             operator,
+            address,
             folder,
             days,
         } => read(cluster).and_then(|cluster| {
             let mut authority = open(folder)?;
-            let issued = authority.issue(&cluster, names, operator, days.days, now);
+            let operators = Operators {
+                names: operator,
+                address: *address,
+            };
+            let issued = authority.issue(&cluster, names, operators, days.days, now);
             issued.map_err(|errors| failed(&errors))
         }),
         What::List { folder } => {

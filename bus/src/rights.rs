@@ -102,7 +102,10 @@ pub(crate) fn run_in_real_time(priority: u8) -> Result<(), String> {
         ThreadPriority::Crossplatform(value),
         policy,
     )
-    .map_err(|error| error.to_string())
+    .map_err(|error| match error {
+        thread_priority::Error::OS(code) => std::io::Error::from_raw_os_error(code).to_string(),
+        error => error.to_string(),
+    })
 }
 
 /// Takes the calling thread out of real time: what it does has time.

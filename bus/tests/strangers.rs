@@ -6,6 +6,7 @@
     reason = "real sockets take real time, and a test that waits has a deadline"
 )]
 
+#[allow(dead_code, reason = "each test uses its part")]
 mod parties;
 
 use std::collections::BTreeSet;

@@ -1,6 +1,7 @@
 //! Who makes the keys of a cluster.
 
 use std::collections::BTreeSet;
+use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 
 use rcgen::{Issuer, KeyPair};
@@ -13,7 +14,7 @@ use crate::date::Date;
 use crate::error::KeysError;
 use crate::files;
 use crate::party::{Heard, KeysFile, Shared};
-use crate::register::{Holder, Register, Role, common_name};
+use crate::register::{Holder, Register, Revoked, Role, common_name};
 use crate::revoked::RevokedFile;
 
 /// The operator that every authority issues keys for.
@@ -21,6 +22,24 @@ pub const DEFAULT_OPERATOR: &str = "operator";
 
 /// The authority's own certificate outlives all that it issues.
 const AUTHORITY_DAYS: u32 = 20 * 365;
+
+/// Operators that are issued keys.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Operators<'a> {
+    /// Their names.
+    pub names: &'a [String],
+    /// Where they are called, if they are: the router of a site is, a person is not.
+    pub address: Option<IpAddr>,
+}
+
+impl<'a> From<&'a [String]> for Operators<'a> {
+    fn from(names: &'a [String]) -> Self {
+        Self {
+            names,
+            address: None,
+        }
+    }
+}
 
 /// An authority and its folder.
 pub struct Authority {
@@ -149,17 +168,23 @@ impl Authority {
         &mut self,
         cluster: &Cluster,
         names: &[String],
-        operators: &[String],
+        operators: Operators<'_>,
         days: u32,
         now: Date,
     ) -> Result<Issued, Vec<KeysError>> {
-        self.check(cluster, names, operators)?;
-        let all = names.iter().map(|name| (name, Role::Party));
-        let all = all.chain(operators.iter().map(|name| (name, Role::Operator)));
+        self.check(cluster, names, operators.names)?;
+        let address = |name: &String| {
+            let party = cluster.party(name);
+            let address = party.and_then(|party| cluster.address(party));
+            address.map(|address| address.ip())
+        };
+        let all = names.iter().map(|name| (name, Role::Party, address(name)));
+        let operator = |name| (name, Role::Operator, operators.address);
+        let all = all.chain(operators.names.iter().map(operator));
         let mut renewed = BTreeSet::new();
-        for (name, role) in all {
+        for (name, role, address) in all {
             if renewed.insert(name.clone()) {
-                self.renew(cluster, name, role, days, now)
+                self.renew(name, role, address, now, now.plus_days(days))
                     .map_err(|error| vec![error])?;
             }
         }
@@ -202,6 +227,10 @@ impl Authority {
         for holder in &mut self.register.holders {
             if names.contains(&holder.name) {
                 holder.revoked = Some(now);
+                holder.revoked_through = Some(Revoked {
+                    generation: holder.generation,
+                    since: now,
+                });
                 revoked.push(holder.clone());
             }
         }
@@ -258,24 +287,19 @@ impl Authority {
 
     fn renew(
         &mut self,
-        cluster: &Cluster,
         name: &str,
         role: Role,
-        days: u32,
+        address: Option<IpAddr>,
         now: Date,
+        expires: Date,
     ) -> Result<(), KeysError> {
-        let generation = self
-            .register
-            .find(name)
-            .map_or(0, |holder| holder.generation)
-            + 1;
-        let address = cluster.party(name).and_then(|party| cluster.address(party));
-        let expires = now.plus_days(days);
+        let known = self.register.find(name).cloned();
+        let generation = known.as_ref().map_or(0, |holder| holder.generation) + 1;
         let pair = certificate::holder(
             &Subject {
-                cluster: cluster.name(),
+                cluster: &self.register.cluster,
                 common_name: &common_name(name, generation),
-                address: address.map(|address| address.ip()),
+                address,
                 issued: now,
                 expires,
             },
@@ -294,6 +318,7 @@ impl Authority {
             issued: now,
             expires,
             revoked: None,
+            revoked_through: known.and_then(|holder| holder.revoked_through),
         };
         match self
             .register

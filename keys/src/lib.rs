@@ -45,9 +45,9 @@ mod party;
 mod register;
 mod revoked;
 
-pub use authority::{Authority, DEFAULT_OPERATOR, Issued};
+pub use authority::{Authority, DEFAULT_OPERATOR, Issued, Operators};
 pub use date::Date;
 pub use error::KeysError;
 pub use party::{OperatorKeys, PartyKeys, TlsFiles};
-pub use register::{Holder, Register, Role};
+pub use register::{Holder, Register, Revoked, Role};
 pub use revoked::RevocationWatch;

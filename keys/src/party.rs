@@ -12,7 +12,7 @@ use crate::date::Date;
 use crate::error::KeysError;
 use crate::files;
 use crate::register::Role;
-use crate::revoked::{RevocationWatch, RevokedFile, Sender3, senders};
+use crate::revoked::{HeardSender, RevocationWatch, RevokedFile, senders};
 
 /// `keys.toml`.
 #[derive(Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -75,7 +75,7 @@ pub struct PartyKeys {
     own: Party,
     expires: Date,
     key: FrameKey,
-    heard: Vec<Sender3>,
+    heard: Vec<HeardSender>,
     heard_keys: Vec<(Party, FrameKey)>,
     to: Vec<(StationId, TransferKey)>,
     from: Vec<(StationId, TransferKey)>,

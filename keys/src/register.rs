@@ -34,6 +34,19 @@ pub struct Holder {
     /// Since when the present ones no longer count.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub revoked: Option<Date>,
+    /// The newest of its keys that ever were revoked: these and all before them stay so, whatever is issued after.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub revoked_through: Option<Revoked>,
+}
+
+/// Keys that no longer count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Revoked {
+    /// This generation and all before it.
+    pub generation: u32,
+    /// Since when.
+    pub since: Date,
 }
 
 /// What a holder may do.

@@ -13,7 +13,7 @@ use understudy_wire::Party;
 use crate::date::Date;
 use crate::error::KeysError;
 use crate::files;
-use crate::register::{Register, common_name};
+use crate::register::Register;
 
 /// How often a running party looks whether its list has changed.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
@@ -23,13 +23,13 @@ const LOOK_EVERY: Duration = Duration::from_millis(500);
 #[serde(deny_unknown_fields)]
 pub(crate) struct RevokedFile {
     #[serde(default)]
-    pub(crate) revoked: Vec<Revoked>,
+    pub(crate) revoked: Vec<Entry>,
 }
 
 /// Of one holder: this generation and all before it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Revoked {
+pub(crate) struct Entry {
     pub(crate) name: String,
     pub(crate) generation: u32,
     pub(crate) since: Date,
@@ -39,10 +39,11 @@ impl RevokedFile {
     pub(crate) fn of(register: &Register) -> Self {
         let holders = register.holders.iter();
         let revoked = holders.filter_map(|holder| {
-            Some(Revoked {
+            let revoked = holder.revoked_through?;
+            Some(Entry {
                 name: holder.name.clone(),
-                generation: holder.generation,
-                since: holder.revoked?,
+                generation: revoked.generation,
+                since: revoked.since,
             })
         });
         Self {
@@ -61,16 +62,16 @@ impl RevokedFile {
 
     /// Those of some common names that are not revoked.
     pub(crate) fn without(&self, names: &[String]) -> Vec<String> {
-        let gone = |name: &String| {
-            self.revoked
-                .iter()
-                .any(|entry| common_name(&entry.name, entry.generation) == *name)
+        let gone = |common_name: &String| {
+            let parts = common_name.rsplit_once('.');
+            let parts = parts.and_then(|(name, number)| Some((name, number.parse().ok()?)));
+            parts.is_some_and(|(name, generation)| self.holds(name, generation))
         };
         names.iter().filter(|name| !gone(name)).cloned().collect()
     }
 
     pub(crate) fn holds(&self, name: &str, generation: u32) -> bool {
-        let revoked = |entry: &Revoked| entry.name == name && generation <= entry.generation;
+        let revoked = |entry: &Entry| entry.name == name && generation <= entry.generation;
         self.revoked.iter().any(revoked)
     }
 }
@@ -83,12 +84,12 @@ pub struct RevocationWatch {
 }
 
 /// A sender, by the name and the generation of its key.
-pub(crate) type Sender3 = (Party, String, u32);
+pub(crate) type HeardSender = (Party, String, u32);
 
 impl RevocationWatch {
     pub(crate) fn start(
         path: PathBuf,
-        heard: Vec<Sender3>,
+        heard: Vec<HeardSender>,
         revoked: Arc<Revocations>,
     ) -> Result<Self, KeysError> {
         let (stop, stopped) = channel();
@@ -133,7 +134,7 @@ impl Drop for RevocationWatch {
 }
 
 /// Those of `heard` whose key is revoked.
-pub(crate) fn senders(file: &RevokedFile, heard: &[Sender3]) -> impl Iterator<Item = Party> {
+pub(crate) fn senders(file: &RevokedFile, heard: &[HeardSender]) -> impl Iterator<Item = Party> {
     heard
         .iter()
         .filter(|(_, name, generation)| file.holds(name, *generation))

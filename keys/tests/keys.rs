@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use understudy_cluster::{Cluster, press_cell, read};
 use understudy_keys::{
-    Authority, DEFAULT_OPERATOR, Date, KeysError, OperatorKeys, PartyKeys, Role,
+    Authority, DEFAULT_OPERATOR, Date, KeysError, OperatorKeys, Operators, PartyKeys, Role,
 };
 use understudy_seal::Refusal;
 use understudy_wire::{Body, Frame, Header, Moment, Party, Topic, encode};
@@ -54,7 +54,13 @@ fn issued(name: &str) -> (Cluster, Authority) {
     let mut authority = Authority::init(&empty(name), &cluster, now()).expect("an empty folder");
     let operators = [DEFAULT_OPERATOR.to_owned()];
     authority
-        .issue(&cluster, &names(&cluster), &operators, DAYS, now())
+        .issue(
+            &cluster,
+            &names(&cluster),
+            operators[..].into(),
+            DAYS,
+            now(),
+        )
         .expect("names of the cluster");
     (cluster, authority)
 }
@@ -255,7 +261,13 @@ fn what_is_revoked_no_longer_counts_and_new_keys_do() {
     );
 
     authority
-        .issue(&cluster, &["robot".to_owned()], &[], DAYS, now())
+        .issue(
+            &cluster,
+            &["robot".to_owned()],
+            Operators::default(),
+            DAYS,
+            now(),
+        )
         .expect("a name of the cluster");
     let fresh = loaded(&authority, &cluster, robot);
     let mut listening = loaded(&authority, &cluster, press).opener();
@@ -268,6 +280,13 @@ fn what_is_revoked_no_longer_counts_and_new_keys_do() {
         listening.open(&mut datagram(&cluster, &stolen, robot)),
         Err(Refusal::Forged { sender: robot })
     );
+    // Whoever has the new list and not yet the new keys still does not hear the old ones.
+    let mut behind = witness.opener();
+    assert_eq!(
+        behind.open(&mut datagram(&cluster, &stolen, robot)),
+        Err(Refusal::Revoked { sender: robot })
+    );
+    assert!(!witness.admitted().1.contains(&"robot.1".to_owned()));
     let members = &loaded(&authority, &cluster, press).tls().members.clone();
     assert!(members.contains(&"robot.2".to_owned()) && !members.contains(&"robot.1".to_owned()));
 }
@@ -340,7 +359,7 @@ fn everything_that_is_wrong_is_said_at_once() {
     );
 
     let nobody = ["robot".to_owned(), "nobody".into(), "no one".into()];
-    let refused = authority.issue(&cluster, &nobody, &["press".into()], DAYS, now());
+    let refused = authority.issue(&cluster, &nobody, ["press".into()][..].into(), DAYS, now());
     assert_eq!(codes(&refused.expect_err("no such names")), ["U0907"; 3]);
     let generation = authority.register().holders[0].generation;
     assert_eq!(generation, 1, "nothing was issued to the one who is known");

@@ -34,7 +34,13 @@ fn issued(name: &str) -> (PathBuf, PathBuf) {
     let mut authority = Authority::init(&folder, &cluster, now).expect("an empty folder");
     let operators = [DEFAULT_OPERATOR.to_owned()];
     authority
-        .issue(&cluster, &["robot".to_owned()], &operators, 1, now)
+        .issue(
+            &cluster,
+            &["robot".to_owned()],
+            operators[..].into(),
+            1,
+            now,
+        )
         .expect("a name of the cluster");
     (
         authority.folder_of("robot"),

@@ -127,6 +127,14 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_router_of_a_site_is_one_that_zenoh_knows() {
+        let text = include_str!("../../../deployment/site-router.json5");
+        let config = zenoh::Config::from_json5(text).expect("Zenoh reads it");
+        let rules = config.get_json("access_control/default_permission");
+        assert_eq!(rules.expect("it is set"), "\"deny\"");
+    }
+
+    #[test]
     fn nobody_is_not_everybody() {
         let rules = access_control("understudy/1/robot", &Admitted::default());
         assert_eq!(rules["default_permission"], "deny");
