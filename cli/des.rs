@@ -10,7 +10,7 @@ use understudy_supervisor::operations::{
     reachable, selfloop, supcon, supreduce, sync, trim,
 };
 use understudy_supervisor::{
-    Automaton, Bounds, Event, Label, Model, State, TooLarge, synthesis_findings,
+    Automaton, AutomatonError, Bounds, Event, Label, Model, State, TooLarge, synthesis_findings,
 };
 
 use crate::answer::{Answer, Failure, Status};
@@ -101,7 +101,8 @@ enum Operation {
         #[arg(long, value_name = "LABEL", value_delimiter = ',', required = true)]
         hide: Vec<u32>,
     },
-    /// The same automaton, to be written in another form
+    /// The automaton of a file, to be written in another form
+    #[command(visible_alias = "create")]
     Convert { file: PathBuf },
     /// The events that cause the avalanche effect in a ladder
     Avalanche { file: PathBuf },
@@ -221,7 +222,14 @@ impl Operation {
                     )),
                 }
             }
-            Self::Mutex { exclude, .. } => Outcome::of(mutex(parts[0], parts[1], exclude, bounds)?),
+            Self::Mutex { exclude, .. } => match no_such_state(parts, exclude) {
+                Some(error) => Outcome::Answer(Answer::failed(
+                    Status::BadInput,
+                    error.code(),
+                    error.to_string(),
+                )),
+                None => Outcome::of(mutex(parts[0], parts[1], exclude, bounds)?),
+            },
             Self::Nonconflict { .. } => Outcome::Answer(conflict(parts, bounds)?),
             Self::Project { hide, .. } => {
                 let hidden: Vec<Label> = labels(hide);
@@ -244,6 +252,21 @@ impl Operation {
             }
         })
     }
+}
+
+/// A pair with a state that its automaton does not have.
+fn no_such_state(parts: &[&Automaton], pairs: &[(State, State)]) -> Option<AutomatonError> {
+    let sides = pairs
+        .iter()
+        .flat_map(|&(left, right)| [(left, parts[0]), (right, parts[1])]);
+    let mut wrong =
+        sides.filter(|(state, part)| !part.is_empty() && state.index() >= part.state_count());
+    wrong
+        .next()
+        .map(|(state, part)| AutomatonError::NoSuchState {
+            state,
+            states: part.state_count(),
+        })
 }
 
 fn word(automaton: &Automaton, labels: &[Label]) -> String {

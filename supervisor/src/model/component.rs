@@ -7,7 +7,7 @@ use toml::de::{DeTable, DeValue};
 use understudy_diagnostic::Diagnostic;
 
 use super::read::Loader;
-use crate::alphabet::{Event, Label};
+use crate::alphabet::{Alphabet, Event, Label};
 use crate::automaton::{Automaton, State, Transition};
 use crate::events::Events;
 use crate::form::{Form, Place, Word, nearest, trimmed};
@@ -70,9 +70,6 @@ pub(super) fn read_component(
         }
         is_marked
     };
-    if states.names.is_empty() {
-        states.names.push(("0", place.clone()));
-    }
     let own = match table.get("events") {
         Some(list) => words(form, list),
         None => Vec::new(),
@@ -84,6 +81,13 @@ pub(super) fn read_component(
             name: events.alphabet.name(label),
         })
         .collect();
+    if states.names.is_empty() {
+        // `states = []` says that there is none: EMPTY.
+        if table.contains_key("states") {
+            return Some(Automaton::empty(&name, Alphabet::new(own)));
+        }
+        states.names.push(("0", place.clone()));
+    }
     let initial = initial
         .and_then(|(word, _)| states.numbers.get(word).copied())
         .unwrap_or(0);

@@ -4,7 +4,7 @@ use insta::assert_snapshot;
 use understudy_diagnostic::{Diagnostic, Report};
 use understudy_supervisor::ads::Vocal;
 use understudy_supervisor::{
-    Automaton, Event, Label, Model, State, read_ads, read_model, write_ads, write_model,
+    Alphabet, Automaton, Event, Label, Model, State, read_ads, read_model, write_ads, write_model,
 };
 
 use crate::models::{MODELS, Model as Reference};
@@ -55,6 +55,17 @@ fn empty_and_vocal_are_read_and_written() {
     let empty = accepted("EMPTY\nState size:\n0\nMarker states:\n\nTransitions:\n");
     assert!(empty.is_empty() && empty.initial().is_none());
     assert_eq!(accepted(&write_ads(&empty, &[]).expect("it fits")), empty);
+    let event = Event {
+        label: Label::new(3),
+        name: "start".to_owned(),
+    };
+    let nothing = Model {
+        alphabet: Alphabet::new([event.clone()]),
+        supervisors: vec![Automaton::empty("EMPTY", Alphabet::new([event]))],
+        ..Model::default()
+    };
+    let again = read_model(&write_model(&nothing), |_| Err(String::new()));
+    assert_eq!(again.model.expect("right").supervisors, nothing.supervisors);
     let text = "V\nState size:\n2\nMarker states:\nVocal states:\n1 10\nTransitions:\n0 0 1\n";
     let read = read_ads(text);
     let vocal = [Vocal {
