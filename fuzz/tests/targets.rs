@@ -1,0 +1,159 @@
+//! One target for each reader.
+
+#![allow(clippy::print_stderr, reason = "a finding names its file")]
+
+mod attack;
+
+use std::time::Duration;
+
+use attack::attack;
+use understudy_ladder::{MAXIMUM_NESTING, check, parse, print};
+use understudy_reconfiguration::{Signals, project, record};
+use understudy_bus::{Endpoints, Peer};
+use understudy_wire::{ClusterHash, MAXIMUM_FRAME_BYTES, decode, encode};
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+#[test]
+fn ladder() {
+    let seeds = [
+        "examples/press-cell/robot.ladder",
+        "examples/boiler/main.ladder",
+        "examples/filling-line/plant.ladder",
+    ];
+    attack("ladder", &seeds, |bytes| {
+        let parsed = parse(&text(bytes));
+        let _ = check(&parsed.program);
+        let Ok((program, _)) = parsed.into_result() else { return };
+        // What is right is the same after it was printed, and becomes a circuit.
+        let again = parse(&print(&program));
+        assert_eq!(again.into_result().map(|(again, _)| print(&again)), Ok(print(&program)));
+        let _ = program.lower(Duration::from_millis(10));
+    });
+}
+
+#[test]
+fn cluster() {
+    let seeds = ["examples/press-cell/cluster.toml", "examples/boiler/cluster.toml"];
+    let ladder = include_str!("../../examples/press-cell/press.ladder");
+    attack("cluster", &seeds, |bytes| {
+        let _ = understudy_cluster::read("cluster.toml", &text(bytes), &mut |_| Ok(ladder.to_owned()));
+    });
+}
+
+#[test]
+fn scenario() {
+    let seeds = ["scenarios/kill-each.toml", "scenarios/lossy.toml", "scenarios/table-two.toml"];
+    attack("scenario", &seeds, |bytes| {
+        let text = text(bytes);
+        let _ = understudy_scenarios::looks_like_a_scenario(&text);
+        let _ = understudy_scenarios::read("scenario.toml", &text, None);
+    });
+}
+
+#[test]
+fn journal() {
+    attack("journal", &[], |bytes| {
+        for record in understudy_scenarios::records(bytes) {
+            let _ = record;
+        }
+    });
+}
+
+#[test]
+fn ads() {
+    let seeds = ["examples/motivating-example/supervisor.ADS", "examples/avalanche/TEST.ADS"];
+    attack("ads", &seeds, |bytes| {
+        let _ = understudy_supervisor::read_ads(&text(bytes));
+    });
+}
+
+#[test]
+fn model() {
+    let seeds = ["examples/small-factory/model.toml", "examples/boiler/pilot.toml"];
+    attack("model", &seeds, |bytes| {
+        let _ = understudy_supervisor::read_model(&text(bytes), |_| Err("absent".to_owned()));
+    });
+}
+
+#[test]
+fn map() {
+    let seeds = ["examples/motivating-example/map.toml", "examples/boiler/main-map.toml"];
+    attack("map", &seeds, |bytes| {
+        let _ = understudy_supervisor::ladder::read_map(&text(bytes));
+    });
+}
+
+#[test]
+fn chain() {
+    attack("chain", &[], |bytes| {
+        let _ = understudy_reliability::read_chain("chain.toml", &text(bytes));
+    });
+}
+
+#[test]
+fn reconfiguration() {
+    let seeds = ["examples/filling-line/reconfiguration.toml"];
+    let ladder = include_str!("../../examples/filling-line/filling-line.ladder");
+    attack("reconfiguration", &seeds, |bytes| {
+        let _ = project::read("project.toml", &text(bytes), &mut |_| Ok(ladder.to_owned()));
+    });
+}
+
+#[test]
+fn record_of_scans() {
+    let names = |text: &str| text.split(' ').map(str::to_owned).collect();
+    let signals = Signals {
+        inputs: names("a b"),
+        outputs: names("y"),
+    };
+    attack("record", &[], |bytes| {
+        let _ = record::read("record.csv", &text(bytes), &signals);
+    });
+}
+
+#[test]
+fn endpoints() {
+    attack("endpoints", &[], |bytes| {
+        let Ok(peers) = serde_json::from_slice::<Vec<Peer>>(bytes) else { return };
+        if let Some(own) = peers.first().map(|peer| peer.party) {
+            let _ = Endpoints::new(ClusterHash(1), own, peers, Vec::new());
+        }
+    });
+}
+
+#[test]
+fn register_of_keys() {
+    attack("keys", &[], |bytes| {
+        let _ = toml::from_str::<understudy_keys::Register>(&text(bytes));
+    });
+}
+
+#[test]
+fn frame() {
+    // Behind the prefix and before the checksum, where a reader has to understand something.
+    attack("frame", &[], |payload| {
+        let mut bytes = b"UNDR\x02".to_vec();
+        bytes.extend_from_slice(payload);
+        let checksum = crc32fast::hash(&bytes);
+        bytes.extend_from_slice(&checksum.to_le_bytes());
+        let _ = decode(payload);
+        // What is taken for a frame is one: it can be said again, and means the same.
+        let Ok(frame) = decode(&bytes) else { return };
+        let mut again = Vec::new();
+        encode(&frame, &mut again).expect("what was heard can be said");
+        assert!(again.len() <= MAXIMUM_FRAME_BYTES);
+        assert_eq!(decode(&again), Ok(frame));
+    });
+}
+
+#[test]
+fn nesting_has_a_bound() {
+    let deep = MAXIMUM_NESTING * 40;
+    for open in ["[ ", "[ a | ", "{SR l R="] {
+        let text = format!("program p\ninput a\noutput y\nrung\n    {} ( y )\n", open.repeat(deep));
+        assert!(parse(&text).into_result().is_err());
+    }
+}
