@@ -266,6 +266,7 @@ impl Cluster {
             agreement: Arc::clone(&self.agreement),
             hash: controller.hash,
             inputs: controller.circuit.inputs().len(),
+            channels: understudy_remote_io::Channel::of_inputs(controller.circuit.inputs()),
             hold_cycles: remote_io.hold_cycles,
             fail_safe: remote_io.fail_safe.clone(),
             release: remote_io.release,

@@ -73,6 +73,7 @@ fn parts(understudies: usize) -> Parts {
         agreement: Arc::clone(&agreement),
         hash: program.hash,
         inputs: 1,
+        channels: Vec::new(),
         hold_cycles: 1,
         fail_safe: Image::zero(1),
         release: Release::Automatic,

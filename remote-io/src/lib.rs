@@ -3,6 +3,7 @@
 //! [`RemoteIo`] is the only source of u(i) and the only place where y(i) is applied, and so the arbiter of program i: no
 //! agreement among the others is needed to mask a failure, and no two masters can drive one actuator.
 
+mod channel;
 mod event;
 mod history;
 mod remote_io;
@@ -12,6 +13,7 @@ mod trust;
 mod votes;
 mod witnesses;
 
+pub use channel::Channel;
 pub use event::{Event, Missing};
 pub use remote_io::RemoteIo;
 pub use settings::{Release, Settings, ValueFault};

@@ -27,6 +27,7 @@ use understudy_wire::{
     StationSet, Time,
 };
 
+use crate::channel;
 use crate::event::{Event, Missing};
 use crate::history::History;
 use crate::selection::Selection;
@@ -314,7 +315,7 @@ impl Machine for RemoteIo {
             Input::Frame(frame) => self.receive(now, frame),
             Input::Field(sensors) => {
                 if sensors.width() == self.settings.inputs {
-                    self.field.clone_from(sensors);
+                    self.field = channel::seen(&self.settings.channels, &self.field, sensors);
                     self.field_lost = false;
                 }
             }

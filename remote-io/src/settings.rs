@@ -5,6 +5,8 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use understudy_wire::{Agreement, Image, ProgramHash, ProgramId};
 
+use crate::channel::Channel;
+
 /// A remote I/O's own settings.
 #[derive(Debug, Clone)]
 pub struct Settings {
@@ -16,6 +18,8 @@ pub struct Settings {
     pub hash: ProgramHash,
     /// Width of u(i) in bits.
     pub inputs: usize,
+    /// Inputs whose channels say when they are failed.
+    pub channels: Vec<Channel>,
     /// Cycles for which the last true outputs are kept when nothing true is there.
     pub hold_cycles: u32,
     /// y(i) after that; its width is that of the outputs.

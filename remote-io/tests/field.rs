@@ -98,6 +98,7 @@ fn without_sensors_nothing_is_sampled_and_the_program_stands_still() {
         agreement: agreement(),
         hash: ProgramHash(9),
         inputs: 2,
+        channels: Vec::new(),
         hold_cycles: 2,
         fail_safe: Image::zero(1),
         release: Release::Automatic,

@@ -63,6 +63,7 @@ pub(crate) fn line(programs: usize, mode: Mode, understudies: usize) -> Parts {
                 agreement: Arc::clone(&agreement),
                 hash: program.hash,
                 inputs: program.scan.input_count(),
+                channels: Vec::new(),
                 hold_cycles: HOLD_CYCLES,
                 fail_safe: Image::zero(program.scan.output_count()),
                 release: understudy_remote_io::Release::Automatic,
