@@ -27,7 +27,9 @@ mod signals;
 pub use advice::{ChannelAdvice, Effect};
 pub use analysis::{Failure, Outcome, analyse};
 pub use controller::{Controller, Move, State};
-pub use mega::{Analysis, Label, MegaController, MegaState, Question, Unbuilt, failed_channels};
+pub use mega::{
+    Analysis, Label, MegaController, MegaState, Question, Trimming, Unbuilt, failed_channels,
+};
 pub use relation::{Feedback, Relation, Row, feedback, joint_feedback};
 pub use settle::{Command, NoCommand};
 pub use signals::{Bits, Event, Signals};

@@ -8,10 +8,13 @@
 //! unseen events from happening where outputs can ([`crate::settle`]), reads a repaired channel's value (*disaggregation*), and
 //! sees all inputs of a scan at once. They differ in how much may have happened unseen before a failure is known.
 
+mod trim;
+
 use std::collections::BTreeSet;
 
 use rustc_hash::FxHashMap;
 
+pub use self::trim::Trimming;
 use crate::command::Objective;
 use crate::controller::{Controller, Move, reach};
 use crate::relation::{Feedback, Relation, joint_feedback};

@@ -256,6 +256,21 @@ impl Outcome {
                 );
             }
         }
+        let dangling = self
+            .mega
+            .dangling
+            .iter()
+            .filter(|dangling| **dangling)
+            .count();
+        if dangling > 0 {
+            let trimming = self.mega.trim(controller, &self.relation);
+            let _ = writeln!(
+                text,
+                "{dangling} states of the mega-controller are left by the operator's release only; {} transitions lead there, of which outputs could prevent {}.\n",
+                trimming.disabled.len() + trimming.unavoidable.len(),
+                trimming.disabled.len()
+            );
+        }
         let minimum = self.minimum_channels();
         let _ = writeln!(
             text,

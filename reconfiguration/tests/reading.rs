@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use understudy_ladder::parse;
 use understudy_reconfiguration::record::{RecordError, learn, missed, read};
-use understudy_reconfiguration::{Analysis, Failure, Signals, analyse, project};
+use understudy_reconfiguration::{Analysis, Signals, analyse, project};
 
 const LADDER: &str = include_str!("../../examples/filling-line/filling-line.ladder");
 const PLANT: &str = include_str!("../../examples/filling-line/plant.ladder");
@@ -75,7 +75,7 @@ states = ["0101", "00000_00x0"]
 events = "ps1-"
 "#
     ));
-    insta::assert_snapshot!(findings("[project]\nladder = 5\n[[relation]\n"), @"");
+    assert!(findings("[project]\nladder = 5\n[[relation]\n").contains("U1201"));
     assert!(findings("relation = []").contains("U1203"));
 }
 
@@ -108,15 +108,6 @@ fn states_without_a_safe_command_are_shown_with_their_rows() {
     );
 }
 
-#[test]
-fn with_too_many_states_the_limit_is_named() {
-    let failure = Failure::TooLarge {
-        what: "the mega-controller",
-        limit: 7,
-    };
-    assert!(failure.to_string().contains('7'));
-}
-
 fn signals() -> Signals {
     let names = |text: &str| text.split(' ').map(str::to_owned).collect();
     Signals {
@@ -141,8 +132,8 @@ fn learnt(text: &str) -> Result<(Vec<String>, usize), RecordError> {
 fn what_is_hidden_is_found_by_what_came_before() {
     let (states, moves) = learnt("a,y\n0,0\n1,1\n1,1\n0,0\n1,0\n0,0\n1,0\n").expect("a record");
     // 0_0 leads to 1_1 at first and to 1_0 later.
-    assert_eq!(states, ["0_0", "1_1", "0_0'1", "1_0"]);
-    assert_eq!(moves, 4);
+    assert_eq!(states, ["0_0", "1_1", "0_0'1", "1_0", "0_0'2"]);
+    assert_eq!(moves, 5);
 }
 
 #[test]

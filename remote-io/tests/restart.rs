@@ -43,6 +43,7 @@ fn run(held: [Held; 3], release: Release, released_at: u64, cycles: u64) -> Vec<
             agreement,
             hash: ProgramHash(1),
             inputs: 1,
+            channels: Vec::new(),
             hold_cycles: 3,
             fail_safe: Image::zero(1),
             release,

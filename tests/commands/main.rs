@@ -8,6 +8,7 @@ mod examples;
 mod help;
 mod others;
 mod petri;
+mod reconfigure;
 mod reliability;
 mod verify;
 

@@ -142,6 +142,37 @@ fn with_prompt_detection_every_repair_finds_the_way_back() {
     assert!(mega.dangling.iter().all(|dangling| !dangling));
 }
 
+#[test]
+fn trimming_disables_what_leads_to_where_nothing_leads_back() {
+    let (controller, relation) = (controller(), relation());
+    for analysis in [Analysis::Section2, Analysis::Late] {
+        let mega = build(analysis, &[1, 3]);
+        let trimming = mega.trim(&controller, &relation);
+        let crossing = mega.edges.iter().enumerate().flat_map(|(source, edges)| {
+            let to = edges.iter().map(move |(_, target)| (source, *target));
+            to.filter(|(source, target)| !mega.dangling[*source] && mega.dangling[*target])
+        });
+        let told = trimming.disabled.len() + trimming.unavoidable.len();
+        assert_eq!(told, crossing.count(), "{analysis:?}");
+        for (state, events) in &trimming.disabled {
+            for &member in &mega.states[*state].members {
+                let defined = events
+                    .iter()
+                    .filter(|&&event| controller.is_defined(member as usize, event));
+                assert!(
+                    defined
+                        .into_iter()
+                        .all(|&event| !relation.rows(member as usize, event).is_empty())
+                );
+            }
+        }
+    }
+    // Late, Filling_done fails in state 5: filled or not cannot be told any more when it is repaired at 0.
+    let late = build(Analysis::Late, &[3]);
+    let unknown = late.find(&[4, 6], 0).expect("it is come to");
+    assert!(late.dangling[unknown]);
+}
+
 /// Section 2 once more, with sets of strings in place of a worklist.
 fn naive_section_2(channels: &[usize]) -> BTreeSet<(BTreeSet<usize>, u64)> {
     let controller = controller();

@@ -7,9 +7,9 @@ mod attack;
 use std::time::Duration;
 
 use attack::attack;
+use understudy_bus::{Endpoints, Peer};
 use understudy_ladder::{MAXIMUM_NESTING, check, parse, print};
 use understudy_reconfiguration::{Signals, project, record};
-use understudy_bus::{Endpoints, Peer};
 use understudy_wire::{ClusterHash, MAXIMUM_FRAME_BYTES, decode, encode};
 
 fn text(bytes: &[u8]) -> String {
@@ -26,26 +26,39 @@ fn ladder() {
     attack("ladder", &seeds, |bytes| {
         let parsed = parse(&text(bytes));
         let _ = check(&parsed.program);
-        let Ok((program, _)) = parsed.into_result() else { return };
+        let Ok((program, _)) = parsed.into_result() else {
+            return;
+        };
         // What is right is the same after it was printed, and becomes a circuit.
         let again = parse(&print(&program));
-        assert_eq!(again.into_result().map(|(again, _)| print(&again)), Ok(print(&program)));
+        assert_eq!(
+            again.into_result().map(|(again, _)| print(&again)),
+            Ok(print(&program))
+        );
         let _ = program.lower(Duration::from_millis(10));
     });
 }
 
 #[test]
 fn cluster() {
-    let seeds = ["examples/press-cell/cluster.toml", "examples/boiler/cluster.toml"];
-    let ladder = include_str!("../../examples/press-cell/press.ladder");
+    let seeds = [
+        "examples/press-cell/cluster.toml",
+        "examples/boiler/cluster.toml",
+    ];
+    let ladder = include_str!("../../../examples/press-cell/press.ladder");
     attack("cluster", &seeds, |bytes| {
-        let _ = understudy_cluster::read("cluster.toml", &text(bytes), &mut |_| Ok(ladder.to_owned()));
+        let _ =
+            understudy_cluster::read("cluster.toml", &text(bytes), &mut |_| Ok(ladder.to_owned()));
     });
 }
 
 #[test]
 fn scenario() {
-    let seeds = ["scenarios/kill-each.toml", "scenarios/lossy.toml", "scenarios/table-two.toml"];
+    let seeds = [
+        "scenarios/kill-each.toml",
+        "scenarios/lossy.toml",
+        "scenarios/table-two.toml",
+    ];
     attack("scenario", &seeds, |bytes| {
         let text = text(bytes);
         let _ = understudy_scenarios::looks_like_a_scenario(&text);
@@ -64,7 +77,10 @@ fn journal() {
 
 #[test]
 fn ads() {
-    let seeds = ["examples/motivating-example/supervisor.ADS", "examples/avalanche/TEST.ADS"];
+    let seeds = [
+        "examples/motivating-example/supervisor.ADS",
+        "examples/avalanche/TEST.ADS",
+    ];
     attack("ads", &seeds, |bytes| {
         let _ = understudy_supervisor::read_ads(&text(bytes));
     });
@@ -72,7 +88,10 @@ fn ads() {
 
 #[test]
 fn model() {
-    let seeds = ["examples/small-factory/model.toml", "examples/boiler/pilot.toml"];
+    let seeds = [
+        "examples/small-factory/model.toml",
+        "examples/boiler/pilot.toml",
+    ];
     attack("model", &seeds, |bytes| {
         let _ = understudy_supervisor::read_model(&text(bytes), |_| Err("absent".to_owned()));
     });
@@ -80,7 +99,10 @@ fn model() {
 
 #[test]
 fn map() {
-    let seeds = ["examples/motivating-example/map.toml", "examples/boiler/main-map.toml"];
+    let seeds = [
+        "examples/motivating-example/map.toml",
+        "examples/boiler/main-map.toml",
+    ];
     attack("map", &seeds, |bytes| {
         let _ = understudy_supervisor::ladder::read_map(&text(bytes));
     });
@@ -96,7 +118,7 @@ fn chain() {
 #[test]
 fn reconfiguration() {
     let seeds = ["examples/filling-line/reconfiguration.toml"];
-    let ladder = include_str!("../../examples/filling-line/filling-line.ladder");
+    let ladder = include_str!("../../../examples/filling-line/filling-line.ladder");
     attack("reconfiguration", &seeds, |bytes| {
         let _ = project::read("project.toml", &text(bytes), &mut |_| Ok(ladder.to_owned()));
     });
@@ -117,7 +139,9 @@ fn record_of_scans() {
 #[test]
 fn endpoints() {
     attack("endpoints", &[], |bytes| {
-        let Ok(peers) = serde_json::from_slice::<Vec<Peer>>(bytes) else { return };
+        let Ok(peers) = serde_json::from_slice::<Vec<Peer>>(bytes) else {
+            return;
+        };
         if let Some(own) = peers.first().map(|peer| peer.party) {
             let _ = Endpoints::new(ClusterHash(1), own, peers, Vec::new());
         }
@@ -153,7 +177,10 @@ fn frame() {
 fn nesting_has_a_bound() {
     let deep = MAXIMUM_NESTING * 40;
     for open in ["[ ", "[ a | ", "{SR l R="] {
-        let text = format!("program p\ninput a\noutput y\nrung\n    {} ( y )\n", open.repeat(deep));
+        let text = format!(
+            "program p\ninput a\noutput y\nrung\n    {} ( y )\n",
+            open.repeat(deep)
+        );
         assert!(parse(&text).into_result().is_err());
     }
 }

@@ -25,7 +25,10 @@ fn files(folder: &Path) -> Vec<Vec<u8>> {
     };
     let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
     paths.sort();
-    paths.iter().filter_map(|path| fs::read(path).ok()).collect()
+    paths
+        .iter()
+        .filter_map(|path| fs::read(path).ok())
+        .collect()
 }
 
 /// Replays, reads and changes; `seeds` are files of the project, relative to its root.
@@ -43,11 +46,17 @@ pub(crate) fn attack(target: &str, seeds: &[&str], read: impl Fn(&[u8]) + RefUnw
         seed.truncate(MAXIMUM_BYTES);
         read(seed);
     }
-    let time = std::env::var("FUZZ_SECONDS").ok().and_then(|text| text.parse().ok());
+    let time = std::env::var("FUZZ_SECONDS")
+        .ok()
+        .and_then(|text| text.parse().ok());
     let run = bolero::check!().with_type::<(u16, Vec<Change>, Vec<u8>)>();
     let run = match time {
-        Some(seconds) => run.with_iterations(usize::MAX).with_test_time(Duration::from_secs(seconds)),
-        None => run.with_iterations(TRIES).with_test_time(Duration::from_secs(600)),
+        Some(seconds) => run
+            .with_iterations(usize::MAX)
+            .with_test_time(Duration::from_secs(seconds)),
+        None => run
+            .with_iterations(TRIES)
+            .with_test_time(Duration::from_secs(600)),
     };
     run.for_each(|(seed, changes, bytes)| {
         let mut input = corpus[usize::from(*seed) % corpus.len()].clone();
@@ -84,7 +93,22 @@ fn apply(input: &mut Vec<u8>, (what, at, first, second): Change, bytes: &[u8], c
         4 => input.truncate(at),
         5 => {
             const WORDS: [&str; 16] = [
-                "\"", "[", "]", "{", "}", "(", ")", "=", "-1", "99999999999999999999", "1e308", "\0", "\u{e9}", "\n", ".", "''",
+                "\"",
+                "[",
+                "]",
+                "{",
+                "}",
+                "(",
+                ")",
+                "=",
+                "-1",
+                "99999999999999999999",
+                "1e308",
+                "\0",
+                "\u{e9}",
+                "\n",
+                ".",
+                "''",
             ];
             let word = WORDS[usize::from(second) % WORDS.len()];
             input.splice(at..at, word.bytes());
@@ -97,8 +121,14 @@ fn apply(input: &mut Vec<u8>, (what, at, first, second): Change, bytes: &[u8], c
         }
         7 => {
             // A line again.
-            let start = input[..at].iter().rposition(|byte| *byte == b'\n').map_or(0, |place| place + 1);
-            let stop = input[at..].iter().position(|byte| *byte == b'\n').map_or(input.len(), |place| at + place + 1);
+            let start = input[..at]
+                .iter()
+                .rposition(|byte| *byte == b'\n')
+                .map_or(0, |place| place + 1);
+            let stop = input[at..]
+                .iter()
+                .position(|byte| *byte == b'\n')
+                .map_or(input.len(), |place| at + place + 1);
             let line = input[start..stop].to_vec();
             input.splice(start..start, line);
         }
