@@ -22,6 +22,7 @@ use understudy_wire::{Party, StationId};
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::demo::PressCell;
+use crate::endurance;
 use crate::failover;
 use crate::lab::RunArguments;
 use crate::memory;
@@ -32,7 +33,8 @@ use crate::memory;
 Example:
   understudy bench exchange --cycles 2000
   understudy bench kills --count 100 --link udp
-  understudy bench failover --figure failover.svg")]
+  understudy bench failover --figure failover.svg
+  understudy bench join --trials 50 --loss 10%")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     what: What,
@@ -55,16 +57,27 @@ enum What {
         #[arg(long, default_value_t = 200_000)]
         cycles: u64,
     },
-    /// Stations of the press cell killed at random phases, and what came of it
+    /// Every role of the press cell killed or stopped at random phases, and what came of it
     Kills {
-        /// Kills
-        #[arg(long, default_value_t = 100)]
+        /// Kills of each role: controllers, understudies, remote I/Os
+        #[arg(long, alias = "kills", default_value_t = 100)]
         count: u64,
+        /// Stop for so many cycles (SIGSTOP) in place of kill, such as 0.5,5,500
+        #[arg(long, value_name = "CYCLES", value_delimiter = ',')]
+        stop: Vec<f64>,
         /// What the phases come from
         #[arg(long, default_value_t = 1)]
         seed: u64,
         #[command(flatten)]
-        run: RunArguments,
+        run: Box<RunArguments>,
+    },
+    /// Clusters that start, and stations that join, where a tenth of all frames is lost, over each link
+    Join {
+        /// Trials over each link
+        #[arg(long, default_value_t = 50)]
+        trials: u64,
+        #[command(flatten)]
+        run: Box<RunArguments>,
     },
     /// The cluster beside hot-standby and active-active pairs: lost cycles, false take-overs, double masters, boxes, bytes
     Failover(failover::Arguments),
@@ -100,7 +113,13 @@ pub(crate) fn run(arguments: Arguments, console: &mut Console) -> Answer {
             no_real_time,
         } => exchange(cycles, !no_real_time),
         What::Simulate { cycles } => simulated(cycles),
-        What::Kills { count, seed, run } => kills(count, seed, &run, console),
+        What::Kills {
+            count,
+            stop,
+            seed,
+            run,
+        } => endurance::troubles(count, &stop, seed, &run, console),
+        What::Join { trials, run } => endurance::join(trials, &run, console),
         What::Failover(arguments) => failover::run(&arguments, console),
         What::Memory(arguments) => memory::run(&arguments),
         What::Party { part } => party(&part),
@@ -165,6 +184,7 @@ const PATIENCE_CYCLES: u64 = 1000;
 const KILL_EVERY: u64 = 60;
 const RESTART_AFTER: u64 = 20;
 
+/// The stations alone, killed one after the other, as the comparison with other arrangements needs it.
 pub(crate) fn kills(
     count: u64,
     seed: u64,

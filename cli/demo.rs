@@ -5,12 +5,12 @@ use std::time::SystemTime;
 
 use clap::Args;
 use understudy_cluster::{Cluster, press_cell};
-use understudy_scenarios::{Parties, RunDirectory, Scenario, TABLE_TWO, read};
+use understudy_scenarios::{Parties, RunDirectory, Scenario, Summary, TABLE_TWO, read};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
-use crate::lab::{RunArguments, in_laboratory};
+use crate::lab::{Judged, RunArguments, in_laboratory, judged};
 
 /// Run the robot and the press of the paper on real processes, and kill each station once
 #[derive(Debug, Args)]
@@ -59,6 +59,29 @@ impl PressCell {
             directory,
             file,
         })
+    }
+
+    /// Where its run is kept.
+    pub(crate) fn path(&self) -> &std::path::Path {
+        self.directory.path()
+    }
+
+    /// As [`Self::run`], with what came of it in place of an answer.
+    pub(crate) fn judged(
+        &self,
+        scenario: &Scenario,
+        arguments: &RunArguments,
+        console: &mut Console,
+    ) -> Result<(Summary, Judged), Answer> {
+        let file = self.file.clone();
+        judged(
+            &self.cluster,
+            scenario,
+            file,
+            arguments,
+            &self.directory,
+            console,
+        )
     }
 
     pub(crate) fn run(

@@ -1,19 +1,20 @@
 //! `understudy lab`: a cluster and a scenario on real processes.
 
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 use clap::{Args, ValueEnum};
 use understudy_cluster::Cluster;
+use understudy_network::Share;
 use understudy_scenarios::{
-    HostKind, LaboratorySettings, NetworkSettings, RunDirectory, Scenario, Summary, World,
-    run_laboratory,
+    HostKind, JOURNAL_LIMIT_BYTES, LaboratoryError, LaboratorySettings, NetworkSettings,
+    RunDirectory, RunDirectoryError, Scenario, Summary, World, run_laboratory,
 };
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
-use crate::overrides::{OverrideArguments, link_kind};
+use crate::overrides::{OverrideArguments, link_kind, parse_size};
 use crate::proxy::ImpairmentArguments;
 use crate::run::{answer, circumstances, command_line, machine};
 
@@ -46,6 +47,9 @@ pub(crate) struct RunArguments {
     /// Where runs are kept, each in a directory of its own
     #[arg(long, value_name = "DIR", default_value = "runs")]
     pub(crate) out: PathBuf,
+    /// What the journal may take of the disk, such as 200MB; its oldest records go when it is full
+    #[arg(long, value_name = "SIZE", default_value = "1GB", value_parser = parse_size)]
+    pub(crate) journal_limit: u64,
 }
 
 /// What lies between the processes.
@@ -72,6 +76,22 @@ enum HostArgument {
 }
 
 impl NetworkArguments {
+    /// The same, losing a share of what is sent where it loses nothing.
+    pub(crate) fn losing(&self, share: Share) -> Self {
+        Self {
+            impairment: self.impairment.losing(share),
+            ..self.clone()
+        }
+    }
+
+    /// The same, with fates from another seed.
+    pub(crate) fn seeded(&self, seed: u64) -> Self {
+        Self {
+            network_seed: seed,
+            ..self.clone()
+        }
+    }
+
     pub(crate) fn settings(&self) -> NetworkSettings {
         NetworkSettings {
             hosts: match self.hosts {
@@ -144,6 +164,7 @@ pub(crate) fn laboratory_settings(
         arguments: overrides.to_arguments(),
         link: link_kind(cluster),
         network,
+        journal_limit_bytes: JOURNAL_LIMIT_BYTES,
     })
 }
 
@@ -156,29 +177,62 @@ pub(crate) fn in_laboratory(
     directory: &RunDirectory,
     console: &mut Console,
 ) -> Answer {
-    let network = arguments.network.settings();
-    let settings = match laboratory_settings(cluster, cluster_file, &arguments.overrides, network) {
-        Ok(settings) => settings,
+    let (summary, run) = match judged(
+        cluster,
+        scenario,
+        cluster_file,
+        arguments,
+        directory,
+        console,
+    ) {
+        Ok(judged) => judged,
         Err(answer) => return answer,
     };
-    let mut watch = |progress| console.show(&progress);
-    let run = match run_laboratory(cluster, scenario, settings, directory, &mut watch) {
-        Ok(run) => run,
-        Err(error) => return Answer::failed(Status::Failed, error.code(), error.to_string()),
-    };
-    let machine = machine().into_iter().chain(run.machine).collect();
-    let circumstances = circumstances(cluster, World::Laboratory, None, machine, command_line());
-    let (mut summary, account) = Summary::new(run.account, scenario, circumstances, run.journal);
-    if run.failure.is_some() {
-        summary.passed = false;
-    }
-    let written = directory.write_results(&summary, &account);
     let mut answer = answer(&summary, Some(directory.path()));
-    if let Err(error) = written {
+    if let Err(error) = run.written {
         answer = answer.and_failure(Status::Failed, "U0602", error.to_string());
     }
     match run.failure {
         Some(failure) => answer.and_failure(Status::Failed, failure.code(), failure.to_string()),
         None => answer,
     }
+}
+
+/// What a run left besides its summary.
+pub(crate) struct Judged {
+    pub(crate) written: Result<(), RunDirectoryError>,
+    /// From all processes ready to everybody in step.
+    pub(crate) start: Option<Duration>,
+    pub(crate) failure: Option<LaboratoryError>,
+}
+
+/// Runs, and writes the results.
+pub(crate) fn judged(
+    cluster: &Cluster,
+    scenario: &Scenario,
+    cluster_file: PathBuf,
+    arguments: &RunArguments,
+    directory: &RunDirectory,
+    console: &mut Console,
+) -> Result<(Summary, Judged), Answer> {
+    let network = arguments.network.settings();
+    let settings = LaboratorySettings {
+        journal_limit_bytes: arguments.journal_limit,
+        ..laboratory_settings(cluster, cluster_file, &arguments.overrides, network)?
+    };
+    let mut watch = |progress| console.show(&progress);
+    let run = run_laboratory(cluster, scenario, settings, directory, &mut watch)
+        .map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))?;
+    let machine = machine().into_iter().chain(run.machine).collect();
+    let circumstances = circumstances(cluster, World::Laboratory, None, machine, command_line());
+    let (mut summary, account) = Summary::new(run.account, scenario, circumstances, run.journal);
+    if run.failure.is_some() {
+        summary.passed = false;
+    }
+    let judged = Judged {
+        written: directory.write_results(&summary, &account),
+        start: run.start,
+        failure: run.failure,
+    };
+    Ok((summary, judged))
 }

@@ -15,6 +15,7 @@ mod demo;
 mod des;
 mod doctor;
 mod draw;
+mod endurance;
 mod failover;
 mod field;
 mod files;

@@ -124,6 +124,21 @@ pub(crate) fn link_kind(cluster: &Cluster) -> LinkKind {
     }
 }
 
+/// `500kB`, `200MB`, `1GB`.
+pub(crate) fn parse_size(text: &str) -> Result<u64, String> {
+    let units = [("kB", 1e3), ("MB", 1e6), ("GB", 1e9), ("TB", 1e12)];
+    let parsed = units.iter().find_map(|(unit, bytes)| {
+        let number: f64 = text.strip_suffix(unit)?.trim().parse().ok()?;
+        Some(number * bytes)
+    });
+    match parsed {
+        Some(size) if (1e5..1e16).contains(&size) => Ok(size as u64),
+        _ => Err(format!(
+            "{text:?} is no size of at least 100kB with its unit, such as 200MB or 1GB"
+        )),
+    }
+}
+
 /// `10ms`, `500us`, `2s`, `100ns`.
 fn parse_time(text: &str) -> Result<Duration, String> {
     let expected = || format!("{text:?} is no time with its unit, such as 10ms, 500us or 1s");
@@ -150,6 +165,17 @@ fn parse_time(text: &str) -> Result<Duration, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sizes_have_units() {
+        let check = |text, expected| assert_eq!(parse_size(text).ok(), expected, "{text}");
+        check("200MB", Some(200_000_000));
+        check("1.5 GB", Some(1_500_000_000));
+        check("100kB", Some(100_000));
+        for text in ["99kB", "200", "MB", "-1GB", "nanMB", "1e9GB"] {
+            check(text, None);
+        }
+    }
 
     #[test]
     fn times_have_units() {

@@ -12,7 +12,8 @@ use serde::Serialize;
 use serde_json::json;
 use understudy_bus::{
     Admitted, ChannelSettings, Commands, Endpoints, FieldDriver, Guard, LinkKind, NoField,
-    NoObserver, PartySettings, Peer, SimulatedField, ZENOH_RUNTIME, hold_back_signals, run_party,
+    NoObserver, PartySettings, Peer, Segments, SimulatedField, ZENOH_RUNTIME, hold_back_signals,
+    run_party,
 };
 use understudy_cluster::{Cluster, Security};
 use understudy_keys::{Date, PartyKeys, RevocationWatch};
@@ -24,7 +25,7 @@ use understudy_wire::{Epoch, Image, Machine, Party, ProgramId, Time};
 use crate::answer::{Answer, Status};
 use crate::field::Equipment;
 use crate::files;
-use crate::overrides::{OverrideArguments, link_kind};
+use crate::overrides::{OverrideArguments, link_kind, parse_size};
 
 /// Run one station, a controller or an understudy, as this process
 #[derive(Debug, Args)]
@@ -53,6 +54,12 @@ pub(crate) struct Arguments {
     /// Do not ask for real-time rights
     #[arg(long)]
     no_real_time: bool,
+    /// Write the reports to this file in place of standard output; older ones to segments beside it
+    #[arg(long, value_name = "FILE")]
+    journal: Option<PathBuf>,
+    /// What that file and its segments may take of the disk, such as 200MB; the oldest reports go when they are full
+    #[arg(long, value_name = "SIZE", default_value = "1GB", value_parser = parse_size)]
+    journal_limit: u64,
     #[command(flatten)]
     overrides: OverrideArguments,
 }
@@ -221,7 +228,16 @@ where
         ends_with_parent: arguments.in_laboratory,
         real_time: !arguments.no_real_time,
     };
-    match run_party(machine, settings, io::stdout()) {
+    let output: Box<dyn io::Write + Send> = match &arguments.journal {
+        None => Box::new(io::stdout()),
+        Some(path) => Box::new(Segments::create(path, arguments.journal_limit).map_err(
+            |error| {
+                let message = format!("{} cannot be written: {error}", path.display());
+                Answer::failed(Status::Failed, "U0602", message)
+            },
+        )?),
+    };
+    match run_party(machine, settings, output) {
         // Its last record has said it already.
         Ok(_) => Ok(Answer::done("", json!(null))),
         Err(error) => Err(Answer::failed(

@@ -72,6 +72,14 @@ pub(crate) struct ImpairmentArguments {
 }
 
 impl ImpairmentArguments {
+    /// The same, losing a share where it loses nothing.
+    pub(crate) fn losing(&self, share: Share) -> Self {
+        Self {
+            loss: Some(self.loss.unwrap_or(share)),
+            ..self.clone()
+        }
+    }
+
     pub(crate) fn impairment(&self) -> Impairment {
         Impairment {
             loss: self.loss.unwrap_or_default(),

@@ -5,7 +5,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::Args;
 use understudy_scenarios::{
-    Journal, JournalState, RunDirectory, Summary, World, simulate as run_simulation,
+    JOURNAL_LIMIT_BYTES, Journal, JournalState, RunDirectory, Summary, World,
+    simulate as run_simulation,
 };
 
 use crate::answer::{Answer, Status};
@@ -62,10 +63,12 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     };
     let mut journal = match &directory {
         None => None,
-        Some(directory) => match Journal::create(&directory.file("journal.jsonl")) {
-            Ok(journal) => Some(journal),
-            Err(error) => return Answer::failed(Status::Failed, "U0602", error.to_string()),
-        },
+        Some(directory) => {
+            match Journal::create(&directory.file("journal.jsonl"), JOURNAL_LIMIT_BYTES) {
+                Ok(journal) => Some(journal),
+                Err(error) => return Answer::failed(Status::Failed, "U0602", error.to_string()),
+            }
+        }
     };
     let account = run_simulation(&cluster, &scenario, seed, &mut |record| {
         if let Some(journal) = &mut journal {

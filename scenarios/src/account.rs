@@ -323,6 +323,9 @@ impl Account {
         let understudy_plant::Event::Stepped { moment, field, .. } = event else {
             return;
         };
+        if let Some(referee) = self.terms.referees.get_mut(program.index()) {
+            referee.saw(&field.sensors);
+        }
         let at = self
             .numbering
             .of(*moment)

@@ -1,20 +1,23 @@
 //! `journal.jsonl`: every record of a run, one JSON object a line, in the order in which they were seen.
 //!
+//! It is kept in segments ([`understudy_bus::Segments`]), of which the oldest go when it reaches its limit.
+//!
 //! Invariant: the journal never stops the run. A full disk or any other failure to write ends the journal, not the cycle; how
 //! many records it lacks and why is said in the summary.
 
 use std::fs::File;
-use std::io::{self, BufRead, BufWriter, Write};
+use std::io::{self, BufRead, BufReader, Write};
 use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use understudy_bus::{Segments, segments_of};
 
 use crate::record::Record;
 
 /// Where records go.
 #[derive(Debug)]
-pub struct Journal<W: Write = BufWriter<File>> {
+pub struct Journal<W: Write = Segments> {
     writer: Option<W>,
     state: JournalState,
 }
@@ -31,12 +34,9 @@ pub struct JournalState {
 }
 
 impl Journal {
-    /// A journal in a new file.
-    pub fn create(path: &Path) -> io::Result<Self> {
-        Ok(Self::new(BufWriter::with_capacity(
-            1 << 16,
-            File::create(path)?,
-        )))
+    /// A journal in a new file, of `limit_bytes` at most: the oldest records go when it is full.
+    pub fn create(path: &Path, limit_bytes: u64) -> io::Result<Self> {
+        Segments::create(path, limit_bytes).map(Self::new)
     }
 }
 
@@ -98,6 +98,25 @@ pub enum JournalError {
     },
 }
 
+/// Bytes of a journal, its older segments included, where nobody says otherwise.
+pub const JOURNAL_LIMIT_BYTES: u64 = 1 << 30;
+
+/// The records of a journal in a file and its older segments, in order.
+///
+/// # Errors
+/// Where the folder or the oldest segment cannot be read; later ones say so as records.
+pub fn records_of(
+    path: &Path,
+) -> io::Result<impl Iterator<Item = Result<Record, JournalError>> + use<>> {
+    let files: Vec<File> = segments_of(path)?
+        .iter()
+        .map(File::open)
+        .collect::<io::Result<_>>()?;
+    Ok(files
+        .into_iter()
+        .flat_map(|file| records(BufReader::new(file))))
+}
+
 /// The records of a journal, in order.
 pub fn records(journal: impl BufRead) -> impl Iterator<Item = Result<Record, JournalError>> {
     journal.lines().enumerate().map(|(index, line)| {
@@ -153,5 +172,29 @@ mod tests {
             .collect::<Result<_, _>>()
             .expect("one record");
         assert_eq!(read, [record]);
+    }
+
+    #[test]
+    fn readers_follow_the_segments() {
+        let name = format!("understudy-journal-{}", std::process::id());
+        let folder = std::env::temp_dir().join(name);
+        // It is there only where a run before was killed.
+        let _ = std::fs::remove_dir_all(&folder);
+        std::fs::create_dir_all(&folder).expect("a folder");
+        let path = folder.join("journal.jsonl");
+        let mut journal = Journal::create(&path, 0).expect("created");
+        for at_ns in 0..5000 {
+            journal.write(&Record::of_run(at_ns, RunEvent::Interrupted));
+        }
+        assert_eq!(journal.finish().lost, 0);
+        let read: Vec<Record> = records_of(&path)
+            .expect("readable")
+            .collect::<Result<_, _>>()
+            .expect("whole lines");
+        let times: Vec<u64> = read.iter().map(|record| record.at_ns).collect();
+        let first = 5000 - times.len() as u64;
+        assert!(first > 0 && times.len() > 100, "{}", times.len());
+        assert_eq!(times, (first..5000).collect::<Vec<_>>());
+        std::fs::remove_dir_all(folder).expect("it goes");
     }
 }

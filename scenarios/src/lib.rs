@@ -5,6 +5,7 @@ mod campaign;
 mod fields;
 mod figure;
 mod injection;
+mod joining;
 mod journal;
 mod laboratory;
 mod observed;
@@ -20,6 +21,7 @@ mod simulation;
 mod summary;
 mod table;
 mod terms;
+mod troubles;
 mod write;
 
 pub use account::{Account, Counts, Interval, OriginRule, Presence, Service, Stall, Terms};
@@ -34,7 +36,8 @@ pub use injection::{
     MAXIMUM_FAILURES, MAXIMUM_RUN_CYCLES, MINIMUM_RUN_CYCLES, MergeError, NoShard, Phase,
     PictureError, Property, Role, Shard, inject, merge, picture,
 };
-pub use journal::{Journal, JournalError, JournalState, records};
+pub use joining::{JOIN_CYCLES, Joined, join_trial};
+pub use journal::{JOURNAL_LIMIT_BYTES, Journal, JournalError, JournalState, records, records_of};
 pub use laboratory::{
     HostKind, LaboratoryError, LaboratoryRun, LaboratorySettings, NetworkSettings, Progress,
     run_laboratory,
@@ -57,5 +60,6 @@ pub use summary::{
 };
 pub use table::{Cell, Row, Table};
 pub use terms::parts;
+pub use troubles::{Target, Trouble, TroubleRow};
 pub use understudy_simulator::{Action, Disturbance, Fault, Network};
 pub use write::write;

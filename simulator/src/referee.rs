@@ -16,6 +16,13 @@ use understudy_wire::{Image, Lineage, Moment, ProgramHash, Source};
 /// States that it can go back to, at most; older ones are forgotten.
 const REMEMBERED: usize = 1024;
 
+/// Different images of a plant that are remembered.
+const SEEN: usize = 16;
+
+/// Samples in a row of which a killed remote I/O has left no record, at most, and the states that they may follow.
+const UNRECORDED_SAMPLES: usize = 2;
+const RECENT_STATES: usize = 16;
+
 /// Checks one remote I/O.
 #[derive(Debug, Clone)]
 pub struct Referee {
@@ -33,6 +40,8 @@ pub struct Referee {
     truth: Option<(Moment, Image)>,
     last_true: Option<Image>,
     held: u32,
+    /// What the plant showed last: any of these may have been sampled.
+    seen: VecDeque<Image>,
 }
 
 /// Something that must never happen.
@@ -114,7 +123,22 @@ impl Referee {
             truth: None,
             last_true: None,
             held: 0,
+            seen: VecDeque::new(),
         }
+    }
+
+    /// What the plant shows, as it says itself.
+    ///
+    /// A remote I/O that is killed may take the record of its last samples with it. The lineage that a station then has proves
+    /// which inputs they were, if only they are among those that the plant has shown.
+    pub fn saw(&mut self, sensors: &Image) {
+        if self.seen.contains(sensors) {
+            return;
+        }
+        if self.seen.len() == SEEN {
+            self.seen.pop_front();
+        }
+        self.seen.push_back(sensors.clone());
     }
 
     /// Takes one report of the remote I/O, in the order in which they were made.
@@ -169,11 +193,43 @@ impl Referee {
             .rev()
             .find(|(known, _)| *known == lineage);
         self.state = known.cloned();
-        if self.state.is_some() {
+        if self.state.is_some() || self.recover(lineage) {
             Ok(())
         } else {
             Err(Violation::UnknownHistory { moment, lineage })
         }
+    }
+
+    /// Finds the samples without a record that lead to a lineage, and goes there.
+    fn recover(&mut self, lineage: Lineage) -> bool {
+        let newest = self.states.iter().rev().take(RECENT_STATES);
+        let begun: Vec<(Lineage, Image)> = newest.cloned().collect();
+        let mut ways: Vec<(usize, Lineage, Vec<usize>)> = begun
+            .iter()
+            .enumerate()
+            .map(|(from, (known, _))| (from, *known, Vec::new()))
+            .collect();
+        for _ in 0..UNRECORDED_SAMPLES {
+            let mut longer = Vec::new();
+            for (from, known, samples) in &ways {
+                for (place, sensors) in self.seen.iter().enumerate() {
+                    let samples: Vec<usize> = samples.iter().copied().chain([place]).collect();
+                    longer.push((*from, known.after(sensors), samples));
+                }
+            }
+            if let Some((from, _, samples)) = longer.iter().find(|(_, found, _)| *found == lineage)
+            {
+                self.state = Some(begun[*from].clone());
+                for &place in samples {
+                    let sensors = self.seen[place].clone();
+                    self.step(Moment::default(), &sensors);
+                }
+                self.truth = None;
+                return true;
+            }
+            ways = longer;
+        }
+        false
     }
 
     fn step(&mut self, moment: Moment, inputs: &Image) {

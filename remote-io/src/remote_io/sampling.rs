@@ -35,7 +35,8 @@ impl RemoteIo {
                 *cycles += u32::from(self.witnesses.anybody());
                 // One who could hold the state and is not there gets longer: it may be the only one that does.
                 let patience = if self.witnesses.everybody() { 1 } else { 5 };
-                if *cycles < listen_cycles * patience {
+                // A history without a sample is one that nobody can follow.
+                if *cycles < listen_cycles * patience || self.field_lost {
                     return;
                 }
                 match self.witnesses.disputed() {

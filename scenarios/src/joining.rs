@@ -1,0 +1,80 @@
+//! How long a cluster takes to come into step, and a station to come back, where frames are lost.
+
+use std::time::Duration;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use understudy_simulator::{Action, Fault};
+use understudy_wire::{Party, Schedule, StationId};
+
+use crate::account::Presence;
+use crate::scenario::Scenario;
+use crate::summary::Summary;
+
+/// Cycles within which everybody has to be in step again.
+pub const JOIN_CYCLES: u64 = 100;
+
+/// When the station of a trial is killed, and when it is started again.
+const KILLED_AT: u64 = 20;
+const RESTARTED_AT: u64 = 40;
+
+/// A trial: the cluster starts, and then one station, another one in each trial, is killed and comes back.
+pub fn join_trial(trial: u64, schedule: &Schedule) -> (StationId, Scenario) {
+    let station = StationId((trial % schedule.stations() as u64) as u8);
+    let step = |at_cycle, action| Fault {
+        at_cycle,
+        phase: 0.0,
+        party: Party::Station(station),
+        action,
+    };
+    let scenario = Scenario {
+        title: format!("trial {trial}: a cluster starts, and a station joins"),
+        cycles: RESTARTED_AT + JOIN_CYCLES + KILLED_AT,
+        steps: vec![
+            step(KILLED_AT, Action::Crash),
+            step(RESTARTED_AT, Action::Restart),
+        ],
+        ..Scenario::default()
+    };
+    (station, scenario)
+}
+
+/// What came of a trial; times in cycles, nothing where it never happened.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Joined {
+    /// From the moment at which all processes were ready to the first cycle in which everybody was in step.
+    pub start: Option<f64>,
+    /// From the restart of the station to its first turn.
+    pub join: Option<u64>,
+    /// What must never be driven and was.
+    pub wrong: u64,
+}
+
+impl Joined {
+    /// Of a run of [`join_trial`].
+    pub fn new(station: StationId, summary: &Summary, start: Option<Duration>) -> Self {
+        let restart = summary.steps.last().map(|step| step.measured);
+        let intervals = summary.stations.get(station.index());
+        let join = restart.zip(intervals).and_then(|(restart, found)| {
+            let mut on = found
+                .intervals
+                .iter()
+                .filter(|interval| interval.state == Presence::On);
+            let first = on.find(|interval| interval.to > restart)?;
+            Some(first.from.saturating_sub(restart))
+        });
+        let period = Duration::from_micros(summary.circumstances.period_us);
+        Self {
+            start: start.map(|start| start.as_secs_f64() / period.as_secs_f64()),
+            join: join.filter(|_| summary.steps.len() == 2),
+            wrong: summary.violation_count,
+        }
+    }
+
+    /// Whether everything came in time and nothing was wrong.
+    pub fn is_in_time(&self) -> bool {
+        self.wrong == 0
+            && self.start.is_some_and(|start| start <= JOIN_CYCLES as f64)
+            && self.join.is_some_and(|join| join <= JOIN_CYCLES)
+    }
+}
