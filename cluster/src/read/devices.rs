@@ -65,7 +65,7 @@ pub(super) fn device(
     }
     let is_error = |found: &Diagnostic| found.severity == understudy_diagnostic::Severity::Error;
     let address = section.address.as_ref()?.value;
-    (!diagnostics[before..].iter().any(is_error)).then(|| FieldDevice {
+    (!diagnostics[before..].iter().any(is_error)).then_some(FieldDevice {
         address,
         unit: section.unit,
         timeout: section.timeout,
