@@ -1,4 +1,4 @@
-//! `understudy check`: everything that is wrong with ladders, clusters and scenarios, in one run.
+//! `understudy check`: everything that is wrong with files of the project, in one run.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -7,23 +7,28 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 use understudy_cluster::Overrides;
-use understudy_diagnostic::{Report, Severity};
+use understudy_diagnostic::{Diagnostic, Report, Severity};
 use understudy_scenarios::{Parties, looks_like_a_scenario, read};
+use understudy_supervisor::ladder::read_map;
+use understudy_supervisor::petri::read_net;
+use understudy_supervisor::{FileKind, read_ads};
 
 use crate::answer::{Answer, Failure, Status};
+use crate::automata;
 use crate::files::read_cluster;
 
-/// Read ladders, clusters and scenarios, and report everything that is wrong with them
+/// Read ladders, clusters, scenarios, models, nets and maps of signals, and report everything that is wrong with them
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy check cluster.toml kill.toml
   understudy check --json robot.ladder
+  understudy check model.toml net.toml map.toml SUPER.ADS
 
 The ladders that a cluster names are checked with it. The names in a scenario are checked against the cluster file that is
 given with it, or else against the cluster.toml beside it. Warnings do not change the exit status.")]
 pub(crate) struct Arguments {
-    /// Ladder programs (.ladder), cluster files and scenario files (.toml)
+    /// Ladder programs (.ladder), automata of TCT (.ADS), and clusters, scenarios, models, nets and maps of signals (.toml)
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
 }
@@ -38,7 +43,7 @@ struct Result {
 #[derive(Serialize)]
 struct CheckedFile {
     name: String,
-    /// `ladder`, `cluster` or `scenario`; nothing for a file that cannot be read.
+    /// `ladder`, `cluster`, `scenario`, `model`, `net`, `map` or `ADS`; nothing for a file that cannot be read.
     kind: Option<&'static str>,
     errors: usize,
     warnings: usize,
@@ -59,16 +64,17 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         let Some(text) = found.text(path) else {
             continue;
         };
-        if path.extension().is_none_or(|extension| extension != "toml") {
-            let parsed = understudy_ladder::parse(&text);
-            found.add(
-                "ladder",
-                Report {
-                    name: path.display().to_string(),
-                    text,
-                    diagnostics: parsed.diagnostics,
-                },
-            );
+        let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+        let is_toml = ending == "toml";
+        let kind = FileKind::of(&text).filter(|_| is_toml);
+        if ending == "ads" {
+            let diagnostics = read_ads(&text).diagnostics;
+            found.add_file("ADS", path, text, diagnostics);
+        } else if let Some(kind) = kind {
+            found.add_kind(kind, path, text);
+        } else if !is_toml {
+            let diagnostics = understudy_ladder::parse(&text).diagnostics;
+            found.add_file("ladder", path, text, diagnostics);
         } else if looks_like_a_scenario(&text) {
             scenarios.push((path, text));
         } else {
@@ -109,6 +115,48 @@ impl Found {
                     message: format!("{} cannot be read: {error}", path.display()),
                 });
                 None
+            }
+        }
+    }
+
+    fn add_file(
+        &mut self,
+        kind: &'static str,
+        path: &Path,
+        text: String,
+        diagnostics: Vec<Diagnostic>,
+    ) {
+        let report = Report {
+            name: path.display().to_string(),
+            text,
+            diagnostics,
+        };
+        self.add(kind, report);
+    }
+
+    fn add_kind(&mut self, kind: FileKind, path: &Path, text: String) {
+        match kind {
+            FileKind::Net => {
+                let diagnostics = read_net(&text).diagnostics;
+                self.add_file("net", path, text, diagnostics);
+            }
+            FileKind::SignalMap => {
+                let diagnostics = read_map(&text).diagnostics;
+                self.add_file("map", path, text, diagnostics);
+            }
+            FileKind::Model => {
+                let reports = match automata::model(path) {
+                    Ok(sources) => sources.reports,
+                    Err(answer) => answer.reports,
+                };
+                for (index, report) in reports.into_iter().enumerate() {
+                    let kind = match index {
+                        0 => "model",
+                        _ if report.name.ends_with(".toml") => "net",
+                        _ => "ADS",
+                    };
+                    self.add(kind, report);
+                }
             }
         }
     }

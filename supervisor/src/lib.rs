@@ -13,6 +13,7 @@ mod events;
 mod explicit;
 mod findings;
 mod form;
+mod kind;
 pub mod ladder;
 pub mod model;
 mod modular;
@@ -32,6 +33,7 @@ pub use findings::{
     Finding, empty_finding, model_findings, modular_findings, specification_findings,
     synthesis_findings,
 };
+pub use kind::FileKind;
 pub use model::{Model, ReadModel, Signal, read_model, write_model};
 pub use modular::{
     LocalSupervisor, ModularSupervisor, Together, coordinator, synthesise_modularly,
