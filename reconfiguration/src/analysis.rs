@@ -7,7 +7,7 @@ use crate::mega::{MegaController, Question, Unbuilt, failed_channels};
 use crate::module_two::{Combined, MAXIMUM_RUNGS, combine};
 use crate::project::{Project, RelationEntry};
 use crate::proof::{Claim, NotProved, Proof, prove};
-use crate::record::{self, RecordError};
+use crate::record::{self, Missed, RecordError};
 use crate::relation::Relation;
 use crate::settle::NoCommand;
 use crate::signals::{Bits, Signals};
@@ -27,7 +27,7 @@ pub struct Outcome {
     /// Inputs that the plant does not show.
     pub unseen_inputs: Vec<String>,
     /// Of each state and each move of S that the records have missed, its name.
-    pub missed: Option<(Vec<String>, Vec<(String, String)>)>,
+    pub missed: Option<Missed>,
     /// Λ.
     pub relation: Relation,
     /// Relations of the file that concern no state, by their places.
@@ -115,7 +115,12 @@ impl Failure {
 /// # Errors
 /// What made it impossible, with the states, events and rows that show it.
 pub fn analyse(project: &Project) -> Result<Outcome, Failure> {
-    let (controller, explored, missed) = automaton(project)?;
+    let Known {
+        controller,
+        joint_states,
+        unseen_inputs,
+        missed,
+    } = automaton(project)?;
     let (relation, idle) = RelationEntry::compile(&project.relation, &controller);
     let question = Question {
         channels: project.channels.clone(),
@@ -156,8 +161,8 @@ pub fn analyse(project: &Project) -> Result<Outcome, Failure> {
         maximum_states: MAXIMUM_PROOF_STATES,
     })?;
     Ok(Outcome {
-        joint_states: explored.as_ref().map(|explored| explored.0),
-        unseen_inputs: explored.map(|explored| explored.1).unwrap_or_default(),
+        joint_states,
+        unseen_inputs,
         controller,
         missed,
         relation,
@@ -170,12 +175,16 @@ pub fn analyse(project: &Project) -> Result<Outcome, Failure> {
     })
 }
 
-type Missed = (Vec<String>, Vec<(String, String)>);
+/// S, what was explored where there is a plant, and what the records have missed of it.
+struct Known {
+    controller: Controller,
+    joint_states: Option<usize>,
+    unseen_inputs: Vec<String>,
+    missed: Option<Missed>,
+}
 
 /// S by exploration where there is a plant, else from the records.
-fn automaton(
-    project: &Project,
-) -> Result<(Controller, Option<(usize, Vec<String>)>, Option<Missed>), Failure> {
+fn automaton(project: &Project) -> Result<Known, Failure> {
     let ladder = &project.ladder;
     let names = |signals: &[understudy_ladder::Signal]| -> Vec<String> {
         signals
@@ -197,7 +206,12 @@ fn automaton(
     };
     let Some(plant) = &project.plant else {
         let controller = recorded.ok_or(RecordError::Empty)?;
-        return Ok((controller, None, None));
+        return Ok(Known {
+            controller,
+            joint_states: None,
+            unseen_inputs: Vec::new(),
+            missed: None,
+        });
     };
     let lower = |program: &understudy_ladder::Program| {
         let lowered = program.lower(project.period);
@@ -215,7 +229,12 @@ fn automaton(
         unseen_inputs,
     } = explored.map_err(not_explored)?;
     let missed = recorded.map(|recorded| record::missed(&recorded, &controller));
-    Ok((controller, Some((joint_states, unseen_inputs)), missed))
+    Ok(Known {
+        controller,
+        joint_states: Some(joint_states),
+        unseen_inputs,
+        missed,
+    })
 }
 
 fn not_explored(why: Unexplored) -> Failure {

@@ -264,7 +264,7 @@ impl Prover<'_> {
         let mut shown = before.shown.clone();
         for (input, shown) in shown.iter_mut().enumerate() {
             let bit = claim.channels.iter().position(|&known| known == input);
-            if !bit.is_some_and(|bit| failed >> bit & 1 == 1) {
+            if bit.is_none_or(|bit| failed >> bit & 1 == 0) {
                 *shown = actual[input];
             }
         }

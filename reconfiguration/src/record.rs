@@ -326,8 +326,17 @@ fn along(number: usize, run: &Run, ladder: &Program, period: Duration) -> Result
     Ok(())
 }
 
-/// What of `whole` a record has missed: states, and moves by the names of their ends.
-pub fn missed(record: &Controller, whole: &Controller) -> (Vec<String>, Vec<(String, String)>) {
+/// What a record has not seen.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Missed {
+    /// States, by their names.
+    pub states: Vec<String>,
+    /// Moves, by the names of their ends.
+    pub moves: Vec<(String, String)>,
+}
+
+/// What of `whole` a record has missed.
+pub fn missed(record: &Controller, whole: &Controller) -> Missed {
     let vector = |controller: &Controller, state: usize| {
         let found = &controller.states()[state];
         (found.inputs.clone(), found.outputs.clone())
@@ -344,19 +353,20 @@ pub fn missed(record: &Controller, whole: &Controller) -> (Vec<String>, Vec<(Str
         })
         .map(|(from, to)| (states[from].clone(), states[to].clone()))
         .collect();
-    let mut missing_states = Vec::new();
-    let mut missing_moves = Vec::new();
+    let mut missed = Missed::default();
     for state in 0..whole.states().len() {
         let here = vector(whole, state);
         if !states.contains(&here) {
-            missing_states.push(whole.state_name(state));
+            missed.states.push(whole.state_name(state));
         }
         for step in whole.moves(state) {
             let there = vector(whole, step.target);
             if here != there && !moves.contains(&(here.clone(), there)) {
-                missing_moves.push((whole.state_name(state), whole.state_name(step.target)));
+                missed
+                    .moves
+                    .push((whole.state_name(state), whole.state_name(step.target)));
             }
         }
     }
-    (missing_states, missing_moves)
+    missed
 }

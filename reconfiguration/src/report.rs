@@ -7,8 +7,9 @@ use serde_json::{Value, json};
 use understudy_ladder::{Program, print};
 
 use crate::analysis::Outcome;
-use crate::controller::Controller;
+use crate::controller::{Controller, Move};
 use crate::mega::{Label, MegaState, failed_channels};
+use crate::record::Missed;
 use crate::relation::{Feedback, feedback};
 use crate::settle::Ground;
 use crate::signals::Event;
@@ -138,11 +139,21 @@ impl Outcome {
             let Some(command) = &state.command else {
                 continue;
             };
-            if !known.insert(&state.members) || known.len() > MAXIMUM_PROGRAMS {
+            if !known.insert((&state.members, state.failed)) || known.len() > MAXIMUM_PROGRAMS {
                 continue;
             }
             let _ = write!(text, "\n## {}\n\n", self.describe(state));
-            for posed in ground.posed(&state.members, &BTreeSet::new()) {
+            let channels: Vec<usize> =
+                failed_channels(&self.question.channels, state.failed).collect();
+            let is_unseen = |event: &Event| {
+                event
+                    .channel()
+                    .is_some_and(|input| channels.contains(&input))
+            };
+            let unseen = |step: &Move| !step.events.is_empty() && step.events.iter().all(is_unseen);
+            let members = state.members.iter().copied().collect();
+            let blocked = ground.blocked(&members, &unseen);
+            for posed in ground.posed(&state.members, &blocked) {
                 let rows: Vec<String> = posed
                     .demand
                     .rows
@@ -238,7 +249,7 @@ impl Outcome {
                 self.unseen_inputs.join(", ")
             );
         }
-        if let Some((states, moves)) = &self.missed {
+        if let Some(Missed { states, moves }) = &self.missed {
             if states.is_empty() && moves.is_empty() {
                 text.push_str("The records have seen every state and every move.\n\n");
             } else {
@@ -387,7 +398,7 @@ impl Outcome {
             "channels": self.question.channels.iter().map(|&input| &signals.inputs[input]).collect::<Vec<_>>(),
             "simultaneous": self.question.simultaneous, "joint_states": self.joint_states,
             "states": states.collect::<Vec<_>>(), "mega_states": mega.collect::<Vec<_>>(),
-            "missed": self.missed.as_ref().map(|(states, moves)| json!({ "states": states, "moves": moves })),
+            "missed": self.missed.as_ref().map(|missed| json!({ "states": missed.states, "moves": missed.moves })),
             "advice": self.advice(), "minimum_channels": self.minimum_channels(),
             "lost_outputs": self.lost_outputs.to_string(),
             "rungs": self.combined.program.rungs.len(), "module_2_rungs": self.combined.program.rungs.len() - self.combined.first_rung,

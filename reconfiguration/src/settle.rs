@@ -106,6 +106,23 @@ impl<'a> Ground<'a> {
         found
     }
 
+    /// Unseen events, each with its state, that would lead out of `members`.
+    pub(crate) fn blocked(
+        &self,
+        members: &BTreeSet<u32>,
+        unseen: &dyn Fn(&Move) -> bool,
+    ) -> BTreeSet<(u32, Event)> {
+        let mut blocked = BTreeSet::new();
+        for &state in members {
+            for step in self.controller.moves(state as usize) {
+                if unseen(step) && !members.contains(&(step.target as u32)) {
+                    blocked.extend(step.events.iter().map(|&event| (state, event)));
+                }
+            }
+        }
+        blocked
+    }
+
     /// The set in which the plant may be from now on, and its command; none where the ladder's own outputs are right.
     pub(crate) fn settle(
         &mut self,
@@ -116,14 +133,7 @@ impl<'a> Ground<'a> {
         let members = self.closure(seed, |state, step| {
             unseen(step) && !self.is_preventable(state, step)
         });
-        let mut blocked = BTreeSet::new();
-        for &state in &members {
-            for step in self.controller.moves(state as usize) {
-                if unseen(step) && !members.contains(&(step.target as u32)) {
-                    blocked.extend(step.events.iter().map(|&event| (state, event)));
-                }
-            }
-        }
+        let blocked = self.blocked(&members, unseen);
         if members.len() == 1 && blocked.is_empty() {
             return Ok((members.into_iter().collect(), None));
         }

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::time::Duration;
 
 use understudy_ladder::parse;
-use understudy_reconfiguration::record::{RecordError, learn, missed, read};
+use understudy_reconfiguration::record::{Missed, RecordError, learn, missed, read};
 use understudy_reconfiguration::{Analysis, Signals, analyse, project};
 
 const LADDER: &str = include_str!("../../examples/filling-line/filling-line.ladder");
@@ -200,8 +200,8 @@ fn a_complete_record_agrees_with_the_exploration_and_a_short_one_says_what_it_mi
             .missed
             .expect("there are records")
     };
-    assert_eq!(check(&table), (Vec::new(), Vec::new()));
-    let (states, moves) = check(&short);
+    assert_eq!(check(&table), Missed::default());
+    let Missed { states, moves } = check(&short);
     assert!(
         !states.is_empty() && moves.len() > states.len(),
         "{states:?} {moves:?}"
@@ -218,5 +218,5 @@ fn a_complete_record_agrees_with_the_exploration_and_a_short_one_says_what_it_mi
         analyse(&project.project.expect("right")).unwrap_or_else(|failure| panic!("{failure}"));
     assert_eq!(outcome.controller.states().len(), 12);
     let itself = missed(&outcome.controller, &outcome.controller);
-    assert_eq!(itself, (Vec::new(), Vec::new()));
+    assert_eq!(itself, Missed::default());
 }

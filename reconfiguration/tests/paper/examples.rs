@@ -99,6 +99,24 @@ fn a_conflict_is_shown_by_its_rows() {
     );
 }
 
+#[test]
+fn weights_choose_among_what_is_safe() {
+    let either = [demand("1 dc; dc 1", true)];
+    assert_eq!(
+        solve(&either, &[2.0, 1.0]).expect("feasible").to_string(),
+        "01"
+    );
+    assert_eq!(
+        solve(&either, &[1.0, 2.0]).expect("feasible").to_string(),
+        "10"
+    );
+    // Nearest to outputs that are on is a negative weight.
+    assert_eq!(
+        solve(&either, &[-1.0, -1.0]).expect("feasible").to_string(),
+        "11"
+    );
+}
+
 fn any_demands() -> impl Strategy<Value = (usize, Vec<Demand>)> {
     (1_usize..=5).prop_flat_map(|outputs| {
         let entry = prop_oneof![2 => Just(None), 1 => Just(Some(true)), 1 => Just(Some(false))];
