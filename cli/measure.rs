@@ -6,7 +6,7 @@ use std::time::{Duration, SystemTime};
 
 use clap::Args;
 use understudy_cluster::Cluster;
-use understudy_reliability::Hours;
+use understudy_reliability::{Hours, Options};
 use understudy_scenarios::{
     LaboratoryError, Measured, Planned, Progress, Question, QuestionError, RealCampaign, Speed,
     hold_against_model, plan_campaign, run_campaign, run_real_campaign,
@@ -100,7 +100,11 @@ fn measured(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answ
     let mttr = times.required("mttr", Some(&arguments.mttr));
     let limit = times.required("limit", Some(&arguments.limit));
     let (cluster, reports) = files::cluster(&arguments.cluster, arguments.overrides.overrides())?;
-    times.finish(Vec::new())?;
+    // What is wrong with the crews is said in the same run as what is wrong with a time.
+    let any = Hours::new("any", 1.0).map_err(|error| refused(&[error]))?;
+    let mut crewed = Options::new(1, any, any);
+    crewed.crews = arguments.crews;
+    times.finish(crewed.system().err().unwrap_or_default())?;
     let (Some(mtbf), Some(mttr), Some(limit)) = (mtbf, mttr, limit) else {
         return Err(refused(&[]));
     };

@@ -57,11 +57,22 @@ fn answered(arguments: &Arguments) -> Result<Answer, Answer> {
         arguments.run.clone()
     };
     let file = File::open(&journal).map_err(|error| {
-        let message = format!("{} cannot be read: {error}", journal.display());
+        let replica = arguments.run.join("replica-1");
+        let hint = if replica.is_dir() {
+            format!("; each replica has one, such as {}", replica.display())
+        } else {
+            String::new()
+        };
+        let message = format!("{} cannot be read: {error}{hint}", journal.display());
         bad("U0601", message)
     })?;
-    let view = observe_journal(records(BufReader::new(file)))
-        .map_err(|error| bad(error.code(), format!("{}: {error}", journal.display())))?;
+    let view = observe_journal(records(BufReader::new(file))).map_err(|error| {
+        let said = error.to_string();
+        let said = said
+            .trim_start_matches(error.code())
+            .trim_start_matches(": ");
+        bad(error.code(), format!("{}: {said}", journal.display()))
+    })?;
     let mode = if folder {
         mode_of(&arguments.run)
     } else {

@@ -39,7 +39,7 @@ pub(crate) struct Axis {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Legend {
     TopRight,
-    MiddleRight,
+    BottomRight,
     BottomLeft,
 }
 
@@ -47,7 +47,7 @@ impl From<Legend> for SeriesLabelPosition {
     fn from(legend: Legend) -> Self {
         match legend {
             Legend::TopRight => Self::UpperRight,
-            Legend::MiddleRight => Self::MiddleRight,
+            Legend::BottomRight => Self::LowerRight,
             Legend::BottomLeft => Self::LowerLeft,
         }
     }

@@ -377,7 +377,7 @@ fn pictures(data: &ReportData) -> Result<Value, ReliabilityError> {
         per_added => safe(curves(&controllers(), &log("MTTF/added unit in h"), &per_added, &none, Legend::TopRight)?),
         gained => safe(curves(&controllers(), &log("MTTF gained/added unit in h"), &gained, &none, Legend::TopRight)?),
         reliability => safe(curves(&log("time in h"), &linear("R(t)"), &in_time(&|point| point.1), &none, Legend::BottomLeft)?),
-        hazard => safe(curves(&log("time in h"), &log("hazard per h"), &in_time(&|point| point.2), &none, Legend::MiddleRight)?),
+        hazard => safe(curves(&log("time in h"), &log("hazard per h"), &in_time(&|point| point.2), &none, Legend::BottomRight)?),
         tornado => safe(tornado("MTTF in h", data.answer.mttf_cluster_hours, &bars)?),
         paper_graph => safe(graph(&chain(&system.as_paper())?)),
         cluster_graph => safe(graph(&chain(system)?)),

@@ -19,6 +19,9 @@ const HOUR_NS: f64 = 3.6e12;
 /// How long before and after a stall silence is explained by it.
 const STALL_NS: u64 = 100_000_000;
 
+/// How much later than a station's last word the step may be noted that took it away: when its process is gone.
+const NOTED_NS: u64 = 50_000_000;
+
 /// What a journal shows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JournalView {
@@ -324,7 +327,7 @@ impl Watch {
         self.lives[rank.index()] = Life::Repaired { since: at };
         self.failures.push(failed);
         self.detections.push(at - failed);
-        let missed = self.missed.filter(|missed| *missed >= failed);
+        let missed = self.missed.filter(|missed| *missed + NOTED_NS >= failed);
         self.newest = should_be_masked.then_some(Newest { missed });
     }
 
@@ -332,7 +335,7 @@ impl Watch {
     fn close_newest(&mut self, next: u64) {
         if let Some(newest) = self.newest.take() {
             self.asked += 1;
-            self.masked += u64::from(newest.missed.is_none_or(|missed| missed >= next));
+            self.masked += u64::from(newest.missed.is_none_or(|missed| missed + NOTED_NS >= next));
         }
     }
 

@@ -146,6 +146,10 @@ impl JournalOutlook {
             &format!("R over the next {} h", grouped(outlook.ahead_hours)),
             said(&outlook.reliability),
         );
+        line(
+            "  averaged over what is unknown",
+            grouped(outlook.predicted),
+        );
         for remark in &self.remarks {
             let _ = writeln!(text, "{remark}");
         }

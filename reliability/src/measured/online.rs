@@ -49,8 +49,10 @@ pub struct Outlook {
     pub detection_rate: Option<Interval>,
     /// The hours to come.
     pub ahead_hours: f64,
-    /// R over them, with all boxes working now.
+    /// R over them, with all boxes working now; the estimate is the median of what is credible.
     pub reliability: Interval,
+    /// The probability of working over them: R averaged over what is not known of the rates.
+    pub predicted: f64,
     /// Assumptions that the journal speaks against, in sentences.
     pub doubts: Vec<String>,
 }
@@ -142,11 +144,12 @@ pub fn outlook(
         },
         ahead_hours: ahead.get(),
         reliability: Interval {
-            estimate: Some(reliabilities.iter().sum::<f64>() / draws as f64),
+            estimate: Some(at(0.5)),
             lower: at(alpha / 2.0),
             upper: Some(at(1.0 - alpha / 2.0)),
             confidence,
         },
+        predicted: reliabilities.iter().sum::<f64>() / draws as f64,
         doubts: doubts(observed, random),
     })
 }

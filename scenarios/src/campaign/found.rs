@@ -106,7 +106,7 @@ impl Found {
         let plan = &self.plan;
         let assessment = &self.assessment;
         let mut text = format!(
-            "seed {}\n{} of {} failures of {} (mode {}) in {} cycles of {}, {} times faster than the plant: \
+            "seed {}\n{} of {} failures of {} (mode {}) in {} cycles of {}, {}: \
              MTBF {} cycles, MTTR {} cycles{}\n\n",
             plan.seed,
             assessment.failures,
@@ -118,7 +118,11 @@ impl Found {
                 "simulator" => "the simulator",
                 _ => "real processes",
             },
-            grouped(plan.acceleration),
+            if (plan.acceleration - 1.0).abs() < 1e-9 {
+                "as fast as the plant".to_owned()
+            } else {
+                format!("{} times faster than the plant", grouped(plan.acceleration))
+            },
             grouped(plan.mtbf_cycles),
             grouped(plan.mttr_cycles),
             match plan.crews {
