@@ -49,7 +49,7 @@ pub(crate) struct Arguments {
     /// What is hunted for
     #[arg(long, value_enum, default_value_t = PropertyArgument::Wrong)]
     property: PropertyArgument,
-    /// Kinds of faults, by default all but flipped bits where the cluster cannot mask them; `all` for really all
+    /// Kinds of faults, by default all; flipped bits only where there is an understudy
     #[arg(long, value_name = "KIND,...", value_delimiter = ',', value_parser = parse_kinds)]
     faults: Vec<Vec<Kind>>,
     /// No run is begun after this time, such as 10min; the findings say how many were made

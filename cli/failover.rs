@@ -88,7 +88,7 @@ fn is_right(comparison: &Comparison) -> bool {
     ended && simulated.chain(real).all(|wrong| wrong == 0)
 }
 
-/// What is needed of the answer of `bench kills`.
+/// What is needed of the answer of a run on real processes.
 #[derive(Deserialize)]
 struct Killed {
     summary: KilledSummary,

@@ -1,5 +1,8 @@
 //! A faultload by chance. Invariant: it is a function of the cluster's schedule, the kinds and the random numbers, and everything in
 //! it can be written in a scenario file and read back unchanged.
+//!
+//! A flipped bit comes alone in its run: beside another fault too few true words may be left to tell it from, and no code of this
+//! distance can locate an error and an erasure, or two equal errors, at once.
 
 use std::ops::Range;
 use std::time::Duration;
@@ -31,6 +34,14 @@ pub(super) fn draw(
         cycles: cycles.clone(),
     };
     let mut faultload = Faultload::default();
+    let (of_values, kinds): (Vec<Kind>, Vec<Kind>) =
+        kinds.iter().partition(|kind| kind.is_value_fault());
+    let alone = kinds.is_empty() || drawn.random.random_range(0..4) == 0;
+    if !of_values.is_empty() && alone {
+        let kind = drawn.one_of(&of_values);
+        faultload.injections.extend(drawn.injection(kind));
+        return faultload;
+    }
     let (of_network, of_parties): (Vec<Kind>, Vec<Kind>) = kinds
         .iter()
         .partition(|kind| kind.roles() == [Role::Network]);

@@ -112,12 +112,11 @@ impl Kind {
     pub fn masked_by(understudies: usize) -> Vec<Self> {
         let kinds = Self::ALL.into_iter();
         kinds
-            .filter(|kind| understudies > 1 || !kind.is_value_fault())
+            .filter(|kind| understudies > 0 || !kind.is_value_fault())
             .collect()
     }
 
-    /// Whether it is one that redundancy of values has to find, as bits flip behind the back of every checksum. What is then
-    /// applied can only be right where the cluster has two understudies, or holds.
+    /// Whether bits flip behind the back of every checksum, so that only words that differ can show it.
     pub fn is_value_fault(self) -> bool {
         matches!(
             self,

@@ -18,6 +18,10 @@ use super::trial::{FIRST_CYCLE, Symptom};
 /// Runs of one minimisation, at most; then what is smallest so far is kept.
 const MAXIMUM_TRIALS: u32 = 1_000;
 
+/// Cycles after the first symptom: a remote I/O that has just started and hears nobody counts its deadlines by itself, and the
+/// account of a scenario numbers them some cycles later.
+const MARGIN_CYCLES: u64 = 3;
+
 /// A run that violates.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Violating {
@@ -85,12 +89,12 @@ impl Search<'_, '_> {
         true
     }
 
-    /// Ends the run behind the first symptom, without what strikes later.
+    /// Ends the run a little behind the first symptom, without what strikes later.
     fn shorten(&mut self) {
         if !self.shortens {
             return;
         }
-        let cycles = self.best.symptom.cycle + 1;
+        let cycles = self.best.symptom.cycle + 1 + MARGIN_CYCLES;
         let mut faultload = self.best.faultload.clone();
         faultload
             .injections
@@ -99,7 +103,7 @@ impl Search<'_, '_> {
             injection.steps.retain(|step| step.at_cycle < cycles);
         }
         let (seed, size) = (self.best.seed, self.best.faultload.size());
-        if cycles < self.best.cycles || faultload.size() < size {
+        if cycles != self.best.cycles || faultload.size() < size {
             self.takes_with(faultload, cycles, seed);
         }
     }
