@@ -1,7 +1,9 @@
 //! The filling line of the examples, from its ladder to the proof of its second module.
 
+use std::sync::Arc;
 use std::time::Duration;
 
+use proptest::prelude::*;
 use understudy_ladder::{Element, Program, parse};
 use understudy_reconfiguration::command::Objective;
 use understudy_reconfiguration::explore::{Bounds, Explored, explore};
@@ -97,8 +99,19 @@ fn prove_line(
     change: impl FnOnce(&mut Combined),
 ) -> Result<Proof, NotProved> {
     let found = explored(PERIOD);
-    let controller = &found.controller;
-    let relation = relation(controller);
+    let relation = relation(&found.controller);
+    prove_with(&found.controller, &relation, analysis, simultaneous, change)
+        .expect("every state has a command")
+}
+
+/// Nothing where some states have no safe command.
+fn prove_with(
+    controller: &Controller,
+    relation: &Relation,
+    analysis: Analysis,
+    simultaneous: usize,
+    change: impl FnOnce(&mut Combined),
+) -> Option<Result<Proof, NotProved>> {
     let ladder = program(LADDER);
     let question = Question {
         channels: vec![0, 1, 2, 3, 4],
@@ -107,8 +120,8 @@ fn prove_line(
         objective: Objective::Fewest,
         maximum_states: 100_000,
     };
-    let mega = MegaController::build(controller, &relation, &question).expect("commands");
-    let lost = Bits(vec![false; 4]);
+    let mega = MegaController::build(controller, relation, &question).ok()?;
+    let lost = MegaController::outputs_for_any(controller, relation, &question).ok()?;
     let mut combined =
         combine(&ladder, controller, &mega, &question, &lost).expect("not too large");
     change(&mut combined);
@@ -116,9 +129,9 @@ fn prove_line(
         let state = &mega.states[place];
         (state.members.clone(), state.failed)
     };
-    prove(&Claim {
+    Some(prove(&Claim {
         controller,
-        relation: &relation,
+        relation,
         alone: &ladder,
         combined: &combined.program,
         correspondence: &combined.correspondence,
@@ -128,7 +141,7 @@ fn prove_line(
         late: analysis == Analysis::Late,
         period: PERIOD,
         maximum_states: 100_000,
-    })
+    }))
 }
 
 #[test]
@@ -225,4 +238,38 @@ fn each_phase_makes_one_transition() {
         assert!(closing);
     })
     .expect("proved");
+}
+
+fn any_relation() -> impl Strategy<Value = Vec<Vec<Vec<Option<bool>>>>> {
+    let entry = prop_oneof![3 => Just(None), 2 => Just(Some(true)), 1 => Just(Some(false))];
+    let row = prop::collection::vec(entry, 4);
+    let row = row.prop_filter("it would always hold", |row| {
+        row.iter().any(Option::is_some)
+    });
+    // For each of the ten events, up to two rows; none makes it uncontrollable.
+    prop::collection::vec(prop::collection::vec(row, 0..=2), 10)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    #[test]
+    fn whatever_the_outputs_can_prevent_what_is_generated_is_proved(
+        rows in any_relation(),
+        late in any::<bool>(),
+    ) {
+        let found = explored(PERIOD);
+        let controller = &found.controller;
+        let mut relation = Relation::new(controller.states().len());
+        for (event, rows) in controller.signals.events().zip(rows) {
+            let rows: Arc<[Row]> = rows.into_iter().map(Row).collect();
+            for state in 0..controller.states().len() {
+                relation.set(state, event, rows.clone());
+            }
+        }
+        let analysis = if late { Analysis::Late } else { Analysis::Prompt };
+        if let Some(proof) = prove_with(controller, &relation, analysis, 1, |_| {}) {
+            prop_assert!(proof.is_ok(), "{}", proof.unwrap_err());
+        }
+    }
 }
