@@ -100,6 +100,8 @@ pub(crate) struct Channel<E> {
     sink: JournalSender<E>,
     clock: Clock,
     stop: Arc<AtomicBool>,
+    /// An operator wants the party to end.
+    stop_wanted: Arc<AtomicBool>,
 }
 
 /// What is open.
@@ -134,6 +136,7 @@ impl<E: Send + 'static> Channel<E> {
             sink,
             clock,
             stop: Arc::clone(&stop),
+            stop_wanted: Arc::default(),
         };
         std::thread::Builder::new()
             .name("channel".into())
@@ -154,6 +157,7 @@ impl<E: Send + 'static> Channel<E> {
         let mut opened: Option<Opened> = None;
         let mut next_try = Time::default();
         let mut looked = self.clock.now();
+        let mut stopping = false;
         loop {
             let now = self.clock.now();
             if opened.is_none() && now >= next_try {
@@ -178,6 +182,11 @@ impl<E: Send + 'static> Channel<E> {
                 continue;
             }
             looked = now;
+            // One look later than it was seen, so that the answer is out before its channel ends.
+            if stopping {
+                self.control.give(Order::Stop);
+            }
+            stopping = self.stop_wanted.load(Ordering::SeqCst);
             let newly = (self.settings.admitted)();
             if newly != admitted {
                 admitted = newly;
@@ -234,15 +243,20 @@ impl<E: Send + 'static> Channel<E> {
             let key = format!("{}/{what}", self.prefix);
             answers.push(answer(&session, key, move || text.clone())?);
         }
-        for (what, order) in [("release", Order::Release), ("stop", Order::Stop)] {
-            let key = format!("{}/command/{what}", self.prefix);
-            let control = self.control.clone();
-            let obey = move || {
-                control.give(order);
-                "done".to_owned()
-            };
-            answers.push(answer(&session, key, obey)?);
-        }
+        let control = self.control.clone();
+        let release = move || {
+            control.give(Order::Release);
+            "done".to_owned()
+        };
+        let key = format!("{}/command/release", self.prefix);
+        answers.push(answer(&session, key, release)?);
+        let wanted = Arc::clone(&self.stop_wanted);
+        let stop = move || {
+            wanted.store(true, Ordering::SeqCst);
+            "done".to_owned()
+        };
+        let key = format!("{}/command/stop", self.prefix);
+        answers.push(answer(&session, key, stop)?);
         Ok(Opened {
             session,
             journal,

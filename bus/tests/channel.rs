@@ -170,8 +170,12 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
         matches!(denied, Err(BusError::Unanswered { .. })),
         "{denied:?}"
     );
-    let done = until("the leader", || asked(site, "shift-leader", Request::Stop));
-    assert_eq!(done, "done");
+    let started = Instant::now();
+    while !running.is_finished() {
+        // Where the answer is lost, the party ends all the same.
+        let _ = asked(site, "shift-leader", Request::Stop);
+        assert!(started.elapsed() < DEADLINE, "the leader is not obeyed");
+    }
     let ended = running.join().expect("no panic");
     ended.expect("it ends as it is told to");
     router.close().wait().expect("it is open");
