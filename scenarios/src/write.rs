@@ -149,7 +149,9 @@ fn time(duration: Duration) -> String {
         ("us", 1_000),
         ("ns", 1),
     ];
-    let unit = units.iter().find(|(_, scale)| nanoseconds.is_multiple_of(*scale));
+    let unit = units
+        .iter()
+        .find(|(_, scale)| nanoseconds.is_multiple_of(*scale));
     let (unit, scale) = unit.unwrap_or(&("ns", 1));
     format!("\"{}{unit}\"", nanoseconds / scale)
 }
