@@ -50,23 +50,21 @@ fn succeeds(arguments: &[&str]) -> Answer {
     answer
 }
 
+/// Models, maps, nets, automata, ladders, clusters and scenarios; what `reconfigure` reads has tests of its own.
 #[test]
-fn every_cluster_scenario_and_ladder_is_right() {
+fn every_file_is_right() {
+    let is_read = |path: &PathBuf| {
+        let extension = path.extension().unwrap_or_default();
+        ["ladder", "toml", "ADS"]
+            .iter()
+            .any(|read| extension == *read)
+            && name(path) != "reconfiguration.toml"
+    };
     for folder in folders() {
-        let cluster = folder.join("cluster.toml");
-        let mut files: Vec<PathBuf> = entries(&folder);
-        files.retain(|path| {
-            path.extension()
-                .is_some_and(|extension| extension == "ladder")
-        });
-        if cluster.exists() {
-            files.insert(0, cluster);
-            files.extend(scenarios(&folder));
-        }
-        if !files.is_empty() {
-            let files = files.iter().map(|path| text(path));
-            succeeds(&[&["check"], &files.collect::<Vec<_>>()[..]].concat());
-        }
+        let mut files = entries(&folder);
+        files.retain(is_read);
+        let files = files.iter().map(|path| text(path));
+        succeeds(&[&["check"], &files.collect::<Vec<_>>()[..]].concat());
     }
 }
 
