@@ -10,12 +10,15 @@ use understudy_supervisor::ladder::locate;
 use understudy_supervisor::petri::{
     HybridError, NetFile, draw_net_dot, draw_net_svg, read_net, reduce, to_ladder, write_net,
 };
-use understudy_supervisor::proof::{HybridProof, HybridVerdict, ProofSettings, prove_hybrid};
+use understudy_supervisor::proof::{
+    Finding, HybridProof, HybridVerdict, ProofSettings, hybrid_findings, prove_hybrid,
+};
 use understudy_supervisor::{Automaton, Model, write_model};
 
 use crate::answer::{Answer, Status};
 use crate::automata::{self, Sources, description, summary};
 use crate::files;
+use crate::supervisor_to_ladder::{listed, notes};
 
 /// Work with automation Petri nets: their bounds, automata and drawings, and proved ladders of nets with supervisors
 #[derive(Debug, Args)]
@@ -275,13 +278,15 @@ fn ladder(
         report.diagnostics.extend(found);
         return Answer::bad_files(vec![report]);
     }
+    // What cannot be looked at beforehand is proved all the same.
+    let found = hybrid_findings(&file.net, &named, limit).map_err(|error| error.to_string());
     let answer = match prove_hybrid(&file.net, &named, &made, ProofSettings::default()) {
         Err(error) => failed(error.code(), error),
         Ok(HybridVerdict::Refuted(found)) => {
             let message = format!("the ladder does not do what net and supervisors say:\n{found}");
             failed("U0875", message)
         }
-        Ok(HybridVerdict::Proved(proof)) => proved(&print(&made.program), &proof, output),
+        Ok(HybridVerdict::Proved(proof)) => proved(&print(&made.program), &proof, &found, output),
     };
     answer.with_reports(vec![report])
 }
@@ -305,7 +310,12 @@ fn supervisors(paths: &[PathBuf]) -> Result<Vec<Automaton>, Answer> {
     Ok(all)
 }
 
-fn proved(ladder: &str, proof: &HybridProof, output: Option<&Path>) -> Answer {
+fn proved(
+    ladder: &str,
+    proof: &HybridProof,
+    found: &Result<Vec<Finding>, String>,
+    output: Option<&Path>,
+) -> Answer {
     let result = json!({
         "rungs": ladder.lines().filter(|line| line.starts_with("rung")).count(),
         "proof": {
@@ -314,6 +324,7 @@ fn proved(ladder: &str, proof: &HybridProof, output: Option<&Path>) -> Answer {
             "markings": proof.markings,
             "never_fired": proof.never_fired,
         },
+        "findings": found.as_ref().ok().map(|found| listed(found)),
         "ladder": ladder,
     });
     let Some(path) = output else {
@@ -322,9 +333,13 @@ fn proved(ladder: &str, proof: &HybridProof, output: Option<&Path>) -> Answer {
     if let Err(answer) = files::write(path, ladder) {
         return answer;
     }
+    let said_before = match found {
+        Ok(found) => notes(found),
+        Err(error) => format!("nothing was looked for beforehand: {error}\n"),
+    };
     let mut text = format!(
-        "proved over {} states in {} scans, {} markings",
-        proof.states, proof.scans, proof.markings
+        "{}proved over {} states in {} scans, {} markings",
+        said_before, proof.states, proof.scans, proof.markings
     );
     if !proof.never_fired.is_empty() {
         text.push_str(&format!("; never fired: {}", proof.never_fired.join(" ")));

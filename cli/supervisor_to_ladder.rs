@@ -1,6 +1,5 @@
 //! `understudy supervisor-to-ladder`: a supervisor as a ladder that is proved to keep it.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -13,7 +12,7 @@ use understudy_supervisor::ladder::{
 use understudy_supervisor::proof::{
     Finding, FindingSeverity, ProofSettings, Verdict, findings, prove,
 };
-use understudy_supervisor::{Automaton, Model, Signal};
+use understudy_supervisor::{Automaton, Label, Model, Signal};
 
 use crate::answer::{Answer, Status};
 use crate::automata::{self, Sources};
@@ -202,6 +201,43 @@ fn bad_map(mut report: Report, diagnostics: Vec<Diagnostic>) -> Answer {
     Answer::bad_files(vec![report])
 }
 
+fn severity(finding: &Finding) -> &'static str {
+    match finding.severity {
+        FindingSeverity::Warning => "warning",
+        FindingSeverity::Error => "error",
+    }
+}
+
+/// Findings for people, a line each.
+pub(crate) fn notes(found: &[Finding]) -> String {
+    let lines = found.iter().map(|finding| {
+        let (code, message) = (finding.code(), &finding.message);
+        format!("{} {code}: {message}\n", severity(finding))
+    });
+    lines.collect()
+}
+
+/// Findings for machines.
+pub(crate) fn listed(found: &[Finding]) -> Value {
+    let numbers = |labels: &[Label]| {
+        labels
+            .iter()
+            .map(|label| label.number())
+            .collect::<Vec<_>>()
+    };
+    let listed = found.iter().map(|finding| {
+        json!({
+            "code": finding.code(),
+            "severity": severity(finding),
+            "message": finding.message,
+            "states": finding.states.iter().map(|state| state.number()).collect::<Vec<_>>(),
+            "events": numbers(&finding.events),
+            "run": numbers(&finding.run),
+        })
+    });
+    listed.collect()
+}
+
 fn answer(
     arguments: &Arguments,
     modules: &Modules,
@@ -210,14 +246,7 @@ fn answer(
     verdict: Verdict,
 ) -> Answer {
     let program = &conversion.program;
-    let mut notes = String::new();
-    for finding in found {
-        let severity = match finding.severity {
-            FindingSeverity::Warning => "warning",
-            FindingSeverity::Error => "error",
-        };
-        let _ = writeln!(notes, "{severity} {}: {}", finding.code(), finding.message);
-    }
+    let notes = notes(found);
     let mut result = json!({
         "program": program.name.as_str(),
         "rungs": program.rungs.len(),
@@ -225,17 +254,7 @@ fn answer(
         "outputs": program.outputs.len(),
         "memory": program.memory.len(),
         "consumed": conversion.consumed.iter().map(|label| label.number()).collect::<Vec<_>>(),
-        "findings": found.iter().map(|finding| json!({
-            "code": finding.code(),
-            "severity": match finding.severity {
-                FindingSeverity::Warning => "warning",
-                FindingSeverity::Error => "error",
-            },
-            "message": finding.message,
-            "states": finding.states.iter().map(|state| state.number()).collect::<Vec<_>>(),
-            "events": finding.events.iter().map(|label| label.number()).collect::<Vec<_>>(),
-            "run": finding.run.iter().map(|label| label.number()).collect::<Vec<_>>(),
-        })).collect::<Vec<_>>(),
+        "findings": listed(found),
     });
     let proof = match verdict {
         Verdict::Proved(proof) => proof,

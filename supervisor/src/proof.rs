@@ -16,6 +16,9 @@ mod verdict;
 mod view;
 
 pub use explore::{ProofSettings, prove};
-pub use findings::{Finding, FindingKind, FindingSeverity, bounded_response, findings};
+pub use findings::{
+    Finding, FindingKind, FindingSeverity, HybridFindingsError, bounded_response, findings,
+    hybrid_findings,
+};
 pub use hybrid::{HybridCounterexample, HybridDeviation, HybridProof, HybridVerdict, prove_hybrid};
 pub use verdict::{Counterexample, Deviation, Proof, ProofError, ScanRecord, Verdict};

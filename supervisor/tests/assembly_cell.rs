@@ -9,7 +9,9 @@ use understudy_ladder::{Element, Interpreter, check, print};
 use understudy_supervisor::ladder::avalanche_events;
 use understudy_supervisor::operations::{condat, supreduce, sync};
 use understudy_supervisor::petri::{HybridLadder, Net, read_net, to_ladder};
-use understudy_supervisor::proof::{HybridDeviation, HybridVerdict, ProofSettings, prove_hybrid};
+use understudy_supervisor::proof::{
+    HybridDeviation, HybridVerdict, ProofSettings, hybrid_findings, prove_hybrid,
+};
 use understudy_supervisor::{Automaton, Bounds, Label, State, read_model, synthesise};
 
 const DONE: u32 = 30;
@@ -219,4 +221,21 @@ fn the_ladder_keeps_the_specifications_and_goes_on() {
         }
     }
     assert!(assembled > 500, "{assembled}");
+}
+
+/// What is known before the ladder is made.
+#[test]
+fn findings_come_before_the_ladder() {
+    let cell = cell();
+    let supervisors = std::slice::from_ref(&cell.reduced);
+    let found = hybrid_findings(&cell.net, supervisors, 1_000).expect("bounded");
+    let said: Vec<String> = found
+        .iter()
+        .map(|finding| format!("{} {}", finding.code(), finding.message))
+        .collect();
+    insta::assert_snapshot!(said.join("\n"), @r#"
+U0885 a PLC that generates every command at once never rests in a marked state after 30 of 30 states, 0 the first
+U0886 in `keeper` placed stand on successive transitions; their bits are reset by the rungs that use them
+"#);
+    assert_eq!(hybrid_findings(&cell.net, &[], 1_000), Ok(Vec::new()));
 }

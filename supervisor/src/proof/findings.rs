@@ -10,7 +10,8 @@ mod conditions;
 use self::closed_loop::ClosedLoop;
 use super::verdict::ProofError;
 use crate::ladder::{Modules, avalanche_events};
-use crate::{Label, State};
+use crate::petri::{ExplorationError, Net, buffers};
+use crate::{Automaton, AutomatonError, Label, State};
 
 /// What a finding is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -110,6 +111,52 @@ fn avalanche(modules: &Modules) -> Vec<Finding> {
         })
     });
     findings.collect()
+}
+
+/// All findings about `supervisors` of a net, whose places are the plants; nothing about a net without supervisors.
+///
+/// # Errors
+/// A net without bounds within `limit` markings, or more than 2,000,000 states together.
+pub fn hybrid_findings(
+    net: &Net,
+    supervisors: &[Automaton],
+    limit: usize,
+) -> Result<Vec<Finding>, HybridFindingsError> {
+    if supervisors.is_empty() {
+        return Ok(Vec::new());
+    }
+    let bounds = net.explore(limit)?.bounds();
+    let plants = buffers(net, &bounds)?;
+    let modules = Modules {
+        supervisors,
+        plants: &plants,
+    };
+    Ok(findings(&modules)?)
+}
+
+/// Why there are no findings about a net.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum HybridFindingsError {
+    /// The net has no bounds.
+    #[error(transparent)]
+    Bounds(#[from] ExplorationError),
+    /// Two transitions of one event move a place differently.
+    #[error(transparent)]
+    Buffers(#[from] AutomatonError),
+    /// The closed loop is too large.
+    #[error(transparent)]
+    ClosedLoop(#[from] ProofError),
+}
+
+impl HybridFindingsError {
+    /// Stable code for people.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Bounds(error) => error.code(),
+            Self::Buffers(error) => error.code(),
+            Self::ClosedLoop(error) => error.code(),
+        }
+    }
 }
 
 /// The longest run of uncontrollable events and the longest run of commands in the closed loop; `None` where there is no
