@@ -38,7 +38,7 @@ fn merged_shards_are_the_whole_and_failures_fail_again() {
         "--property",
         "held",
         "--faults",
-        "loss,jitter",
+        "isolation,slow",
     ];
     let whole = folder.join("whole");
     let answer = campaign(&whole, &[&asked[..], &["--jobs", "1"]].concat());
