@@ -24,6 +24,7 @@ mod keys;
 mod lab;
 mod measure;
 mod memory;
+mod model_check;
 mod operate;
 mod outlook;
 mod overrides;
@@ -87,6 +88,7 @@ enum Command {
     Measure(measure::Arguments),
     Outlook(outlook::Arguments),
     Campaign(campaign::Arguments),
+    ModelCheck(model_check::Arguments),
     Init(init::Arguments),
     Keys(keys::Arguments),
     Operate(operate::Arguments),
@@ -120,6 +122,7 @@ impl Command {
             Self::Measure(_) => "measure",
             Self::Outlook(_) => "outlook",
             Self::Campaign(_) => "campaign",
+            Self::ModelCheck(_) => "model-check",
             Self::Init(_) => "init",
             Self::Keys(_) => "keys",
             Self::Operate(_) => "operate",
@@ -152,6 +155,7 @@ impl Command {
             Self::Reliability(arguments) => reliability::run(&arguments),
             Self::Measure(arguments) => measure::run(&arguments, console),
             Self::Outlook(arguments) => outlook::run(&arguments),
+            Self::ModelCheck(arguments) => model_check::run(&arguments),
             Self::Campaign(arguments) => campaign::run(&arguments, console),
             Self::Init(arguments) => init::run(&arguments),
             Self::Keys(arguments) => keys::run(&arguments),

@@ -3,6 +3,7 @@
 use stateright::{Checker, Model as _};
 use understudy_simulator::Fault;
 
+use crate::properties::{ALL, Promise};
 use crate::step::Step;
 use crate::world::Model;
 
@@ -22,6 +23,10 @@ pub struct Verdict {
 pub struct Counterexample {
     /// Which.
     pub property: &'static str,
+    /// What it promises of a run of these faults.
+    pub promise: Promise,
+    /// Cycles of that run.
+    pub cycles: u64,
     /// What is done; all steps but waiting.
     pub steps: Vec<Step>,
     /// The same, for the simulator.
@@ -41,8 +46,11 @@ pub fn check(model: Model, threads: usize) -> Verdict {
                 .into_iter()
                 .filter(|&step| step != Step::Wait)
                 .collect();
+            let named = ALL.iter().find(|known| known.name == property);
             Counterexample {
                 property,
+                promise: named.map_or(Promise::NothingWrong, |known| known.promise),
+                cycles: checker.model().cycles(),
                 steps,
                 faults,
             }

@@ -18,6 +18,6 @@ mod step;
 mod world;
 
 pub use checker::{Counterexample, Verdict, check};
-pub use properties::{ALL, Property};
+pub use properties::{ALL, Promise, Property};
 pub use step::{Budget, Step};
 pub use world::{Model, World};

@@ -8,11 +8,26 @@ mod protection_comes_back;
 
 use crate::world::{Model, World};
 
+pub(crate) use protection_comes_back::RECOVERY_CYCLES;
+
+/// What a run must come to where a property holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Promise {
+    /// Nothing wrong is driven.
+    NothingWrong,
+    /// And no cycle is held or fail-safe.
+    NothingHeld,
+    /// And everybody is in step at the end.
+    Protected,
+}
+
 /// One property.
 #[derive(Debug, Clone, Copy)]
 pub struct Property {
     /// As a counterexample names it.
     pub name: &'static str,
+    /// What it promises of a run.
+    pub promise: Promise,
     pub(crate) holds: fn(&Model, &World) -> bool,
 }
 

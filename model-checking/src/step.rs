@@ -90,6 +90,21 @@ impl Place {
     }
 }
 
+/// Everybody who is down, and whether it has crashed, comes back at `place`.
+pub(crate) fn revivals(down: &[(Party, bool)], place: Place) -> Vec<Fault> {
+    let back = |&(party, crashed): &(Party, bool)| Fault {
+        at_cycle: place.cycle,
+        phase: place.phase(),
+        party,
+        action: if crashed {
+            Action::Restart
+        } else {
+            Action::Continue
+        },
+    };
+    down.iter().map(back).collect()
+}
+
 /// The faults that a step at `place` is; nothing for waiting. `parties` are all of the cluster.
 pub(crate) fn faults(step: Step, place: Place, parties: &[Party], period: Duration) -> Vec<Fault> {
     let fault = |place: Place, party, action| Fault {

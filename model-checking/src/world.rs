@@ -8,8 +8,8 @@ use stateright::Property as Checked;
 use understudy_simulator::{Fault, Network, NotReady, Parts, Simulation};
 use understudy_wire::{Party, ProgramId, StationId};
 
-use crate::properties::Property;
-use crate::step::{Budget, LATE_PER_MILLE, Place, Step, faults};
+use crate::properties::{Property, RECOVERY_CYCLES};
+use crate::step::{Budget, LATE_PER_MILLE, Place, Step, faults, revivals};
 
 /// Cycles that the undisturbed cluster gets to come into step.
 const PATIENCE_CYCLES: u64 = 200;
@@ -81,13 +81,30 @@ impl Model {
     pub fn faults(&self, steps: &[Step]) -> Vec<Fault> {
         let mut place = FIRST;
         let mut all = Vec::new();
+        let mut down: Vec<(Party, bool)> = Vec::new();
         for &step in steps {
             all.extend(faults(step, place, &self.parties, self.period));
-            if step == Step::Wait {
-                place = place.next();
+            match step {
+                Step::Wait => place = place.next(),
+                Step::Crash(party) | Step::Stop(party) => {
+                    down.push((party, matches!(step, Step::Crash(_))));
+                }
+                Step::Restart(party) | Step::Continue(party) => {
+                    down.retain(|&(other, _)| other != party);
+                }
+                _ => {}
             }
         }
+        // Who is still down where the run is over comes back, as for the property that protection does.
+        if place.cycle >= FIRST.cycle + self.budget.cycles {
+            all.extend(revivals(&down, place));
+        }
         all
+    }
+
+    /// Cycles of a run that has all of a path in it, and the time to come into step again.
+    pub fn cycles(&self) -> u64 {
+        FIRST.cycle + self.budget.cycles + RECOVERY_CYCLES
     }
 
     /// Parties that send anything in the slot that begins here if nothing is done.

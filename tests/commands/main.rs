@@ -6,6 +6,7 @@ mod check;
 mod des;
 mod examples;
 mod help;
+mod model_check;
 mod others;
 mod petri;
 mod reconfigure;

@@ -3,10 +3,11 @@
 
 use understudy_simulator::Violation;
 
-use super::Property;
+use super::{Promise, Property};
 
 pub(super) const PROPERTY: Property = Property {
     name: "nothing wrong is driven",
+    promise: Promise::NothingWrong,
     holds: |_, world| {
         let wrong = |violation: &Violation| matches!(violation, Violation::Wrong { .. });
         !world.simulation.violations().iter().any(wrong)

@@ -3,10 +3,11 @@
 use understudy_simulator::Tally;
 use understudy_wire::Party;
 
-use super::Property;
+use super::{Promise, Property};
 
 pub(super) const PROPERTY: Property = Property {
     name: "one lost station costs no cycle",
+    promise: Promise::NothingHeld,
     holds: |_, world| {
         let used = &world.used;
         let quiet = used.losses + used.delays + used.duplicates == 0;

@@ -2,10 +2,11 @@
 
 use understudy_simulator::Violation;
 
-use super::Property;
+use super::{Promise, Property};
 
 pub(super) const PROPERTY: Property = Property {
     name: "what is not true is held or fail-safe",
+    promise: Promise::NothingWrong,
     holds: |_, world| {
         let neither = |violation: &Violation| {
             matches!(
