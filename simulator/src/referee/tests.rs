@@ -34,6 +34,7 @@ fn referee() -> Referee {
         agreement: std::sync::Arc::new(agreement),
         hash: ProgramHash(5),
         inputs: 1,
+        channels: Vec::new(),
         hold_cycles: 2,
         fail_safe: Image::zero(1),
         release: Release::Automatic,
