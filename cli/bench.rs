@@ -80,7 +80,7 @@ enum What {
         run: Box<RunArguments>,
     },
     /// The cluster beside hot-standby and active-active pairs: lost cycles, false take-overs, double masters, boxes, bytes
-    Failover(failover::Arguments),
+    Failover(Box<failover::Arguments>),
     /// Memory of a long simulated run with loss and failures
     Memory(memory::Arguments),
     /// One process of the exchange

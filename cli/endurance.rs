@@ -106,9 +106,9 @@ struct Trials {
     trials: u64,
     in_time: u64,
     /// In cycles, the longest; nothing where one never came.
-    longest_start: Option<f64>,
+    longest_start: Option<u64>,
     longest_join: Option<u64>,
-    median_start: f64,
+    median_start: u64,
     median_join: u64,
     each: Vec<Joined>,
 }
@@ -133,7 +133,7 @@ pub(crate) fn join(trials: u64, arguments: &RunArguments, console: &mut Console)
             let (station, scenario) = join_trial(trial, &cell.cluster.agreement().schedule);
             console.note(&format!("{link}, {}", scenario.title));
             match cell.judged(&scenario, &arguments, &mut Console::new(true)) {
-                Ok((summary, judged)) => each.push(Joined::new(station, &summary, judged.start)),
+                Ok((summary, _)) => each.push(Joined::new(station, &summary)),
                 Err(answer) => return answer,
             }
         }
@@ -145,7 +145,7 @@ pub(crate) fn join(trials: u64, arguments: &RunArguments, console: &mut Console)
     );
     let never = |longest: Option<String>| longest.unwrap_or_else(|| "never".into());
     for link in &links {
-        let start = never(link.longest_start.map(|start| format!("{start:.0}")));
+        let start = never(link.longest_start.map(|start| start.to_string()));
         let join = never(link.longest_join.map(|join| join.to_string()));
         let _ = writeln!(
             text,
@@ -153,7 +153,7 @@ pub(crate) fn join(trials: u64, arguments: &RunArguments, console: &mut Console)
             link.link,
             link.trials,
             link.in_time,
-            format!("{:.0}, {start}", link.median_start),
+            format!("{}, {start}", link.median_start),
             format!("{}, {join}", link.median_join),
         );
     }
@@ -164,9 +164,9 @@ pub(crate) fn join(trials: u64, arguments: &RunArguments, console: &mut Console)
 }
 
 fn summed_up(link: String, trials: u64, each: Vec<Joined>) -> Trials {
-    let mut starts: Vec<f64> = each.iter().filter_map(|joined| joined.start).collect();
+    let mut starts: Vec<u64> = each.iter().filter_map(|joined| joined.start).collect();
     let mut joins: Vec<u64> = each.iter().filter_map(|joined| joined.join).collect();
-    starts.sort_by(f64::total_cmp);
+    starts.sort_unstable();
     joins.sort_unstable();
     let all = |came: usize| came == each.len();
     Trials {

@@ -1,7 +1,7 @@
 //! `understudy lab`: a cluster and a scenario on real processes.
 
 use std::path::{Path, PathBuf};
-use std::time::{Duration, SystemTime};
+use std::time::SystemTime;
 
 use clap::{Args, ValueEnum};
 use understudy_cluster::Cluster;
@@ -201,8 +201,6 @@ pub(crate) fn in_laboratory(
 /// What a run left besides its summary.
 pub(crate) struct Judged {
     pub(crate) written: Result<(), RunDirectoryError>,
-    /// From all processes ready to everybody in step.
-    pub(crate) start: Option<Duration>,
     pub(crate) failure: Option<LaboratoryError>,
 }
 
@@ -231,7 +229,6 @@ pub(crate) fn judged(
     }
     let judged = Judged {
         written: directory.write_results(&summary, &account),
-        start: run.start,
         failure: run.failure,
     };
     Ok((summary, judged))

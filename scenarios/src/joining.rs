@@ -1,7 +1,5 @@
 //! How long a cluster takes to come into step, and a station to come back, where frames are lost.
 
-use std::time::Duration;
-
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_simulator::{Action, Fault};
@@ -42,8 +40,8 @@ pub fn join_trial(trial: u64, schedule: &Schedule) -> (StationId, Scenario) {
 /// What came of a trial; times in cycles, nothing where it never happened.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Joined {
-    /// From the moment at which all processes were ready to the first cycle in which everybody was in step.
-    pub start: Option<f64>,
+    /// From the first cycle that the cluster counted to the first one in which everybody was in step.
+    pub start: Option<u64>,
     /// From the restart of the station to its first turn.
     pub join: Option<u64>,
     /// What must never be driven and was.
@@ -52,7 +50,7 @@ pub struct Joined {
 
 impl Joined {
     /// Of a run of [`join_trial`].
-    pub fn new(station: StationId, summary: &Summary, start: Option<Duration>) -> Self {
+    pub fn new(station: StationId, summary: &Summary) -> Self {
         let restart = summary.steps.last().map(|step| step.measured);
         let intervals = summary.stations.get(station.index());
         let join = restart.zip(intervals).and_then(|(restart, found)| {
@@ -63,9 +61,11 @@ impl Joined {
             let first = on.find(|interval| interval.to > restart)?;
             Some(first.from.saturating_sub(restart))
         });
-        let period = Duration::from_micros(summary.circumstances.period_us);
+        // As `epoch:cycle`, where an epoch counts from 0.
+        let origin = summary.origin.as_deref();
+        let start = origin.and_then(|origin| origin.rsplit_once(':')?.1.parse().ok());
         Self {
-            start: start.map(|start| start.as_secs_f64() / period.as_secs_f64()),
+            start,
             join: join.filter(|_| summary.steps.len() == 2),
             wrong: summary.violation_count,
         }
@@ -74,7 +74,7 @@ impl Joined {
     /// Whether everything came in time and nothing was wrong.
     pub fn is_in_time(&self) -> bool {
         self.wrong == 0
-            && self.start.is_some_and(|start| start <= JOIN_CYCLES as f64)
+            && self.start.is_some_and(|start| start <= JOIN_CYCLES)
             && self.join.is_some_and(|join| join <= JOIN_CYCLES)
     }
 }

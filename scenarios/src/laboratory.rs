@@ -115,8 +115,6 @@ pub struct LaboratoryRun {
     pub journal: JournalState,
     /// Rights that the processes lack, and similar things that a reader should know.
     pub machine: Vec<String>,
-    /// From the moment at which all processes were ready to the one at which everybody was in step.
-    pub start: Option<Duration>,
     /// Why it ended early, where nobody asked it to.
     pub failure: Option<LaboratoryError>,
 }
@@ -178,8 +176,6 @@ pub(crate) fn run_conducted(
         processes: BTreeMap::new(),
         lives: BTreeMap::new(),
         ready: BTreeSet::new(),
-        ready_at: None,
-        in_step_at: None,
         machine: BTreeSet::new(),
         conductor,
         sender,
@@ -224,8 +220,6 @@ struct Laboratory<'w> {
     lives: BTreeMap<Party, u32>,
     /// Parties that have said that they listen.
     ready: BTreeSet<Party>,
-    ready_at: Option<Instant>,
-    in_step_at: Option<Instant>,
     machine: BTreeSet<String>,
     conductor: &'w mut dyn Conductor,
     sender: Sender<Said>,
@@ -243,10 +237,6 @@ impl Laboratory<'_> {
             account: self.account,
             journal: self.journal.take().map(Journal::finish).unwrap_or_default(),
             machine: self.machine.into_iter().collect(),
-            start: self
-                .in_step_at
-                .zip(self.ready_at)
-                .map(|(step, ready)| step.duration_since(ready)),
             failure,
         }
     }
@@ -287,9 +277,6 @@ impl Laboratory<'_> {
             self.conductor.follow(self.account.cycle(), now);
             while let Some(step) = self.conductor.take_due(now) {
                 self.do_step(&step).await?;
-            }
-            if self.account.cycle().is_some() {
-                self.in_step_at.get_or_insert(now);
             }
             self.show_progress(&mut waits);
             if self.conductor.is_over(now) {
@@ -405,9 +392,6 @@ impl Laboratory<'_> {
         };
         if let Happening::Host(HostEvent::Ready { rights, .. }) = &record.event {
             self.ready.insert(party);
-            if self.ready.len() == self.processes.len() {
-                self.ready_at.get_or_insert_with(Instant::now);
-            }
             self.machine.extend(rights.lacking.iter().cloned());
         }
         self.take(&record);

@@ -124,3 +124,44 @@ fn a_killed_laboratory_leaves_no_host() {
         "{named:?}"
     );
 }
+
+#[test]
+fn stations_join_where_a_tenth_of_all_frames_is_lost() {
+    let _one = one_at_a_time();
+    let out = empty_folder("join");
+    let arguments = [
+        "bench", "join", "--trials", "2", "--period", PERIOD, "--out",
+    ];
+    let (_, document, errors) = answer(&[&arguments[..], &[out.to_str().expect("text")]].concat());
+    no_orphan(&out);
+    let links = document["result"].as_array().expect("one for each link");
+    assert_eq!(links.len(), 2, "{document:#}\n{errors}");
+    for trial in links
+        .iter()
+        .flat_map(|link| link["each"].as_array().expect("trials"))
+    {
+        assert_eq!(trial["wrong"], 0, "{document:#}");
+        // How soon is measured where nothing else runs.
+        assert!(trial["start"].is_u64(), "{document:#}\n{errors}");
+    }
+}
+
+#[test]
+fn every_role_is_killed_and_nothing_is_wrong() {
+    let _one = one_at_a_time();
+    let out = empty_folder("kills");
+    let arguments = [
+        "bench", "kills", "--kills", "4", "--link", "udp", "--period", PERIOD, "--out",
+    ];
+    let (_, document, errors) = answer(&[&arguments[..], &[out.to_str().expect("text")]].concat());
+    no_orphan(&out);
+    let rows = document["result"].as_array().expect("one for each role");
+    assert_eq!(rows.len(), 3, "{document:#}\n{errors}");
+    for row in rows {
+        assert_eq!(
+            (&row["wrong"], &row["count"]),
+            (&0.into(), &4.into()),
+            "{document:#}"
+        );
+    }
+}
