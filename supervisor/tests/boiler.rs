@@ -197,5 +197,8 @@ fn an_emergency_closes_everything_in_a_bounded_number_of_commands() {
         states.sort_unstable();
         states.dedup();
     }
-    assert_eq!(commands, 8, "at most, with the shut-down and burner management");
+    assert_eq!(
+        commands, 8,
+        "at most, with the shut-down and burner management"
+    );
 }

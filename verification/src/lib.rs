@@ -8,5 +8,5 @@ pub mod smv;
 pub mod symbolic;
 mod table;
 
-pub use table::scan_table;
 pub use parity::{Assignment, Place, Proof, Refutation, prove_parity, prove_parity_within};
+pub use table::scan_table;
