@@ -8,6 +8,7 @@ use clap::Args;
 use serde::Serialize;
 use understudy_cluster::Overrides;
 use understudy_diagnostic::{Diagnostic, Report, Severity};
+use understudy_reconfiguration::project::looks_like_a_project;
 use understudy_scenarios::{Parties, looks_like_a_scenario, read};
 use understudy_supervisor::ladder::read_map;
 use understudy_supervisor::petri::read_net;
@@ -16,8 +17,9 @@ use understudy_supervisor::{FileKind, read_ads};
 use crate::answer::{Answer, Failure, Status};
 use crate::automata;
 use crate::files::read_cluster;
+use crate::reconfigure::read_project;
 
-/// Read ladders, clusters, scenarios, models, nets and maps of signals, and report everything that is wrong with them
+/// Read ladders, clusters, scenarios, models, nets, maps of signals and projects, and report everything that is wrong with them
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -43,7 +45,7 @@ struct Result {
 #[derive(Serialize)]
 struct CheckedFile {
     name: String,
-    /// `ladder`, `cluster`, `scenario`, `model`, `net`, `map` or `ADS`; nothing for a file that cannot be read.
+    /// `ladder`, `cluster`, `scenario`, `model`, `net`, `map`, `project` or `ADS`; nothing for a file that cannot be read.
     kind: Option<&'static str>,
     errors: usize,
     warnings: usize,
@@ -77,6 +79,10 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
             found.add_file("ladder", path, text, diagnostics);
         } else if looks_like_a_scenario(&text) {
             scenarios.push((path, text));
+        } else if looks_like_a_project(&text) {
+            for (index, report) in read_project(path, &text).reports.into_iter().enumerate() {
+                found.add(if index == 0 { "project" } else { "ladder" }, report);
+            }
         } else {
             let loaded = read_cluster(path, &text, Overrides::default());
             for (index, report) in loaded.reports.into_iter().enumerate() {

@@ -6,7 +6,7 @@ use clap::Args;
 use serde_json::Value;
 use understudy_diagnostic::{Diagnostic, Report};
 use understudy_ladder::print;
-use understudy_reconfiguration::project::{self, Project};
+use understudy_reconfiguration::project::{self, Loaded, Project};
 use understudy_reconfiguration::{Failure, Outcome, analyse};
 use understudy_supervisor::{draw_automaton_svg, draw_dot};
 
@@ -83,18 +83,23 @@ fn reconfigure(arguments: &Arguments) -> Result<Answer, Answer> {
 }
 
 fn read(path: &Path) -> Result<(Project, Vec<Report>), Answer> {
-    let text = files::text(path)?;
+    let Loaded { project, reports } = read_project(path, &files::text(path)?);
+    match project {
+        Some(project) => Ok((project, reports)),
+        None => Err(Answer::bad_files(reports)),
+    }
+}
+
+/// Reads a project and the ladders that it names, which stand beside it.
+pub(crate) fn read_project(path: &Path, text: &str) -> Loaded {
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-    let mut loaded = project::read(&path.display().to_string(), &text, &mut |name| {
+    let mut loaded = project::read(&path.display().to_string(), text, &mut |name| {
         std::fs::read_to_string(folder.join(name)).map_err(|error| error.to_string())
     });
     for report in loaded.reports.iter_mut().skip(1) {
         report.name = folder.join(&report.name).display().to_string();
     }
-    match loaded.project {
-        Some(project) => Ok((project, loaded.reports)),
-        None => Err(Answer::bad_files(loaded.reports)),
-    }
+    loaded
 }
 
 /// What the command line says instead of the project.

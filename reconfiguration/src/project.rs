@@ -96,6 +96,12 @@ pub struct Loaded {
     pub reports: Vec<Report>,
 }
 
+/// Whether this TOML text is meant as a project: it has a table of that name.
+pub fn looks_like_a_project(text: &str) -> bool {
+    let (table, _) = DeTable::parse_recoverable(text);
+    table.get_ref().contains_key("project")
+}
+
 /// Reads a project; `open` gives the text of a file by the name that stands there, or says why it cannot.
 pub fn read(
     name: &str,
