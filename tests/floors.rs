@@ -42,6 +42,8 @@ const FLOORS: &[&[&str]] = &[
         "understudy-model-checking",
         "understudy-scenarios",
     ],
+    &["understudy-view"],
+    &[],
     &["understudy", "understudy-fuzz"],
 ];
 
