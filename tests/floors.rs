@@ -20,6 +20,7 @@ const FLOORS: &[&[&str]] = &[
         "understudy-seal",
     ],
     &[
+        "understudy-interchange",
         "understudy-node",
         "understudy-plant",
         "understudy-remote-io",
