@@ -7,7 +7,6 @@ mod conductor;
 mod error;
 mod keys;
 mod patience;
-mod ports;
 mod process;
 mod site;
 mod steps;

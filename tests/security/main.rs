@@ -11,13 +11,13 @@ mod parties;
 mod strangers;
 
 use std::fs;
-use std::net::{SocketAddr, TcpListener, UdpSocket};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, MutexGuard};
 use std::time::Duration;
 
 use serde_json::Value;
+use understudy_bus::free_addresses;
 
 /// Two clusters at once on two processors would measure each other, and one could find the ports of the other free.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
@@ -79,21 +79,12 @@ fn text(path: &Path) -> &str {
 
 /// The press cell in a folder of its own, every party on a port of its own.
 fn addressed_cell(folder: &Path) -> PathBuf {
-    let held: Vec<(SocketAddr, TcpListener, UdpSocket)> = std::iter::repeat_with(|| {
-        let datagrams = UdpSocket::bind(("127.0.0.1", 0)).ok()?;
-        let address = datagrams.local_addr().ok()?;
-        let streams = TcpListener::bind(address).ok()?;
-        Some((address, streams, datagrams))
-    })
-    .flatten()
-    .take(7)
-    .collect();
+    let mut addresses = free_addresses(7).expect("seven free ports").into_iter();
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/press-cell");
     for name in ["robot.ladder", "press.ladder"] {
         fs::copy(source.join(name), folder.join(name)).expect("the example is whole");
     }
     let cluster = fs::read_to_string(source.join("cluster.toml")).expect("the example is whole");
-    let mut addresses = held.iter().map(|(address, _, _)| *address);
     let mut addressed = String::new();
     for line in cluster.lines() {
         addressed.push_str(line);

@@ -3,7 +3,7 @@
 //! The caller starts the processes: each is its own program again, told its part as one argument ([`ExchangeParty`] as JSON).
 
 use std::io::{self, BufRead, BufReader, Write};
-use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
+use std::net::{SocketAddr, UdpSocket};
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -28,6 +28,7 @@ use crate::journal::{EventSink, HostEvent, Journal, Noted, Record};
 use crate::link::LinkKind;
 use crate::observer::{NoObserver, Observer};
 use crate::party::{PartySettings, run_party};
+use crate::ports::free_addresses;
 use crate::rights::{CYCLE_PRIORITY, run_in_real_time, sleep_exactly};
 use crate::zenoh_link::ZENOH_RUNTIME;
 
@@ -269,22 +270,18 @@ fn run_raw_party(
     Ok(())
 }
 
-/// All parties of the pattern on ports that were free a moment ago.
+/// All parties of the pattern on free ports.
 fn parties() -> io::Result<Vec<Peer>> {
     let stations = (0..STATIONS).map(|rank| Party::Station(StationId(rank)));
     let remote_ios = (0..PROGRAMS).map(|program| Party::RemoteIo(ProgramId(program)));
-    let sockets: Vec<(Party, UdpSocket)> = stations
-        .chain(remote_ios)
-        .map(|party| Ok((party, UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?)))
-        .collect::<io::Result<_>>()?;
-    let peer = |(party, socket): &(Party, UdpSocket)| {
-        Ok(Peer {
-            party: *party,
-            name: format!("{party:?}"),
-            address: socket.local_addr()?,
-        })
+    let parties: Vec<Party> = stations.chain(remote_ios).collect();
+    let addresses = free_addresses(parties.len())?;
+    let peer = |(party, address)| Peer {
+        party,
+        name: format!("{party:?}"),
+        address,
     };
-    sockets.iter().map(peer).collect()
+    Ok(parties.into_iter().zip(addresses).map(peer).collect())
 }
 
 /// Processes that do not outlive their measurement.

@@ -1,12 +1,11 @@
 //! A party that says who it is and reports whom it hears, and clusters of such parties.
 
 use std::collections::{BTreeSet, VecDeque};
-use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::Arc;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
-use understudy_bus::{Endpoints, Guard, Peer};
+use understudy_bus::{Endpoints, Guard, Peer, free_addresses};
 use understudy_seal::{ClusterSecret, FrameKey, Opener, Seal, Title};
 use understudy_wire::{
     Agreement, Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Field, Frame, Header, Image,
@@ -103,7 +102,7 @@ impl Machine for Chatter {
                 });
             }
             Input::Field(_) => self.report_once(Chat::Sensed),
-            Input::FieldLost => {}
+            Input::FieldLost | Input::Force(_) | Input::Unforce(_) => {}
             Input::Release => self.said.push_back(Output::Report(Chat::Released)),
         }
     }
@@ -166,17 +165,13 @@ pub(crate) fn plant(program: u8) -> Party {
 
 /// Gives each party a port that was free a moment ago.
 pub(crate) fn peers(parties: &[Party]) -> Vec<Peer> {
-    let sockets: Vec<UdpSocket> = parties
-        .iter()
-        .map(|_| UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).expect("a free port"))
-        .collect();
-    let address = |socket: &UdpSocket| -> SocketAddr { socket.local_addr().expect("bound") };
-    let named = parties.iter().zip(&sockets);
+    let addresses = free_addresses(parties.len()).expect("free ports");
+    let named = parties.iter().zip(addresses);
     named
-        .map(|(&party, socket)| Peer {
+        .map(|(&party, address)| Peer {
             party,
             name: format!("{party:?}"),
-            address: address(socket),
+            address,
         })
         .collect()
 }

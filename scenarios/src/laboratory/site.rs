@@ -342,7 +342,7 @@ fn loopback_addresses(cluster: &Cluster) -> io::Result<Vec<SocketAddr>> {
         .map(|party| cluster.address(party))
         .collect();
     let lacking = known.iter().filter(|address| address.is_none()).count();
-    let mut free = ports::free_addresses(lacking)?.into_iter();
+    let mut free = understudy_bus::free_addresses(lacking)?.into_iter();
     Ok(known
         .into_iter()
         .filter_map(|address| address.or_else(|| free.next()))

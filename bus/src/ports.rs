@@ -1,0 +1,78 @@
+//! Free ports of the loopback interface, for parties whose cluster file names no address.
+
+use std::io;
+use std::net::{Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
+use std::ops::Range;
+use std::sync::atomic::{AtomicU16, Ordering};
+
+/// Ports that no system gives to outgoing connections of its own accord, so that a party that is restarted finds its port
+/// again: Linux begins at 32768, others at 49152.
+const PORTS: Range<u16> = 16_384..32_768;
+/// A process that begins here leaves the next process, whose number is one higher, as many ports.
+const PORTS_A_PROCESS: u32 = 61;
+
+/// The port, counted from the first of [`PORTS`], that this process tries next: nobody in it is given one twice before all were tried.
+static NEXT: AtomicU16 = AtomicU16::new(0);
+
+/// So many addresses on 127.0.0.1 that nobody uses, neither by UDP nor by TCP.
+///
+/// They are only found free: another process may take one before it is used, and the party then says so.
+///
+/// # Errors
+/// Where fewer are free, or no socket can be had.
+pub fn free_addresses(count: usize) -> io::Result<Vec<SocketAddr>> {
+    let span = PORTS.end - PORTS.start;
+    let own = (std::process::id().wrapping_mul(PORTS_A_PROCESS) % u32::from(span)) as u16;
+    let mut last = None;
+    let mut found = Vec::with_capacity(count);
+    for _ in PORTS {
+        if found.len() == count {
+            break;
+        }
+        let turn = NEXT.fetch_add(1, Ordering::Relaxed);
+        let port = PORTS.start + own.wrapping_add(turn) % span;
+        let address = SocketAddr::from((Ipv4Addr::LOCALHOST, port));
+        let free = UdpSocket::bind(address).and_then(|_datagrams| TcpListener::bind(address));
+        match free {
+            Ok(_) => found.push(address),
+            Err(error) => last = Some(error),
+        }
+    }
+    if found.len() < count {
+        return Err(last.unwrap_or_else(|| io::ErrorKind::AddrInUse.into()));
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn free_addresses_differ_and_are_left_alone_by_the_system() {
+        let both = [free_addresses(20), free_addresses(20)];
+        let addresses: BTreeSet<SocketAddr> = both
+            .into_iter()
+            .flat_map(|addresses| addresses.expect("20 free ports"))
+            .collect();
+        assert_eq!(addresses.len(), 40);
+        assert!(addresses.iter().all(|address| PORTS.contains(&address.port())));
+    }
+
+    #[test]
+    fn a_port_in_use_is_passed_over() {
+        let taken: Vec<UdpSocket> = free_addresses(3)
+            .expect("free ports")
+            .into_iter()
+            .map(|address| UdpSocket::bind(address).expect("found free"))
+            .collect();
+        let used: Vec<SocketAddr> = taken
+            .iter()
+            .map(|socket| socket.local_addr().expect("bound"))
+            .collect();
+        let others = free_addresses(50).expect("free ports");
+        assert!(others.iter().all(|address| !used.contains(address)));
+    }
+}
