@@ -11,8 +11,9 @@ use std::collections::HashMap;
 use std::time::Duration;
 
 use self::blocks::{BlockState, FallingTrigger, RisingTrigger};
+use crate::flow::{ElementFlow, Evaluation, Reading, RungFlow};
 use crate::lower::{LowerError, validate};
-use crate::program::{Block, CoilKind, ContactKind, Element, Program, Series};
+use crate::program::{Block, CoilKind, ContactKind, Element, Program, Series, Signal, visit};
 
 /// A running program.
 #[derive(Debug, Clone)]
@@ -66,14 +67,60 @@ impl<'a> Interpreter<'a> {
     /// # Panics
     /// If `inputs` is not as wide as the program's inputs.
     pub fn scan(&mut self, inputs: &[bool]) -> Vec<bool> {
+        self.scan_rungs(inputs, &mut |_| {}, &mut |_, _| {});
+        self.values_of(&self.program.outputs)
+    }
+
+    /// [`Self::scan`], and what the power did in every rung.
+    ///
+    /// # Panics
+    /// If `inputs` is not as wide as the program's inputs.
+    pub fn scan_observed(&mut self, inputs: &[bool]) -> Evaluation {
+        let mut elements = Vec::new();
+        let mut rungs = Vec::new();
+        self.scan_rungs(
+            inputs,
+            &mut |flow| elements.push(flow),
+            &mut |power, coils| {
+                rungs.push((power, coils.to_vec()));
+            },
+        );
+        let mut elements = elements.into_iter();
+        let rungs = rungs.into_iter().zip(&self.program.rungs);
+        let rungs = rungs.map(|((power, coils), rung)| {
+            let mut count = 0;
+            visit(&rung.network, &mut |_| count += 1);
+            RungFlow {
+                elements: elements.by_ref().take(count).collect(),
+                power,
+                coils,
+            }
+        });
+        Evaluation {
+            rungs: rungs.collect(),
+            inputs: inputs.to_vec(),
+            outputs: self.values_of(&self.program.outputs),
+            memory: self.values_of(&self.program.memory),
+        }
+    }
+
+    /// One scan; tells each element, and the power and coils of each rung behind its elements.
+    fn scan_rungs(
+        &mut self,
+        inputs: &[bool],
+        element: &mut dyn FnMut(ElementFlow),
+        rung_done: &mut dyn FnMut(bool, &[bool]),
+    ) {
         let program = self.program;
         assert_eq!(inputs.len(), program.inputs.len(), "one value per input");
         for (signal, &value) in program.inputs.iter().zip(inputs) {
             self.set(&signal.name, value);
         }
         (self.next_rising, self.next_falling) = (0, 0);
+        let mut written = Vec::new();
         for rung in &program.rungs {
-            let power = self.series(&rung.network, true);
+            let power = self.series(&rung.network, true, element);
+            written.clear();
             for coil in &rung.coils {
                 match coil.kind {
                     CoilKind::Plain => self.set(&coil.target, power),
@@ -90,11 +137,18 @@ impl<'a> Interpreter<'a> {
                         self.set(&coil.target, pulse);
                     }
                 }
+                written.push(self.get(&coil.target));
             }
+            rung_done(power, &written);
         }
         self.now += self.period;
-        let outputs = program.outputs.iter();
-        outputs.map(|signal| self.get(&signal.name)).collect()
+    }
+
+    fn values_of(&self, signals: &[Signal]) -> Vec<bool> {
+        signals
+            .iter()
+            .map(|signal| self.get(&signal.name))
+            .collect()
     }
 
     /// The present value of a signal or of a block's output such as `pause.Q`; `None` for a name that is neither.
@@ -110,41 +164,61 @@ impl<'a> Interpreter<'a> {
         *self.values.get_mut(name).expect("names were checked") = value;
     }
 
-    fn series(&mut self, series: &'a Series, power: bool) -> bool {
+    fn series(
+        &mut self,
+        series: &'a Series,
+        power: bool,
+        seen: &mut dyn FnMut(ElementFlow),
+    ) -> bool {
         let mut power = power;
         for element in series {
-            power = match element {
+            let enters = power;
+            let (passes, reading);
+            match element {
                 Element::Contact(contact) => {
                     let value = self.get(&contact.operand);
-                    let passes = match contact.kind {
+                    passes = match contact.kind {
                         ContactKind::NormallyOpen => value,
                         ContactKind::NormallyClosed => !value,
                         ContactKind::Rising => self.rising_trigger(value),
                         ContactKind::Falling => self.falling_trigger(value),
                     };
-                    power && passes
+                    reading = Reading::Bit(value);
+                    power = enters && passes;
                 }
                 Element::Comparison(comparison) => {
                     let value = self.blocks[comparison.counter.as_str()].counter_value();
-                    power && comparison.relation.holds(value, comparison.value)
+                    passes = comparison.relation.holds(value, comparison.value);
+                    reading = Reading::Number(value);
+                    power = enters && passes;
                 }
                 Element::Branches(branches) => {
-                    let mut any = false;
+                    power = false;
                     for branch in branches {
-                        any |= self.series(branch, power);
+                        power |= self.series(branch, enters, seen);
                     }
-                    any
+                    (passes, reading) = (power, Reading::Nothing);
                 }
-                Element::Block(block) => self.block(block, power),
-            };
+                Element::Block(block) => {
+                    power = self.block(block, enters, seen);
+                    let state = &self.blocks[block.name.as_str()];
+                    (passes, reading) = (power, state.reading(block.kind, self.now));
+                }
+            }
+            seen(ElementFlow {
+                enters,
+                passes,
+                leaves: power,
+                reading,
+            });
         }
         power
     }
 
-    fn block(&mut self, block: &'a Block, power: bool) -> bool {
+    fn block(&mut self, block: &'a Block, power: bool, seen: &mut dyn FnMut(ElementFlow)) -> bool {
         let mut fed = HashMap::new();
         for feed in &block.pins {
-            let value = self.series(&feed.network, true);
+            let value = self.series(&feed.network, true, seen);
             fed.insert(feed.pin.as_str(), value);
         }
         let input = |pin: &str| fed.get(pin).copied().unwrap_or(false);

@@ -2,33 +2,50 @@
 //!
 //! A [`Piece`] enters at cell 0 of its wire row and leaves into the cell behind its last one, so that pieces join by standing
 //! side by side. Row 0 is the wire; what stands above it has negative rows. Wires run from cell centre to cell centre.
+//!
+//! Where a scan is drawn too, wires with power are `live`, and names have their values behind them.
+
+mod block;
 
 use std::ops::RangeInclusive;
 
-use crate::print::{series_text, time_text};
-use crate::program::{Block, CoilKind, ContactKind, Element, Program, Rung, Series};
+use self::block::block_piece;
+use crate::flow::{ElementFlow, Evaluation, Flows, Reading, RungFlow};
+use crate::program::{Coil, CoilKind, ContactKind, Element, Program, Rung, Series};
 
 /// Something to paint.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Shape {
     /// A wire along a row, from `left` to `right`.
-    Wire { left: i32, right: i32, row: i32 },
+    Wire {
+        left: i32,
+        right: i32,
+        row: i32,
+        live: bool,
+    },
     /// A wire along a column, from `top` to `bottom`.
-    Riser { column: i32, top: i32, bottom: i32 },
+    Riser {
+        column: i32,
+        top: i32,
+        bottom: i32,
+        live: bool,
+    },
     /// A power rail along a column; reaches half a cell past both ends.
     Rail { column: i32, top: i32, bottom: i32 },
-    /// A contact with its sign between two bars; `left` and `right` are the cells of the bars.
+    /// A contact with its sign between two bars; `left` and `right` are the cells of the bars. `closed` where it passes power.
     Contact {
         left: i32,
         right: i32,
         row: i32,
         sign: String,
+        closed: bool,
     },
-    /// A coil with its sign between two arcs; three cells from `left`.
+    /// A coil with its sign between two arcs; three cells from `left`. `on` where its target is 1.
     Coil {
         left: i32,
         row: i32,
         sign: &'static str,
+        on: bool,
     },
     /// The outline of a block, its corners in cells.
     Outline {
@@ -42,6 +59,8 @@ pub(crate) enum Shape {
         column: i32,
         row: i32,
         text: String,
+        /// Its value such as `=1`, right behind the text; empty where no scan is drawn.
+        value: String,
         signal: bool,
     },
 }
@@ -49,7 +68,9 @@ pub(crate) enum Shape {
 impl Shape {
     fn moved(mut self, columns: i32, rows: i32) -> Self {
         match &mut self {
-            Self::Wire { left, right, row }
+            Self::Wire {
+                left, right, row, ..
+            }
             | Self::Contact {
                 left, right, row, ..
             } => {
@@ -61,6 +82,7 @@ impl Shape {
                 column,
                 top,
                 bottom,
+                ..
             }
             | Self::Rail {
                 column,
@@ -120,6 +142,20 @@ fn length(text: &str) -> i32 {
     i32::try_from(text.chars().count()).unwrap_or(i32::MAX / 4)
 }
 
+fn wire(left: i32, right: i32, row: i32, live: bool) -> Shape {
+    Shape::Wire {
+        left,
+        right,
+        row,
+        live,
+    }
+}
+
+/// `=1`
+fn value_of(bit: bool) -> String {
+    format!("={}", u8::from(bit))
+}
+
 /// What the rungs of one drawing share.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Frame {
@@ -136,15 +172,19 @@ const RIGHT_RAIL: RangeInclusive<i32> = 60..=140;
 const WIDEST_COMMON_COIL: i32 = 32;
 
 impl Frame {
-    pub(crate) fn of(program: &Program) -> Self {
-        let coils = program.rungs.iter().map(coils_width);
+    pub(crate) fn of(program: &Program, evaluation: Option<&Evaluation>) -> Self {
+        let flow_of = |place: usize| evaluation.and_then(|evaluation| evaluation.rungs.get(place));
+        let rungs = || program.rungs.iter().enumerate();
+        let coils = rungs().map(|(place, rung)| coils_width(rung, flow_of(place)));
         let coils = coils
             .filter(|coils| *coils <= WIDEST_COMMON_COIL)
             .max()
             .unwrap_or(0);
-        let rungs = program.rungs.iter();
-        let rights =
-            rungs.map(|rung| series(&rung.network).width + coils.max(coils_width(rung)) + 5);
+        let rights = rungs().map(|(place, rung)| {
+            let flow = flow_of(place);
+            let (network, _) = series(&rung.network, &mut Flows::of(flow));
+            network.width + coils.max(coils_width(rung, flow)) + 5
+        });
         let right = rights.filter(|right| RIGHT_RAIL.contains(right)).max();
         Self {
             right: right.unwrap_or(*RIGHT_RAIL.start()),
@@ -153,53 +193,40 @@ impl Frame {
     }
 }
 
-/// A whole rung between its rails.
-pub(crate) fn rung(rung: &Rung, frame: Frame) -> Piece {
-    let network = series(&rung.network);
-    let coils_width = coils_width(rung).max(frame.coils);
+/// A whole rung between its rails, with what the power does in it where a scan is drawn.
+pub(crate) fn rung(rung: &Rung, flow: Option<&RungFlow>, frame: Frame) -> Piece {
+    let (network, _) = series(&rung.network, &mut Flows::of(flow));
+    let power = flow.is_some_and(|flow| flow.power);
+    let coils_width = coils_width(rung, flow).max(frame.coils);
     let right = frame.right.max(network.width + coils_width + 5);
     let mut piece = Piece::default();
     let end = 2 + network.width;
-    piece.shapes.push(Shape::Wire {
-        left: 0,
-        right: 2,
-        row: 0,
-    });
+    piece.shapes.push(wire(0, 2, 0, flow.is_some()));
     piece.place(network, 2, 0);
     let junction = right - coils_width - 1;
     if !rung.coils.is_empty() {
-        piece.shapes.push(Shape::Wire {
-            left: end,
-            right: junction,
-            row: 0,
-        });
+        piece.shapes.push(wire(end, junction, 0, power));
     }
     let mut row = 0;
     for (place, coil) in rung.coils.iter().enumerate() {
         row = 2 * i32::try_from(place).unwrap_or(0);
-        let label = coil.target.to_string();
+        let (label, value) = coil_label(coil, place, flow);
         let middle = junction + 1 + coils_width / 2;
         let left = middle - 1;
         piece.shapes.extend([
-            Shape::Wire {
-                left: junction,
-                right: left,
-                row,
-            },
+            wire(junction, left, row, power),
             Shape::Coil {
                 left,
                 row,
                 sign: coil_sign(coil.kind),
+                on: value == "=1",
             },
-            Shape::Wire {
-                left: left + 2,
-                right,
-                row,
-            },
+            wire(left + 2, right, row, power),
             Shape::Label {
-                column: middle - length(&label) / 2,
+                column: middle - (length(&label) + length(&value)) / 2,
                 row: row - 1,
                 text: label,
+                value,
                 signal: true,
             },
         ]);
@@ -209,6 +236,7 @@ pub(crate) fn rung(rung: &Rung, frame: Frame) -> Piece {
             column: junction,
             top: 0,
             bottom: row,
+            live: power,
         });
     }
     piece.above = piece.above.max(1);
@@ -224,11 +252,17 @@ pub(crate) fn rung(rung: &Rung, frame: Frame) -> Piece {
     piece
 }
 
-fn coils_width(rung: &Rung) -> i32 {
-    let widths = rung
-        .coils
-        .iter()
-        .map(|coil| length(&coil.target).max(3) + 3);
+fn coil_label(coil: &Coil, place: usize, flow: Option<&RungFlow>) -> (String, String) {
+    let value = flow.and_then(|flow| flow.coils.get(place));
+    let value = value.map_or(String::new(), |&bit| value_of(bit));
+    (coil.target.to_string(), value)
+}
+
+fn coils_width(rung: &Rung, flow: Option<&RungFlow>) -> i32 {
+    let widths = rung.coils.iter().enumerate().map(|(place, coil)| {
+        let (label, value) = coil_label(coil, place, flow);
+        (length(&label) + length(&value)).max(3) + 3
+    });
     widths.max().unwrap_or(0)
 }
 
@@ -241,10 +275,12 @@ fn coil_sign(kind: CoilKind) -> &'static str {
     }
 }
 
-fn series(series: &Series) -> Piece {
+/// The elements side by side, and the power behind the last one; nothing where there is none, or no scan.
+fn series(series: &Series, flows: &mut Flows<'_>) -> (Piece, Option<bool>) {
     let mut whole = Piece::default();
+    let mut power = None;
     for element in series {
-        let piece = match element {
+        let (piece, flow) = match element {
             Element::Contact(contact) => {
                 let sign = match contact.kind {
                     ContactKind::NormallyOpen => " ",
@@ -252,25 +288,36 @@ fn series(series: &Series) -> Piece {
                     ContactKind::Rising => "P",
                     ContactKind::Falling => "N",
                 };
-                contact_piece(contact.operand.to_string(), sign.into())
+                let flow = flows.next();
+                let label = contact.operand.to_string();
+                (contact_piece(label, sign.into(), flow), flow)
             }
-            Element::Comparison(comparison) => contact_piece(
-                format!("{}.CV", comparison.counter),
-                format!("{}{}", comparison.relation.sign(), comparison.value),
-            ),
-            Element::Branches(branches) => branches_piece(branches),
-            Element::Block(block) => block_piece(block),
+            Element::Comparison(comparison) => {
+                let sign = format!("{}{}", comparison.relation.sign(), comparison.value);
+                let flow = flows.next();
+                let label = format!("{}.CV", comparison.counter);
+                (contact_piece(label, sign, flow), flow)
+            }
+            Element::Branches(branches) => branches_piece(branches, flows),
+            Element::Block(block) => block_piece(block, flows),
         };
+        power = flow.map(|flow| flow.leaves);
         let column = whole.width;
         whole.width += piece.width;
         whole.place(piece, column, 0);
     }
-    whole
+    (whole, power)
 }
 
-fn contact_piece(label: String, sign: String) -> Piece {
+fn contact_piece(label: String, sign: String, flow: Option<&ElementFlow>) -> Piece {
+    let value = match flow.map(|flow| flow.reading) {
+        Some(Reading::Bit(bit)) => value_of(bit),
+        Some(Reading::Number(number)) => format!("={number}"),
+        _ => String::new(),
+    };
+    let labelled = length(&label) + length(&value);
     let symbol = length(&sign) + 2;
-    let width = length(&label).max(symbol) + 3;
+    let width = labelled.max(symbol) + 3;
     let left = (width - symbol) / 2 + 1;
     let right = left + symbol - 1;
     Piece {
@@ -278,20 +325,13 @@ fn contact_piece(label: String, sign: String) -> Piece {
         above: 1,
         below: 0,
         shapes: vec![
-            Shape::Wire {
-                left: 0,
-                right: left,
-                row: 0,
-            },
-            Shape::Wire {
-                left: right,
-                right: width,
-                row: 0,
-            },
+            wire(0, left, 0, flow.is_some_and(|flow| flow.enters)),
+            wire(right, width, 0, flow.is_some_and(|flow| flow.leaves)),
             Shape::Label {
-                column: (width - length(&label)) / 2 + 1,
+                column: (width - labelled) / 2 + 1,
                 row: -1,
                 text: label,
+                value,
                 signal: true,
             },
             Shape::Contact {
@@ -299,131 +339,59 @@ fn contact_piece(label: String, sign: String) -> Piece {
                 right,
                 row: 0,
                 sign,
+                closed: flow.is_some_and(|flow| flow.passes),
             },
         ],
     }
 }
 
-fn branches_piece(branches: &[Series]) -> Piece {
-    let pieces: Vec<Piece> = branches.iter().map(series).collect();
-    let inner = pieces.iter().map(|piece| piece.width).max().unwrap_or(0);
+fn branches_piece<'e>(
+    branches: &[Series],
+    flows: &mut Flows<'e>,
+) -> (Piece, Option<&'e ElementFlow>) {
+    let pieces = branches.iter().map(|branch| series(branch, flows));
+    let pieces: Vec<(Piece, Option<bool>)> = pieces.collect();
+    let flow = flows.next();
+    let enters = flow.is_some_and(|flow| flow.enters);
+    let widths = pieces.iter().map(|(piece, _)| piece.width);
+    let inner = widths.max().unwrap_or(0);
     let mut whole = Piece {
         width: inner + 2,
         ..Piece::default()
     };
     let mut row = 0;
-    for (place, piece) in pieces.into_iter().enumerate() {
+    let mut lowest_live = 0;
+    for (place, (piece, power)) in pieces.into_iter().enumerate() {
         if place > 0 {
             row = whole.below + piece.above + 1;
         }
         let end = 1 + piece.width;
-        whole.shapes.push(Shape::Wire {
-            left: 0,
-            right: 1,
-            row,
-        });
+        let live = power.unwrap_or(enters);
+        if live {
+            lowest_live = row;
+        }
+        whole.shapes.push(wire(0, 1, row, enters));
         whole.place(piece, 1, row);
-        whole.shapes.push(Shape::Wire {
-            left: end,
-            right: inner + 1,
-            row,
-        });
+        whole.shapes.push(wire(end, inner + 1, row, live));
     }
     whole.below = whole.below.max(row);
-    whole.shapes.push(Shape::Wire {
-        left: inner + 1,
-        right: inner + 2,
-        row: 0,
-    });
-    for column in [0, inner + 1] {
-        whole.shapes.push(Shape::Riser {
-            column,
-            top: 0,
-            bottom: row,
-        });
-    }
-    whole
-}
-
-/// ```text
-///      parts
-///    ┌────────┐
-/// ───┤CU CTU Q├───
-///    │PV 5    │
-///    │R reset │
-///    └────────┘
-/// ```
-fn block_piece(block: &Block) -> Piece {
-    let outputs = block.kind.outputs();
-    let mut rows = Vec::new();
-    rows.extend(
-        block
-            .kind
-            .preset_time()
-            .map(|time| format!("PT {}", time_text(time))),
-    );
-    rows.extend(block.kind.preset_value().map(|value| format!("PV {value}")));
-    for feed in &block.pins {
-        rows.push(format!("{} {}", feed.pin, series_text(&feed.network)));
-    }
-    let (input, word) = (block.kind.wire_input(), block.kind.word());
-    let head = length(input) + length(word) + length(outputs[0]) + 2;
-    let second = outputs.get(1).copied().unwrap_or("");
-    let widths = rows.iter().enumerate().map(|(place, row)| {
-        let beside = if place == 0 && !second.is_empty() {
-            length(second) + 1
-        } else {
-            0
-        };
-        length(row) + beside
-    });
-    let inner = widths.max().unwrap_or(0).max(head).max(length(&block.name));
-    let latest = inner - length(outputs[0]) - 1 - length(word);
-    let word_column = ((inner - length(word)) / 2).clamp(length(input) + 1, latest);
-    let (left, right) = (2, 3 + inner);
-    let bottom = i32::try_from(rows.len()).unwrap_or(0) + 1;
-    let label = |column, row, text: &str| Shape::Label {
-        column,
-        row,
-        text: text.to_owned(),
-        signal: false,
-    };
-    let mut shapes = vec![
-        Shape::Outline {
-            left,
-            right,
-            top: -1,
-            bottom,
-        },
-        Shape::Wire {
-            left: 0,
-            right: left,
-            row: 0,
-        },
-        Shape::Wire {
-            left: right,
-            right: right + 2,
-            row: 0,
-        },
-        label(
-            left + 1 + (inner - length(&block.name)) / 2,
-            -2,
-            &block.name,
-        ),
-        label(left + 1, 0, input),
-        label(left + 1 + word_column, 0, word),
-        label(right - length(outputs[0]), 0, outputs[0]),
-        label(right - length(second), 1, second),
+    let leaves = flow.is_some_and(|flow| flow.leaves);
+    whole.shapes.push(wire(inner + 1, inner + 2, 0, leaves));
+    // Behind the branches power runs from those that have it to the wire, and not down to the others.
+    let risers = [
+        (0, 0, row, enters),
+        (inner + 1, lowest_live, row, false),
+        (inner + 1, 0, lowest_live, leaves),
     ];
-    let mut row = 0;
-    for text in &rows {
-        row += 1;
-        shapes.push(label(left + 1, row, text));
+    for (column, top, bottom, live) in risers {
+        if top < bottom {
+            whole.shapes.push(Shape::Riser {
+                column,
+                top,
+                bottom,
+                live,
+            });
+        }
     }
-    Piece {
-        width: right + 2,
-        above: 2,
-        below: bottom,
-        shapes,
-    }
+    (whole, flow)
 }

@@ -18,6 +18,7 @@
 
 mod check;
 mod draw;
+mod flow;
 mod from_circuit;
 mod interpreter;
 mod layout;
@@ -31,11 +32,12 @@ mod program;
 mod structured_text;
 
 pub use check::check;
-pub use draw::{draw_svg, draw_text};
+pub use draw::{draw_svg, draw_svg_rungs, draw_svg_with_flow, draw_text, draw_text_rungs};
+pub use flow::{ElementFlow, Evaluation, Reading, RungFlow};
 pub use from_circuit::from_circuit;
 pub use interpreter::Interpreter;
 pub use lexer::{MAXIMUM_NAME_LENGTH, MAXIMUM_PRESET_TIME, parse_address, parse_time};
-pub use lower::{LowerError, PERIODS};
+pub use lower::{LowerError, Observer, PERIODS};
 pub use parser::{
     KEYWORDS, MAXIMUM_NESTING, MAXIMUM_PRESET_VALUE, MAXIMUM_RUNGS, MAXIMUM_TEXT_BYTES, Parsed,
     parse,

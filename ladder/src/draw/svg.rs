@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::fmt::Write;
 
+use crate::flow::Evaluation;
 use crate::layout::{Frame, Shape, rung};
 use crate::program::{Program, Signal};
 
@@ -29,31 +30,41 @@ const STYLE: &str = "\
 .ladder .box{stroke:var(--ink);stroke-width:1.5;fill:var(--fill)}
 .ladder .rail{stroke:var(--rail);stroke-width:3}";
 
+/// What a scan adds: power by thickness and colour, a closed contact by its filling, values as text.
+const FLOW_STYLE: &str = "
+.ladder{--live:#0a7a33}
+@media(prefers-color-scheme:dark){.ladder{--live:#52d984}}
+.ladder .live{stroke:var(--live);stroke-width:4.5;fill:none;stroke-linecap:square}
+.ladder .closed{fill:var(--live);fill-opacity:.3}
+.ladder .one{fill:var(--live);font-weight:bold}
+.ladder .zero{fill:var(--soft)}";
+
 /// The picture of a program: its signals, then its rungs between their rails. Signals show address and comment on hover.
 pub fn draw_svg(program: &Program) -> String {
     let mut picture = Picture::new(program);
-    picture.header(program);
-    let frame = Frame::of(program);
-    for (place, content) in program.rungs.iter().enumerate() {
-        picture.top += LINE_HEIGHT * 0.6;
-        let number = (place + 1).to_string();
-        picture.text(MARGIN, "soft", &number);
-        if let Some(title) = &content.title {
-            picture.text(MARGIN + CELL_WIDTH * 4.0, "title", title);
-        }
-        picture.top += LINE_HEIGHT;
-        for comment in &content.comments {
-            picture.text(MARGIN + CELL_WIDTH * 4.0, "soft", comment);
-            picture.top += LINE_HEIGHT;
-        }
-        let piece = rung(content, frame);
-        picture.top += CELL_HEIGHT * f64::from(piece.above);
-        for shape in &piece.shapes {
-            picture.paint(shape);
-        }
-        picture.fit(MARGIN + CELL_WIDTH * f64::from(piece.width));
-        picture.top += CELL_HEIGHT * f64::from(piece.below + 1);
-    }
+    picture.header(program, None);
+    let rungs: Vec<usize> = (0..program.rungs.len()).collect();
+    picture.rungs(program, &rungs, None);
+    picture.finish(program)
+}
+
+/// [`draw_svg`] with one scan of the program in it: which wires have power, and every value.
+pub fn draw_svg_with_flow(program: &Program, evaluation: &Evaluation) -> String {
+    let mut picture = Picture::new(program);
+    picture.header(program, Some(evaluation));
+    let rungs: Vec<usize> = (0..program.rungs.len()).collect();
+    picture.rungs(program, &rungs, Some(evaluation));
+    picture.finish(program)
+}
+
+/// Some rungs only, in this order and by their place from 0, without the list of signals; those that the program does not have are left out.
+pub fn draw_svg_rungs(
+    program: &Program,
+    rungs: &[usize],
+    evaluation: Option<&Evaluation>,
+) -> String {
+    let mut picture = Picture::new(program);
+    picture.rungs(program, rungs, evaluation);
     picture.finish(program)
 }
 
@@ -64,6 +75,8 @@ struct Picture {
     /// The next line's row, or the wire of the rung being painted, in pixels.
     top: f64,
     width: f64,
+    /// A scan is drawn.
+    flows: bool,
 }
 
 impl Picture {
@@ -77,6 +90,44 @@ impl Picture {
                 .collect(),
             top: MARGIN,
             width: 0.0,
+            flows: false,
+        }
+    }
+
+    fn rungs(&mut self, program: &Program, rungs: &[usize], evaluation: Option<&Evaluation>) {
+        let frame = Frame::of(program, evaluation);
+        self.flows = evaluation.is_some();
+        for &place in rungs {
+            let Some(content) = program.rungs.get(place) else {
+                continue;
+            };
+            self.top += LINE_HEIGHT * 0.6;
+            let number = (place + 1).to_string();
+            self.text(MARGIN, "soft", &number);
+            if let Some(title) = &content.title {
+                self.text(MARGIN + CELL_WIDTH * 4.0, "title", title);
+            }
+            self.top += LINE_HEIGHT;
+            for comment in &content.comments {
+                self.text(MARGIN + CELL_WIDTH * 4.0, "soft", comment);
+                self.top += LINE_HEIGHT;
+            }
+            let flow = evaluation.and_then(|evaluation| evaluation.rungs.get(place));
+            let piece = rung(content, flow, frame);
+            self.top += CELL_HEIGHT * f64::from(piece.above);
+            // Thick lines last, so that no thin one crosses them.
+            let (live, other): (Vec<&Shape>, Vec<&Shape>) =
+                piece.shapes.iter().partition(|shape| {
+                    matches!(
+                        shape,
+                        Shape::Wire { live: true, .. } | Shape::Riser { live: true, .. }
+                    )
+                });
+            for shape in other.into_iter().chain(live) {
+                self.paint(shape);
+            }
+            self.fit(MARGIN + CELL_WIDTH * f64::from(piece.width));
+            self.top += CELL_HEIGHT * f64::from(piece.below + 1);
         }
     }
 
@@ -84,7 +135,7 @@ impl Picture {
         self.width = self.width.max(right);
     }
 
-    fn header(&mut self, program: &Program) {
+    fn header(&mut self, program: &Program, evaluation: Option<&Evaluation>) {
         self.text(MARGIN, "heading", &program.name);
         self.top += LINE_HEIGHT * 1.3;
         let lines = program.description.iter().chain(&program.comments);
@@ -92,23 +143,29 @@ impl Picture {
             self.text(MARGIN, "soft", line);
             self.top += LINE_HEIGHT;
         }
+        let none = Evaluation::default();
+        let values = evaluation.unwrap_or(&none);
         let groups = [
-            ("inputs", &program.inputs),
-            ("outputs", &program.outputs),
-            ("memory", &program.memory),
+            ("inputs", &program.inputs, &values.inputs),
+            ("outputs", &program.outputs, &values.outputs),
+            ("memory", &program.memory, &values.memory),
         ];
-        let signals = groups.iter().flat_map(|(_, signals)| signals.iter());
+        let signals = groups.iter().flat_map(|(_, signals, _)| signals.iter());
         let widest = signals.map(|signal| signal.name.chars().count()).max();
         let column = MARGIN
             + CELL_WIDTH * (4.0 + f64::from(u32::try_from(widest.unwrap_or(0)).unwrap_or(0)));
-        for (heading, signals) in groups {
+        for (heading, signals, values) in groups {
             if signals.is_empty() {
                 continue;
             }
             self.top += LINE_HEIGHT * 0.5;
             self.text(MARGIN, "title", heading);
             self.top += LINE_HEIGHT;
-            for signal in signals {
+            for (place, signal) in signals.iter().enumerate() {
+                if let Some(&value) = values.get(place) {
+                    let (class, text) = if value { ("one", "1") } else { ("zero", "0") };
+                    self.text(MARGIN, class, text);
+                }
                 self.text(MARGIN + CELL_WIDTH * 2.0, "name", &signal.name);
                 self.text(column, "soft", &meaning(signal));
                 self.top += LINE_HEIGHT;
@@ -148,6 +205,15 @@ impl Picture {
         );
     }
 
+    /// The inside of a contact or coil whose wire is at `y`.
+    fn filled(&mut self, left: f64, y: f64, width: f64) {
+        let top = y - 8.0;
+        let _ = writeln!(
+            self.body,
+            r#"<rect class="closed" x="{left:.1}" y="{top:.1}" width="{width:.1}" height="16.0"/>"#
+        );
+    }
+
     fn centred(&mut self, middle: f64, row: i32, text: &str) {
         let baseline = self.down(row) + 4.5;
         let _ = writeln!(
@@ -159,17 +225,29 @@ impl Picture {
 
     fn paint(&mut self, shape: &Shape) {
         match shape {
-            Shape::Wire { left, right, row } => {
+            Shape::Wire {
+                left,
+                right,
+                row,
+                live,
+            } => {
                 let y = self.down(*row);
-                self.line("wire", [Self::across(*left), y, Self::across(*right), y]);
+                self.line(
+                    wire_class(*live),
+                    [Self::across(*left), y, Self::across(*right), y],
+                );
             }
             Shape::Riser {
                 column,
                 top,
                 bottom,
+                live,
             } => {
                 let x = Self::across(*column);
-                self.line("wire", [x, self.down(*top), x, self.down(*bottom)]);
+                self.line(
+                    wire_class(*live),
+                    [x, self.down(*top), x, self.down(*bottom)],
+                );
             }
             Shape::Rail {
                 column,
@@ -186,8 +264,12 @@ impl Picture {
                 right,
                 row,
                 sign,
+                closed,
             } => {
                 let (x1, x2, y) = (Self::across(*left), Self::across(*right), self.down(*row));
+                if *closed {
+                    self.filled(x1, y, x2 - x1);
+                }
                 self.line("bar", [x1, y - 8.0, x1, y + 8.0]);
                 self.line("bar", [x2, y - 8.0, x2, y + 8.0]);
                 match sign.as_str() {
@@ -196,8 +278,16 @@ impl Picture {
                     _ => self.centred((x1 + x2) / 2.0, *row, sign),
                 }
             }
-            Shape::Coil { left, row, sign } => {
+            Shape::Coil {
+                left,
+                row,
+                sign,
+                on,
+            } => {
                 let (x1, x2, y) = (Self::across(*left), Self::across(left + 2), self.down(*row));
+                if *on {
+                    self.filled(x1 + 1.0, y, x2 - x1 - 2.0);
+                }
                 let (top, bottom) = (y - 8.0, y + 8.0);
                 let _ = writeln!(
                     self.body,
@@ -228,6 +318,7 @@ impl Picture {
                 column,
                 row,
                 text,
+                value,
                 signal,
             } => {
                 let x = MARGIN + CELL_WIDTH * f64::from(*column);
@@ -237,11 +328,16 @@ impl Picture {
                 let title = meaning.map_or(String::new(), |meaning| {
                     format!("<title>{}</title>", escaped(meaning))
                 });
-                let length =
-                    CELL_WIDTH * f64::from(u32::try_from(text.chars().count()).unwrap_or(0));
+                let characters = text.chars().count() + value.chars().count();
+                let length = CELL_WIDTH * f64::from(u32::try_from(characters).unwrap_or(0));
+                let value = match value.as_str() {
+                    "" => String::new(),
+                    "=0" => r#"<tspan class="zero">=0</tspan>"#.to_owned(),
+                    other => format!(r#"<tspan class="one">{}</tspan>"#, escaped(other)),
+                };
                 let _ = writeln!(
                     self.body,
-                    r#"<text class="{class}" x="{x:.1}" y="{baseline:.1}" textLength="{length:.1}">{title}{}</text>"#,
+                    r#"<text class="{class}" x="{x:.1}" y="{baseline:.1}" textLength="{length:.1}">{title}{}{value}</text>"#,
                     escaped(text)
                 );
             }
@@ -250,14 +346,19 @@ impl Picture {
 
     fn finish(self, program: &Program) -> String {
         let (width, height) = (self.width + MARGIN, self.top + MARGIN);
+        let flow_style = if self.flows { FLOW_STYLE } else { "" };
         format!(
             "<svg class=\"ladder\" xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" viewBox=\"0 0 {width:.0} {height:.0}\">\n\
-             <title>{}</title>\n<style>\n{STYLE}\n</style>\n\
+             <title>{}</title>\n<style>\n{STYLE}{flow_style}\n</style>\n\
              <rect class=\"paper\" width=\"100%\" height=\"100%\"/>\n{}</svg>\n",
             escaped(&program.name),
             self.body
         )
     }
+}
+
+fn wire_class(live: bool) -> &'static str {
+    if live { "live" } else { "wire" }
 }
 
 /// Address, initial value and comment of a signal on one line.

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use crate::flow::Evaluation;
 use crate::layout::{Frame, Shape, rung};
 use crate::program::{Program, Signal};
 
@@ -19,15 +20,30 @@ pub fn draw_text(program: &Program) -> String {
     signals(&mut text, "inputs", &program.inputs);
     signals(&mut text, "outputs", &program.outputs);
     signals(&mut text, "memory", &program.memory);
-    let frame = Frame::of(program);
-    for (place, content) in program.rungs.iter().enumerate() {
+    let rungs: Vec<usize> = (0..program.rungs.len()).collect();
+    text + &draw_text_rungs(program, &rungs, None)
+}
+
+/// Some rungs, in this order and by their place from 0; wires with power are heavy lines. Those that the program does not have are left out.
+pub fn draw_text_rungs(
+    program: &Program,
+    rungs: &[usize],
+    evaluation: Option<&Evaluation>,
+) -> String {
+    let mut text = String::new();
+    let frame = Frame::of(program, evaluation);
+    for &place in rungs {
+        let Some(content) = program.rungs.get(place) else {
+            continue;
+        };
         let title = content.title.as_deref().unwrap_or("");
         let heading = format!("{}  {title}", place + 1);
         let _ = writeln!(text, "\n{}", heading.trim_end());
         for comment in &content.comments {
             let _ = writeln!(text, "{}", format!("   -- {comment}").trim_end());
         }
-        let piece = rung(content, frame);
+        let flow = evaluation.and_then(|evaluation| evaluation.rungs.get(place));
+        let piece = rung(content, flow, frame);
         let mut canvas = Canvas::new(piece.width, piece.above, piece.below);
         for shape in &piece.shapes {
             canvas.paint(shape);
@@ -68,21 +84,27 @@ fn address(signal: &Signal) -> String {
         .unwrap_or_default()
 }
 
-/// Directions in which a wire leaves a cell.
-const LEFT: u8 = 1;
-const RIGHT: u8 = 2;
-const UP: u8 = 4;
-const DOWN: u8 = 8;
+/// Directions in which a wire leaves a cell, each the value of a digit of base 3.
+const LEFT: usize = 27;
+const RIGHT: usize = 9;
+const UP: usize = 3;
+const DOWN: usize = 1;
 
-/// The box character for each set of directions.
-const WIRES: [char; 16] = [
-    ' ', '─', '─', '─', '│', '┘', '└', '┴', '│', '┐', '┌', '┬', '│', '┤', '├', '┼',
-];
+/// The box character for the weights of the directions: 0 for no wire, 1 for a wire, 2 for one with power.
+const WIRES: &str = " │┃││╽┃╿┃\
+─┌┎└├┟┖┞┠\
+━┍┏┕┝┢┗┡┣\
+─┐┒┘┤┧┚┦┨\
+─┬┰┴┼╁┸╀╂\
+╼┮┲┶┾╆┺╄╊\
+━┑┓┙┥┪┛┩┫\
+╾┭┱┵┽╅┹╃╉\
+━┯┳┷┿╈┻╇╋";
 
 struct Canvas {
     width: usize,
     above: i32,
-    directions: Vec<u8>,
+    weights: Vec<usize>,
     characters: Vec<Option<char>>,
 }
 
@@ -93,7 +115,7 @@ impl Canvas {
         Self {
             width,
             above,
-            directions: vec![0; cells],
+            weights: vec![0; cells],
             characters: vec![None; cells],
         }
     }
@@ -103,9 +125,12 @@ impl Canvas {
         row * self.width + usize::try_from(column).unwrap_or(0)
     }
 
-    fn connect(&mut self, column: i32, row: i32, directions: u8) {
+    /// What is heavy stays heavy.
+    fn connect(&mut self, column: i32, row: i32, direction: usize, live: bool) {
         let cell = self.cell(column, row);
-        self.directions[cell] |= directions;
+        let weight = self.weights[cell] / direction % 3;
+        let wanted = weight.max(1 + usize::from(live));
+        self.weights[cell] += (wanted - weight) * direction;
     }
 
     fn write_at(&mut self, column: i32, row: i32, text: &str) {
@@ -115,57 +140,79 @@ impl Canvas {
         }
     }
 
-    fn across(&mut self, left: i32, right: i32, row: i32) {
+    fn across(&mut self, left: i32, right: i32, row: i32, live: bool) {
         for column in left..right {
-            self.connect(column, row, RIGHT);
-            self.connect(column + 1, row, LEFT);
+            self.connect(column, row, RIGHT, live);
+            self.connect(column + 1, row, LEFT, live);
         }
     }
 
-    fn along(&mut self, column: i32, top: i32, bottom: i32) {
+    fn along(&mut self, column: i32, top: i32, bottom: i32, live: bool) {
         for row in top..bottom {
-            self.connect(column, row, DOWN);
-            self.connect(column, row + 1, UP);
+            self.connect(column, row, DOWN, live);
+            self.connect(column, row + 1, UP, live);
         }
     }
 
     fn paint(&mut self, shape: &Shape) {
         match shape {
-            Shape::Wire { left, right, row } => self.across(*left, *right, *row),
+            Shape::Wire {
+                left,
+                right,
+                row,
+                live,
+            } => self.across(*left, *right, *row, *live),
             Shape::Riser {
                 column,
                 top,
                 bottom,
-            } => self.along(*column, *top, *bottom),
+                live,
+            } => self.along(*column, *top, *bottom, *live),
             Shape::Rail {
                 column,
                 top,
                 bottom,
             } => {
                 for row in *top..=*bottom {
-                    self.connect(*column, row, UP | DOWN);
+                    self.connect(*column, row, UP, false);
+                    self.connect(*column, row, DOWN, false);
                 }
             }
             Shape::Contact {
-                left, row, sign, ..
+                left,
+                row,
+                sign,
+                closed,
+                ..
             } => {
-                self.write_at(*left, *row, &format!("┤{sign}├"));
+                let (before, behind) = if *closed {
+                    ('┫', '┣')
+                } else {
+                    ('┤', '├')
+                };
+                self.write_at(*left, *row, &format!("{before}{sign}{behind}"));
             }
-            Shape::Coil { left, row, sign } => self.write_at(*left, *row, &format!("({sign})")),
+            Shape::Coil {
+                left, row, sign, ..
+            } => self.write_at(*left, *row, &format!("({sign})")),
             Shape::Outline {
                 left,
                 right,
                 top,
                 bottom,
             } => {
-                self.across(*left, *right, *top);
-                self.across(*left, *right, *bottom);
-                self.along(*left, *top, *bottom);
-                self.along(*right, *top, *bottom);
+                self.across(*left, *right, *top, false);
+                self.across(*left, *right, *bottom, false);
+                self.along(*left, *top, *bottom, false);
+                self.along(*right, *top, *bottom, false);
             }
             Shape::Label {
-                column, row, text, ..
-            } => self.write_at(*column, *row, text),
+                column,
+                row,
+                text,
+                value,
+                ..
+            } => self.write_at(*column, *row, &format!("{text}{value}")),
         }
     }
 
@@ -173,15 +220,16 @@ impl Canvas {
         if self.width == 0 {
             return;
         }
+        let wires: Vec<char> = WIRES.chars().collect();
         let rows = self
-            .directions
+            .weights
             .chunks(self.width)
             .zip(self.characters.chunks(self.width));
-        for (directions, characters) in rows {
-            let line: String = directions
+        for (weights, characters) in rows {
+            let line: String = weights
                 .iter()
                 .zip(characters)
-                .map(|(&directions, character)| character.unwrap_or(WIRES[usize::from(directions)]))
+                .map(|(&weights, character)| character.unwrap_or(wires[weights]))
                 .collect();
             let _ = writeln!(text, "{}", line.trim_end());
         }

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use crate::flow::Reading;
 use crate::program::BlockKind;
 
 /// `Q := CLK AND NOT M; M := CLK;` It pulses in the first scan when its input is 1 then.
@@ -78,6 +79,15 @@ impl Timer {
         input || self.phase == Phase::Running
     }
 
+    /// ET: since the start, and at the end the preset.
+    fn elapsed(&self, preset: Duration, now: Duration) -> Duration {
+        match self.phase {
+            Phase::Idle => Duration::ZERO,
+            Phase::Running => (now - self.start).min(preset),
+            Phase::Done => preset,
+        }
+    }
+
     fn pulse(&mut self, preset: Duration, now: Duration, input: bool) -> bool {
         if self.phase == Phase::Idle && !self.previous_input && input {
             self.phase = Phase::Running;
@@ -135,6 +145,15 @@ impl BlockState {
         match self.0 {
             Memory::Counter(counter) => counter.value,
             _ => 0,
+        }
+    }
+
+    /// What it holds after a call at `now`.
+    pub(super) fn reading(&self, kind: BlockKind, now: Duration) -> Reading {
+        match (self.0, kind.preset_time()) {
+            (Memory::Timer(timer), Some(preset)) => Reading::Time(timer.elapsed(preset, now)),
+            (Memory::Counter(counter), _) => Reading::Number(counter.value),
+            _ => Reading::Nothing,
         }
     }
 

@@ -3,6 +3,7 @@
 mod cell;
 mod diagnostics;
 mod drawing;
+mod flow;
 mod format;
 mod generated;
 mod lowering;
