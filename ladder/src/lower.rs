@@ -10,6 +10,7 @@
 
 mod blocks;
 mod number;
+mod observer;
 
 use std::collections::{HashMap, HashSet};
 use std::ops::RangeInclusive;
@@ -19,8 +20,10 @@ use understudy_diagnostic::{Diagnostic, has_errors};
 use understudy_logic::{Circuit, CircuitBuilder, Expression, Graph, RegisterId, Variable};
 
 use self::number::Number;
+pub use self::observer::Observer;
+use self::observer::{Tapped, Wires};
 use crate::check::check;
-use crate::program::{CoilKind, Contact, ContactKind, Element, Program, Series};
+use crate::program::{CoilKind, Contact, ContactKind, Element, Program, Rung, Series};
 
 /// Periods from one scan to the next that make sense.
 pub const PERIODS: RangeInclusive<Duration> = Duration::from_nanos(1)..=Duration::from_secs(3600);
@@ -110,12 +113,13 @@ impl Program {
         validate(self, period)?;
         let mut lowering = Lowering::new(self, period);
         for rung in &self.rungs {
-            let rail = lowering.graph.constant(true);
-            let power = lowering.series(&rung.network, rail);
-            for coil in &rung.coils {
-                lowering.coil(coil.kind, &coil.target, power);
-            }
+            lowering.rung(rung);
         }
+        let shown = shown.into_iter().map(|name| {
+            let value = lowering.read(lowering.places[name.as_str()]);
+            (name, value)
+        });
+        let shown = shown.collect();
         Ok(lowering.finish(self, shown))
     }
 
@@ -168,6 +172,8 @@ struct Lowering<'a> {
     /// The last clock of each counter input and trigger block, by block and pin.
     clocks: HashMap<(&'a str, &'static str), usize>,
     register_names: HashSet<String>,
+    /// Where every element is to be looked at: its wires.
+    tapped: Option<Tapped>,
 }
 
 impl<'a> Lowering<'a> {
@@ -181,6 +187,7 @@ impl<'a> Lowering<'a> {
             numbers: HashMap::new(),
             clocks: HashMap::new(),
             register_names: HashSet::new(),
+            tapped: None,
         };
         for (index, signal) in program.inputs.iter().enumerate() {
             let index = u32::try_from(index).expect("fewer than 2^32 inputs");
@@ -244,19 +251,37 @@ impl<'a> Lowering<'a> {
         }
     }
 
+    fn rung(&mut self, rung: &'a Rung) {
+        let rail = self.graph.constant(true);
+        let power = self.series(&rung.network, rail);
+        self.tap(&[power]);
+        for coil in &rung.coils {
+            self.coil(coil.kind, &coil.target, power);
+            let written = self.read(self.places[coil.target.as_str()]);
+            self.tap(&[written]);
+        }
+    }
+
     fn series(&mut self, series: &'a Series, power: Expression) -> Expression {
         let mut power = power;
         for element in series {
+            let enters = power;
             power = match element {
                 Element::Contact(contact) => {
+                    let value = self.signal(&contact.operand);
                     let passes = self.contact(contact);
-                    self.graph.and(power, passes)
+                    let leaves = self.graph.and(enters, passes);
+                    self.tap_element([enters, passes, leaves], Wires::Bit, &[value]);
+                    leaves
                 }
                 Element::Comparison(comparison) => {
                     let number = self.number(&comparison.counter);
                     let value = u64::from(comparison.value);
                     let holds = number.compare(&mut self.graph, comparison.relation, value);
-                    self.graph.and(power, holds)
+                    let leaves = self.graph.and(enters, holds);
+                    let wires = Wires::Number(number.0.len());
+                    self.tap_element([enters, holds, leaves], wires, &number.0);
+                    leaves
                 }
                 Element::Branches(branches) => {
                     // The power before the branches is common to them: (power and a) or (power and b) would hide it.
@@ -266,19 +291,27 @@ impl<'a> Lowering<'a> {
                             matches!(element, Element::Block(_))
                         })
                     });
-                    let start = if has_block { power } else { rail };
+                    let inside = has_block || self.tapped.is_some();
+                    let start = if inside { power } else { rail };
                     let mut any = self.graph.constant(false);
                     for branch in branches {
                         let passes = self.series(branch, start);
                         any = self.graph.or(any, passes);
                     }
-                    if has_block {
+                    let leaves = if inside {
                         any
                     } else {
                         self.graph.and(power, any)
-                    }
+                    };
+                    self.tap_element([enters, leaves, leaves], Wires::None, &[]);
+                    leaves
                 }
-                Element::Block(block) => self.block(block, power),
+                Element::Block(block) => {
+                    let before = self.before_block(block);
+                    let leaves = self.block(block, power);
+                    self.tap_block(block, before, enters, leaves);
+                    leaves
+                }
             };
         }
         power
@@ -350,11 +383,7 @@ impl<'a> Lowering<'a> {
     }
 
     /// Numbers the registers and moves everything into one circuit.
-    fn finish(mut self, program: &Program, shown: Vec<String>) -> Circuit {
-        let outputs: Vec<Expression> = shown
-            .iter()
-            .map(|name| self.read(self.places[name.as_str()]))
-            .collect();
+    fn finish(self, program: &Program, shown: Vec<(String, Expression)>) -> Circuit {
         let mut builder = CircuitBuilder::new(program.name.to_string());
         for signal in &program.inputs {
             builder.input(signal.name.to_string());
@@ -370,7 +399,7 @@ impl<'a> Lowering<'a> {
                 roots.push(slot.present.expect("what is written somewhere has a value"));
             }
         }
-        roots.extend(&outputs);
+        roots.extend(shown.iter().map(|(_, value)| *value));
         let roots = builder
             .graph()
             .import(&self.graph, &roots, |graph, variable| match variable {
@@ -383,7 +412,7 @@ impl<'a> Lowering<'a> {
         for (register, &next) in registers.into_iter().zip(next) {
             builder.set_next(register, next);
         }
-        for (name, &value) in shown.into_iter().zip(outputs) {
+        for ((name, _), &value) in shown.into_iter().zip(outputs) {
             builder.output(name, value);
         }
         builder.finish().expect("names were checked to be unique")
