@@ -24,7 +24,6 @@ use understudy_simulator::{Action, Network};
 use understudy_wire::{Party, ProgramId};
 
 use super::error::LaboratoryError;
-use super::ports;
 use crate::run_directory::RunDirectory;
 use crate::scenario::Scenario;
 
