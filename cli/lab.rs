@@ -100,6 +100,7 @@ impl NetworkArguments {
             },
             impairment: self.impairment.impairment(),
             seed: self.network_seed,
+            can_be_cut: false,
         }
     }
 }

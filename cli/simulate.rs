@@ -5,7 +5,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::Args;
 use understudy_scenarios::{
-    JOURNAL_LIMIT_BYTES, Journal, JournalState, RunDirectory, Summary, World,
+    JOURNAL_LIMIT_BYTES, Journal, JournalState, RunDirectory, Summary, World, keep_cluster,
     simulate as run_simulation,
 };
 
@@ -61,6 +61,11 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
             Err(error) => return Answer::failed(Status::Failed, "U0602", error.to_string()),
         },
     };
+    if let Some(directory) = &directory
+        && let Err(error) = keep_cluster(directory.path(), &arguments.cluster, &cluster)
+    {
+        return Answer::failed(Status::Failed, "U0602", error.to_string());
+    }
     let mut journal = match &directory {
         None => None,
         Some(directory) => {

@@ -7,11 +7,12 @@ use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::signal::{SigSet, Signal};
 use nix::sys::signalfd::{SfdFlags, SignalFd};
+use understudy_wire::Force;
 
 use crate::error::BusError;
 use crate::orders::{Control, Order};
 
-/// Whether commands are read, one a line: `stop` and `release`.
+/// Whether commands are read, one a line: `stop`, `release`, `force {...}` and `unforce {...}` with a [`Force`] and a [`SignalPlace`](understudy_wire::SignalPlace) as JSON.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Commands {
     /// None: standard input is left alone.
@@ -23,7 +24,7 @@ pub enum Commands {
 }
 
 /// A line without an end is cut here.
-const LINE_BYTES: usize = 256;
+const LINE_BYTES: usize = 1024;
 
 /// Holds SIGINT and SIGTERM back from the calling thread, and from all that it starts. To be called before any other thread
 /// starts: one that does not hold them back dies of them, and the process with it.
@@ -95,17 +96,31 @@ pub(crate) fn watch(
                 }
                 Ok(length) => {
                     for line in lines.take(&bytes[..length]) {
-                        match line.as_str() {
-                            "stop" => control.give(Order::Stop),
-                            "release" => control.give(Order::Release),
-                            "" => {}
-                            _ => unknown(line),
+                        match order(&line) {
+                            Some(order) => control.give(order),
+                            None if line.is_empty() => {}
+                            None => unknown(line),
                         }
                     }
                 }
                 Err(_) => {}
             }
         }
+    }
+}
+
+/// What a line says.
+fn order(line: &str) -> Option<Order> {
+    let (word, rest) = line.split_once(' ').unwrap_or((line, ""));
+    match (word, rest) {
+        ("stop", "") => Some(Order::Stop),
+        ("release", "") => Some(Order::Release),
+        ("force", force) => {
+            let force: Force = serde_json::from_str(force).ok()?;
+            force.check().is_ok().then_some(Order::Force(force))
+        }
+        ("unforce", signal) => serde_json::from_str(signal).ok().map(Order::Unforce),
+        _ => None,
     }
 }
 
@@ -133,6 +148,8 @@ impl Lines {
 
 #[cfg(test)]
 mod tests {
+    use understudy_wire::SignalPlace;
+
     use super::*;
 
     fn check(pieces: &[&[u8]], expected: &[&str]) {
@@ -146,6 +163,33 @@ mod tests {
         check(&[b"st", b"op\nrel", b"ease\r\n"], &["stop", "release"]);
         check(&[b"stop"], &[]);
         check(&[b"\n\xff\n"], &["", "\u{fffd}"]);
+    }
+
+    #[test]
+    fn a_line_is_an_order_or_none() {
+        let check =
+            |line: &str, expected: Option<Order>| assert_eq!(order(line), expected, "{line}");
+        let force = Force {
+            signal: SignalPlace::Output(3),
+            value: true,
+            seconds: 60,
+            owner: "anna".into(),
+            reason: "to see the lamp".into(),
+        };
+        let line = serde_json::to_string(&force).expect("JSON");
+        assert!("force ".len() + line.len() < LINE_BYTES);
+        check("stop", Some(Order::Stop));
+        check("release", Some(Order::Release));
+        check("release now", None);
+        check(&format!("force {line}"), Some(Order::Force(force)));
+        check(&format!("force {}", line.replace("60", "0")), None);
+        check(
+            r#"unforce {"input":0}"#,
+            Some(Order::Unforce(SignalPlace::Input(0))),
+        );
+        check(r#"unforce {"input":70000}"#, None);
+        check("unforce", None);
+        check("", None);
     }
 
     #[test]

@@ -148,14 +148,15 @@ impl<M: Machine> Host<'_, M> {
     /// True where it is to stop.
     fn obey(&mut self, round: &mut Round) -> bool {
         while let Some(order) = self.orders.take() {
-            match order {
+            let input = match &order {
                 Order::Stop => return true,
-                Order::Release => {
-                    let now = self.clock.now();
-                    self.machine.handle_input(now, Input::Release);
-                    self.drain(now, round);
-                }
-            }
+                Order::Release => Input::Release,
+                Order::Force(force) => Input::Force(force),
+                Order::Unforce(signal) => Input::Unforce(*signal),
+            };
+            let now = self.clock.now();
+            self.machine.handle_input(now, input);
+            self.drain(now, round);
         }
         false
     }

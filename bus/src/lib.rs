@@ -47,5 +47,5 @@ pub use orders::{Control, Order, Orders, orders};
 pub use party::{PartySettings, run_party};
 pub use ports::free_addresses;
 pub use rights::Rights;
-pub use segments::{Segments, segments_of};
+pub use segments::{Segments, closed_segments, segments_of};
 pub use zenoh_link::ZENOH_RUNTIME;

@@ -4,6 +4,8 @@ use std::os::fd::BorrowedFd;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use understudy_wire::{Force, SignalPlace};
+
 use crate::doorbell::{Inbox, Outbox, doorbell};
 use crate::error::BusError;
 
@@ -11,12 +13,16 @@ use crate::error::BusError;
 const BOUND: usize = 16;
 
 /// One order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Order {
     /// To end.
     Stop,
     /// The operator releases the outputs of a program that was started cold.
     Release,
+    /// The operator puts a value in the place of a signal.
+    Force(Force),
+    /// The operator takes it back.
+    Unforce(SignalPlace),
 }
 
 /// The party's end.

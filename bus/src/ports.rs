@@ -58,7 +58,11 @@ mod tests {
             .flat_map(|addresses| addresses.expect("20 free ports"))
             .collect();
         assert_eq!(addresses.len(), 40);
-        assert!(addresses.iter().all(|address| PORTS.contains(&address.port())));
+        assert!(
+            addresses
+                .iter()
+                .all(|address| PORTS.contains(&address.port()))
+        );
     }
 
     #[test]

@@ -126,7 +126,14 @@ fn parts(path: &Path) -> (String, String) {
     (part(path.file_stem()), part(path.extension()))
 }
 
-/// The closed segments with their numbers, oldest first.
+/// The closed segments of `path` with their numbers, oldest first: what was written before the file that is written now.
+///
+/// # Errors
+/// What the system says of the folder.
+pub fn closed_segments(path: &Path) -> io::Result<Vec<(u64, PathBuf)>> {
+    closed(path)
+}
+
 fn closed(path: &Path) -> io::Result<Vec<(u64, PathBuf)>> {
     let (stem, extension) = parts(path);
     let folder = match path.parent() {

@@ -304,7 +304,11 @@ impl Machine for Station {
         match input {
             Input::Wakeup => self.wake(now),
             Input::Frame(frame) => self.receive(now, frame),
-            Input::Field(_) | Input::FieldLost | Input::Release => {}
+            Input::Field(_)
+            | Input::FieldLost
+            | Input::Release
+            | Input::Force(_)
+            | Input::Unforce(_) => {}
         }
         self.asked = self.next_wakeup();
     }

@@ -244,7 +244,11 @@ impl Machine for PlantMachine {
         match input {
             Input::Wakeup => self.wake(now),
             Input::Frame(frame) => self.hear(now, frame),
-            Input::Field(_) | Input::FieldLost | Input::Release => {}
+            Input::Field(_)
+            | Input::FieldLost
+            | Input::Release
+            | Input::Force(_)
+            | Input::Unforce(_) => {}
         }
     }
 

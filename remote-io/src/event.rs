@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use understudy_wire::{
-    ConfigurationHash, Image, Lineage, Moment, Party, ProgramId, Source, StationId, StationSet,
+    ConfigurationHash, Force, Image, Lineage, Moment, Party, ProgramId, SignalPlace, Source,
+    StationId, StationSet,
 };
 
 use crate::settings::ValueFault;
@@ -74,6 +75,22 @@ pub enum Event {
     Released {
         /// In this cycle.
         moment: Moment,
+    },
+    /// The operator has put a value in the place of a signal. An input is sampled so; an output is driven so, whatever is applied.
+    Forced {
+        /// From this cycle.
+        moment: Moment,
+        /// Which signal, what, for how long, who and why.
+        force: Force,
+    },
+    /// The signal is its own again.
+    Unforced {
+        /// From this cycle.
+        moment: Moment,
+        /// Which signal.
+        signal: SignalPlace,
+        /// Whether its time was over; the operator has taken it back otherwise.
+        expired: bool,
     },
     /// A station was silent for too long: θ = 1.
     Flagged {

@@ -15,6 +15,7 @@
 //! ```
 
 mod deadline;
+mod forcing;
 mod sampling;
 
 use std::collections::VecDeque;
@@ -35,6 +36,8 @@ use crate::settings::Settings;
 use crate::trust::Trust;
 use crate::witnesses::Witnesses;
 
+use forcing::Forcing;
+
 /// One remote I/O. See [`Machine`] for how it is driven.
 #[derive(Debug, Clone)]
 pub struct RemoteIo {
@@ -47,6 +50,7 @@ pub struct RemoteIo {
     field: Image,
     /// The sensors cannot be seen: there is no u(i), and the program stands still.
     field_lost: bool,
+    forcing: Forcing,
     released: bool,
     /// The turns of this cycle, by rank.
     turns: Vec<Option<Arc<Frame>>>,
@@ -113,6 +117,7 @@ impl RemoteIo {
             phase: Phase::LISTENING,
             field: Image::zero(settings.inputs),
             field_lost: false,
+            forcing: Forcing::default(),
             released: true,
             turns: vec![None; stations],
             decided: false,
@@ -282,6 +287,7 @@ impl Hash for RemoteIo {
             phase,
             field,
             field_lost,
+            forcing,
             released,
             turns,
             decided,
@@ -297,7 +303,7 @@ impl Hash for RemoteIo {
             outbox: _,
         } = self;
         (
-            reception, clock, attendance, witnesses, phase, field, field_lost,
+            reception, clock, attendance, witnesses, phase, field, field_lost, forcing,
         )
             .hash(hasher);
         (released, turns, decided, idle, missed, applied).hash(hasher);
@@ -310,6 +316,7 @@ impl Machine for RemoteIo {
 
     fn handle_input(&mut self, now: Time, input: Input<'_>) {
         self.notice_stall(now);
+        self.end_forces(now);
         match input {
             Input::Wakeup => self.wake(now),
             Input::Frame(frame) => self.receive(now, frame),
@@ -326,6 +333,8 @@ impl Machine for RemoteIo {
                 self.start(self.moment());
             }
             Input::FieldLost => self.field_lost = true,
+            Input::Force(force) => self.force(now, force),
+            Input::Unforce(signal) => self.unforce(signal),
             Input::Release => {
                 if !self.released || !self.trust.is_complete() {
                     self.released = true;

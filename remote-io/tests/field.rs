@@ -1,13 +1,13 @@
-//! A remote I/O whose sensors cannot be seen: nobody steps its program meanwhile, and what it drives is held, and then fail-safe.
+//! What the plant shows and what a remote I/O makes of it: sensors that cannot be seen, and signals that the operator forces.
 
 use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_remote_io::{Event, Missing, Release, RemoteIo, Settings, ValueFault};
 use understudy_wire::{
-    Agreement, Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Frame, Header, Image, Input,
-    Join, Lineage, Machine, Mode, Moment, Output, Party, ProgramHash, ProgramId, ProgramSet,
-    Schedule, Source, StationId, Time,
+    Agreement, Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Force, Frame, Header, Image,
+    Input, Join, Lineage, Machine, Mode, Moment, Output, Party, ProgramHash, ProgramId, ProgramSet,
+    Schedule, SignalPlace, Source, StationId, Time,
 };
 
 const PERIOD: Duration = Duration::from_millis(10);
@@ -38,6 +38,26 @@ impl Bench {
 
     /// One cycle from its Sync to its deadline: the base of what was sampled, what was driven, and why it was not true.
     fn cycle(&mut self) -> (Option<Lineage>, Source, Option<Missing>) {
+        let said = self.said();
+        let sampled = said.iter().find_map(|output| match output {
+            Output::Send(frame) => match &frame.body {
+                Body::Sample(sample) => Some(sample.base),
+                _ => None,
+            },
+            _ => None,
+        });
+        let applied = said.iter().rev().find_map(|output| match output {
+            Output::Report(Event::Applied {
+                source, missing, ..
+            }) => Some((*source, *missing)),
+            _ => None,
+        });
+        let (source, missing) = applied.expect("it drives at every deadline");
+        (sampled, source, missing)
+    }
+
+    /// All that it says in one cycle.
+    fn said(&mut self) -> Vec<Output<Event>> {
         self.cycle += 1;
         let agreement = agreement();
         let header = Header {
@@ -63,21 +83,7 @@ impl Bench {
         let deadline = self.start() + agreement.schedule.deadline();
         self.remote_io.handle_input(deadline, Input::Wakeup);
         said.extend(self.drain());
-        let sampled = said.iter().find_map(|output| match output {
-            Output::Send(frame) => match &frame.body {
-                Body::Sample(sample) => Some(sample.base),
-                _ => None,
-            },
-            _ => None,
-        });
-        let applied = said.iter().rev().find_map(|output| match output {
-            Output::Report(Event::Applied {
-                source, missing, ..
-            }) => Some((*source, *missing)),
-            _ => None,
-        });
-        let (source, missing) = applied.expect("it drives at every deadline");
-        (sampled, source, missing)
+        said
     }
 
     fn drain(&mut self) -> Vec<Output<Event>> {
@@ -91,9 +97,8 @@ impl Bench {
     }
 }
 
-#[test]
-fn without_sensors_nothing_is_sampled_and_the_program_stands_still() {
-    let settings = Settings {
+fn settings() -> Settings {
+    Settings {
         program: ProgramId(0),
         agreement: agreement(),
         hash: ProgramHash(9),
@@ -103,9 +108,93 @@ fn without_sensors_nothing_is_sampled_and_the_program_stands_still() {
         fail_safe: Image::zero(1),
         release: Release::Automatic,
         value_fault: ValueFault::default(),
-    };
+    }
+}
+
+#[test]
+fn a_forced_signal_is_sampled_and_driven_so_until_its_time_is_over() {
     let mut bench = Bench {
-        remote_io: RemoteIo::new(Time::default(), settings),
+        remote_io: RemoteIo::new(Time::default(), settings()),
+        cycle: 0,
+    };
+    bench.tell(Input::Field(&Image::from_bits([true, false])));
+    let started = (0..60).find_map(|_| bench.cycle().0);
+    assert!(
+        started.is_some(),
+        "it starts cold where nobody holds a state"
+    );
+    let force = |signal, value, seconds| Force {
+        signal,
+        value,
+        seconds,
+        owner: "anna".to_owned(),
+        reason: "a test".to_owned(),
+    };
+    let (input, output) = (SignalPlace::Input(1), SignalPlace::Output(0));
+    bench.tell(Input::Force(&force(input, true, 1)));
+    bench.tell(Input::Force(&force(output, true, 1)));
+    // None of these is a force.
+    bench.tell(Input::Force(&force(SignalPlace::Input(2), true, 1)));
+    bench.tell(Input::Force(&force(SignalPlace::Output(1), true, 1)));
+    bench.tell(Input::Force(&force(SignalPlace::Input(0), false, 0)));
+    let said = bench.drain();
+    assert_eq!(forced_and_ended(&said), (2, 0), "{said:?}");
+    let frames = |bench: &mut Bench| {
+        let said = bench.said();
+        let sampled = said.iter().find_map(|output| match output {
+            Output::Report(Event::Sampled { inputs, .. }) => Some(inputs.clone()),
+            _ => None,
+        });
+        let driven = said.iter().find_map(|output| match output {
+            Output::Drive(outputs) => Some(outputs.clone()),
+            _ => None,
+        });
+        let applied = said.iter().find_map(|output| match output {
+            Output::Report(Event::Applied { outputs, .. }) => Some(outputs.clone()),
+            _ => None,
+        });
+        let ended = forced_and_ended(&said).1;
+        (sampled, driven, applied, ended)
+    };
+    let image = |bits: &[bool]| Some(Image::from_bits(bits.iter().copied()));
+    let (fail_safe, forced) = (image(&[false]), image(&[true]));
+    let both = (image(&[true, true]), forced.clone(), fail_safe.clone(), 0);
+    assert_eq!(frames(&mut bench), both);
+    bench.tell(Input::Unforce(output));
+    bench.tell(Input::Unforce(output));
+    assert_eq!(forced_and_ended(&bench.drain()), (0, 1), "taken back once");
+    let one = (
+        image(&[true, true]),
+        fail_safe.clone(),
+        fail_safe.clone(),
+        0,
+    );
+    assert_eq!(frames(&mut bench), one);
+    // A second later.
+    bench.cycle += 100;
+    let none = (image(&[true, false]), fail_safe.clone(), fail_safe, 1);
+    assert_eq!(frames(&mut bench), none);
+}
+
+/// How many forces began and ended.
+fn forced_and_ended(said: &[Output<Event>]) -> (usize, usize) {
+    let count = |test: &dyn Fn(&Event) -> bool| {
+        let reports = said.iter().filter(|output| match output {
+            Output::Report(event) => test(event),
+            _ => false,
+        });
+        reports.count()
+    };
+    (
+        count(&|event| matches!(event, Event::Forced { .. })),
+        count(&|event| matches!(event, Event::Unforced { .. })),
+    )
+}
+
+#[test]
+fn without_sensors_nothing_is_sampled_and_the_program_stands_still() {
+    let mut bench = Bench {
+        remote_io: RemoteIo::new(Time::default(), settings()),
         cycle: 0,
     };
     let sensors = Image::from_bits([true, false]);

@@ -27,12 +27,12 @@ use crate::parties::Parties;
 use crate::record::{Happening, Record, RunEvent, moment};
 use crate::scenario::{During, Scenario};
 
+pub use numbering::Numbering;
 pub use presence::{Interval, Presence};
 pub use service::{Counts, Service};
 pub use stalls::Stall;
 pub(crate) use traces::{PlantTrace, TRACED_CYCLES, Trace, Traces};
 
-use numbering::Numbering;
 use presence::Presences;
 use service::{Outcome, ServiceTrack};
 use stalls::Stalls;
@@ -198,11 +198,14 @@ impl Account {
     }
 
     /// The simulator knows better than the records where the origin is: `moment` is cycle `cycle` from it.
-    pub(crate) fn origin_is(&mut self, moment: Moment, cycle: u64) {
-        if let (None, Some(number)) = (self.origin, self.numbering.of(moment)) {
-            let cycle = i64::try_from(cycle).unwrap_or(i64::MAX / 2);
-            self.origin = Some((moment, number - cycle));
-        }
+    /// True where that is news.
+    pub(crate) fn origin_is(&mut self, moment: Moment, cycle: u64) -> bool {
+        let (None, Some(number)) = (self.origin, self.numbering.of(moment)) else {
+            return false;
+        };
+        let cycle = i64::try_from(cycle).unwrap_or(i64::MAX / 2);
+        self.origin = Some((moment, number - cycle));
+        true
     }
 
     /// Takes the next record.
@@ -362,7 +365,11 @@ impl Account {
                 });
             }
             RunEvent::Interrupted => self.interrupted = true,
-            RunEvent::Started { .. } | RunEvent::Ended { .. } | RunEvent::Finished => {}
+            RunEvent::Started { .. }
+            | RunEvent::Origin { .. }
+            | RunEvent::Commanded { .. }
+            | RunEvent::Ended { .. }
+            | RunEvent::Finished => {}
         }
     }
 

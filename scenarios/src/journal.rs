@@ -67,11 +67,16 @@ impl<W: Write> Journal<W> {
         }
     }
 
-    /// Writes what is buffered, and says how it went.
-    pub fn finish(mut self) -> JournalState {
+    /// Writes what is buffered.
+    pub fn flush(&mut self) {
         if let Some(Err(error)) = self.writer.as_mut().map(Write::flush) {
             self.stop(&error);
         }
+    }
+
+    /// Writes what is buffered, and says how it went.
+    pub fn finish(mut self) -> JournalState {
+        self.flush();
         self.state
     }
 

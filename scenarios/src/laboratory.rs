@@ -6,6 +6,7 @@
 mod conductor;
 mod error;
 mod keys;
+mod operator;
 mod patience;
 mod process;
 mod site;
@@ -16,7 +17,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use nix::time::{ClockId, clock_gettime};
-use tokio::process::Command;
+use tokio::process::Command as ProcessCommand;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::mpsc::{Receiver, Sender, channel};
 use understudy_bus::{HostEvent, LinkKind, ZENOH_RUNTIME};
@@ -26,12 +27,14 @@ use understudy_wire::Party;
 
 use crate::account::{Account, OriginRule, Terms};
 use crate::journal::{Journal, JournalState};
+use crate::kept::keep_cluster;
 use crate::record::{Happening, Record, RunEvent};
 use crate::run_directory::RunDirectory;
 use crate::scenario::{Scenario, action_word};
 
 pub(crate) use conductor::Conductor;
 pub use error::LaboratoryError;
+pub use operator::{Command, Commander, Commands, Refusal, commands};
 pub use site::{HostKind, NetworkSettings};
 
 use keys::RunKeys;
@@ -132,8 +135,26 @@ pub fn run_laboratory(
     directory: &RunDirectory,
     watch: &mut dyn FnMut(Progress),
 ) -> Result<LaboratoryRun, LaboratoryError> {
+    run_commanded(cluster, scenario, settings, directory, None, watch)
+}
+
+/// The same, while somebody may give commands; then it waits for cycles as long as that takes.
+///
+/// # Errors
+/// As [`run_laboratory`].
+pub fn run_commanded(
+    cluster: &Cluster,
+    scenario: &Scenario,
+    settings: LaboratorySettings,
+    directory: &RunDirectory,
+    commands: Option<Commands>,
+    watch: &mut dyn FnMut(Progress),
+) -> Result<LaboratoryRun, LaboratoryError> {
     let mut steps = Steps::new(scenario, cluster.agreement().schedule.period());
-    run_conducted(cluster, scenario, settings, directory, &mut steps, watch)
+    let conductor = &mut steps;
+    run(
+        cluster, scenario, settings, directory, commands, conductor, watch,
+    )
 }
 
 /// The same with a conductor in place of the scenario's steps.
@@ -142,6 +163,20 @@ pub(crate) fn run_conducted(
     scenario: &Scenario,
     settings: LaboratorySettings,
     directory: &RunDirectory,
+    conductor: &mut dyn Conductor,
+    watch: &mut dyn FnMut(Progress),
+) -> Result<LaboratoryRun, LaboratoryError> {
+    run(
+        cluster, scenario, settings, directory, None, conductor, watch,
+    )
+}
+
+fn run(
+    cluster: &Cluster,
+    scenario: &Scenario,
+    settings: LaboratorySettings,
+    directory: &RunDirectory,
+    commands: Option<Commands>,
     conductor: &mut dyn Conductor,
     watch: &mut dyn FnMut(Progress),
 ) -> Result<LaboratoryRun, LaboratoryError> {
@@ -154,6 +189,8 @@ pub(crate) fn run_conducted(
         settings.network,
         directory,
     )?;
+    keep_cluster(directory.path(), &settings.cluster_file, cluster)
+        .map_err(|error| system("to keep the cluster file")(std::io::Error::other(error)))?;
     let journal = Journal::create(
         &directory.file("journal.jsonl"),
         settings.journal_limit_bytes,
@@ -177,10 +214,11 @@ pub(crate) fn run_conducted(
         ready: BTreeSet::new(),
         machine: BTreeSet::new(),
         conductor,
+        commanded: commands.is_some(),
         sender,
         watch,
     };
-    Ok(runtime.block_on(laboratory.run(receiver)))
+    Ok(runtime.block_on(laboratory.run(receiver, commands)))
 }
 
 /// A process has no way to do some of what a simulation can.
@@ -221,13 +259,19 @@ struct Laboratory<'w> {
     ready: BTreeSet<Party>,
     machine: BTreeSet<String>,
     conductor: &'w mut dyn Conductor,
+    /// Whether somebody may give commands.
+    commanded: bool,
     sender: Sender<Said>,
     watch: &'w mut dyn FnMut(Progress),
 }
 
 impl Laboratory<'_> {
-    async fn run(mut self, mut receiver: Receiver<Said>) -> LaboratoryRun {
-        let failure = self.work(&mut receiver).await.err();
+    async fn run(
+        mut self,
+        mut receiver: Receiver<Said>,
+        mut commands: Option<Commands>,
+    ) -> LaboratoryRun {
+        let failure = self.work(&mut receiver, &mut commands).await.err();
         (self.watch)(Progress::Ending);
         self.end(&mut receiver).await;
         self.note(RunEvent::Finished);
@@ -240,7 +284,11 @@ impl Laboratory<'_> {
         }
     }
 
-    async fn work(&mut self, receiver: &mut Receiver<Said>) -> Result<(), LaboratoryError> {
+    async fn work(
+        &mut self,
+        receiver: &mut Receiver<Said>,
+        commands: &mut Option<Commands>,
+    ) -> Result<(), LaboratoryError> {
         let system = |what| move |source| LaboratoryError::System { what, source };
         let mut interrupt = signal(SignalKind::interrupt()).map_err(system("to hear SIGINT"))?;
         let mut terminate = signal(SignalKind::terminate()).map_err(system("to hear SIGTERM"))?;
@@ -265,12 +313,13 @@ impl Laboratory<'_> {
                 _ = interrupt.recv() => return self.interrupted(),
                 _ = terminate.recv() => return self.interrupted(),
                 () = sleep, if due.is_some() => {}
+                commanded = Commands::next(commands) => self.obey(commanded).await,
                 said = receiver.recv() => {
                     if let Some(said) = said {
                         self.hear(said).await?;
                     }
                 }
-                _ = tick.tick() => {}
+                _ = tick.tick() => self.show_journal(),
             }
             let now = Instant::now();
             self.conductor.follow(self.account.cycle(), now);
@@ -313,18 +362,29 @@ impl Laboratory<'_> {
     }
 
     fn take(&mut self, record: &Record) {
+        let had_origin = self.account.origin().is_some();
         if let Some(journal) = &mut self.journal {
             journal.write(record);
         }
         self.account.observe(record);
         self.conductor.hear(record, Instant::now());
+        if let Some(moment) = self.account.origin().filter(|_| !had_origin) {
+            self.note(RunEvent::Origin { moment, cycle: 0 });
+        }
+    }
+
+    /// Who follows the journal is to see it while it is written.
+    fn show_journal(&mut self) {
+        if let Some(journal) = &mut self.journal {
+            journal.flush();
+        }
     }
 
     // ── processes ───────────────────────────────────────────────────────────────────────────────────────────────────
 
     fn start(&mut self, party: Party) -> Result<(), LaboratoryError> {
         let name = self.name(party);
-        let mut command = Command::new(&self.settings.program);
+        let mut command = ProcessCommand::new(&self.settings.program);
         command
             .arg(match party {
                 Party::Station(_) => "node",

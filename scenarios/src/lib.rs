@@ -7,6 +7,7 @@ mod figure;
 mod injection;
 mod joining;
 mod journal;
+mod kept;
 mod laboratory;
 mod observed;
 mod outlook;
@@ -24,7 +25,9 @@ mod terms;
 mod troubles;
 mod write;
 
-pub use account::{Account, Counts, Interval, OriginRule, Presence, Service, Stall, Terms};
+pub use account::{
+    Account, Counts, Interval, Numbering, OriginRule, Presence, Service, Stall, Terms,
+};
 pub use campaign::{
     CampaignError, CampaignPlan, Found, Measured, OwnTime, Planned, Question, QuestionError,
     RealCampaign, RealCampaignRun, Speed, hold_against_model, options_of, plan_campaign,
@@ -38,15 +41,16 @@ pub use injection::{
 };
 pub use joining::{JOIN_CYCLES, Joined, join_trial};
 pub use journal::{JOURNAL_LIMIT_BYTES, Journal, JournalError, JournalState, records, records_of};
+pub use kept::{KeptError, keep_cluster, kept_cluster};
 pub use laboratory::{
-    HostKind, LaboratoryError, LaboratoryRun, LaboratorySettings, NetworkSettings, Progress,
-    run_laboratory,
+    Command, Commander, Commands, HostKind, LaboratoryError, LaboratoryRun, LaboratorySettings,
+    NetworkSettings, Progress, Refusal, commands, run_commanded, run_laboratory,
 };
 pub use observed::{JournalView, ObservationError, observe_journal};
 pub use outlook::{JournalOutlook, look_ahead};
 pub use parties::Parties;
 pub use read::{MAXIMUM_CYCLES, MAXIMUM_STEPS, ReadScenario, looks_like_a_scenario, read};
-pub use record::{Happening, LABORATORY, Record, RunEvent};
+pub use record::{Happening, LABORATORY, Record, RunEvent, moment};
 pub use report::{ReportError, report};
 pub use run_directory::{RunDirectory, RunDirectoryError, time_name};
 pub use scenario::{

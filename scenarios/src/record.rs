@@ -8,6 +8,7 @@ use understudy_bus::{HostEvent, Noted};
 use understudy_simulator::Action;
 use understudy_wire::{Moment, Party};
 
+use crate::laboratory::Command;
 use crate::parties::Parties;
 
 /// One line of `journal.jsonl`.
@@ -57,12 +58,32 @@ pub enum RunEvent {
         /// The first cycle that was to feel it, counted from the origin.
         asked: u64,
     },
+    /// Somebody gave a command; what it did stands before it.
+    Commanded {
+        /// To whom.
+        party: Party,
+        /// What.
+        command: Command,
+        /// Who.
+        owner: String,
+        /// Why.
+        reason: String,
+        /// Why it was not done, where it was not.
+        refused: Option<String>,
+    },
     /// A party's process ended; asked for or not.
     Ended {
         /// Who.
         party: Party,
         /// How, in words.
         how: String,
+    },
+    /// Everybody is in step: from here on cycles are counted.
+    Origin {
+        /// A moment of the cluster.
+        moment: Moment,
+        /// Which cycle of the run it is; 0 but for a run of which it is known later.
+        cycle: u64,
     },
     /// The run was asked to end early.
     Interrupted,
@@ -96,7 +117,7 @@ impl Record {
 }
 
 /// Moment of an event, where it has one.
-pub(crate) fn moment(event: &Happening) -> Option<Moment> {
+pub fn moment(event: &Happening) -> Option<Moment> {
     use understudy_node::Event as Station;
     use understudy_remote_io::Event as RemoteIo;
     match event {
@@ -120,6 +141,8 @@ pub(crate) fn moment(event: &Happening) -> Option<Moment> {
             | RemoteIo::AdoptedLineage { moment, .. }
             | RemoteIo::Voided { moment, .. }
             | RemoteIo::Released { moment }
+            | RemoteIo::Forced { moment, .. }
+            | RemoteIo::Unforced { moment, .. }
             | RemoteIo::Flagged { moment, .. }
             | RemoteIo::Cleared { moment, .. }
             | RemoteIo::Syndrome { moment, .. }

@@ -44,8 +44,13 @@ pub fn simulate(
     let mut take = |record: &Record, origin: Option<(Moment, u64)>| {
         journal(record);
         account.observe(record);
-        if let Some((moment, cycle)) = origin {
-            account.origin_is(moment, cycle);
+        if let Some((moment, cycle)) = origin
+            && account.origin_is(moment, cycle)
+        {
+            let origin = RunEvent::Origin { moment, cycle };
+            let record = Record::of_run(record.at_ns, origin);
+            journal(&record);
+            account.observe(&record);
         }
     };
     let ran = simulation.run(

@@ -9,6 +9,7 @@ mod audience;
 mod codec;
 mod copies;
 mod cycle_clock;
+mod force;
 mod frame;
 mod identifier;
 mod image;
@@ -25,6 +26,10 @@ pub use audience::Topic;
 pub use codec::{FrameError, MAXIMUM_FRAME_BYTES, decode, encode};
 pub use copies::Copies;
 pub use cycle_clock::{Arrival, CycleClock};
+pub use force::{
+    Force, ForceError, MAXIMUM_FORCE_SECONDS, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH,
+    SignalPlace,
+};
 pub use frame::{
     Actuation, Applied, Body, Field, Frame, Header, Holding, Join, MAXIMUM_HISTORY, Sample, Source,
     Transfer, Turn, Word,

@@ -6,6 +6,7 @@
 
 use std::sync::Arc;
 
+use crate::force::{Force, SignalPlace};
 use crate::frame::Frame;
 use crate::image::Image;
 use crate::time::Time;
@@ -23,6 +24,10 @@ pub enum Input<'a> {
     FieldLost,
     /// The operator releases the outputs of a program that was started cold; ignored by all but its remote I/O.
     Release,
+    /// The operator puts a value in the place of a signal; ignored by all but its remote I/O.
+    Force(&'a Force),
+    /// The operator takes it back.
+    Unforce(SignalPlace),
 }
 
 /// What a party says.

@@ -139,7 +139,8 @@ impl RemoteIo {
             source,
             outputs: outputs.clone(),
         });
-        self.outbox.push_back(Output::Drive(outputs.clone()));
+        let driven = self.forcing.outputs(&outputs);
+        self.outbox.push_back(Output::Drive(driven));
         self.report(Event::Applied {
             moment,
             sampled,

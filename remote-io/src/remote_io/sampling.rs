@@ -92,6 +92,7 @@ impl RemoteIo {
             return;
         }
         let moment = self.moment();
+        let inputs = self.forcing.inputs(&self.field);
         let Phase::Running {
             history, sampled, ..
         } = &mut self.phase
@@ -103,7 +104,7 @@ impl RemoteIo {
             .holdings()
             .filter_map(|(_, holding)| history.place(holding.lineage))
             .max();
-        let void = history.push(&self.field, living);
+        let void = history.push(&inputs, living);
         *sampled = true;
         let base = history.base();
         let body = Body::Sample(Sample {
@@ -122,10 +123,7 @@ impl RemoteIo {
                 lineage: base,
             });
         }
-        self.report(Event::Sampled {
-            moment,
-            inputs: self.field.clone(),
-        });
+        self.report(Event::Sampled { moment, inputs });
         let frame = Arc::new(self.frame(body));
         self.outbox.push_back(Output::Send(Arc::clone(&frame)));
         self.copies

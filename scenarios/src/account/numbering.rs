@@ -11,7 +11,7 @@ use understudy_wire::{Epoch, Moment, ProgramId};
 
 /// Gives numbers to moments.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Numbering {
+pub struct Numbering {
     /// For each epoch: what has to be added to its cycles.
     offsets: BTreeMap<Epoch, i64>,
     /// The newest cycle that was started.
@@ -29,7 +29,7 @@ struct Last {
 
 impl Numbering {
     /// The number of a deadline that a remote I/O reports. `idle` says that no cycle was started for it.
-    pub(crate) fn deadline(&mut self, remote_io: ProgramId, moment: Moment, idle: bool) -> i64 {
+    pub fn deadline(&mut self, remote_io: ProgramId, moment: Moment, idle: bool) -> i64 {
         if idle
             && let Some(last) = self.remote_ios.get_mut(&remote_io)
             && last.moment == moment
@@ -48,13 +48,13 @@ impl Numbering {
     }
 
     /// The number of a moment that others speak of; none for an epoch that no remote I/O has seen.
-    pub(crate) fn of(&self, moment: Moment) -> Option<i64> {
+    pub fn of(&self, moment: Moment) -> Option<i64> {
         let offset = self.offsets.get(&moment.epoch)?;
         Some(cycle(moment) + offset)
     }
 
     /// The last number that was given.
-    pub(crate) fn latest(&self) -> Option<i64> {
+    pub fn latest(&self) -> Option<i64> {
         self.remote_ios
             .values()
             .map(|last| last.number + last.idle)

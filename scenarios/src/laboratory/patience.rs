@@ -55,7 +55,8 @@ impl Laboratory<'_> {
             }
             return Ok(());
         };
-        if waits.cycle != Some(cycle) || self.conductor.wait_for_time() {
+        let waits_on = self.commanded || self.conductor.wait_for_time();
+        if waits.cycle != Some(cycle) || waits_on {
             waits.cycle = Some(cycle);
             waits.cycle_since = now;
         } else if over(waits.cycle_since, CYCLE_PATIENCE) {

@@ -99,6 +99,11 @@ impl Process {
         self.party
     }
 
+    /// Whether SIGSTOP has made it stand still.
+    pub(super) fn stands_still(&self) -> bool {
+        self.stands_still
+    }
+
     /// As `kill -9`.
     pub(super) async fn crash(&mut self) -> io::Result<()> {
         self.may_end = true;

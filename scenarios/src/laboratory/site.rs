@@ -49,6 +49,8 @@ pub struct NetworkSettings {
     pub impairment: Impairment,
     /// What the fates of datagrams come from.
     pub seed: u64,
+    /// Whether somebody may want to cut links that the scenario does not.
+    pub can_be_cut: bool,
 }
 
 /// Where everybody is.
@@ -122,7 +124,7 @@ impl Site {
                 let pairs = site.pairs_of_hosts();
                 hosts.lose(&pairs, impairment.loss)?;
             }
-            None if impairment.is_none() && !has_cuts(scenario) => {}
+            None if impairment.is_none() && !has_cuts(scenario) && !settings.can_be_cut => {}
             _ => {
                 let feeds = feeds(cluster);
                 site.route(cluster, &feeds, link, &peers, hosts.as_ref(), settings.seed)?;
@@ -145,6 +147,11 @@ impl Site {
     /// The file in which the party finds the others.
     pub(super) fn endpoints(&self, party: Party) -> Option<&Path> {
         self.endpoints.get(&party).map(PathBuf::as_path)
+    }
+
+    /// Whether something lies between the parties that can cut.
+    pub(super) fn can_cut(&self) -> bool {
+        self.proxy.is_some() || self.hosts.is_some()
     }
 
     /// Nothing that one says reaches the other any more, or everything does again.

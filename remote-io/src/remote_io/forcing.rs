@@ -1,0 +1,112 @@
+//! The signals that the operator has forced, and until when.
+//!
+//! Invariant: at most one force for each signal, and none after its time.
+
+use std::time::Duration;
+
+use understudy_wire::{Force, Image, SignalPlace, Time};
+
+use super::RemoteIo;
+use crate::event::Event;
+
+/// Forces in effect, by signal.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
+pub(super) struct Forcing {
+    active: Vec<Active>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+struct Active {
+    signal: SignalPlace,
+    value: bool,
+    until: Time,
+}
+
+impl Forcing {
+    fn put(&mut self, signal: SignalPlace, value: bool, until: Time) {
+        self.remove(signal);
+        self.active.push(Active {
+            signal,
+            value,
+            until,
+        });
+    }
+
+    fn remove(&mut self, signal: SignalPlace) -> bool {
+        let before = self.active.len();
+        self.active.retain(|active| active.signal != signal);
+        self.active.len() < before
+    }
+
+    /// Takes one away whose time is over.
+    fn take_expired(&mut self, now: Time) -> Option<SignalPlace> {
+        let expired = self.active.iter().position(|active| active.until <= now)?;
+        Some(self.active.remove(expired).signal)
+    }
+
+    /// u(i) as it is sampled.
+    pub(super) fn inputs(&self, field: &Image) -> Image {
+        self.with(field, |signal| match signal {
+            SignalPlace::Input(place) => Some(place),
+            SignalPlace::Output(_) => None,
+        })
+    }
+
+    /// y(i) as it is driven.
+    pub(super) fn outputs(&self, applied: &Image) -> Image {
+        self.with(applied, |signal| match signal {
+            SignalPlace::Output(place) => Some(place),
+            SignalPlace::Input(_) => None,
+        })
+    }
+
+    fn with(&self, image: &Image, place: impl Fn(SignalPlace) -> Option<u16>) -> Image {
+        let mut forced = image.clone();
+        for active in &self.active {
+            if let Some(place) = place(active.signal) {
+                forced.set(usize::from(place), active.value);
+            }
+        }
+        forced
+    }
+}
+
+impl RemoteIo {
+    /// A force of a signal that the program does not have, or without an end, is none.
+    pub(super) fn force(&mut self, now: Time, force: &Force) {
+        let width = match force.signal {
+            SignalPlace::Input(_) => self.settings.inputs,
+            SignalPlace::Output(_) => self.settings.fail_safe.width(),
+        };
+        let (SignalPlace::Input(place) | SignalPlace::Output(place)) = force.signal;
+        if usize::from(place) >= width || force.check().is_err() {
+            return;
+        }
+        let until = now + Duration::from_secs(u64::from(force.seconds));
+        self.forcing.put(force.signal, force.value, until);
+        self.report(Event::Forced {
+            moment: self.moment(),
+            force: force.clone(),
+        });
+    }
+
+    pub(super) fn unforce(&mut self, signal: SignalPlace) {
+        if self.forcing.remove(signal) {
+            self.report_unforced(signal, false);
+        }
+    }
+
+    pub(super) fn end_forces(&mut self, now: Time) {
+        while let Some(signal) = self.forcing.take_expired(now) {
+            self.report_unforced(signal, true);
+        }
+    }
+
+    fn report_unforced(&mut self, signal: SignalPlace, expired: bool) {
+        self.report(Event::Unforced {
+            moment: self.moment(),
+            signal,
+            expired,
+        });
+    }
+}

@@ -1,0 +1,218 @@
+//! `cluster/` in the directory of a run: the files that it was made of, so that who reads the run later knows its programs.
+//!
+//! `kept.json` says under which names the cluster file reads its ladders, and what the command line said in its place. The
+//! files lie beside it, under names without folders.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+use understudy_cluster::{Cluster, Link, Overrides, Security, read_with};
+use understudy_diagnostic::Report;
+use understudy_wire::Mode;
+
+use crate::run_directory::RunDirectoryError;
+
+const FOLDER: &str = "cluster";
+const CLUSTER_FILE: &str = "cluster.toml";
+const KEPT_FILE: &str = "kept.json";
+
+/// What `kept.json` holds.
+#[derive(Debug, Default, Serialize, Deserialize)]
+struct Kept {
+    /// Of this format: 1.
+    format: u32,
+    /// By the name that stands in the cluster file: the file in this folder.
+    ladders: BTreeMap<String, String>,
+    period_ns: Option<u64>,
+    link: Option<Link>,
+    security: Option<Security>,
+    mode: Option<Mode>,
+}
+
+/// Why the cluster of a run is not known.
+#[derive(Debug, thiserror::Error)]
+pub enum KeptError {
+    /// The run has no folder `cluster/`.
+    #[error("{} does not say which programs it ran: it has no folder `cluster/`", run.display())]
+    NotKept {
+        /// The directory of the run.
+        run: PathBuf,
+    },
+    /// A file cannot be read.
+    #[error("{} cannot be read: {reason}", path.display())]
+    Read {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// The files have errors: somebody has changed them, or another version of this program wrote them.
+    #[error("the cluster that was kept with the run has errors")]
+    Files {
+        /// With what was found in them.
+        reports: Vec<Report>,
+    },
+}
+
+/// Keeps the `cluster` that was read from `file`, and the ladders that it names, in the directory of a run.
+///
+/// # Errors
+/// [`RunDirectoryError::Write`]. A ladder that cannot be read any more is left out; the run has read it already.
+pub fn keep_cluster(run: &Path, file: &Path, cluster: &Cluster) -> Result<(), RunDirectoryError> {
+    let overrides = Overrides {
+        period: Some(cluster.agreement().schedule.period()),
+        link: Some(cluster.link()),
+        security: Some(cluster.security()),
+        mode: Some(cluster.agreement().mode),
+    };
+    let folder = run.join(FOLDER);
+    let write = |name: &str, text: &str| {
+        let path = folder.join(name);
+        let written = fs::create_dir_all(&folder).and_then(|()| fs::write(&path, text));
+        written.map_err(|source| RunDirectoryError::Write { path, source })
+    };
+    let text = fs::read_to_string(file).map_err(|source| RunDirectoryError::Write {
+        path: file.to_owned(),
+        source,
+    })?;
+    let beside = file.parent().unwrap_or(Path::new(""));
+    let mut ladders: BTreeMap<String, String> = BTreeMap::new();
+    let _ = read_with(CLUSTER_FILE, &text, overrides, &mut |name| {
+        let ladder = fs::read_to_string(beside.join(name)).map_err(|error| error.to_string())?;
+        ladders.insert(name.to_owned(), ladder.clone());
+        Ok(ladder)
+    });
+    write(CLUSTER_FILE, &text)?;
+    let mut kept = Kept {
+        format: 1,
+        ladders: BTreeMap::new(),
+        period_ns: overrides
+            .period
+            .map(|period| u64::try_from(period.as_nanos()).unwrap_or(u64::MAX)),
+        link: overrides.link,
+        security: overrides.security,
+        mode: overrides.mode,
+    };
+    for (name, ladder) in &ladders {
+        let file = unique(name, &kept.ladders);
+        write(&file, ladder)?;
+        kept.ladders.insert(name.clone(), file);
+    }
+    let json = serde_json::to_string_pretty(&kept)? + "\n";
+    write(KEPT_FILE, &json)
+}
+
+/// The cluster that was kept with a run.
+///
+/// # Errors
+/// [`KeptError`].
+pub fn kept_cluster(run: &Path) -> Result<Cluster, KeptError> {
+    let folder = run.join(FOLDER);
+    let file = folder.join(CLUSTER_FILE);
+    if !file.is_file() {
+        let run = run.to_owned();
+        return Err(KeptError::NotKept { run });
+    }
+    let unreadable = |path: PathBuf, reason: String| KeptError::Read { path, reason };
+    let text =
+        fs::read_to_string(&file).map_err(|error| unreadable(file.clone(), error.to_string()))?;
+    let kept_file = folder.join(KEPT_FILE);
+    let kept: Kept = match fs::read(&kept_file) {
+        Ok(bytes) => serde_json::from_slice(&bytes)
+            .map_err(|error| unreadable(kept_file, error.to_string()))?,
+        // A folder that a person has put there.
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Kept::default(),
+        Err(error) => return Err(unreadable(kept_file, error.to_string())),
+    };
+    let overrides = Overrides {
+        period: kept.period_ns.map(Duration::from_nanos),
+        link: kept.link,
+        security: kept.security,
+        mode: kept.mode,
+    };
+    let loaded = read_with(&file.display().to_string(), &text, overrides, &mut |name| {
+        let file = kept.ladders.get(name).map_or(name, String::as_str);
+        fs::read_to_string(folder.join(file)).map_err(|error| error.to_string())
+    });
+    loaded.cluster.ok_or(KeptError::Files {
+        reports: loaded.reports,
+    })
+}
+
+/// The last part of a name, which no other ladder and no file of ours has.
+fn unique(name: &str, taken: &BTreeMap<String, String>) -> String {
+    let last = Path::new(name).file_name().map_or_else(
+        || "ladder".to_owned(),
+        |last| last.to_string_lossy().into_owned(),
+    );
+    let free = |candidate: &String| {
+        ![CLUSTER_FILE, KEPT_FILE].contains(&candidate.as_str())
+            && !taken.values().any(|taken| taken == candidate)
+    };
+    let numbered = (2..).map(|number| format!("{number}-{last}"));
+    std::iter::once(last.clone())
+        .chain(numbered)
+        .find(free)
+        .unwrap_or(last)
+}
+
+#[cfg(test)]
+mod tests {
+    use understudy_cluster::press_cell;
+
+    use super::*;
+
+    #[test]
+    fn what_was_kept_is_the_same_cluster() {
+        let name = format!("understudy-kept-{}", std::process::id());
+        let folder = std::env::temp_dir().join(name);
+        // It is there only where a run before was killed.
+        let _ = fs::remove_dir_all(&folder);
+        let source = folder.join("source");
+        fs::create_dir_all(source.join("ladders")).expect("a folder");
+        for file in press_cell() {
+            let path = if file.name.ends_with(".ladder") {
+                source.join("ladders").join(file.name)
+            } else {
+                source.join(file.name)
+            };
+            let text = file
+                .text
+                .replace("\"robot.ladder\"", "\"ladders/robot.ladder\"")
+                .replace("\"press.ladder\"", "\"ladders/../ladders/press.ladder\"");
+            fs::write(path, text).expect("written");
+        }
+        let run = folder.join("run");
+        assert!(matches!(kept_cluster(&run), Err(KeptError::NotKept { .. })));
+        let overrides = Overrides {
+            period: Some(Duration::from_millis(7)),
+            mode: Some(Mode::Paper),
+            link: Some(Link::Udp),
+            security: Some(Security::Off),
+        };
+        let file = source.join(CLUSTER_FILE);
+        let text = fs::read_to_string(&file).expect("a text");
+        let read = read_with("cluster.toml", &text, overrides, &mut |name| {
+            fs::read_to_string(source.join(name)).map_err(|error| error.to_string())
+        });
+        let cluster = read.cluster.expect("it has no errors");
+        keep_cluster(&run, &file, &cluster).expect("kept");
+        fs::remove_dir_all(&source).expect("it goes");
+        let kept = kept_cluster(&run).expect("it has no errors");
+        let schedule = &kept.agreement().schedule;
+        assert_eq!(schedule.period(), Duration::from_millis(7));
+        assert_eq!(kept.agreement().mode, Mode::Paper);
+        assert_eq!((kept.link(), kept.security()), (Link::Udp, Security::Off));
+        assert_eq!(
+            kept.agreement().configuration,
+            cluster.agreement().configuration
+        );
+        fs::write(run.join("cluster/robot.ladder"), "rung oh").expect("written");
+        assert!(matches!(kept_cluster(&run), Err(KeptError::Files { .. })));
+        fs::remove_dir_all(folder).expect("it goes");
+    }
+}
