@@ -11,3 +11,4 @@ mod words;
 pub use event::Event;
 pub use settings::{Program, Settings};
 pub use station::Station;
+pub use words::{of_controller as words_of_controller, of_understudy as words_of_understudy};

@@ -15,7 +15,7 @@ use smallvec::SmallVec;
 use understudy_wire::{Image, Mode, ProgramId, ProgramSet, Word};
 
 /// The word of a controller.
-pub(crate) fn of_controller(program: ProgramId, outputs: &Image) -> SmallVec<[Word; 2]> {
+pub fn of_controller(program: ProgramId, outputs: &Image) -> SmallVec<[Word; 2]> {
     smallvec::smallvec![Word {
         members: ProgramSet::only(program),
         sum: outputs.clone(),
@@ -24,7 +24,7 @@ pub(crate) fn of_controller(program: ProgramId, outputs: &Image) -> SmallVec<[Wo
 
 /// The words of an understudy that knows the outputs of `known` (those that `outputs_of` answers for), in a cluster of
 /// the programs `all`, where the controllers of `spoke` have said the same in this cycle.
-pub(crate) fn of_understudy<'a>(
+pub fn of_understudy<'a>(
     mode: Mode,
     all: ProgramSet,
     known: ProgramSet,

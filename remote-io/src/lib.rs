@@ -5,6 +5,7 @@
 
 mod channel;
 mod event;
+mod foresight;
 mod history;
 mod remote_io;
 mod selection;
@@ -15,5 +16,6 @@ mod witnesses;
 
 pub use channel::Channel;
 pub use event::{Event, Missing};
+pub use foresight::Foreseen;
 pub use remote_io::RemoteIo;
 pub use settings::{Release, Settings, ValueFault};

@@ -41,6 +41,14 @@ pub(crate) struct Accusation {
 }
 
 impl Trust {
+    /// Of one that has found these stations faulty.
+    pub(crate) fn excluding(excluded: StationSet) -> Self {
+        Self {
+            excluded,
+            ..Self::default()
+        }
+    }
+
     /// Stations whose votes do not count.
     pub(crate) fn excluded(&self) -> StationSet {
         self.excluded

@@ -141,6 +141,20 @@ impl Referee {
         self.seen.push_back(sensors.clone());
     }
 
+    /// Where the reference run stands: its lineage and x(t), as of the samples so far; nothing before a start that it has seen.
+    pub fn standing(&self) -> Option<(Lineage, &Image)> {
+        self.state
+            .as_ref()
+            .map(|(lineage, state)| (*lineage, state))
+    }
+
+    /// h(x(t), u(t)) of the newest sample, with its cycle.
+    pub fn truth(&self) -> Option<(Moment, &Image)> {
+        self.truth
+            .as_ref()
+            .map(|(moment, outputs)| (*moment, outputs))
+    }
+
     /// Takes one report of the remote I/O, in the order in which they were made.
     ///
     /// # Errors
