@@ -1,0 +1,154 @@
+//! A program with every name resolved and every instance in its place: cells, and steps over them.
+//!
+//! A step is an assignment, a choice, or a function block of the ladder. Calls of other blocks and of functions, loops and
+//! CASE are gone, so that a walk over the steps in their order is one execution.
+
+use std::ops::Range;
+
+use understudy_ladder::{Address, BlockKind, Relation};
+
+/// What a cell is in the program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Role {
+    Input,
+    Output,
+    Memory,
+    /// An output of a block of the ladder, which its block alone writes.
+    Pin,
+}
+
+/// What a cell holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Truth,
+    Number {
+        /// What its declaration allows.
+        declared: (i64, i64),
+        /// What its type holds; past it an assignment wraps around.
+        wide: (i64, i64),
+    },
+}
+
+/// A variable of one instance.
+#[derive(Debug, Clone)]
+pub(super) struct Cell {
+    /// Legal in a ladder, and unique.
+    pub(super) name: String,
+    pub(super) kind: Kind,
+    pub(super) role: Role,
+    /// 0 or 1 for a truth.
+    pub(super) initial: i64,
+    /// Its declaration gives the initial value.
+    pub(super) is_given: bool,
+    pub(super) address: Option<Address>,
+    pub(super) description: Option<String>,
+}
+
+/// A Boolean expression.
+#[derive(Debug, Clone)]
+pub(super) enum Truth {
+    Constant(bool),
+    Cell(usize),
+    Not(Box<Truth>),
+    All(Vec<Truth>),
+    Any(Vec<Truth>),
+    /// An odd number of them.
+    Odd(Vec<Truth>),
+    Compare(Relation, Box<Number>, Box<Number>),
+    /// The value of a counter of the ladder, by its block's name.
+    Counter(String, Relation, u16),
+}
+
+/// A whole number.
+#[derive(Debug, Clone)]
+pub(super) enum Number {
+    Constant(i64),
+    Cell(usize),
+    /// Each with whether it is subtracted.
+    Sum(Vec<(bool, Number)>),
+    Product(Vec<Number>),
+    /// By a number other than 0, towards 0.
+    Quotient(Box<Number>, i64),
+    /// With the sign of what is divided.
+    Remainder(Box<Number>, i64),
+    Choice(Box<Truth>, Box<Number>, Box<Number>),
+}
+
+impl Number {
+    /// Its value where no cell decides it, and 64 bits hold it.
+    pub(super) fn constant(&self) -> Option<i64> {
+        match self {
+            Self::Constant(value) => Some(*value),
+            Self::Sum(parts) => parts.iter().try_fold(0_i64, |sum, (negative, part)| {
+                let value = part.constant()?;
+                if *negative {
+                    sum.checked_sub(value)
+                } else {
+                    sum.checked_add(value)
+                }
+            }),
+            Self::Product(factors) => factors.iter().try_fold(1_i64, |product, factor| {
+                product.checked_mul(factor.constant()?)
+            }),
+            Self::Quotient(number, by) => number.constant()?.checked_div(*by),
+            Self::Remainder(number, by) => number.constant()?.checked_rem(*by),
+            Self::Cell(_) | Self::Choice(..) => None,
+        }
+    }
+}
+
+/// What a step does.
+#[derive(Debug, Clone)]
+pub(super) enum Action {
+    SetTruth(usize, Truth),
+    SetNumber(usize, Number),
+    If(Vec<(Truth, Vec<Step>)>, Vec<Step>),
+    /// Only where every execution passes.
+    Block {
+        name: String,
+        kind: BlockKind,
+        wire: Truth,
+        feeds: Vec<(&'static str, Truth)>,
+    },
+}
+
+/// One step with its place in the text.
+#[derive(Debug, Clone)]
+pub(super) struct Step {
+    pub(super) action: Action,
+    pub(super) span: Range<usize>,
+    pub(super) comments: Vec<String>,
+}
+
+/// A whole resolved program.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Resolved {
+    pub(super) cells: Vec<Cell>,
+    pub(super) steps: Vec<Step>,
+}
+
+impl Resolved {
+    /// For each cell, whether some step assigns it.
+    pub(super) fn assigned(&self) -> Vec<bool> {
+        let mut assigned = vec![false; self.cells.len()];
+        walk(&self.steps, &mut |step| {
+            if let Action::SetTruth(cell, _) | Action::SetNumber(cell, _) = step.action {
+                assigned[cell] = true;
+            }
+        });
+        assigned
+    }
+}
+
+/// Calls `see` with every step, choices before what they choose among.
+pub(super) fn walk<'a>(steps: &'a [Step], see: &mut impl FnMut(&'a Step)) {
+    for step in steps {
+        see(step);
+        if let Action::If(branches, otherwise) = &step.action {
+            for (_, branch) in branches {
+                walk(branch, see);
+            }
+            walk(otherwise, see);
+        }
+    }
+}

@@ -1,0 +1,261 @@
+//! Syntax to cells and steps: names are looked up, types are checked, instances are put in place of their calls.
+//!
+//! Every error is said once, and resolving goes on with what it knows. The number of cells and steps is bounded, and a block
+//! cannot contain itself, so this ends.
+
+mod call;
+mod declare;
+mod expression;
+mod statement;
+mod uses;
+
+use std::collections::{HashMap, HashSet};
+use std::ops::Range;
+use std::rc::Rc;
+use std::time::Duration;
+
+use understudy_diagnostic::Diagnostic;
+use understudy_ladder::{KEYWORDS, MAXIMUM_NAME_LENGTH, Name};
+
+use self::declare::Types;
+use self::uses::UsesByName;
+use super::parser::{MAXIMUM_FINDINGS, parse};
+use super::program::{Cell, Resolved, Step};
+use super::syntax::{Declaration, Unit};
+
+/// The most cells of a program, bits of numbers not counted.
+const MAXIMUM_CELLS: usize = 50_000;
+/// The most steps of a program, those of all instances together.
+const MAXIMUM_STEPS: usize = 100_000;
+/// The most instances of blocks and calls of functions.
+const MAXIMUM_INSTANCES: usize = 20_000;
+
+/// What a name stands for in an instance.
+#[derive(Debug, Clone)]
+enum Entity {
+    Cell(usize),
+    /// A constant or a value of an enumeration.
+    Truth(bool),
+    Number(i64),
+    /// Known where it is known.
+    Time(Option<Duration>),
+    Instance(usize),
+    /// The count of a counter in a rung.
+    Counter(String),
+    /// Already diagnosed.
+    Broken,
+}
+
+/// A program, a block or a function at work.
+#[derive(Debug, Default)]
+struct Instance {
+    /// Which of the units.
+    unit: usize,
+    /// The standard block that stands in a rung, in its place.
+    native: Option<&'static str>,
+    /// Its name among all, with those around it.
+    path: String,
+    /// By name in capitals.
+    entities: HashMap<String, Entity>,
+    uses: UsesByName,
+    /// Called once in each execution, whatever happens.
+    exclusive: bool,
+    called: bool,
+}
+
+/// The result, with everything that was wrong.
+pub(super) struct Resolving {
+    pub(super) program: Resolved,
+    pub(super) diagnostics: Vec<Diagnostic>,
+}
+
+/// The program `unit`, with `others` to be called and `globals` behind its VAR_EXTERNAL.
+pub(super) fn resolve(
+    unit: &Unit,
+    prefix: &str,
+    others: &[Unit],
+    types: &[super::syntax::TypeDefinition],
+    globals: &[Declaration],
+) -> Resolving {
+    let (library, _) = parse(include_str!("library.st"));
+    let mut units = vec![unit.clone()];
+    units.extend(others.iter().cloned());
+    units.extend(library.units.into_iter().map(|unit| Unit {
+        foreign: true,
+        ..unit
+    }));
+    let mut by_name = HashMap::new();
+    for (place, unit) in units.iter().enumerate().skip(1) {
+        by_name
+            .entry(unit.name.to_ascii_uppercase())
+            .or_insert(place);
+    }
+    let mut resolver = Resolver {
+        first_of_library: 1 + others.len(),
+        units: units.into_iter().map(Rc::new).collect(),
+        by_name,
+        types: Types::default(),
+        globals: globals.to_vec(),
+        global_cells: HashMap::new(),
+        instances: Vec::new(),
+        stack: Vec::new(),
+        program: Resolved::default(),
+        steps: Vec::new(),
+        step_count: 0,
+        conditional: 0,
+        names: HashSet::new(),
+        blame: None,
+        is_full: false,
+        findings: HashSet::new(),
+        diagnostics: Vec::new(),
+    };
+    resolver.define_types(types);
+    let main = resolver.instantiate(0, prefix.to_owned(), true);
+    resolver.execute(main);
+    resolver.program.steps = std::mem::take(&mut resolver.steps);
+    Resolving {
+        program: resolver.program,
+        diagnostics: resolver.diagnostics,
+    }
+}
+
+struct Resolver {
+    /// The program itself, the other units, the library.
+    units: Vec<Rc<Unit>>,
+    first_of_library: usize,
+    by_name: HashMap<String, usize>,
+    types: Types,
+    globals: Vec<Declaration>,
+    global_cells: HashMap<String, Entity>,
+    instances: Vec<Instance>,
+    /// Units around, against a block in itself.
+    stack: Vec<usize>,
+    program: Resolved,
+    /// Of the list that is being made.
+    steps: Vec<Step>,
+    step_count: usize,
+    /// How many choices are around.
+    conditional: usize,
+    /// Names of cells and blocks.
+    names: HashSet<String>,
+    /// Where a text that is not the user's was called from.
+    blame: Option<Range<usize>>,
+    is_full: bool,
+    findings: HashSet<(&'static str, usize, String)>,
+    diagnostics: Vec<Diagnostic>,
+}
+
+impl Resolver {
+    /// Says what is wrong, once for each place, however many instances have it.
+    fn say(&mut self, mut finding: Diagnostic) {
+        if let Some(place) = &self.blame {
+            finding.span = place.clone();
+        }
+        let known = (finding.code, finding.span.start, finding.message.clone());
+        if self.diagnostics.len() < MAXIMUM_FINDINGS && self.findings.insert(known) {
+            self.diagnostics.push(finding);
+        }
+    }
+
+    fn error(&mut self, code: &'static str, message: impl Into<String>, span: Range<usize>) {
+        self.say(Diagnostic::error(code, message, span));
+    }
+
+    /// A name for a cell or a block that the ladder can have, and that no other has.
+    fn unique(&mut self, wanted: &str) -> String {
+        let mut base = wanted.to_owned();
+        if KEYWORDS.contains(&wanted) {
+            base.push('_');
+        }
+        // Room for the number of a bit and of a namesake.
+        if base.len() > MAXIMUM_NAME_LENGTH - 16 {
+            base.truncate(MAXIMUM_NAME_LENGTH - 16);
+            base = base.trim_end_matches('.').to_owned();
+        }
+        let mut name = base.clone();
+        let mut count = 2;
+        while !self.names.insert(name.clone()) {
+            name = format!("{base}_{count}");
+            count += 1;
+        }
+        name
+    }
+
+    /// Adds a cell; past the bound the last one again, and the program is given up.
+    fn add_cell(&mut self, cell: Cell, span: Range<usize>) -> usize {
+        if self.program.cells.len() >= MAXIMUM_CELLS {
+            self.give_up(
+                format!("the program has more than {MAXIMUM_CELLS} variables"),
+                span,
+            );
+            return self.program.cells.len() - 1;
+        }
+        self.program.cells.push(cell);
+        self.program.cells.len() - 1
+    }
+
+    fn give_up(&mut self, message: String, span: Range<usize>) {
+        if !self.is_full {
+            self.is_full = true;
+            self.error("U1048", message, span);
+        }
+    }
+
+    fn push(&mut self, action: super::program::Action, span: Range<usize>, comments: Vec<String>) {
+        let span = self.blame.clone().unwrap_or(span);
+        if self.count_step(&span) {
+            self.steps.push(Step {
+                action,
+                span,
+                comments,
+            });
+        }
+    }
+
+    /// False past the bound, where the program is given up. A call counts too, so that empty blocks end as well.
+    fn count_step(&mut self, span: &Range<usize>) -> bool {
+        self.step_count += 1;
+        if self.step_count > MAXIMUM_STEPS {
+            self.give_up(
+                format!("the program has more than {MAXIMUM_STEPS} steps, its blocks in place"),
+                span.clone(),
+            );
+        }
+        !self.is_full
+    }
+
+    fn entity(&self, instance: usize, name: &str) -> Option<&Entity> {
+        self.instances[instance]
+            .entities
+            .get(&name.to_ascii_uppercase())
+    }
+
+    /// The known name that is nearest to a misspelt one.
+    fn nearest(&self, instance: usize, name: &Name) -> Option<String> {
+        let unit = &self.units[self.instances[instance].unit];
+        let wanted = name.to_ascii_uppercase();
+        let near = unit
+            .declarations
+            .iter()
+            .map(|declaration| declaration.name.as_str());
+        let near = near.map(|known| (distance(&known.to_ascii_uppercase(), &wanted), known));
+        let (far, known) = near.min_by_key(|(far, _)| *far)?;
+        (far <= 2 && far < wanted.len()).then(|| known.to_owned())
+    }
+}
+
+/// Letters to change, add or leave out to make one word of the other.
+fn distance(left: &str, right: &str) -> usize {
+    let right: Vec<char> = right.chars().collect();
+    let mut row: Vec<usize> = (0..=right.len()).collect();
+    for (place, letter) in left.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = place + 1;
+        for (column, &other) in right.iter().enumerate() {
+            let change = diagonal + usize::from(letter != other);
+            diagonal = row[column + 1];
+            row[column + 1] = change.min(diagonal + 1).min(row[column] + 1);
+        }
+    }
+    row[right.len()]
+}

@@ -1,0 +1,542 @@
+//! Declarations: types, variables as cells, instances of blocks.
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use understudy_diagnostic::Diagnostic;
+use understudy_ladder::{Address, Area, Name, parse_address};
+
+use super::super::program::{Cell, Kind, Number, Role, Truth};
+use super::super::syntax::{
+    Class, Declaration, Expression, TypeDefinition, TypeMeaning, TypeName, UnitKind,
+};
+use super::expression::Value;
+use super::uses::{Uses, uses};
+use super::{Entity, Instance, MAXIMUM_INSTANCES, Resolver};
+
+/// Types that the text defines, by name in capitals.
+#[derive(Debug, Default)]
+pub(super) struct Types {
+    known: HashMap<String, Type>,
+    /// Values of enumerations.
+    values: HashMap<String, i64>,
+}
+
+/// What a type is.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Type {
+    Elementary(Kind),
+    Time,
+    /// One of the units.
+    Block(usize),
+    /// A standard block that can stand in a rung.
+    Standard(&'static str),
+}
+
+/// The standard blocks of the ladder, timers first.
+const STANDARD: [&str; 10] = [
+    "TON", "TOF", "TP", "CTU", "CTD", "CTUD", "SR", "RS", "R_TRIG", "F_TRIG",
+];
+
+/// Whether the block measures time.
+pub(super) fn is_timer(word: &str) -> bool {
+    matches!(word, "TON" | "TOF" | "TP")
+}
+
+/// Inputs of a standard block, the wire's first.
+pub(super) fn inputs(word: &str) -> &'static [&'static str] {
+    match word {
+        "CTU" => &["CU", "R", "PV"],
+        "CTD" => &["CD", "LD", "PV"],
+        "CTUD" => &["CU", "CD", "R", "LD", "PV"],
+        "SR" => &["S1", "R"],
+        "RS" => &["S", "R1"],
+        "R_TRIG" | "F_TRIG" => &["CLK"],
+        _ => &["IN", "PT"],
+    }
+}
+
+/// Boolean outputs of a standard block.
+pub(super) fn outputs(word: &str) -> &'static [&'static str] {
+    match word {
+        "CTUD" => &["QU", "QD"],
+        "SR" | "RS" => &["Q1"],
+        _ => &["Q"],
+    }
+}
+
+/// What the type of whole numbers of that name holds.
+pub(super) fn whole_range(word: &str) -> Option<(i64, i64)> {
+    Some(match word {
+        "SINT" => (-0x80, 0x7f),
+        "INT" => (-0x8000, 0x7fff),
+        "DINT" => (-0x8000_0000, 0x7fff_ffff),
+        "USINT" => (0, 0xff),
+        "UINT" => (0, 0xffff),
+        "UDINT" => (0, 0xffff_ffff),
+        _ => return None,
+    })
+}
+
+fn whole(low: i64, high: i64) -> Type {
+    Type::Elementary(Kind::Number {
+        declared: (low, high),
+        wide: (low, high),
+    })
+}
+
+impl Resolver {
+    pub(super) fn define_types(&mut self, types: &[TypeDefinition]) {
+        for definition in types {
+            let defined = match &definition.meaning {
+                TypeMeaning::Enumeration(values) => {
+                    for (number, value) in values.iter().enumerate() {
+                        let number = i64::try_from(number).unwrap_or(i64::MAX);
+                        let known = self.types.values.insert(value.to_ascii_uppercase(), number);
+                        if known.is_some_and(|known| known != number) {
+                            let message = format!(
+                                "the value `{value}` stands in two enumerations at different places"
+                            );
+                            self.error("U1042", message, value.span());
+                        }
+                    }
+                    let last = i64::try_from(values.len()).unwrap_or(i64::MAX) - 1;
+                    Some(whole(0, last.max(0)))
+                }
+                TypeMeaning::Alias(name) => self.type_of(name),
+            };
+            let Some(defined) = defined else { continue };
+            let key = definition.name.to_ascii_uppercase();
+            if self.types.known.insert(key, defined).is_some() {
+                let message = format!("the type `{}` is defined twice", definition.name);
+                self.error("U1042", message, definition.name.span());
+            }
+        }
+    }
+
+    pub(super) fn enumeration_value(&self, name: &str) -> Option<i64> {
+        self.types.values.get(&name.to_ascii_uppercase()).copied()
+    }
+
+    fn type_of(&mut self, name: &TypeName) -> Option<Type> {
+        let key = name.name.to_ascii_uppercase();
+        let found = match key.as_str() {
+            "BOOL" => Some(Type::Elementary(Kind::Truth)),
+            "TIME" => Some(Type::Time),
+            word => whole_range(word).map(|(low, high)| whole(low, high)),
+        };
+        let found = found.or_else(|| self.types.known.get(&key).copied());
+        let found = found.or_else(|| {
+            let unit = self.by_name.get(&key).copied();
+            let user = unit.filter(|unit| *unit < self.first_of_library);
+            let user = user.filter(|unit| self.units[*unit].kind == UnitKind::FunctionBlock);
+            let standard = STANDARD.into_iter().find(|word| *word == key);
+            user.map(Type::Block).or(standard.map(Type::Standard))
+        });
+        let Some(found) = found else {
+            let message = format!("variables of the type `{}` are not taken", name.name);
+            let finding = Diagnostic::error("U1040", message, name.name.span());
+            self.say(finding.with_help("taken are BOOL, SINT, INT, DINT, USINT, UINT, UDINT, TIME, enumerations, and function blocks"));
+            return None;
+        };
+        match (found, name.range) {
+            (_, None) => Some(found),
+            (Type::Elementary(Kind::Number { wide, .. }), Some((low, high))) => {
+                if low < wide.0 || high > wide.1 {
+                    let message = format!("the range {low}..{high} is not within `{}`", name.name);
+                    self.error("U1036", message, name.name.span());
+                }
+                let declared = (low.clamp(wide.0, wide.1), high.clamp(wide.0, wide.1));
+                Some(Type::Elementary(Kind::Number { declared, wide }))
+            }
+            _ => {
+                self.error(
+                    "U1036",
+                    format!("`{}` has no range", name.name),
+                    name.name.span(),
+                );
+                None
+            }
+        }
+    }
+
+    /// Makes the cells of a unit; instances of blocks come last, since their presets may be constants of the unit.
+    pub(super) fn instantiate(&mut self, unit: usize, path: String, exclusive: bool) -> usize {
+        let number = self.instances.len();
+        let content = self.units[unit].clone();
+        if number >= MAXIMUM_INSTANCES {
+            self.give_up(
+                format!("the program has more than {MAXIMUM_INSTANCES} instances"),
+                content.name.span(),
+            );
+        }
+        self.instances.push(Instance {
+            unit,
+            path,
+            uses: uses(&content.body),
+            exclusive,
+            ..Instance::default()
+        });
+        self.stack.push(unit);
+        let blame = self.blame.clone();
+        if !content.foreign {
+            self.blame = None;
+        }
+        if let Some(result) = &content.result {
+            let result = Declaration {
+                name: content.name.clone(),
+                class: Class::Local,
+                constant: false,
+                temporary: true,
+                address: None,
+                type_name: result.clone(),
+                initial: None,
+                description: None,
+            };
+            self.declare(number, &result, false);
+        }
+        for blocks in [false, true] {
+            for declaration in &content.declarations {
+                self.declare(number, declaration, blocks);
+            }
+        }
+        self.blame = blame;
+        self.stack.pop();
+        number
+    }
+
+    fn declare(&mut self, instance: usize, declaration: &Declaration, blocks: bool) {
+        if self.is_full {
+            return;
+        }
+        if declaration.class == Class::External {
+            if !blocks {
+                self.declare_external(instance, declaration);
+            }
+            return;
+        }
+        let found = self
+            .types
+            .known
+            .get(&declaration.type_name.name.to_ascii_uppercase());
+        let is_block = found.is_none() && {
+            let key = declaration.type_name.name.to_ascii_uppercase();
+            self.by_name.contains_key(&key) || STANDARD.contains(&key.as_str())
+        };
+        if is_block != blocks {
+            return;
+        }
+        let entity = match self.type_of(&declaration.type_name) {
+            None => Entity::Broken,
+            Some(Type::Time) => Entity::Time(self.initial_time(instance, declaration)),
+            Some(Type::Elementary(kind)) => self.declare_variable(instance, declaration, kind),
+            Some(Type::Block(unit)) => self.declare_block(instance, declaration, unit),
+            Some(Type::Standard(word)) => self.declare_standard(instance, declaration, word),
+        };
+        self.define(instance, &declaration.name, entity);
+    }
+
+    fn define(&mut self, instance: usize, name: &Name, entity: Entity) {
+        let entities = &mut self.instances[instance].entities;
+        if entities.insert(name.to_ascii_uppercase(), entity).is_some() {
+            self.error("U1042", format!("`{name}` is declared twice"), name.span());
+        }
+    }
+
+    fn declare_external(&mut self, instance: usize, declaration: &Declaration) {
+        let key = declaration.name.to_ascii_uppercase();
+        if let Some(entity) = self.global_cells.get(&key) {
+            let entity = entity.clone();
+            self.define(instance, &declaration.name, entity);
+            return;
+        }
+        let mut globals = self.globals.iter();
+        let global = globals.find(|global| global.name.eq_ignore_ascii_case(&declaration.name));
+        // Without its configuration, the declaration is all there is.
+        let global = global.unwrap_or(declaration).clone();
+        let as_local = Declaration {
+            class: Class::Local,
+            ..global
+        };
+        let entity = match self.type_of(&as_local.type_name) {
+            Some(Type::Elementary(kind)) => self.declare_variable(instance, &as_local, kind),
+            Some(Type::Time) => Entity::Time(self.initial_time(instance, &as_local)),
+            Some(Type::Block(_) | Type::Standard(_)) => {
+                let message = format!(
+                    "`{}` is a block that several programs share; that is not taken",
+                    declaration.name
+                );
+                self.error("U1040", message, declaration.name.span());
+                Entity::Broken
+            }
+            None => Entity::Broken,
+        };
+        self.global_cells.insert(key, entity.clone());
+        self.define(instance, &declaration.name, entity);
+    }
+
+    fn path_of(&self, instance: usize, name: &str) -> String {
+        let around = &self.instances[instance].path;
+        if around.is_empty() {
+            name.to_owned()
+        } else {
+            format!("{around}.{name}")
+        }
+    }
+
+    fn initial_time(
+        &mut self,
+        instance: usize,
+        declaration: &Declaration,
+    ) -> Option<std::time::Duration> {
+        // An input gets its time from the call.
+        match &declaration.initial {
+            None => (declaration.class != Class::Input).then_some(std::time::Duration::ZERO),
+            Some(initial) => match self.expression(instance, initial) {
+                Value::Time(time) => time,
+                Value::Error => None,
+                _ => {
+                    let message = format!(
+                        "`{}` is a time, and begins with something else",
+                        declaration.name
+                    );
+                    self.error("U1043", message, initial.span.clone());
+                    None
+                }
+            },
+        }
+    }
+
+    fn initial(&mut self, instance: usize, initial: &Expression, kind: Kind) -> Option<i64> {
+        let value = match (self.expression(instance, initial), kind) {
+            (Value::Error, _) => return None,
+            (Value::Truth(Truth::Constant(value)), Kind::Truth) => Some(i64::from(value)),
+            (Value::Number(Number::Constant(value @ (0 | 1))), Kind::Truth) => Some(value),
+            (Value::Number(number), Kind::Number { declared, .. }) => number
+                .constant()
+                .filter(|value| (declared.0..=declared.1).contains(value)),
+            _ => None,
+        };
+        if value.is_none() {
+            let message = "this is no constant of the variable's type and range";
+            self.error("U1043", message, initial.span.clone());
+        }
+        value
+    }
+
+    fn declare_variable(
+        &mut self,
+        instance: usize,
+        declaration: &Declaration,
+        kind: Kind,
+    ) -> Entity {
+        let name = &declaration.name;
+        let given = declaration.initial.as_ref();
+        let mut initial = given.and_then(|given| self.initial(instance, given, kind));
+        if let (Kind::Number { declared, .. }, None) = (kind, initial) {
+            // 0, or what is nearest to it, as the standard has it.
+            initial = Some(0.clamp(declared.0, declared.1));
+        }
+        let initial = initial.unwrap_or(0);
+        if declaration.constant {
+            return match kind {
+                Kind::Truth => Entity::Truth(initial == 1),
+                Kind::Number { .. } => Entity::Number(initial),
+            };
+        }
+        if declaration.class == Class::InOut {
+            let message =
+                format!("`{name}` is passed by reference (VAR_IN_OUT); that is not taken");
+            self.error("U1040", message, name.span());
+            return Entity::Broken;
+        }
+        let is_program = instance == 0 && self.units[0].kind == UnitKind::Program;
+        let address = declaration
+            .address
+            .as_ref()
+            .and_then(|address| self.address(address, kind));
+        let located =
+            declaration
+                .address
+                .as_ref()
+                .and_then(|address| match address.as_bytes().first() {
+                    Some(b'I') => Some(Role::Input),
+                    Some(b'Q') => Some(Role::Output),
+                    _ => None,
+                });
+        let role = match declaration.class {
+            _ if !is_program && declaration.address.is_none() => {
+                self.role_of_block(instance, declaration.class)
+            }
+            Class::Input => Role::Input,
+            Class::Output => Role::Output,
+            _ => located.unwrap_or(Role::Memory),
+        };
+        if role == Role::Input && given.is_some() && initial != 0 {
+            let message = format!(
+                "the initial value of the input `{name}` is not kept: an input is what is read"
+            );
+            self.say(Diagnostic::warning("U1055", message, name.span()));
+        }
+        let wanted = self.path_of(instance, name);
+        let cell = Cell {
+            name: self.unique(&wanted),
+            kind,
+            role,
+            initial,
+            is_given: given.is_some(),
+            address,
+            description: declaration.description.clone(),
+        };
+        Entity::Cell(self.add_cell(cell, name.span()))
+    }
+
+    /// A block that is lowered by itself shows its inputs and outputs; one in a program keeps them to itself.
+    fn role_of_block(&self, instance: usize, class: Class) -> Role {
+        match class {
+            Class::Input if instance == 0 => Role::Input,
+            Class::Output if instance == 0 => Role::Output,
+            _ => Role::Memory,
+        }
+    }
+
+    /// The address of a bit; that of a number or of a byte is not kept, which is said.
+    fn address(&mut self, address: &Name, kind: Kind) -> Option<Address> {
+        if kind == Kind::Truth {
+            let found = parse_address(address);
+            if found.is_none() {
+                let message = format!("`%{address}` is not the address of a bit");
+                let finding = Diagnostic::error("U1036", message, address.span());
+                self.say(finding.with_help("addresses look like %IX0.3, %QX1.0 or %MX2.7"));
+            }
+            return found;
+        }
+        let message = format!("the address `%{address}` of a number is not kept");
+        self.say(Diagnostic::warning("U1055", message, address.span()));
+        None
+    }
+
+    /// The cell behind an address in a body; it is made where no variable has it.
+    pub(super) fn direct(&mut self, address: &Name) -> Option<usize> {
+        let text = address.trim_start_matches('%');
+        let Some(found) = parse_address(text) else {
+            let message = format!("`{address}` is not the address of a bit");
+            self.error("U1036", message, address.span());
+            return None;
+        };
+        let mut cells = self.program.cells.iter();
+        if let Some(known) = cells.position(|cell| cell.address.as_ref() == Some(&found)) {
+            return Some(known);
+        }
+        let role = match found.area {
+            Area::Input => Role::Input,
+            Area::Output => Role::Output,
+            Area::Memory => Role::Memory,
+        };
+        let cell = Cell {
+            name: self.unique(&text.replace('.', "_")),
+            kind: Kind::Truth,
+            role,
+            initial: 0,
+            is_given: false,
+            address: Some(found),
+            description: None,
+        };
+        Some(self.add_cell(cell, address.span()))
+    }
+
+    fn uses_of(&self, instance: usize, name: &str) -> Uses {
+        let uses = &self.instances[instance].uses;
+        uses.get(&name.to_ascii_uppercase())
+            .cloned()
+            .unwrap_or_default()
+    }
+
+    fn declare_block(&mut self, instance: usize, declaration: &Declaration, unit: usize) -> Entity {
+        if self.stack.contains(&unit) {
+            let message = format!("the block `{}` contains itself", declaration.type_name.name);
+            self.error("U1047", message, declaration.type_name.name.span());
+            return Entity::Broken;
+        }
+        let uses = self.uses_of(instance, &declaration.name);
+        let exclusive = self.instances[instance].exclusive && uses.calls <= 1 && !uses.conditional;
+        let path = self.path_of(instance, &declaration.name);
+        let blame = self.blame.clone();
+        if self.units[unit].foreign && self.blame.is_none() {
+            self.blame = Some(declaration.name.span());
+        }
+        let made = self.instantiate(unit, path, exclusive);
+        self.blame = blame;
+        Entity::Instance(made)
+    }
+
+    fn declare_standard(
+        &mut self,
+        instance: usize,
+        declaration: &Declaration,
+        word: &'static str,
+    ) -> Entity {
+        let uses = self.uses_of(instance, &declaration.name);
+        let exclusive = self.instances[instance].exclusive && uses.calls <= 1 && !uses.conditional;
+        let is_counter = inputs(word).contains(&"PV");
+        let preset = uses.preset.as_ref().filter(|_| is_counter);
+        let preset = preset.and_then(|preset| self.constant(instance, preset));
+        let has_preset =
+            preset.is_some_and(|preset| (0..=super::uses::MAXIMUM_COMPARED).contains(&preset));
+        let fits = exclusive
+            && !uses.counts
+            && !uses.touched.contains("PV")
+            && (has_preset || !is_counter);
+        if !is_timer(word) && !fits {
+            let unit = self.by_name[word];
+            return self.declare_block(instance, declaration, unit);
+        }
+        let wanted = self.path_of(instance, &declaration.name);
+        let path = self.unique(&wanted);
+        let made = self.instances.len();
+        self.instances.push(Instance {
+            native: Some(word),
+            path: path.clone(),
+            exclusive,
+            ..Instance::default()
+        });
+        let span = declaration.name.span();
+        for pin in outputs(word) {
+            self.add_pin(made, &path, pin, Role::Pin, &span);
+        }
+        for pin in inputs(word)
+            .iter()
+            .filter(|pin| !matches!(**pin, "PT" | "PV"))
+        {
+            if uses.touched.contains(*pin) {
+                self.add_pin(made, &path, pin, Role::Memory, &span);
+            }
+        }
+        if is_counter {
+            let entities = &mut self.instances[made].entities;
+            entities.insert("CV".into(), Entity::Counter(path));
+        }
+        Entity::Instance(made)
+    }
+
+    fn add_pin(&mut self, instance: usize, path: &str, pin: &str, role: Role, span: &Range<usize>) {
+        // A contact reads an output by the names of the block and of the pin; an input is a bit of its own.
+        let name = match role {
+            Role::Pin => format!("{path}.{pin}"),
+            _ => self.unique(&format!("{path}_{pin}")),
+        };
+        let cell = Cell {
+            name,
+            kind: Kind::Truth,
+            role,
+            initial: 0,
+            is_given: false,
+            address: None,
+            description: None,
+        };
+        let cell = self.add_cell(cell, span.clone());
+        self.instances[instance]
+            .entities
+            .insert(pin.to_owned(), Entity::Cell(cell));
+    }
+}
