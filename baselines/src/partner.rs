@@ -184,6 +184,7 @@ impl Partner {
                 members: ProgramSet::only(program),
                 sum: outputs,
             }],
+            recalled: Vec::new(),
         };
         self.send(now, Body::Turn(turn));
         self.give_state(now);

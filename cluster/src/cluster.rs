@@ -11,7 +11,7 @@ use understudy_logic::Circuit;
 use understudy_node::Program;
 use understudy_parity::ParityController;
 use understudy_plant::{Followed, Plant};
-use understudy_remote_io::{Release, ValueFault};
+use understudy_remote_io::{Diagnosis, Release, ValueFault};
 use understudy_wire::{Agreement, Epoch, Image, Party, ProgramHash, ProgramId, StationId};
 
 /// What carries the frames.
@@ -62,8 +62,19 @@ pub struct Understudy {
     pub address: Option<SocketAddr>,
 }
 
+/// A ladder that finds failed channels.
+#[derive(Debug, Clone)]
+pub struct DiagnosisPlace {
+    /// Its file, as the cluster file names it.
+    pub ladder: String,
+    /// It, for the period of the cluster.
+    pub circuit: Circuit,
+    /// Bound to the signals of its program.
+    pub compiled: Arc<Diagnosis>,
+}
+
 /// The plant's side of a controller.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub struct RemoteIo {
     /// Its name.
     pub name: String,
@@ -77,6 +88,8 @@ pub struct RemoteIo {
     pub field: Option<FieldDevice>,
     /// What is driven while nobody can say which of two stations is right.
     pub value_fault: ValueFault,
+    /// What finds failed channels that do not say so.
+    pub diagnosis: Option<DiagnosisPlace>,
     /// Where it listens, if the file says so.
     pub address: Option<SocketAddr>,
 }
@@ -267,6 +280,10 @@ impl Cluster {
             hash: controller.hash,
             inputs: controller.circuit.inputs().len(),
             channels: understudy_remote_io::Channel::of_inputs(controller.circuit.inputs()),
+            diagnosis: remote_io
+                .diagnosis
+                .as_ref()
+                .map(|it| Arc::clone(&it.compiled)),
             hold_cycles: remote_io.hold_cycles,
             fail_safe: remote_io.fail_safe.clone(),
             release: remote_io.release,

@@ -47,6 +47,11 @@ pub(crate) fn configuration_text(cluster: &Cluster, plants: &[String]) -> String
         line(format_args!("  fail-safe {}", remote_io.fail_safe));
         line(format_args!("  release {:?}", remote_io.release));
         line(format_args!("  value fault {:?}", remote_io.value_fault));
+        if let Some(diagnosis) = &remote_io.diagnosis {
+            line(format_args!("diagnosis"));
+            let text = circuit_text(&diagnosis.circuit);
+            line(format_args!("{}", indented(&text)));
+        }
         if let Some(plant) = plant {
             line(format_args!("plant {}", plant.name));
             line(format_args!("  watchdog {}", plant.watchdog_cycles));

@@ -235,6 +235,11 @@ pub(crate) static REMOTE_IO: Section = Section {
             "what is driven while two stations say different outputs from one history and no third one says which is right: `hold`, the last true outputs and then the fail-safe ones, until they agree or the operator releases them; `alarm`, the outputs of the controller itself; `fail-safe`, the fail-safe outputs at once, until the operator releases them",
         ),
         key(
+            "diagnosis",
+            Kind::Text,
+            "the file of a ladder that finds failed input channels, relative to the cluster file, see [reconfiguration.md](reconfiguration.md)",
+        ),
+        key(
             "field",
             Kind::Device,
             "real equipment behind it, see below; without it its plant is simulated",

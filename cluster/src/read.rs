@@ -21,12 +21,14 @@
 //! | U0217 | a terminal of a plant that two things drive |
 //! | U0221 | a remote I/O with both a device and a simulated plant |
 //! | U0222 | a place that no device has, or that an output cannot go to |
+//! | U0223 | a diagnosing ladder that does not fit its program |
 //! | U0251 | warning: an input that no sensor drives |
 //! | U0252 | warning: an output that moves nothing |
 //! | U0253 | warning: not one understudy where the mode wants one |
 //! | U0254 | warning: parts that never come |
 
 mod devices;
+mod diagnosis;
 mod follows;
 mod ladders;
 mod limits;
@@ -154,7 +156,14 @@ fn build(
     let mut names = Names::default();
     let members = members(file.controllers, period, ladders, &mut names, diagnostics);
     let understudies = understudies(file.understudies, &mut names, diagnostics);
-    let remote_ios = remote_ios(file.remote_ios, &members, &mut names, diagnostics);
+    let remote_ios = remote_ios(
+        file.remote_ios,
+        period,
+        &members,
+        ladders,
+        &mut names,
+        diagnostics,
+    );
     let simulated: Vec<_> = file
         .plants
         .iter()
@@ -310,7 +319,9 @@ fn understudies(
 
 fn remote_ios(
     sections: Vec<file::RemoteIoSection>,
+    period: Duration,
     members: &[Member],
+    ladders: &mut Ladders<'_>,
     names: &mut Names,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Vec<RemoteIo> {
@@ -347,6 +358,10 @@ fn remote_ios(
                 .and_then(|field| devices::device(field, member, diagnostics)),
             value_fault: [ValueFault::Hold, ValueFault::Alarm, ValueFault::FailSafe]
                 [section.value_fault],
+            diagnosis: section
+                .diagnosis
+                .as_ref()
+                .and_then(|file| diagnosis::read(file, period, member, ladders, diagnostics)),
             address: section.address.map(|address| address.value),
         };
         places.insert(index, remote_io);
@@ -368,6 +383,7 @@ fn remote_ios(
                 release: Release::default(),
                 field: None,
                 value_fault: ValueFault::default(),
+                diagnosis: None,
                 address: None,
             }
         })

@@ -10,7 +10,8 @@ use std::sync::Arc;
 
 use understudy_logic::Scratch;
 use understudy_wire::{
-    Body, Digest, Frame, Holding, Image, Lineage, Moment, ProgramId, Sample, StationId, Transfer,
+    Body, Digest, Frame, Holding, Image, Lineage, Moment, ProgramId, Recalled, Sample, StationId,
+    Transfer,
 };
 
 use crate::settings::Program;
@@ -41,6 +42,8 @@ pub(crate) struct Replica {
     outputs_of: Option<Lineage>,
     /// The last sample that could not be followed, for replaying it onto a state that is given later.
     unfollowed: Option<Arc<Frame>>,
+    /// What the newest sample said, and its cycle; of no cycle where another station told it.
+    recalled: Option<(Option<Moment>, Recalled)>,
     history: usize,
 }
 
@@ -82,6 +85,7 @@ impl Replica {
             outputs: Image::zero(program.scan.output_count()),
             outputs_of: None,
             unfollowed: None,
+            recalled: None,
             history,
         }
     }
@@ -126,6 +130,34 @@ impl Replica {
             stepped: copy.state.stepped,
             digest: copy.state.digest,
         })
+    }
+
+    /// Keeps what the sample of `moment` says, whether it can be followed or not.
+    pub(crate) fn hear(&mut self, program: &Program, moment: Moment, sample: &Sample) {
+        let Some(inputs) = sample.history.last() else {
+            return;
+        };
+        if inputs.width() == program.scan.input_count() {
+            let recalled = Recalled {
+                program: self.id,
+                excluded: sample.excluded,
+                inputs: inputs.clone(),
+            };
+            self.recalled = Some((Some(moment), recalled));
+        }
+    }
+
+    /// Takes what another station has heard, where this one has heard nothing.
+    pub(crate) fn is_told(&mut self, program: &Program, recalled: &Recalled) {
+        if self.recalled.is_none() && recalled.inputs.width() == program.scan.input_count() {
+            self.recalled = Some((None, recalled.clone()));
+        }
+    }
+
+    /// What the newest sample said, where none was heard in the cycle `moment`.
+    pub(crate) fn recalled(&self, moment: Moment) -> Option<&Recalled> {
+        let (heard, recalled) = self.recalled.as_ref()?;
+        (*heard != Some(moment)).then_some(recalled)
     }
 
     /// Follows the sample of `moment`, a frame whose body is `sample`.

@@ -23,8 +23,8 @@ use smallvec::SmallVec;
 use understudy_logic::Scratch;
 use understudy_wire::{
     Admission, Arrival, Attendance, Body, Copies, CycleClock, Digest, Frame, Header, Holding,
-    Image, Input, Lineage, Machine, Output, Party, ProgramId, ProgramSet, Reception, Sample,
-    StationId, StationSet, Time,
+    Image, Input, Lineage, Machine, Moment, Output, Party, ProgramId, ProgramSet, Recalled,
+    Reception, Sample, StationId, StationSet, Time,
 };
 
 use crate::event::Event;
@@ -209,6 +209,7 @@ impl Station {
         else {
             return;
         };
+        replica.hear(&self.settings.programs[program.index()], moment, sample);
         if replica.set_excluded(excluded) {
             self.outbox.push_back(Output::Report(if excluded {
                 Event::Excluded { moment, program }
@@ -234,6 +235,20 @@ impl Station {
 
     fn holdings(&self) -> SmallVec<[Holding; 2]> {
         self.replicas.iter().filter_map(Replica::holding).collect()
+    }
+
+    /// For remote I/Os that say nothing in this cycle.
+    fn recalled(&self, moment: Moment) -> Vec<Recalled> {
+        let recalled = self.replicas.iter().filter_map(|it| it.recalled(moment));
+        recalled.cloned().collect()
+    }
+
+    fn is_told(&mut self, recalled: &[Recalled]) {
+        for one in recalled {
+            if let Some(replica) = self.replicas.iter_mut().find(|it| it.id() == one.program) {
+                replica.is_told(&self.settings.programs[one.program.index()], one);
+            }
+        }
     }
 
     fn next_wakeup(&self) -> Time {

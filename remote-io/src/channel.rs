@@ -31,9 +31,19 @@ impl Channel {
     }
 }
 
-/// What the program sees of `sensors`, where it has seen `last` before.
-pub(crate) fn seen(channels: &[Channel], last: &Image, sensors: &Image) -> Image {
+/// What the program sees of `sensors`, where it has seen `last` before and `unsteady` inputs are not believed yet.
+pub(crate) fn seen(
+    channels: &[Channel],
+    last: &Image,
+    sensors: &Image,
+    unsteady: Option<&Image>,
+) -> Image {
     let mut seen = sensors.clone();
+    for input in 0..unsteady.map_or(0, Image::width) {
+        if unsteady.is_some_and(|unsteady| unsteady.get(input)) {
+            seen.set(input, last.get(input));
+        }
+    }
     for channel in channels {
         if sensors.get(channel.status) {
             seen.set(channel.input, last.get(channel.input));
@@ -70,7 +80,7 @@ mod tests {
             let bit = |place: u32| case >> place & 1 == 1;
             let last = Image::from_bits((0..4).map(bit));
             let sensors = Image::from_bits((4..8).map(bit));
-            let seen: Vec<bool> = seen(&channels, &last, &sensors).bits().collect();
+            let seen: Vec<bool> = seen(&channels, &last, &sensors, None).bits().collect();
             for input in 0..2 {
                 let expected = if bit(6 + input) {
                     bit(input)
@@ -80,6 +90,16 @@ mod tests {
                 assert_eq!(seen[input as usize], expected, "{case:08b}");
             }
             assert_eq!(seen[2..], [bit(6), bit(7)]);
+        }
+    }
+
+    #[test]
+    fn an_unsteady_input_keeps_its_last_value() {
+        for case in 0..8_u32 {
+            let [last, sensors, unsteady] =
+                [0, 1, 2].map(|place| Image::from_bits([case >> place & 1 == 1]));
+            let expected = if unsteady.get(0) { &last } else { &sensors };
+            assert_eq!(seen(&[], &last, &sensors, Some(&unsteady)), *expected);
         }
     }
 }

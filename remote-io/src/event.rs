@@ -92,6 +92,20 @@ pub enum Event {
         /// Whether its time was over; the operator has taken it back otherwise.
         expired: bool,
     },
+    /// After a restart: stations recall whom this remote I/O had excluded.
+    RecalledExclusion {
+        /// In this cycle.
+        moment: Moment,
+        /// They stay excluded until the operator releases them.
+        stations: StationSet,
+    },
+    /// The diagnosis finds other channels failed than before.
+    Diagnosed {
+        /// From this cycle.
+        moment: Moment,
+        /// Their statuses, as bits of u(i).
+        failed: Image,
+    },
     /// A station was silent for too long: θ = 1.
     Flagged {
         /// In this cycle.

@@ -4,6 +4,7 @@
 //! agreement among the others is needed to mask a failure, and no two masters can drive one actuator.
 
 mod channel;
+mod diagnosis;
 mod event;
 mod foresight;
 mod history;
@@ -15,6 +16,7 @@ mod votes;
 mod witnesses;
 
 pub use channel::Channel;
+pub use diagnosis::Diagnosis;
 pub use event::{Event, Missing};
 pub use foresight::Foreseen;
 pub use remote_io::RemoteIo;

@@ -24,11 +24,11 @@ use std::sync::Arc;
 
 use understudy_wire::{
     Admission, Applied, Arrival, Attendance, Body, Change, Copies, CycleClock, Frame, Header,
-    Holding, Image, Input, Machine, Moment, Output, Party, ProgramId, Reception, StationId,
-    StationSet, Time,
+    Holding, Image, Input, Machine, Moment, Output, Party, ProgramId, Recalled, Reception,
+    StationId, StationSet, Time,
 };
 
-use crate::channel;
+use crate::diagnosis::Diagnosing;
 use crate::event::{Event, Missing};
 use crate::history::History;
 use crate::selection::Selection;
@@ -47,7 +47,17 @@ pub struct RemoteIo {
     attendance: Attendance,
     witnesses: Witnesses,
     phase: Phase,
+    /// What the sensors show.
+    sensors: Image,
+    /// What the program sees of it, as of the last sample.
     field: Image,
+    diagnosing: Diagnosing,
+    /// Statuses that the diagnosis found to be 1 in the last scan.
+    diagnosed: Image,
+    /// Whether it has lost its memory, so that stations know more of its past than it does.
+    forgetful: bool,
+    /// Whether the operator has released everybody meanwhile.
+    pardons: bool,
     /// The sensors cannot be seen: there is no u(i), and the program stands still.
     field_lost: bool,
     forcing: Forcing,
@@ -115,7 +125,12 @@ impl RemoteIo {
                 agreement.flag_after,
             ),
             phase: Phase::LISTENING,
+            sensors: Image::zero(settings.inputs),
             field: Image::zero(settings.inputs),
+            diagnosing: Diagnosing::new(settings.diagnosis.as_deref()),
+            diagnosed: Image::zero(settings.inputs),
+            forgetful: true,
+            pardons: false,
             field_lost: false,
             forcing: Forcing::default(),
             released: true,
@@ -173,19 +188,21 @@ impl RemoteIo {
         }
         match &frame.body {
             Body::Turn(turn) if self.attendance.heard(station) => {
-                self.note(station, &turn.holdings);
+                self.note(station, &turn.holdings, &turn.recalled);
                 self.turns[station.index()] = Some(Arc::clone(frame));
             }
-            Body::Join(join) => self.note(station, &join.holdings),
+            Body::Join(join) => self.note(station, &join.holdings, &join.recalled),
             _ => {}
         }
     }
 
-    fn note(&mut self, station: StationId, holdings: &[Holding]) {
-        let own = holdings
-            .iter()
-            .find(|holding| holding.program == self.settings.program);
-        self.witnesses.note(station, own);
+    fn note(&mut self, station: StationId, holdings: &[Holding], recalled: &[Recalled]) {
+        let program = self.settings.program;
+        let own = holdings.iter().find(|holding| holding.program == program);
+        let recalled = recalled.iter().find(|recalled| {
+            recalled.program == program && recalled.inputs.width() == self.settings.inputs
+        });
+        self.witnesses.note(station, own, recalled);
         if let (Phase::Running { history, .. }, Some(holding)) = (&mut self.phase, own)
             && let Some(place) = history.place(holding.lineage)
         {
@@ -285,7 +302,12 @@ impl Hash for RemoteIo {
             attendance,
             witnesses,
             phase,
+            sensors,
             field,
+            diagnosing,
+            diagnosed,
+            forgetful,
+            pardons,
             field_lost,
             forcing,
             released,
@@ -306,6 +328,7 @@ impl Hash for RemoteIo {
             reception, clock, attendance, witnesses, phase, field, field_lost, forcing,
         )
             .hash(hasher);
+        (sensors, diagnosing, diagnosed, forgetful, pardons).hash(hasher);
         (released, turns, decided, idle, missed, applied).hash(hasher);
         (asked, stalled, last_true, trust, differed, copies).hash(hasher);
     }
@@ -322,7 +345,7 @@ impl Machine for RemoteIo {
             Input::Frame(frame) => self.receive(now, frame),
             Input::Field(sensors) => {
                 if sensors.width() == self.settings.inputs {
-                    self.field = channel::seen(&self.settings.channels, &self.field, sensors);
+                    self.sensors = sensors.clone();
                     self.field_lost = false;
                 }
             }
@@ -336,6 +359,8 @@ impl Machine for RemoteIo {
             Input::Force(force) => self.force(now, force),
             Input::Unforce(signal) => self.unforce(signal),
             Input::Release => {
+                self.pardons |= self.forgetful;
+                self.diagnosing.release();
                 if !self.released || !self.trust.is_complete() {
                     self.released = true;
                     self.trust.release();

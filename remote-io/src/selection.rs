@@ -277,6 +277,7 @@ mod tests {
                 heard: StationSet::EMPTY,
                 holdings: holdings.iter().copied().collect(),
                 words: words.iter().cloned().collect(),
+                recalled: Vec::new(),
             }),
         })
     }

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use understudy_wire::{Agreement, Image, ProgramHash, ProgramId};
 
 use crate::channel::Channel;
+use crate::diagnosis::Diagnosis;
 
 /// A remote I/O's own settings.
 #[derive(Debug, Clone)]
@@ -20,6 +21,8 @@ pub struct Settings {
     pub inputs: usize,
     /// Inputs whose channels say when they are failed.
     pub channels: Vec<Channel>,
+    /// What finds failed channels that do not say so.
+    pub diagnosis: Option<Arc<Diagnosis>>,
     /// Cycles for which the last true outputs are kept when nothing true is there.
     pub hold_cycles: u32,
     /// y(i) after that; its width is that of the outputs.

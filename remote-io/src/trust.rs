@@ -13,7 +13,7 @@ use understudy_wire::StationSet;
 
 use crate::votes::{Finding, Vote, find};
 
-/// Kept from cycle to cycle; a remote I/O that restarts trusts everybody again.
+/// Kept from cycle to cycle. Stations recall the excluded for a remote I/O that restarts; whom it has only accused, it accuses again.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub(crate) struct Trust {
     excluded: StationSet,

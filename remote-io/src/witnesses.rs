@@ -2,7 +2,7 @@
 //!
 //! Living means heard in the last few cycles, speaking or asking to join.
 
-use understudy_wire::{Holding, ProgramId, StationId, StationSet};
+use understudy_wire::{Holding, Image, ProgramId, Recalled, StationId, StationSet};
 
 /// One entry for each station that can hold the program's state.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -15,6 +15,8 @@ pub(crate) struct Witnesses {
 struct Witness {
     station: StationId,
     holding: Option<Holding>,
+    /// What it recalls of this remote I/O's last sample.
+    recalled: Option<Recalled>,
     /// Cycles since it was heard; `u32::MAX` for never.
     silent: u32,
 }
@@ -35,6 +37,7 @@ impl Witnesses {
             .map(|station| Witness {
                 station,
                 holding: None,
+                recalled: None,
                 silent: u32::MAX,
             })
             .collect();
@@ -44,14 +47,22 @@ impl Witnesses {
         }
     }
 
-    /// A station has said what it holds of this program.
-    pub(crate) fn note(&mut self, station: StationId, holding: Option<&Holding>) {
+    /// A station has said what it holds of this program, and what it recalls of its last sample.
+    pub(crate) fn note(
+        &mut self,
+        station: StationId,
+        holding: Option<&Holding>,
+        recalled: Option<&Recalled>,
+    ) {
         if let Some(entry) = self
             .entries
             .iter_mut()
             .find(|entry| entry.station == station)
         {
             entry.holding = holding.copied();
+            if recalled.is_some() {
+                entry.recalled = recalled.cloned();
+            }
             entry.silent = 0;
         }
     }
@@ -71,6 +82,19 @@ impl Witnesses {
     /// Whether all who could hold the state live.
     pub(crate) fn everybody(&self) -> bool {
         self.entries.iter().all(|entry| self.lives(entry))
+    }
+
+    /// Whom this remote I/O had excluded, as any living station recalls it.
+    pub(crate) fn excluded(&self) -> StationSet {
+        let living = self.entries.iter().filter(|entry| self.lives(entry));
+        let recalled = living.filter_map(|entry| entry.recalled.as_ref());
+        recalled.fold(StationSet::EMPTY, |all, one| all.or(one.excluded))
+    }
+
+    /// u(i) of the last sample, as `station` recalls it.
+    pub(crate) fn inputs(&self, station: StationId) -> Option<&Image> {
+        let entry = self.entries.iter().find(|entry| entry.station == station)?;
+        entry.recalled.as_ref().map(|recalled| &recalled.inputs)
     }
 
     /// What the living hold.

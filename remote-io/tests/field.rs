@@ -73,6 +73,7 @@ impl Bench {
         let join = Join {
             wants: ProgramSet::first(1),
             holdings: Default::default(),
+            recalled: Vec::new(),
         };
         for body in [Body::Sync, Body::Join(join)] {
             let frame = Arc::new(Frame { header, body });
@@ -104,6 +105,7 @@ fn settings() -> Settings {
         hash: ProgramHash(9),
         inputs: 2,
         channels: Vec::new(),
+        diagnosis: None,
         hold_cycles: 2,
         fail_safe: Image::zero(1),
         release: Release::Automatic,

@@ -44,6 +44,7 @@ fn run(held: [Held; 3], release: Release, released_at: u64, cycles: u64) -> Vec<
             hash: ProgramHash(1),
             inputs: 1,
             channels: Vec::new(),
+            diagnosis: None,
             hold_cycles: 3,
             fail_safe: Image::zero(1),
             release,
@@ -72,6 +73,7 @@ fn run(held: [Held; 3], release: Release, released_at: u64, cycles: u64) -> Vec<
                 body: Body::Join(Join {
                     wants: ProgramSet::EMPTY,
                     holdings: holdings.into_iter().collect(),
+                    recalled: Vec::new(),
                 }),
             });
             remote_io.handle_input(start, Input::Frame(&frame));

@@ -140,6 +140,8 @@ pub fn moment(event: &Happening) -> Option<Moment> {
             | RemoteIo::Applied { moment, .. }
             | RemoteIo::AdoptedLineage { moment, .. }
             | RemoteIo::Voided { moment, .. }
+            | RemoteIo::RecalledExclusion { moment, .. }
+            | RemoteIo::Diagnosed { moment, .. }
             | RemoteIo::Released { moment }
             | RemoteIo::Forced { moment, .. }
             | RemoteIo::Unforced { moment, .. }

@@ -47,6 +47,7 @@ fn turn() -> (Frame, Vec<u8>) {
             heard: StationSet::first(3),
             holdings: smallvec![holding],
             words: smallvec![word],
+            recalled: Vec::new(),
         }),
     };
     let mut bytes = Vec::new();

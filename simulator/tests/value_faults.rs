@@ -216,6 +216,49 @@ fn two_understudies_locate_a_flipped_state_and_exclude_its_station() {
     }
 }
 
+/// The stations recall for a remote I/O that restarts whom it had excluded.
+#[test]
+fn who_is_excluded_stays_so_when_the_remote_io_restarts() {
+    for (program, rank, action) in state_flips(2) {
+        let remote_io = Party::RemoteIo(ProgramId(program as u8));
+        let outcome = run(
+            2,
+            ValueFault::Hold,
+            &[
+                (AT, 0.8, station(rank), action),
+                (AT + 10, 0.3, remote_io, Action::Crash),
+                (AT + 12, 0.3, remote_io, Action::Restart),
+            ],
+        );
+        let what = format!("{action:?} in station {rank}");
+        assert_eq!(outcome.violations, [], "{what}");
+        let wrong = StationSet::only(StationId(rank as u8));
+        let accused = (ProgramId(program as u8), AT + 1, wrong, true);
+        assert_eq!(outcome.accusations, [accused], "{what}");
+        let mut simulation = outcome.simulation;
+        let readmitted = |simulation: &mut Simulation, cycles| {
+            let mut count = 0;
+            let in_step = simulation.run(1, cycles, &mut |_, _, _, record| {
+                let is_back = matches!(
+                    record,
+                    Record::Station(understudy_node::Event::Readmitted { .. })
+                );
+                count += u64::from(is_back);
+            });
+            (in_step.is_ok(), count, simulation.violations().len())
+        };
+        // Nobody waits for an understudy that is excluded.
+        assert_eq!(readmitted(&mut simulation, 50), (rank >= 2, 0, 0), "{what}");
+        simulation.schedule(Fault {
+            at_cycle: 0,
+            phase: 0.0,
+            party: remote_io,
+            action: Action::Release,
+        });
+        assert_eq!(readmitted(&mut simulation, 20), (true, 1, 0), "{what}");
+    }
+}
+
 #[test]
 fn two_understudies_mask_a_flipped_word() {
     for rank in 0..4 {

@@ -3,7 +3,7 @@
 //! ```text
 //! offset  size  what
 //!      0     4  magic "UNDR"
-//!      4     1  version of this layout, 2
+//!      4     1  version of this layout, 3
 //!      5     n  header and body, bincode 2 "standard": little-endian, integers as varints, enums by their index
 //!    5+n     4  CRC-32 (IEEE) of everything before it, little-endian
 //! ```
@@ -13,7 +13,7 @@
 
 use bincode::config::{Configuration, Limit};
 
-use crate::frame::{Body, Frame, Holding, MAXIMUM_HISTORY, Word};
+use crate::frame::{Body, Frame, Holding, MAXIMUM_HISTORY, Recalled, Word};
 use crate::identifier::{MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, Party};
 use crate::set::ProgramSet;
 
@@ -21,7 +21,7 @@ use crate::set::ProgramSet;
 pub const MAXIMUM_FRAME_BYTES: usize = 32 * 1024;
 
 const MAGIC: [u8; 4] = *b"UNDR";
-const VERSION: u8 = 2;
+const VERSION: u8 = 3;
 const PREFIX_BYTES: usize = 5;
 const CHECKSUM_BYTES: usize = 4;
 /// Positions that a plant may show, at most.
@@ -166,6 +166,7 @@ fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
         Body::Turn(turn) => {
             kept(station, "only a station takes turns")?;
             let held = kept_holdings(&turn.holdings)?;
+            kept_recalled(&turn.recalled)?;
             kept(
                 turn.words.len() <= MAXIMUM_PROGRAMS + 1,
                 "a turn has at most 65 words",
@@ -179,6 +180,7 @@ fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
         }
         Body::Join(join) => {
             kept(station, "only a station joins")?;
+            kept_recalled(&join.recalled)?;
             kept_holdings(&join.holdings).map(|_| ())
         }
         Body::Transfer(transfer) => {
@@ -203,6 +205,17 @@ fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
             matches!(sender, Party::RemoteIo(_)),
             "only a remote I/O drives",
         ),
+    }
+}
+
+fn kept_recalled(recalled: &[Recalled]) -> Result<(), FrameError> {
+    let programs: ProgramSet = recalled.iter().map(|one| one.program).collect();
+    if programs.len() == recalled.len() {
+        Ok(())
+    } else {
+        Err(FrameError::Promise(
+            "a program is recalled once, with an index below 64",
+        ))
     }
 }
 

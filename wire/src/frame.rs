@@ -118,6 +118,8 @@ pub struct Turn {
     pub holdings: SmallVec<[Holding; 2]>,
     /// Its outputs of this cycle; members are among `holdings`, and stepped with this cycle's sample.
     pub words: SmallVec<[Word; 2]>,
+    /// Of programs whose remote I/Os have said nothing in this cycle; one for each at most.
+    pub recalled: Vec<Recalled>,
 }
 
 /// A copy of a program's state that a station has.
@@ -151,6 +153,20 @@ pub struct Join {
     pub wants: ProgramSet,
     /// What it has.
     pub holdings: SmallVec<[Holding; 2]>,
+    /// As in a [`Turn`].
+    pub recalled: Vec<Recalled>,
+}
+
+/// What the newest sample of a program said, from a station that has heard none in this cycle: the program's remote I/O may
+/// have lost its memory, and then takes it up from here.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Recalled {
+    /// Whose sample.
+    pub program: ProgramId,
+    /// Stations that it excluded.
+    pub excluded: StationSet,
+    /// u(i), with the channels that were failed and the values that they kept.
+    pub inputs: Image,
 }
 
 /// x(i), from one who has it to one who asked.

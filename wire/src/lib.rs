@@ -31,8 +31,8 @@ pub use force::{
     SignalPlace,
 };
 pub use frame::{
-    Actuation, Applied, Body, Field, Frame, Header, Holding, Join, MAXIMUM_HISTORY, Sample, Source,
-    Transfer, Turn, Word,
+    Actuation, Applied, Body, Field, Frame, Header, Holding, Join, MAXIMUM_HISTORY, Recalled,
+    Sample, Source, Transfer, Turn, Word,
 };
 pub use identifier::{
     ClusterHash, ConfigurationHash, Cycle, Epoch, MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, Moment,

@@ -5,8 +5,8 @@ use smallvec::smallvec;
 use understudy_wire::{
     Actuation, Applied, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Field, Frame,
     FrameError, Header, Holding, Image, Join, Lineage, MAXIMUM_FRAME_BYTES, Moment, Party,
-    ProgramHash, ProgramId, ProgramSet, Sample, Source, StationId, StationSet, Transfer, Turn,
-    Word, decode, encode,
+    ProgramHash, ProgramId, ProgramSet, Recalled, Sample, Source, StationId, StationSet, Transfer,
+    Turn, Word, decode, encode,
 };
 
 fn moment(epoch: u64, cycle: u64) -> Moment {
@@ -43,6 +43,14 @@ fn holding(program: u8) -> Holding {
     }
 }
 
+fn recalled(program: u8) -> Recalled {
+    Recalled {
+        program: ProgramId(program),
+        excluded: StationSet::from_bits(0b100),
+        inputs: image(4, 0b1010),
+    }
+}
+
 /// One frame of every kind.
 fn every_kind() -> Vec<(&'static str, Frame)> {
     let station = Party::Station(StationId(2));
@@ -69,10 +77,12 @@ fn every_kind() -> Vec<(&'static str, Frame)> {
             members: ProgramSet::from_bits(0b11),
             sum: image(5, 0b10101),
         }],
+        recalled: vec![recalled(0)],
     };
     let join = Join {
         wants: ProgramSet::from_bits(0b01),
         holdings: smallvec![holding(1)],
+        recalled: vec![recalled(0), recalled(1)],
     };
     let transfer = Transfer {
         to: StationId(0),
@@ -190,10 +200,17 @@ fn a_frame_that_breaks_a_promise_never_leaves() {
         heard: StationSet::EMPTY,
         holdings: programs.iter().map(|&program| holding(program)).collect(),
         words: smallvec![word(members)],
+        recalled: Vec::new(),
     };
     check_refused(station, Body::Turn(turn(0, &[0])));
     check_refused(station, Body::Turn(turn(0b10, &[0])));
     check_refused(station, Body::Turn(turn(0b1, &[0, 0])));
+    let twice = Join {
+        wants: ProgramSet::EMPTY,
+        holdings: smallvec![],
+        recalled: vec![recalled(1), recalled(1)],
+    };
+    check_refused(station, Body::Join(twice));
 }
 
 #[test]

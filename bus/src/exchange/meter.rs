@@ -152,6 +152,7 @@ mod tests {
                         heard: StationSet::EMPTY,
                         holdings: [].into_iter().collect(),
                         words: [].into_iter().collect(),
+                        recalled: Vec::new(),
                     })
                 }),
             };

@@ -179,6 +179,7 @@ fn turn(own: StationId) -> Body {
         }]
         .into_iter()
         .collect(),
+        recalled: Vec::new(),
     })
 }
 

@@ -30,14 +30,18 @@ fn transfer_bytes(registers: usize) -> usize {
     FRAME_BYTES + image_bytes(registers)
 }
 
-/// The turn of an understudy: a word for each program that is silent, one for the rest, and all that it holds.
-fn turn_bytes(programs: usize, widest_outputs: usize) -> usize {
-    FRAME_BYTES + (programs + 1) * image_bytes(widest_outputs) + programs * HOLDING_BYTES
+/// The turn of an understudy: a word for each program that is silent, one for the rest, all that it holds, and the last inputs of
+/// each program where every remote I/O is silent.
+fn turn_bytes(programs: usize, widest_inputs: usize, widest_outputs: usize) -> usize {
+    let recalled = image_bytes(widest_inputs) + 2 * INTEGER_BYTES;
+    FRAME_BYTES
+        + (programs + 1) * image_bytes(widest_outputs)
+        + programs * (HOLDING_BYTES + recalled)
 }
 
 /// Reports every program whose samples, state or turn could be longer than a frame.
 pub(crate) fn check(members: &[Member], history: u32, diagnostics: &mut Vec<Diagnostic>) {
-    let mut widest = 0;
+    let (mut widest, mut widest_inputs) = (0, 0);
     for member in members {
         let Some((_, circuit)) = &member.lowered else {
             continue;
@@ -46,6 +50,7 @@ pub(crate) fn check(members: &[Member], history: u32, diagnostics: &mut Vec<Diag
         let registers = circuit.registers().len();
         let outputs = circuit.outputs().len();
         widest = widest.max(outputs);
+        widest_inputs = widest_inputs.max(inputs);
         if let Some(message) = too_wide(&member.name, circuit) {
             let span = member.section.span.clone();
             diagnostics.push(Diagnostic::error("U0213", message, span));
@@ -72,10 +77,10 @@ pub(crate) fn check(members: &[Member], history: u32, diagnostics: &mut Vec<Diag
             "divide the program: memory, timers and counters are state bits",
         );
     }
-    let bytes = turn_bytes(members.len(), widest);
+    let bytes = turn_bytes(members.len(), widest_inputs, widest);
     if bytes > MAXIMUM_FRAME_BYTES {
         let message = format!(
-            "{} programs of up to {widest} outputs: a turn of the understudy takes up to {bytes} bytes, and a frame {MAXIMUM_FRAME_BYTES}",
+            "{} programs of up to {widest_inputs} inputs and {widest} outputs: a turn of the understudy takes up to {bytes} bytes, and a frame {MAXIMUM_FRAME_BYTES}",
             members.len()
         );
         diagnostics.push(Diagnostic::error("U0213", message, 0..0));
@@ -101,7 +106,7 @@ mod tests {
     use understudy_wire::{
         Applied, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header,
         Holding, Image, Lineage, MAXIMUM_HISTORY, Moment, Party, ProgramHash, ProgramId,
-        ProgramSet, Sample, Source, StationId, StationSet, Transfer, Turn, Word, encode,
+        ProgramSet, Recalled, Sample, Source, StationId, StationSet, Transfer, Turn, Word, encode,
     };
 
     use super::*;
@@ -169,6 +174,11 @@ mod tests {
                     stepped: LATE,
                     digest: Digest(u64::MAX),
                 };
+                let recalled = |program| Recalled {
+                    program: ProgramId(program),
+                    excluded: StationSet::from_bits(u64::MAX),
+                    inputs: ones(bits),
+                };
                 let word = Word {
                     members: ProgramSet::first(programs),
                     sum: ones(bits),
@@ -177,8 +187,9 @@ mod tests {
                     heard: StationSet::first(64),
                     holdings: (0..programs as u8).map(holding).collect(),
                     words: std::iter::repeat_n(word, programs + 1).collect(),
+                    recalled: (0..programs as u8).map(recalled).collect(),
                 };
-                check_body(station, Body::Turn(turn), turn_bytes(programs, bits));
+                check_body(station, Body::Turn(turn), turn_bytes(programs, bits, bits));
             }
         }
         let widest = MAXIMUM_IMAGE_BITS;

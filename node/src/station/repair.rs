@@ -15,6 +15,7 @@ impl Station {
             return;
         }
         self.cycle.joiners.insert(station);
+        self.is_told(&join.recalled);
         for program in join.wants.iter() {
             if self.cycle.others_have.contains(program) && self.own().0 != program.0 {
                 continue;
@@ -71,7 +72,12 @@ impl Station {
         }
         if !wants.is_empty() || !self.speaks() {
             let holdings = self.holdings();
-            self.send(Body::Join(Join { wants, holdings }));
+            let recalled = self.recalled(moment);
+            self.send(Body::Join(Join {
+                wants,
+                holdings,
+                recalled,
+            }));
         }
     }
 

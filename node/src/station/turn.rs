@@ -32,6 +32,7 @@ impl Station {
                 self.cycle.others_have = self.cycle.others_have.or(word.members);
             }
         }
+        self.is_told(&turn.recalled);
         self.compare(station, &turn.holdings);
     }
 
@@ -143,6 +144,7 @@ impl Station {
             heard: self.attendance.spoke(),
             holdings: self.holdings(),
             words,
+            recalled: self.recalled(moment),
         };
         self.send_cyclic(now, Body::Turn(turn));
     }

@@ -2,12 +2,15 @@
 
 use std::sync::Arc;
 
-use understudy_wire::{Body, Moment, Output, Sample, Time};
+use understudy_wire::{Body, Moment, Output, Sample, Source, StationId, Time};
 
 use super::{Phase, RemoteIo};
+use crate::channel;
+use crate::diagnosis::Sight;
 use crate::event::Event;
 use crate::history::History;
 use crate::settings::Release;
+use crate::trust::Trust;
 
 impl RemoteIo {
     /// Listens until it is known who holds which state; notices when nobody is on this history any more.
@@ -78,11 +81,57 @@ impl RemoteIo {
                 History::genesis(self.settings.hash, moment, capacity)
             }
         };
+        self.remember(moment, newest.map(|(station, _)| station));
         self.phase = Phase::Running {
             history,
             sampled: false,
             unfollowed: 0,
         };
+    }
+
+    /// After a restart: takes up from what the stations recall.
+    fn remember(&mut self, moment: Moment, from: Option<StationId>) {
+        if !std::mem::take(&mut self.forgetful) {
+            return;
+        }
+        if let Some(inputs) = from.and_then(|station| self.witnesses.inputs(station)) {
+            self.diagnosing.recall(inputs);
+            self.field = inputs.clone();
+        }
+        let stations = self.witnesses.excluded();
+        if !self.pardons && !stations.is_empty() {
+            self.trust = Trust::excluding(stations);
+            self.report(Event::RecalledExclusion { moment, stations });
+        }
+    }
+
+    /// What the program sees from now on, by what the sensors show and what the diagnosis finds of it.
+    fn see(&mut self, moment: Moment) {
+        let mut shown = self.sensors.clone();
+        let mut unsteady = None;
+        if let Some(diagnosis) = &self.settings.diagnosis {
+            let applied = self.applied.as_ref();
+            let outputs = applied.map_or(&self.settings.fail_safe, |applied| &applied.outputs);
+            let sight = Sight {
+                sensors: &self.sensors,
+                driven: &self.forcing.outputs(outputs),
+                is_true: applied.is_some_and(|applied| {
+                    matches!(applied.source, Source::Direct | Source::Reconstructed)
+                }),
+            };
+            let found = self.diagnosing.scan(diagnosis, sight);
+            for status in (0..shown.width()).filter(|&place| found.failed.get(place)) {
+                shown.set(status, true);
+            }
+            unsteady = Some(found.unsteady);
+            if self.diagnosed != found.failed {
+                self.diagnosed = found.failed.clone();
+                let failed = found.failed;
+                self.report(Event::Diagnosed { moment, failed });
+            }
+        }
+        let channels = &self.settings.channels;
+        self.field = channel::seen(channels, &self.field, &shown, unsteady.as_ref());
     }
 
     /// Takes u(i)(t) and says it. Where it is not known nothing is said, so that nobody steps the program: it goes on from
@@ -92,6 +141,9 @@ impl RemoteIo {
             return;
         }
         let moment = self.moment();
+        if matches!(self.phase, Phase::Running { .. }) {
+            self.see(moment);
+        }
         let inputs = self.forcing.inputs(&self.field);
         let Phase::Running {
             history, sampled, ..

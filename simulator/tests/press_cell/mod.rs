@@ -64,6 +64,7 @@ pub(crate) fn line(programs: usize, mode: Mode, understudies: usize) -> Parts {
                 hash: program.hash,
                 inputs: program.scan.input_count(),
                 channels: Vec::new(),
+                diagnosis: None,
                 hold_cycles: HOLD_CYCLES,
                 fail_safe: Image::zero(program.scan.output_count()),
                 release: understudy_remote_io::Release::Automatic,
