@@ -1,1 +1,47 @@
 //! What a person asks of a run, live or finished, folded from its journal.
+//!
+//! ```text
+//!   journal ──► Source ──► Model::note(record) ──┬─► Snapshot: who works, margin of survival, alarms
+//!   (files that grow, or a channel)              ├─► events, trends, bands
+//!                                                ├─► History: x(i), u(i) of each cycle ──► why, power flow
+//!                                                └─► diff of two runs
+//! ```
+//!
+//! A reader of files only: no party knows that it is looked at. Memory is bounded ([`Bounds`]); what is older is forgotten.
+//! Cycles are counted from the origin of the run, as its report counts them; those before it are negative.
+
+mod alarm;
+mod cycles;
+mod describe;
+mod diff;
+mod error;
+mod event;
+mod history;
+mod margin;
+mod model;
+mod run;
+mod series;
+mod snapshot;
+mod source;
+mod station;
+mod timeline;
+mod timing;
+
+pub use alarm::Alarm;
+pub use describe::{Description, describe};
+pub use diff::{Difference, Differing, RunDiff, diff};
+pub use error::ViewError;
+pub use event::{Event, Level};
+pub use history::{Driven, History, Sampled, Step};
+pub use margin::{Holders, Loss, Margin, Outcome};
+pub use model::{Bounds, Model, Spoken};
+pub use run::{Run, find_run};
+pub use series::Series;
+pub use snapshot::{
+    MarginSnapshot, OutcomeSnapshot, ProgramSnapshot, RunState, Snapshot, StationSnapshot,
+    TimingSnapshot,
+};
+pub use source::{Feed, Source, Trouble};
+pub use station::StationState;
+pub use timeline::{Span, Timeline};
+pub use timing::CycleTiming;

@@ -1,0 +1,228 @@
+//! What one program did, cycle by cycle, made again from the samples of its remote I/O.
+//!
+//! The [`Referee`] of the simulator runs the program; what it adopts and voids is what the remote I/O adopted and voided. A step keeps
+//! x(t), u(t) and the lineages before and after, so that a scan can be looked at as its station evaluated it.
+
+use std::collections::VecDeque;
+
+use understudy_cluster::Cluster;
+use understudy_remote_io::{Event, Missing};
+use understudy_simulator::{Referee, Violation};
+use understudy_wire::{Image, Lineage, Moment, ProgramId, Source, StationId, StationSet};
+
+/// A sample, and what it did to the program.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Sampled {
+    /// u(t).
+    pub inputs: Image,
+    /// L(t).
+    pub before: Lineage,
+    /// x(t).
+    pub state: Image,
+    /// L(t+1).
+    pub after: Lineage,
+    /// h(x(t), u(t)).
+    pub outputs: Image,
+}
+
+/// What was driven at a deadline.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Driven {
+    /// y(i).
+    pub outputs: Image,
+    /// Where it came from.
+    pub source: Source,
+    /// Whose word restored it.
+    pub word_of: Option<StationId>,
+    /// Why nothing true was there.
+    pub missing: Option<Missing>,
+    /// Who was heard.
+    pub heard: StationSet,
+}
+
+/// One cycle of one program.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Step {
+    /// From the origin of the run.
+    pub cycle: i64,
+    /// As the cluster counts it.
+    pub moment: Moment,
+    /// Nothing where no sample was taken, or where the state before it is not known.
+    pub sampled: Option<Sampled>,
+    /// Nothing while its deadline is ahead, or where the remote I/O died before it.
+    pub driven: Option<Driven>,
+    /// Whether nobody heard the sample, so that the program went on without it.
+    pub void: bool,
+}
+
+/// The last cycles of one program.
+#[derive(Debug, Clone)]
+pub struct History {
+    program: ProgramId,
+    referee: Referee,
+    steps: VecDeque<Step>,
+    most: usize,
+    /// Whether steps have gone, or were never seen.
+    cut: bool,
+}
+
+impl History {
+    /// Of a program of a cluster; nothing where it has no such program.
+    pub(crate) fn new(cluster: &Cluster, program: ProgramId, most: usize) -> Option<Self> {
+        let settings = cluster.remote_io_settings(program)?;
+        let scan = cluster.programs().get(program.index())?.scan.clone();
+        Some(Self {
+            program,
+            referee: Referee::new(&settings, scan),
+            steps: VecDeque::new(),
+            most: most.max(2),
+            cut: false,
+        })
+    }
+
+    /// Whose.
+    pub fn program(&self) -> ProgramId {
+        self.program
+    }
+
+    /// Oldest first.
+    pub fn steps(&self) -> &VecDeque<Step> {
+        &self.steps
+    }
+
+    /// Whether there were older cycles.
+    pub fn is_cut(&self) -> bool {
+        self.cut
+    }
+
+    /// The step of a cycle; the last one where a cycle was told of twice.
+    pub fn at(&self, cycle: i64) -> Option<&Step> {
+        self.place_of(cycle).map(|place| &self.steps[place])
+    }
+
+    pub(crate) fn place_of(&self, cycle: i64) -> Option<usize> {
+        // Nearly in order: only an epoch that is given up can count back.
+        self.steps.iter().rposition(|step| step.cycle == cycle)
+    }
+
+    /// The place of the step that led to the state in which the step at `place` began.
+    pub(crate) fn before(&self, place: usize) -> Option<usize> {
+        let before = self.steps.get(place)?.sampled.as_ref()?.before;
+        (0..place).rev().find(|&earlier| {
+            self.steps[earlier]
+                .sampled
+                .as_ref()
+                .is_some_and(|sampled| sampled.after == before)
+        })
+    }
+
+    /// h(x(t), u(t)) of a moment, where it is among the newest.
+    pub(crate) fn truth_of(&self, moment: Moment) -> Option<&Image> {
+        let newest = self.steps.iter().rev().take(NEWEST);
+        let mut of_moment = newest.filter(|step| step.moment == moment && !step.void);
+        Some(&of_moment.find_map(|step| step.sampled.as_ref())?.outputs)
+    }
+
+    /// What its plant shows.
+    pub(crate) fn saw(&mut self, sensors: &Image) {
+        self.referee.saw(sensors);
+    }
+
+    /// A report of its remote I/O, of a cycle; the wrong thing that it is, if it is one.
+    pub(crate) fn note(&mut self, cycle: i64, event: &Event) -> Option<Violation> {
+        let before = match event {
+            Event::Sampled { .. } => {
+                let standing = self.referee.standing();
+                standing.map(|(lineage, state)| (lineage, state.clone()))
+            }
+            _ => None,
+        };
+        if let Event::Voided { samples, .. } = event {
+            let sampled = self.steps.iter_mut().rev();
+            let sampled = sampled.filter(|step| step.sampled.is_some() && !step.void);
+            sampled.take(*samples).for_each(|step| step.void = true);
+        }
+        let violation = self.referee.observe(event).err();
+        match event {
+            Event::Sampled { moment, inputs } => {
+                let sampled = before.and_then(|(before, state)| {
+                    let (_, outputs) = self.referee.truth().filter(|(of, _)| of == moment)?;
+                    Some(Sampled {
+                        inputs: inputs.clone(),
+                        before,
+                        state,
+                        after: before.after(inputs),
+                        outputs: outputs.clone(),
+                    })
+                });
+                self.push(Step {
+                    cycle,
+                    moment: *moment,
+                    sampled,
+                    driven: None,
+                    void: false,
+                });
+            }
+            Event::Applied {
+                moment,
+                outputs,
+                source,
+                word_of,
+                missing,
+                heard,
+                ..
+            } => {
+                let driven = Driven {
+                    outputs: outputs.clone(),
+                    source: *source,
+                    word_of: *word_of,
+                    missing: *missing,
+                    heard: *heard,
+                };
+                match self.steps.back_mut() {
+                    Some(last) if last.moment == *moment && last.driven.is_none() => {
+                        last.cycle = cycle;
+                        last.driven = Some(driven);
+                    }
+                    _ => self.push(Step {
+                        cycle,
+                        moment: *moment,
+                        sampled: None,
+                        driven: Some(driven),
+                        void: false,
+                    }),
+                }
+            }
+            _ => {}
+        }
+        violation.filter(|violation| !self.is_of_a_cut_journal(violation))
+    }
+
+    /// What went before the first record of a journal is no violation of what comes after.
+    fn is_of_a_cut_journal(&mut self, violation: &Violation) -> bool {
+        let known = self.steps.iter().any(|step| step.sampled.is_some());
+        let unknown = matches!(
+            violation,
+            Violation::UnknownHistory { .. }
+                | Violation::Wrong { truth: None, .. }
+                | Violation::WronglyHeld { .. }
+        );
+        self.cut |= !known && unknown;
+        !known && unknown
+    }
+
+    fn push(&mut self, step: Step) {
+        if self.steps.len() == self.most {
+            self.steps.pop_front();
+            self.cut = true;
+        }
+        self.steps.push_back(step);
+    }
+
+    pub(crate) fn shift(&mut self, by: i64) {
+        self.steps.iter_mut().for_each(|step| step.cycle += by);
+    }
+}
+
+/// Lines of different parties are so many cycles apart, at most.
+const NEWEST: usize = 64;

@@ -1,0 +1,229 @@
+//! The margin of survival: which further failures would be masked now, and which not.
+//!
+//! Nothing of the rule is said again here. For every failure that could come, the turns are made that would then be heard, with the
+//! words that stations say ([`words_of_controller`], [`words_of_understudy`]), and the remote I/O's own selection is asked
+//! ([`Foreseen`]). What is not true now already is no loss of that failure.
+
+use std::sync::Arc;
+
+use understudy_node::{words_of_controller, words_of_understudy};
+use understudy_remote_io::{Foreseen, Missing};
+use understudy_wire::{
+    Body, ClusterHash, ConfigurationHash, Digest, Frame, Header, Holding, Image, Lineage, Mode,
+    Moment, Party, ProgramId, ProgramSet, StationId, StationSet, Turn, Word,
+};
+
+/// Who is alive, and holds what.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct Holders {
+    /// How many failures are masked.
+    pub mode: Mode,
+    /// The width of y(i), by program; so many controllers.
+    pub widths: Vec<usize>,
+    /// By rank: the programs whose state a station speaks from; none for one that is silent.
+    pub holds: Vec<ProgramSet>,
+    /// By program: whom its remote I/O hears.
+    pub heard: Vec<StationSet>,
+    /// By program: whose state of it its remote I/O has found faulty.
+    pub excluded: Vec<StationSet>,
+    /// Programs that nothing true can be driven of now, whoever speaks: their outputs are not released, their sensors not seen.
+    pub blocked: ProgramSet,
+}
+
+/// What a failure would do.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Outcome {
+    /// Who fails, all at once.
+    pub failed: Vec<Party>,
+    /// The programs whose outputs would be true no more; none where it is masked.
+    pub lost: Vec<Loss>,
+}
+
+/// A program that a failure would take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Loss {
+    /// Which.
+    pub program: ProgramId,
+    /// Why nothing true would be there; nothing where its own remote I/O fails.
+    pub missing: Option<Missing>,
+}
+
+impl Outcome {
+    /// Whether every program that has true outputs now keeps them.
+    pub fn is_masked(&self) -> bool {
+        self.lost.is_empty()
+    }
+}
+
+/// Which further failures would be masked now.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Margin {
+    /// Programs with true outputs now.
+    pub served: ProgramSet,
+    /// Each party alone: the stations that speak by rank, then the remote I/Os of the programs that are served.
+    pub singles: Vec<Outcome>,
+    /// Each pair of stations that speak.
+    pub pairs: Vec<Outcome>,
+    /// Further failures of stations that are masked whichever they are: 0, 1, or 2 and perhaps more.
+    pub survives: u8,
+}
+
+impl Holders {
+    /// The margin. Some thousand selections for a cluster of 64 stations, so it is asked for when somebody has come or gone.
+    pub fn margin(&self) -> Margin {
+        let served = self.served(StationSet::EMPTY);
+        let speaking: Vec<StationId> = (0..)
+            .map(StationId)
+            .zip(&self.holds)
+            .filter(|(_, holds)| !holds.is_empty())
+            .map(|(station, _)| station)
+            .collect();
+        let stations: Vec<Outcome> = speaking
+            .iter()
+            .map(|&station| self.outcome(served, StationSet::only(station)))
+            .collect();
+        let mut pairs = Vec::new();
+        for (place, &first) in speaking.iter().enumerate() {
+            for &second in &speaking[place + 1..] {
+                pairs.push(self.outcome(served, [first, second].into_iter().collect()));
+            }
+        }
+        let all_masked = |outcomes: &[Outcome]| outcomes.iter().all(Outcome::is_masked);
+        let survives = match (all_masked(&stations), all_masked(&pairs)) {
+            _ if served.is_empty() => 0,
+            (false, _) => 0,
+            (true, false) => 1,
+            (true, true) => 2,
+        };
+        let remote_ios = served.iter().map(|program| Outcome {
+            failed: vec![Party::RemoteIo(program)],
+            lost: vec![Loss {
+                program,
+                missing: None,
+            }],
+        });
+        Margin {
+            served,
+            singles: stations.iter().cloned().chain(remote_ios).collect(),
+            pairs,
+            survives,
+        }
+    }
+
+    /// Programs whose outputs would be true if these stations were silent too.
+    pub fn served(&self, failed: StationSet) -> ProgramSet {
+        let sources = self.sources(failed);
+        let served = sources.iter().filter(|(_, source)| source.is_ok());
+        let served: ProgramSet = served.map(|(program, _)| *program).collect();
+        served.without(self.blocked)
+    }
+
+    fn outcome(&self, served: ProgramSet, failed: StationSet) -> Outcome {
+        let sources = self.sources(failed);
+        let lost = sources.into_iter().filter_map(|(program, source)| {
+            let missing = source.err().filter(|_| served.contains(program))?;
+            Some(Loss {
+                program,
+                missing: Some(missing),
+            })
+        });
+        Outcome {
+            failed: failed.iter().map(Party::Station).collect(),
+            lost: lost.collect(),
+        }
+    }
+
+    /// What each remote I/O would find.
+    fn sources(&self, failed: StationSet) -> Vec<(ProgramId, Result<(), Missing>)> {
+        let turns = self.turns(failed);
+        let programs = (0..).map(ProgramId).zip(&self.widths);
+        programs
+            .map(|(program, &width)| {
+                let place = program.index();
+                let heard: Vec<Option<Arc<Frame>>> = (0..)
+                    .map(StationId)
+                    .zip(&turns)
+                    .map(|(station, turn)| {
+                        let turn = turn.as_ref()?;
+                        self.heard[place]
+                            .contains(station)
+                            .then(|| Arc::clone(turn))
+                    })
+                    .collect();
+                let foreseen = Foreseen {
+                    turns: &heard,
+                    controllers: self.widths.len(),
+                    mode: self.mode,
+                };
+                let truth = lineage(program);
+                let source = foreseen.source(program, truth, width, self.excluded[place]);
+                (program, source.map(|_| ()))
+            })
+            .collect()
+    }
+
+    /// What would be said in a cycle in which `failed` are silent.
+    fn turns(&self, failed: StationSet) -> Vec<Option<Arc<Frame>>> {
+        let controllers = self.widths.len();
+        let all = ProgramSet::first(controllers);
+        let outputs: Vec<Image> = self
+            .widths
+            .iter()
+            .map(|&width| Image::zero(width))
+            .collect();
+        let speaks = |station: StationId| {
+            let holds = self.holds[station.index()];
+            (!failed.contains(station) && !holds.is_empty()).then_some(holds)
+        };
+        let spoke: ProgramSet = all
+            .iter()
+            .filter(|program| {
+                speaks(StationId(program.0)).is_some_and(|holds| holds.contains(*program))
+            })
+            .collect();
+        let ranks = (0..self.holds.len()).map(|rank| StationId(rank as u8));
+        ranks
+            .map(|station| {
+                let holds = speaks(station)?;
+                let words = if station.index() < controllers {
+                    let own = ProgramId(station.0);
+                    words_of_controller(own, outputs.get(own.index())?)
+                } else {
+                    words_of_understudy(self.mode, all, holds, spoke, |program| {
+                        outputs.get(program.index())
+                    })
+                };
+                Some(turn(station, holds, words.into_iter().collect()))
+            })
+            .collect()
+    }
+}
+
+/// Every holder of a state is on its one true history: who is not does not speak.
+fn lineage(program: ProgramId) -> Lineage {
+    Lineage(u64::from(program.0) + 1)
+}
+
+fn turn(station: StationId, holds: ProgramSet, words: Vec<Word>) -> Arc<Frame> {
+    let holdings = holds.iter().map(|program| Holding {
+        program,
+        born: Moment::default(),
+        lineage: lineage(program),
+        stepped: Moment::default(),
+        digest: Digest::default(),
+    });
+    Arc::new(Frame {
+        header: Header {
+            cluster: ClusterHash::default(),
+            configuration: ConfigurationHash::default(),
+            moment: Moment::default(),
+            sender: Party::Station(station),
+            alone: false,
+        },
+        body: Body::Turn(Turn {
+            heard: StationSet::EMPTY,
+            holdings: holdings.collect(),
+            words: words.into_iter().collect(),
+        }),
+    })
+}

@@ -1,0 +1,512 @@
+//! The model of a run: everything that views show, folded from its records one by one.
+
+mod programs;
+mod turns;
+
+use std::sync::{Arc, OnceLock};
+
+use understudy_bus::HostEvent;
+use understudy_cluster::Cluster;
+use understudy_ladder::{Evaluation, Observer};
+use understudy_logic::Scratch;
+use understudy_node::Event as StationEvent;
+use understudy_scenarios::{Happening, Parties, Record, RunEvent, moment};
+use understudy_wire::{Moment, Party, ProgramId, StationId};
+
+use crate::alarm::{Alarm, Alarms};
+use crate::cycles::Cycles;
+use crate::describe::{describe, fault_text};
+use crate::error::ViewError;
+use crate::event::{Event, Events, Level};
+use crate::history::History;
+use crate::margin::Holders;
+use crate::series::Series;
+use crate::source::Trouble;
+use crate::station::{StationState, StationTrack};
+use crate::timing::{CycleTiming, Timings};
+
+pub(crate) use programs::ProgramTrack;
+pub use turns::Spoken;
+use turns::Turns;
+
+/// How much of a run is remembered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Bounds {
+    /// Cycles of each program, for states, words and causes.
+    pub cycles: usize,
+    /// Events.
+    pub events: usize,
+    /// Changes of each signal group, for trends.
+    pub changes: usize,
+    /// Times of cycles.
+    pub timings: usize,
+}
+
+impl Default for Bounds {
+    /// Some minutes at 10 ms; some tens of megabytes for a cluster of ten programs.
+    fn default() -> Self {
+        Self {
+            cycles: 8192,
+            events: 10_000,
+            changes: 100_000,
+            timings: 600,
+        }
+    }
+}
+
+/// Everything that is known of a run.
+#[derive(Debug, Clone)]
+pub struct Model {
+    pub(crate) cluster: Arc<Cluster>,
+    pub(crate) parties: Parties,
+    cycles: Cycles,
+    pub(crate) stations: Vec<StationTrack>,
+    pub(crate) programs: Vec<ProgramTrack>,
+    histories: Vec<History>,
+    turns: Turns,
+    series: Series,
+    events: Events,
+    alarms: Alarms,
+    timings: Timings,
+    observers: Vec<OnceLock<Option<Observer>>>,
+    /// The newest cycle of which the stations' states are in the series.
+    closed: Option<i64>,
+    at_ns: u64,
+    records: u64,
+    left_out: u64,
+    pub(crate) finished: bool,
+    pub(crate) interrupted: bool,
+}
+
+impl Model {
+    /// Of a run of which nothing is known yet.
+    pub fn new(cluster: Arc<Cluster>, bounds: Bounds) -> Self {
+        let schedule = &cluster.agreement().schedule;
+        let programs = cluster.controllers().len();
+        let histories = (0..programs as u8)
+            .filter_map(|program| History::new(&cluster, ProgramId(program), bounds.cycles));
+        Self {
+            parties: Parties::of(&cluster),
+            cycles: Cycles::default(),
+            stations: vec![StationTrack::default(); schedule.stations()],
+            programs: vec![ProgramTrack::default(); programs],
+            histories: histories.collect(),
+            turns: Turns::new(bounds.cycles),
+            series: Series::new(programs, schedule.stations(), bounds.changes),
+            events: Events::new(bounds.events),
+            alarms: Alarms::default(),
+            timings: Timings::new(schedule, bounds.timings),
+            observers: vec![OnceLock::new(); programs],
+            closed: None,
+            at_ns: 0,
+            records: 0,
+            left_out: 0,
+            finished: false,
+            interrupted: false,
+            cluster,
+        }
+    }
+
+    /// Takes the next record.
+    pub fn note(&mut self, record: &Record) {
+        self.records += 1;
+        self.at_ns = record.at_ns;
+        match (&record.event, record.party) {
+            (Happening::Station(event), Some(Party::Station(station))) => {
+                self.station(record, station, event);
+            }
+            (Happening::RemoteIo(event), Some(Party::RemoteIo(program))) => {
+                self.remote_io(record, program, event);
+            }
+            (Happening::Plant(event), Some(Party::Plant(program))) => {
+                self.plant(record, program, event);
+            }
+            (Happening::Host(event), Some(party)) => self.host(record, party, event),
+            (Happening::Run(event), _) => self.run(record, event),
+            _ => {}
+        }
+        if let Some(shift) = self.cycles.take_shift() {
+            self.shift(shift);
+        }
+    }
+
+    /// Something stood between the records and this model.
+    pub fn trouble(&mut self, trouble: &Trouble) {
+        self.left_out += match trouble {
+            Trouble::Gone { count } => count.unwrap_or(1),
+            _ => 1,
+        };
+        let event = Event {
+            number: 0,
+            cycle: self.cycles.of(None),
+            at_ns: self.at_ns,
+            name: "journal".to_owned(),
+            event: "left-out",
+            level: Level::Warning,
+            text: trouble.to_string(),
+            cause: None,
+        };
+        self.events.push(event);
+    }
+
+    /// `moment` is cycle `cycle` of the run.
+    pub fn origin_is(&mut self, moment: Moment, cycle: i64) {
+        self.cycles.origin_is(moment, cycle);
+        if let Some(shift) = self.cycles.take_shift() {
+            self.shift(shift);
+        }
+    }
+
+    fn shift(&mut self, by: i64) {
+        self.stations.iter_mut().for_each(|track| track.shift(by));
+        self.programs.iter_mut().for_each(|track| track.since += by);
+        self.histories
+            .iter_mut()
+            .for_each(|history| history.shift(by));
+        self.series.shift(by);
+        self.events.shift(by);
+        self.alarms.shift(by);
+        self.timings.shift(by);
+        self.closed = self.closed.map(|closed| closed + by);
+    }
+
+    // ── what the parties say ────────────────────────────────────────────────────────────────────────────────────────
+
+    fn station(&mut self, record: &Record, station: StationId, event: &StationEvent) {
+        if station.index() >= self.stations.len() {
+            return;
+        }
+        let cycle = self.cycles.of(moment(&record.event));
+        match event {
+            StationEvent::Spoke { moment, words } => {
+                let covers = words.iter().fold(
+                    Default::default(),
+                    |covers: understudy_wire::ProgramSet, word| covers.or(word.members),
+                );
+                self.stations[station.index()].spoke(covers);
+                self.timings.spoke(*moment, record.at_ns);
+                self.turns.spoke(*moment, station, words);
+                self.check_words(*moment);
+                return;
+            }
+            StationEvent::Joins { .. } => self.stations[station.index()].joins(),
+            StationEvent::Adopted { program, from, .. } => {
+                self.stations[station.index()].adopted(*program, from.is_some());
+            }
+            StationEvent::InStep { program, .. } => {
+                self.stations[station.index()].in_step(*program)
+            }
+            StationEvent::Flagged {
+                station: silent, ..
+            } => {
+                if let Some(track) = self.stations.get_mut(silent.index()) {
+                    track.flagged_by_station(station, true);
+                }
+            }
+            StationEvent::Cleared {
+                station: silent, ..
+            } => {
+                if let Some(track) = self.stations.get_mut(silent.index()) {
+                    track.flagged_by_station(station, false);
+                }
+            }
+            StationEvent::Excluded { program, .. } => {
+                self.stations[station.index()].excluded.insert(*program);
+                let text = describe(record, &self.parties).text;
+                self.alarms
+                    .raise((record.name.clone(), "excluded"), cycle, text);
+            }
+            StationEvent::Readmitted { program, .. } => {
+                let track = &mut self.stations[station.index()];
+                track.excluded.remove(*program);
+                if track.excluded.is_empty() {
+                    self.alarms.over(&(record.name.clone(), "excluded"), cycle);
+                }
+            }
+            StationEvent::Refused { party, .. } => self.refused(*party),
+            StationEvent::Paces { .. }
+            | StationEvent::DigestDiffers { .. }
+            | StationEvent::Stalled { .. } => {}
+        }
+        let cause = match event {
+            StationEvent::Flagged { station, .. } => self.cause_of_silence(*station),
+            StationEvent::Joins { .. } => self.cause_of_silence(station),
+            _ => None,
+        };
+        self.happened(record, cycle, cause);
+    }
+
+    fn host(&mut self, record: &Record, party: Party, event: &HostEvent) {
+        let cycle = self.cycles.of(None);
+        match (event, party) {
+            (HostEvent::Ready { .. }, Party::Station(station)) => {
+                if let Some(track) = self.stations.get_mut(station.index()) {
+                    track.ready();
+                }
+            }
+            (HostEvent::FieldLost { reason }, Party::RemoteIo(_)) => {
+                let subject = (record.name.clone(), "field-lost");
+                self.alarms.raise(subject, cycle, reason.clone());
+            }
+            (HostEvent::FieldRegained, Party::RemoteIo(_)) => {
+                self.alarms
+                    .over(&(record.name.clone(), "field-lost"), cycle);
+            }
+            (HostEvent::Exchange(_), _) => return,
+            _ => {}
+        }
+        self.happened(record, cycle, None);
+    }
+
+    fn run(&mut self, record: &Record, event: &RunEvent) {
+        // What is done is felt in the next cycle.
+        let cycle = self.cycles.of(None) + i64::from(self.cycles.latest().is_some());
+        match event {
+            RunEvent::Started {
+                party: Party::Station(station),
+            } => {
+                if let Some(track) = self.stations.get_mut(station.index()) {
+                    let text =
+                        format!("{} is started", self.parties.name(Party::Station(*station)));
+                    track.started();
+                    track.done = Some((text, cycle));
+                }
+            }
+            RunEvent::Fault { action, party, .. } => {
+                let text = fault_text(*action, *party, &self.parties);
+                if let Party::Station(station) = party
+                    && let Some(track) = self.stations.get_mut(station.index())
+                {
+                    track.fault(*action, cycle, text);
+                }
+            }
+            RunEvent::Ended { party, how } => {
+                let name = self.parties.name(*party).to_owned();
+                let text = format!("{name} has ended by itself: {how}");
+                if let Party::Station(station) = party
+                    && let Some(track) = self.stations.get_mut(station.index())
+                {
+                    track.ended(cycle, text.clone());
+                }
+                self.alarms.raise((name, "ended"), cycle, text);
+            }
+            RunEvent::Origin { moment, cycle } => {
+                let cycle = i64::try_from(*cycle).unwrap_or(i64::MAX / 2);
+                self.cycles.origin_is(*moment, cycle);
+            }
+            RunEvent::Interrupted => self.interrupted = true,
+            RunEvent::Finished => self.finished = true,
+            RunEvent::Started { party } => {
+                let name = self.parties.name(*party).to_owned();
+                self.alarms.over(&(name, "ended"), cycle);
+            }
+            RunEvent::Commanded { .. } => {}
+        }
+        self.happened(record, cycle, None);
+    }
+
+    fn refused(&mut self, party: Party) {
+        if let Party::Station(station) = party
+            && let Some(track) = self.stations.get_mut(station.index())
+        {
+            track.refused();
+        }
+    }
+
+    /// A record that is an event.
+    fn happened(&mut self, record: &Record, cycle: i64, cause: Option<String>) {
+        let description = describe(record, &self.parties);
+        self.events.push(Event {
+            number: 0,
+            cycle,
+            at_ns: record.at_ns,
+            name: record.name.clone(),
+            event: description.event,
+            level: description.level,
+            text: description.text,
+            cause,
+        });
+    }
+
+    /// What was last done to a station, in words.
+    fn cause_of_silence(&self, station: StationId) -> Option<String> {
+        let (what, cycle) = self.stations.get(station.index())?.done.as_ref()?;
+        Some(format!("{what} in cycle {cycle}"))
+    }
+
+    // ── what is asked ───────────────────────────────────────────────────────────────────────────────────────────────
+
+    /// What is run.
+    pub fn cluster(&self) -> &Arc<Cluster> {
+        &self.cluster
+    }
+
+    /// Who is who.
+    pub fn parties(&self) -> &Parties {
+        &self.parties
+    }
+
+    /// The newest cycle that was decided, from the origin of the run.
+    pub fn cycle(&self) -> Option<i64> {
+        self.cycles.latest()
+    }
+
+    /// Whether it is known where cycles are counted from.
+    pub fn has_origin(&self) -> bool {
+        self.cycles.has_origin()
+    }
+
+    /// Records taken so far, and those that were left out, at least.
+    pub fn records(&self) -> (u64, u64) {
+        (self.records, self.left_out)
+    }
+
+    /// The time of the newest record.
+    pub fn at_ns(&self) -> u64 {
+        self.at_ns
+    }
+
+    /// The last record of the run was read.
+    pub fn is_finished(&self) -> bool {
+        self.finished
+    }
+
+    /// What a station is now.
+    pub fn station_state(&self, station: StationId) -> Option<StationState> {
+        let track = self.stations.get(station.index())?;
+        Some(track.state(self.cycles.latest(), 1))
+    }
+
+    /// What a program did in its last cycles.
+    pub fn history(&self, program: ProgramId) -> Option<&History> {
+        self.histories.get(program.index())
+    }
+
+    /// The trends.
+    pub fn series(&self) -> &Series {
+        &self.series
+    }
+
+    /// The newest events, oldest first.
+    pub fn events(&self) -> impl DoubleEndedIterator<Item = &Event> {
+        self.events.iter()
+    }
+
+    /// Events so far, the forgotten ones too: the number of the newest.
+    pub fn event_count(&self) -> u64 {
+        self.events.count()
+    }
+
+    /// Alarms, oldest first.
+    pub fn alarms(&self) -> impl DoubleEndedIterator<Item = &Alarm> {
+        self.alarms.iter()
+    }
+
+    /// Somebody has seen an alarm; false where there is none of this number.
+    pub fn acknowledge(&mut self, alarm: u64, by: &str) -> bool {
+        self.alarms.acknowledge(alarm, by)
+    }
+
+    /// Times of the newest cycles, oldest first.
+    pub fn timings(&self) -> impl DoubleEndedIterator<Item = &CycleTiming> {
+        self.timings.iter()
+    }
+
+    /// What the stations said in a cycle of the cluster.
+    pub fn spoken(&self, moment: Moment) -> &[Spoken] {
+        self.turns.of(moment)
+    }
+
+    /// Who is alive, and holds what: what the margin of survival is calculated from.
+    pub fn holders(&self) -> Holders {
+        let latest = self.cycles.latest();
+        let widths = self.cluster.controllers().iter();
+        let holds = self.stations.iter().map(|track| {
+            if track.state(latest, 1) == StationState::Speaking {
+                track.covers.without(track.excluded)
+            } else {
+                Default::default()
+            }
+        });
+        Holders {
+            mode: self.cluster.agreement().mode,
+            widths: widths
+                .map(|controller| controller.circuit.outputs().len())
+                .collect(),
+            holds: holds.collect(),
+            heard: self.programs.iter().map(ProgramTrack::hears).collect(),
+            excluded: self.programs.iter().map(|track| track.excluded).collect(),
+            blocked: (0..)
+                .map(ProgramId)
+                .zip(&self.programs)
+                .filter(|(_, track)| track.is_blocked())
+                .map(|(program, _)| program)
+                .collect(),
+        }
+    }
+
+    /// The scan of a program in a cycle as its station evaluated it: what the power did in every rung.
+    ///
+    /// # Errors
+    /// Where the cycle or the state is not known.
+    pub fn evaluation(&self, program: ProgramId, cycle: i64) -> Result<Evaluation, ViewError> {
+        let history = self.history_of(program)?;
+        let place = history
+            .place_of(cycle)
+            .ok_or_else(|| self.no_cycle(program, cycle))?;
+        self.evaluation_at(history, place)
+    }
+
+    pub(crate) fn evaluation_at(
+        &self,
+        history: &History,
+        place: usize,
+    ) -> Result<Evaluation, ViewError> {
+        let program = history.program();
+        let step = &history.steps()[place];
+        let no_state = |reason: &str| ViewError::NoState {
+            cycle: step.cycle,
+            program: self.program_name(program).to_owned(),
+            reason: reason.to_owned(),
+        };
+        let sampled = step.sampled.as_ref().ok_or_else(|| {
+            no_state(
+                match step.driven.as_ref().and_then(|driven| driven.missing) {
+                    Some(missing) => crate::describe::missing_text(missing),
+                    None => "the journal does not reach back to where its history starts",
+                },
+            )
+        })?;
+        let controller = &self.cluster.controllers()[program.index()];
+        let period = self.cluster.agreement().schedule.period();
+        let observer = self.observers[program.index()]
+            .get_or_init(|| Observer::new(&controller.program, period).ok());
+        let observer = observer
+            .as_ref()
+            .ok_or_else(|| no_state("its ladder cannot be lowered"))?;
+        let mut scratch = Scratch::default();
+        Ok(observer.evaluate(&mut scratch, sampled.state.words(), sampled.inputs.words()))
+    }
+
+    pub(crate) fn history_of(&self, program: ProgramId) -> Result<&History, ViewError> {
+        self.history(program).ok_or_else(|| ViewError::NoName {
+            kind: "program",
+            name: program.0.to_string(),
+            hint: format!("it has {}", self.programs.len()),
+        })
+    }
+
+    pub(crate) fn no_cycle(&self, program: ProgramId, cycle: i64) -> ViewError {
+        let steps = self.history(program).map(History::steps);
+        let ends = steps.and_then(|steps| Some((steps.front()?.cycle, steps.back()?.cycle)));
+        ViewError::NoCycle {
+            cycle,
+            program: self.program_name(program).to_owned(),
+            known: ends.map_or("none".to_owned(), |(from, to)| format!("{from} to {to}")),
+        }
+    }
+
+    pub(crate) fn program_name(&self, program: ProgramId) -> &str {
+        crate::describe::program_name(program, &self.parties)
+    }
+}

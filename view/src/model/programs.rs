@@ -1,0 +1,327 @@
+//! What is driven of each program, and why.
+
+use understudy_plant::Event as PlantEvent;
+use understudy_remote_io::{Event as RemoteIoEvent, Missing};
+use understudy_scenarios::{Record, moment, source_word};
+use understudy_wire::{
+    Field, Force, Image, Moment, Party, ProgramId, SignalPlace, Source, StationId, StationSet,
+};
+
+use super::Model;
+use crate::describe::{describe, missing_text};
+use crate::event::{Event, Level};
+
+/// One program at its remote I/O.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct ProgramTrack {
+    pub(crate) inputs: Option<Image>,
+    pub(crate) outputs: Option<Image>,
+    pub(crate) source: Option<Source>,
+    pub(crate) word_of: Option<StationId>,
+    pub(crate) missing: Option<Missing>,
+    /// Since when its outputs come from there.
+    pub(crate) since: i64,
+    /// Cycles with direct, reconstructed, held and fail-safe outputs.
+    pub(crate) counts: [u64; 4],
+    /// At the last two deadlines: a single frame may be lost.
+    heard: [StationSet; 2],
+    pub(crate) excluded: StationSet,
+    pub(crate) awaits_release: bool,
+    pub(crate) forced: Vec<Force>,
+    pub(crate) plant: Option<Field>,
+    /// Whether it was ever driven by true outputs.
+    served: bool,
+}
+
+impl ProgramTrack {
+    pub(crate) fn hears(&self) -> StationSet {
+        self.heard[0].or(self.heard[1])
+    }
+
+    /// Whether nothing true is driven for a reason that no station can help.
+    pub(crate) fn is_blocked(&self) -> bool {
+        let reasons = [
+            Missing::BadQuality,
+            Missing::NoHistory,
+            Missing::NotReleased,
+            Missing::ValueFault,
+            Missing::TooLate,
+        ];
+        self.missing
+            .is_some_and(|missing| reasons.contains(&missing))
+    }
+}
+
+impl Model {
+    pub(super) fn remote_io(&mut self, record: &Record, program: ProgramId, event: &RemoteIoEvent) {
+        let place = program.index();
+        if place >= self.programs.len() {
+            return;
+        }
+        let cycle = match event {
+            RemoteIoEvent::Applied {
+                moment, missing, ..
+            } => {
+                let idle = *missing == Some(Missing::NoCycle);
+                self.cycles.deadline(program, *moment, idle)
+            }
+            RemoteIoEvent::Sampled { moment, .. } => {
+                self.timings.sampled(*moment, record.at_ns);
+                // The deadline of the cycle before has passed.
+                self.cycles
+                    .of_known(*moment)
+                    .unwrap_or_else(|| self.cycles.of(None) + 1)
+            }
+            _ => self.cycles.of(moment(&record.event)),
+        };
+        if let Some(violation) = self.histories[place].note(cycle, event) {
+            self.violated(record, cycle, &violation.to_string());
+        }
+        match event {
+            RemoteIoEvent::Sampled { moment, .. } => {
+                self.check_words(*moment);
+                return;
+            }
+            RemoteIoEvent::Applied { moment, .. } => {
+                self.applied(record, program, cycle, *moment, event);
+                return;
+            }
+            _ => {}
+        }
+        self.changed(record, program, cycle, event);
+        let cause = match event {
+            RemoteIoEvent::Flagged { station, .. } => self.cause_of_silence(*station),
+            _ => None,
+        };
+        self.happened(record, cycle, cause);
+    }
+
+    /// What changes a program's standing.
+    fn changed(&mut self, record: &Record, program: ProgramId, cycle: i64, event: &RemoteIoEvent) {
+        let track = &mut self.programs[program.index()];
+        let subject = |alarm| (record.name.clone(), alarm);
+        let mut alarm = None;
+        match event {
+            RemoteIoEvent::StartedCold { awaits_release, .. } => {
+                track.awaits_release = *awaits_release;
+                track.excluded = StationSet::EMPTY;
+            }
+            RemoteIoEvent::Released { .. } => {
+                track.awaits_release = false;
+                track.excluded = StationSet::EMPTY;
+                let over = ["value-fault", "disputed"];
+                self.alarms.all_over(&record.name, &over, cycle);
+            }
+            RemoteIoEvent::Disputed { .. } => alarm = Some("disputed"),
+            RemoteIoEvent::ValueFault {
+                accused, located, ..
+            } => {
+                if *located {
+                    track.excluded = track.excluded.or(*accused);
+                }
+                alarm = Some("value-fault");
+            }
+            RemoteIoEvent::AdoptedLineage { .. } => self.alarms.over(&subject("disputed"), cycle),
+            RemoteIoEvent::Flagged { station, .. } | RemoteIoEvent::Cleared { station, .. } => {
+                let flagged = matches!(event, RemoteIoEvent::Flagged { .. });
+                if let Some(silent) = self.stations.get_mut(station.index()) {
+                    silent.flagged_by_remote_io(program, flagged);
+                }
+            }
+            RemoteIoEvent::Refused { party, .. } => self.refused(*party),
+            RemoteIoEvent::Forced { force, .. } => {
+                track.forced.retain(|other| other.signal != force.signal);
+                track.forced.push(force.clone());
+                alarm = Some("forced");
+            }
+            RemoteIoEvent::Unforced { signal, .. } => {
+                track.forced.retain(|other| other.signal != *signal);
+                if track.forced.is_empty() {
+                    self.alarms.over(&subject("forced"), cycle);
+                }
+            }
+            _ => {}
+        }
+        if let Some(alarm) = alarm {
+            let text = describe(record, &self.parties).text;
+            self.alarms.raise(subject(alarm), cycle, text);
+        }
+    }
+
+    fn applied(
+        &mut self,
+        record: &Record,
+        program: ProgramId,
+        cycle: i64,
+        moment: Moment,
+        event: &RemoteIoEvent,
+    ) {
+        let RemoteIoEvent::Applied {
+            sampled,
+            outputs,
+            source,
+            word_of,
+            missing,
+            heard,
+            ..
+        } = event
+        else {
+            return;
+        };
+        self.timings.decided(moment, cycle);
+        self.series
+            .applied(program, cycle, sampled.as_ref(), outputs, *source);
+        for station in heard.iter() {
+            if let Some(track) = self.stations.get_mut(station.index()) {
+                track.heard(cycle);
+            }
+        }
+        self.close_up_to(cycle - 1);
+        let track = &mut self.programs[program.index()];
+        track.counts[*source as usize] += 1;
+        track.heard = [*heard, track.heard[0]];
+        track.word_of = *word_of;
+        track.missing = *missing;
+        track.outputs = Some(outputs.clone());
+        if let Some(inputs) = sampled {
+            track.inputs = Some(inputs.clone());
+        }
+        let before = track.source.replace(*source);
+        let was_served = track.served;
+        track.served |= missing.is_none();
+        let changed = before != Some(*source);
+        if changed {
+            track.since = cycle;
+        }
+        if changed && (was_served || missing.is_none()) {
+            self.source_changed(record, program, cycle, *source);
+        }
+    }
+
+    fn source_changed(&mut self, record: &Record, program: ProgramId, cycle: i64, source: Source) {
+        let track = &self.programs[program.index()];
+        let mut text = format!("its outputs are {}", source_word(source));
+        if let Some(station) = track.word_of {
+            text += &format!(
+                " from a word of {}",
+                self.parties.name(Party::Station(station))
+            );
+        }
+        if let Some(missing) = track.missing {
+            text += &format!(": {}", missing_text(missing));
+        }
+        let level = match source {
+            Source::Direct | Source::Reconstructed => Level::Notice,
+            Source::Held => Level::Warning,
+            Source::FailSafe => Level::Alarm,
+        };
+        let own = StationId(program.0);
+        let cause = match source {
+            Source::Direct => None,
+            _ if !track.heard[0].contains(own) => {
+                let name = self.parties.name(Party::Station(own));
+                let why = self.cause_of_silence(own);
+                Some(match why {
+                    Some(why) => format!("{name} is silent: {why}"),
+                    None => format!("{name} is silent"),
+                })
+            }
+            _ => None,
+        };
+        let subject = (record.name.clone(), "fail-safe");
+        if source == Source::FailSafe {
+            let why = cause.clone().unwrap_or_else(|| text.clone());
+            self.alarms.raise(subject, cycle, why);
+        } else {
+            self.alarms.over(&subject, cycle);
+        }
+        self.events.push(Event {
+            number: 0,
+            cycle,
+            at_ns: record.at_ns,
+            name: record.name.clone(),
+            event: "source",
+            level,
+            text,
+            cause,
+        });
+    }
+
+    /// Something that must never happen.
+    fn violated(&mut self, record: &Record, cycle: i64, what: &str) {
+        self.events.push(Event {
+            number: 0,
+            cycle,
+            at_ns: record.at_ns,
+            name: record.name.clone(),
+            event: "wrong",
+            level: Level::Alarm,
+            text: what.to_owned(),
+            cause: None,
+        });
+        let subject = (record.name.clone(), "wrong");
+        self.alarms.raise(subject, cycle, what.to_owned());
+    }
+
+    pub(super) fn plant(&mut self, record: &Record, program: ProgramId, event: &PlantEvent) {
+        let Some(track) = self.programs.get_mut(program.index()) else {
+            return;
+        };
+        match event {
+            PlantEvent::Stepped { moment, field, .. } => {
+                self.histories[program.index()].saw(&field.sensors);
+                let before = track.plant.as_ref().map_or(0, |plant| plant.mishaps);
+                track.plant = Some(field.clone());
+                if field.mishaps > before {
+                    let cycle = self.cycles.of(Some(*moment));
+                    let text = format!(
+                        "something happened to it that must not: {} so far",
+                        field.mishaps
+                    );
+                    self.alarms
+                        .raise((record.name.clone(), "mishap"), cycle, text.clone());
+                    self.events.push(Event {
+                        number: 0,
+                        cycle,
+                        at_ns: record.at_ns,
+                        name: record.name.clone(),
+                        event: "mishap",
+                        level: Level::Alarm,
+                        text,
+                        cause: None,
+                    });
+                }
+            }
+            PlantEvent::Refused { party, .. } => {
+                self.refused(*party);
+                let cycle = self.cycles.of(None);
+                self.happened(record, cycle, None);
+            }
+        }
+    }
+
+    /// What every station was up to `cycle`, of which all remote I/Os have told but for the slowest.
+    fn close_up_to(&mut self, cycle: i64) {
+        if self.closed.is_some_and(|closed| closed >= cycle) {
+            return;
+        }
+        self.closed = Some(cycle);
+        for (rank, track) in self.stations.iter().enumerate() {
+            self.series
+                .station_was(rank, cycle, track.state(Some(cycle), 0));
+        }
+    }
+
+    /// The name of a signal that is forced.
+    pub(crate) fn signal_name(&self, program: ProgramId, signal: SignalPlace) -> String {
+        let circuit = &self.cluster.controllers()[program.index()].circuit;
+        let name = match signal {
+            SignalPlace::Input(place) => circuit.inputs().get(usize::from(place)).cloned(),
+            SignalPlace::Output(place) => {
+                let output = circuit.outputs().get(usize::from(place));
+                output.map(|output| output.name.clone())
+            }
+        };
+        name.unwrap_or_else(|| "a signal that it has not".to_owned())
+    }
+}

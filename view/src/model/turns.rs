@@ -1,0 +1,125 @@
+//! What the stations said, and whether it is what the samples lead to.
+
+use std::collections::{BTreeSet, HashMap, VecDeque};
+
+use smallvec::SmallVec;
+use understudy_wire::{Image, Moment, Party, StationId, Word};
+
+use super::Model;
+use crate::event::{Event, Level};
+
+/// What a station said in a cycle.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Spoken {
+    /// Who.
+    pub station: StationId,
+    /// Its words.
+    pub words: SmallVec<[Word; 2]>,
+    checked: bool,
+}
+
+/// The turns of the newest cycles.
+#[derive(Debug, Clone)]
+pub(super) struct Turns {
+    by_moment: HashMap<Moment, Vec<Spoken>>,
+    order: VecDeque<Moment>,
+    most: usize,
+    /// Stations that said something else than the samples lead to, and have not agreed since.
+    differing: BTreeSet<StationId>,
+}
+
+impl Turns {
+    pub(super) fn new(most: usize) -> Self {
+        Self {
+            by_moment: HashMap::new(),
+            order: VecDeque::new(),
+            most: most.max(2),
+            differing: BTreeSet::new(),
+        }
+    }
+
+    pub(super) fn spoke(&mut self, moment: Moment, station: StationId, words: &[Word]) {
+        if !self.by_moment.contains_key(&moment) {
+            if self.order.len() == self.most
+                && let Some(oldest) = self.order.pop_front()
+            {
+                self.by_moment.remove(&oldest);
+            }
+            self.order.push_back(moment);
+        }
+        let turns = self.by_moment.entry(moment).or_default();
+        if turns.iter().all(|turn| turn.station != station) {
+            turns.push(Spoken {
+                station,
+                words: words.iter().cloned().collect(),
+                checked: false,
+            });
+        }
+    }
+
+    pub(super) fn of(&self, moment: Moment) -> &[Spoken] {
+        self.by_moment.get(&moment).map_or(&[], Vec::as_slice)
+    }
+}
+
+impl Model {
+    /// Compares the words of a cycle with what the samples lead to, as soon as both are there.
+    pub(super) fn check_words(&mut self, moment: Moment) {
+        let Some(mut turns) = self.turns.by_moment.remove(&moment) else {
+            return;
+        };
+        for turn in turns.iter_mut().filter(|turn| !turn.checked) {
+            let compared: Option<Vec<(&Word, Image)>> = turn
+                .words
+                .iter()
+                .map(|word| Some((word, self.sum_of(word, moment)?)))
+                .collect();
+            let Some(compared) = compared else {
+                continue;
+            };
+            let wrong = compared.into_iter().find(|(word, sum)| word.sum != *sum);
+            let text = wrong
+                .map(|(word, sum)| format!("says {}, where the samples lead to {sum}", word.sum));
+            turn.checked = true;
+            self.compared(turn.station, moment, text);
+        }
+        self.turns.by_moment.insert(moment, turns);
+    }
+
+    /// Σ h(j)(x(j), u(j)) over the members of a word, where all of them are known.
+    fn sum_of(&self, word: &Word, moment: Moment) -> Option<Image> {
+        let mut sum = Image::default();
+        for program in word.members.iter() {
+            sum.add(self.history(program)?.truth_of(moment)?);
+        }
+        Some(sum)
+    }
+
+    fn compared(&mut self, station: StationId, moment: Moment, wrong: Option<String>) {
+        let name = self.parties.name(Party::Station(station)).to_owned();
+        let cycle = self.cycles.of(Some(moment));
+        let subject = (name.clone(), "word-differs");
+        match wrong {
+            None => {
+                if self.turns.differing.remove(&station) {
+                    self.alarms.over(&subject, cycle);
+                }
+            }
+            Some(text) => {
+                if self.turns.differing.insert(station) {
+                    self.events.push(Event {
+                        number: 0,
+                        cycle,
+                        at_ns: self.at_ns,
+                        name,
+                        event: "word-differs",
+                        level: Level::Alarm,
+                        text: text.clone(),
+                        cause: None,
+                    });
+                    self.alarms.raise(subject, cycle, text);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! A run that lies in a directory, or is written there now.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde_json::Value;
+use understudy_bus::segments_of;
+use understudy_cluster::Cluster;
+use understudy_scenarios::kept_cluster;
+use understudy_wire::{Cycle, Epoch, Moment};
+
+use crate::error::ViewError;
+use crate::model::{Bounds, Model};
+use crate::source::{Source, Trouble};
+
+const JOURNAL: &str = "journal.jsonl";
+
+/// A run: its journal, and the cluster that it ran.
+#[derive(Debug, Clone)]
+pub struct Run {
+    path: PathBuf,
+    cluster: Arc<Cluster>,
+}
+
+/// The directory of a run that a person names: itself, the newest of a directory of runs, or the folder of a journal.
+///
+/// # Errors
+/// [`ViewError::NoRun`].
+pub fn find_run(path: &Path) -> Result<PathBuf, ViewError> {
+    let has_journal =
+        |folder: &Path| segments_of(&folder.join(JOURNAL)).is_ok_and(|files| !files.is_empty());
+    let is_run = |folder: &Path| has_journal(folder) || folder.join("cluster").is_dir();
+    if path.is_dir() {
+        if is_run(path) {
+            return Ok(path.to_owned());
+        }
+        let latest = path.join("latest");
+        if is_run(&latest) {
+            return Ok(latest);
+        }
+    }
+    let folder = path.parent().unwrap_or(Path::new("."));
+    if path.is_file()
+        && path
+            .extension()
+            .is_some_and(|extension| extension == "jsonl")
+    {
+        return Ok(folder.to_owned());
+    }
+    let replica = path.join("replica-1");
+    let hint = if replica.is_dir() {
+        format!("; each replica is one, such as {}", replica.display())
+    } else if !path.exists() {
+        "; nothing lies there".to_owned()
+    } else {
+        String::new()
+    };
+    Err(ViewError::NoRun {
+        path: path.to_owned(),
+        hint,
+    })
+}
+
+impl Run {
+    /// A run in a directory, finished or not.
+    ///
+    /// # Errors
+    /// Where there is none, or where it does not say which programs it ran.
+    pub fn open(path: &Path) -> Result<Self, ViewError> {
+        let path = find_run(path)?;
+        let cluster = Arc::new(kept_cluster(&path)?);
+        Ok(Self { path, cluster })
+    }
+
+    /// Its directory.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What it ran.
+    pub fn cluster(&self) -> &Arc<Cluster> {
+        &self.cluster
+    }
+
+    /// Whether its results lie there, so that nothing more will come.
+    pub fn is_finished(&self) -> bool {
+        self.path.join("summary.json").is_file()
+    }
+
+    /// Its records, also those that are still to be written.
+    pub fn follow(&self) -> Source {
+        Source::following(&self.path.join(JOURNAL))
+    }
+
+    /// A model that knows nothing yet of it but where its cycles are counted from.
+    pub fn model(&self, bounds: Bounds) -> Model {
+        let mut model = Model::new(Arc::clone(&self.cluster), bounds);
+        if let Some(moment) = self.origin_of_summary() {
+            model.origin_is(moment, 0);
+        }
+        model
+    }
+
+    /// A model of all that is in its journal now.
+    ///
+    /// # Errors
+    /// [`ViewError::Journal`].
+    pub fn read(&self, bounds: Bounds) -> Result<Model, ViewError> {
+        self.read_until(bounds, i64::MAX)
+    }
+
+    /// A model of its journal up to a few cycles behind `cycle`: what is asked of this cycle can be answered with it, also where
+    /// the run is longer than the bounds.
+    ///
+    /// # Errors
+    /// [`ViewError::Journal`].
+    pub fn read_until(&self, bounds: Bounds, cycle: i64) -> Result<Model, ViewError> {
+        let mut source = self.follow();
+        let mut model = self.model(bounds);
+        let mut any = false;
+        loop {
+            let taken = source.poll(&mut |found| match found {
+                Ok(record) => model.note(&record),
+                Err(trouble) => model.trouble(&trouble),
+            });
+            any |= taken > 0;
+            let past = model.has_origin()
+                && model
+                    .cycle()
+                    .is_some_and(|newest| newest > cycle.saturating_add(BEHIND));
+            if taken == 0 || past {
+                break;
+            }
+        }
+        match source.failure() {
+            Some(Trouble::Read { path, reason }) if !any => {
+                Err(ViewError::Journal { path, reason })
+            }
+            _ => Ok(model),
+        }
+    }
+
+    /// As the summary says it, for journals whose own record of it is gone.
+    fn origin_of_summary(&self) -> Option<Moment> {
+        let summary = std::fs::read(self.path.join("summary.json")).ok()?;
+        let summary: Value = serde_json::from_slice(&summary).ok()?;
+        let (epoch, cycle) = summary["origin"].as_str()?.split_once(':')?;
+        Some(Moment {
+            epoch: Epoch(epoch.parse().ok()?),
+            cycle: Cycle(cycle.parse().ok()?),
+        })
+    }
+}
+
+/// Lines of different parties may be a few cycles apart.
+const BEHIND: i64 = 64;

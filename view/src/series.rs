@@ -1,0 +1,82 @@
+//! What the trends show: images and sources of each program, and what each station was, over the cycles.
+
+use understudy_wire::{Image, ProgramId, Source, StationId};
+
+use crate::station::StationState;
+use crate::timeline::Timeline;
+
+/// Over cycles from the origin of the run.
+#[derive(Debug, Clone)]
+pub struct Series {
+    inputs: Vec<Timeline<Image>>,
+    outputs: Vec<Timeline<Image>>,
+    sources: Vec<Timeline<Source>>,
+    stations: Vec<Timeline<StationState>>,
+}
+
+impl Series {
+    pub(crate) fn new(programs: usize, stations: usize, most: usize) -> Self {
+        Self {
+            inputs: vec![Timeline::new(most); programs],
+            outputs: vec![Timeline::new(most); programs],
+            sources: vec![Timeline::new(most); programs],
+            stations: vec![Timeline::new(most); stations],
+        }
+    }
+
+    /// u(i), where it was sampled.
+    pub fn inputs(&self, program: ProgramId) -> Option<&Timeline<Image>> {
+        self.inputs.get(program.index())
+    }
+
+    /// y(i) as it was applied.
+    pub fn outputs(&self, program: ProgramId) -> Option<&Timeline<Image>> {
+        self.outputs.get(program.index())
+    }
+
+    /// Where it came from.
+    pub fn sources(&self, program: ProgramId) -> Option<&Timeline<Source>> {
+        self.sources.get(program.index())
+    }
+
+    /// What a station was.
+    pub fn station(&self, station: StationId) -> Option<&Timeline<StationState>> {
+        self.stations.get(station.index())
+    }
+
+    pub(crate) fn shift(&mut self, by: i64) {
+        let images = self.inputs.iter_mut().chain(&mut self.outputs);
+        images.for_each(|timeline| timeline.shift(by));
+        self.sources
+            .iter_mut()
+            .for_each(|timeline| timeline.shift(by));
+        self.stations
+            .iter_mut()
+            .for_each(|timeline| timeline.shift(by));
+    }
+
+    pub(crate) fn applied(
+        &mut self,
+        program: ProgramId,
+        cycle: i64,
+        inputs: Option<&Image>,
+        outputs: &Image,
+        source: Source,
+    ) {
+        let place = program.index();
+        if place >= self.outputs.len() {
+            return;
+        }
+        if let Some(inputs) = inputs {
+            self.inputs[place].push(cycle, inputs);
+        }
+        self.outputs[place].push(cycle, outputs);
+        self.sources[place].push(cycle, &source);
+    }
+
+    pub(crate) fn station_was(&mut self, rank: usize, cycle: i64, state: StationState) {
+        if let Some(timeline) = self.stations.get_mut(rank) {
+            timeline.push(cycle, &state);
+        }
+    }
+}

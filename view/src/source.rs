@@ -1,0 +1,79 @@
+//! Records as they come: from the files of a journal, also while they are written and closed, or handed over in this process.
+//!
+//! A reader of files only, that never blocks and never waits: [`Source::poll`] takes what is there and says how much that was.
+
+mod channel;
+mod follow;
+
+use std::path::{Path, PathBuf};
+
+use understudy_scenarios::Record;
+
+use channel::Channel;
+pub use channel::Feed;
+use follow::Follower;
+
+/// What stands between a reader and the records.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Trouble {
+    /// A file or its folder cannot be read.
+    #[error("{} cannot be read: {reason}", path.display())]
+    Read {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// A line is no record; it is left out.
+    #[error("a line of the journal is no record: {reason}")]
+    Line {
+        /// Why.
+        reason: String,
+    },
+    /// Records went before they were read: the journal has reached its limit, or the reader was too slow.
+    #[error("records are gone that nobody has read here{}", count.map_or(String::new(), |count| format!(": {count}")))]
+    Gone {
+        /// How many, where that is known.
+        count: Option<u64>,
+    },
+}
+
+/// Where records come from.
+#[derive(Debug)]
+pub struct Source(Kind);
+
+#[derive(Debug)]
+enum Kind {
+    Files(Box<Follower>),
+    Channel(Channel),
+}
+
+impl Source {
+    /// The journal at `path` with all its segments: what is there, and then what is written. It need not be there yet.
+    pub fn following(path: &Path) -> Self {
+        Self(Kind::Files(Box::new(Follower::new(path))))
+    }
+
+    /// Records of this process, `most` of them waiting at most; what does not fit is counted and said.
+    pub fn channel(most: usize) -> (Feed, Self) {
+        let (feed, channel) = channel::bounded(most);
+        (feed, Self(Kind::Channel(channel)))
+    }
+
+    /// Takes what is there, some thousand records at most; answers with how many that were, troubles included. 0 means that
+    /// there is nothing now.
+    pub fn poll(&mut self, take: &mut dyn FnMut(Result<Record, Trouble>)) -> usize {
+        match &mut self.0 {
+            Kind::Files(follower) => follower.poll(take),
+            Kind::Channel(channel) => channel.poll(take),
+        }
+    }
+
+    /// Why it cannot be read at present, where that is so.
+    pub fn failure(&self) -> Option<Trouble> {
+        match &self.0 {
+            Kind::Files(follower) => follower.failure(),
+            Kind::Channel(_) => None,
+        }
+    }
+}

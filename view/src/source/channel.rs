@@ -1,0 +1,87 @@
+//! Records handed over in one process. Whoever hands them over never waits.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+
+use understudy_scenarios::Record;
+
+use super::Trouble;
+
+/// Records taken in one go, at most.
+const AT_ONCE: usize = 4096;
+
+/// The end that is given records.
+#[derive(Debug, Clone)]
+pub struct Feed {
+    sender: SyncSender<Record>,
+    lost: Arc<AtomicU64>,
+}
+
+impl Feed {
+    /// Hands a record over; one that does not fit is lost, and said to be. False where nobody reads any more.
+    pub fn give(&self, record: Record) -> bool {
+        match self.sender.try_send(record) {
+            Ok(()) => true,
+            Err(std::sync::mpsc::TrySendError::Full(_)) => {
+                self.lost.fetch_add(1, Ordering::Relaxed);
+                true
+            }
+            Err(std::sync::mpsc::TrySendError::Disconnected(_)) => false,
+        }
+    }
+}
+
+#[derive(Debug)]
+pub(super) struct Channel {
+    receiver: Receiver<Record>,
+    lost: Arc<AtomicU64>,
+}
+
+pub(super) fn bounded(most: usize) -> (Feed, Channel) {
+    let (sender, receiver) = sync_channel(most.max(1));
+    let lost = Arc::new(AtomicU64::new(0));
+    let feed = Feed {
+        sender,
+        lost: Arc::clone(&lost),
+    };
+    (feed, Channel { receiver, lost })
+}
+
+impl Channel {
+    pub(super) fn poll(&mut self, take: &mut dyn FnMut(Result<Record, Trouble>)) -> usize {
+        let mut taken = 0;
+        for record in self.receiver.try_iter().take(AT_ONCE) {
+            take(Ok(record));
+            taken += 1;
+        }
+        match self.lost.swap(0, Ordering::Relaxed) {
+            0 => taken,
+            lost => {
+                take(Err(Trouble::Gone { count: Some(lost) }));
+                taken + 1
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use understudy_scenarios::RunEvent;
+
+    use super::*;
+
+    #[test]
+    fn what_does_not_fit_is_counted() {
+        let (feed, mut channel) = bounded(3);
+        for at_ns in 0..5 {
+            assert!(feed.give(Record::of_run(at_ns, RunEvent::Finished)));
+        }
+        let mut found = Vec::new();
+        assert_eq!(channel.poll(&mut |record| found.push(record)), 4);
+        assert_eq!(found[3], Err(Trouble::Gone { count: Some(2) }));
+        assert_eq!(channel.poll(&mut |_| ()), 0);
+        drop(channel);
+        assert!(!feed.give(Record::of_run(5, RunEvent::Finished)));
+    }
+}

@@ -1,0 +1,239 @@
+//! Follows a journal through its segments.
+//!
+//! ```text
+//!   journal.000007.jsonl ─► journal.000008.jsonl ─► … ─► journal.jsonl ─(closed as the next number)─► journal.jsonl
+//! ```
+//!
+//! A file that is open stays readable when it is renamed or removed, so nothing of it is lost once it has been opened. Which file
+//! follows is told by the number that ours got when it was closed.
+
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+use understudy_bus::closed_segments;
+use understudy_scenarios::Record;
+
+use super::Trouble;
+
+/// Bytes read in one go, and so the work of one call.
+const PIECE: usize = 1 << 20;
+
+/// A line without an end is left out when it has so many bytes.
+const LONGEST_LINE: usize = 1 << 20;
+
+#[derive(Debug)]
+pub(super) struct Follower {
+    path: PathBuf,
+    open: Option<Open>,
+    /// The beginning of a line whose end is not written yet.
+    line: Vec<u8>,
+    /// The rest of a line that is too long is skipped.
+    skipping: bool,
+    piece: Vec<u8>,
+    failure: Option<Trouble>,
+}
+
+#[derive(Debug)]
+struct Open {
+    file: File,
+    inode: u64,
+    /// Where it is closed already.
+    number: Option<u64>,
+}
+
+impl Follower {
+    pub(super) fn new(path: &Path) -> Self {
+        Self {
+            path: path.to_owned(),
+            open: None,
+            line: Vec::new(),
+            skipping: false,
+            piece: vec![0; PIECE],
+            failure: None,
+        }
+    }
+
+    pub(super) fn failure(&self) -> Option<Trouble> {
+        self.failure.clone()
+    }
+
+    pub(super) fn poll(&mut self, take: &mut dyn FnMut(Result<Record, Trouble>)) -> usize {
+        match self.try_poll(take) {
+            Ok(taken) => {
+                self.failure = None;
+                taken
+            }
+            Err(error) => {
+                self.failure = Some(Trouble::Read {
+                    path: self.path.clone(),
+                    reason: error.to_string(),
+                });
+                0
+            }
+        }
+    }
+
+    fn try_poll(&mut self, take: &mut dyn FnMut(Result<Record, Trouble>)) -> io::Result<usize> {
+        if self.open.is_none() && !self.open_first(take)? {
+            return Ok(0);
+        }
+        let mut taken = self.read(take)?;
+        // Until there is something, or nothing follows.
+        while taken == 0 {
+            if !self.is_closed()? {
+                return Ok(0);
+            }
+            // It may have been written to after it was read and before it was closed.
+            taken = self.read(take)?;
+            if taken > 0 {
+                break;
+            }
+            if !self.open_next(take, &mut taken)? {
+                return Ok(taken);
+            }
+            taken += self.read(take)?;
+        }
+        Ok(taken)
+    }
+
+    /// The oldest segment that there is.
+    fn open_first(&mut self, take: &mut dyn FnMut(Result<Record, Trouble>)) -> io::Result<bool> {
+        let closed = match closed_segments(&self.path) {
+            Ok(closed) => closed,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
+            Err(error) => return Err(error),
+        };
+        let first = closed.into_iter().next();
+        if first.as_ref().is_some_and(|(number, _)| *number > 1) {
+            take(Err(Trouble::Gone { count: None }));
+        }
+        match first {
+            Some((number, path)) => self.open(&path, Some(number)),
+            None => {
+                let path = self.path.clone();
+                self.open(&path, None)
+            }
+        }
+    }
+
+    /// False where it is not there (any more).
+    fn open(&mut self, path: &Path, number: Option<u64>) -> io::Result<bool> {
+        match File::open(path) {
+            Ok(file) => {
+                let inode = file.metadata()?.ino();
+                self.open = Some(Open {
+                    file,
+                    inode,
+                    number,
+                });
+                Ok(true)
+            }
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Whether the file that is open will not be written to any more.
+    fn is_closed(&self) -> io::Result<bool> {
+        let Some(open) = &self.open else {
+            return Ok(false);
+        };
+        if open.number.is_some() {
+            return Ok(true);
+        }
+        match fs::metadata(&self.path) {
+            Ok(metadata) => Ok(metadata.ino() != open.inode),
+            // Closed, and the next one is not made yet.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(true),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Opens what follows the file that is open. False where it is not there yet.
+    fn open_next(
+        &mut self,
+        take: &mut dyn FnMut(Result<Record, Trouble>),
+        taken: &mut usize,
+    ) -> io::Result<bool> {
+        let Some(open) = &self.open else {
+            return Ok(false);
+        };
+        let closed = closed_segments(&self.path)?;
+        let number = open.number.or_else(|| {
+            let ours =
+                |path: &Path| fs::metadata(path).is_ok_and(|found| found.ino() == open.inode);
+            let found = closed.iter().find(|(_, path)| ours(path));
+            found.map(|(number, _)| *number)
+        });
+        let next = match number {
+            Some(number) => closed.iter().find(|(other, _)| *other > number),
+            // Ours is gone already: all that is left follows it.
+            None => closed.first(),
+        };
+        if !self.line.is_empty() || self.skipping {
+            // Its writer was killed within a line.
+            (self.line, self.skipping) = (Vec::new(), false);
+            let reason = "it has no end".to_owned();
+            take(Err(Trouble::Line { reason }));
+            *taken += 1;
+        }
+        let gap = match (number, next) {
+            (Some(number), Some((next, _))) => *next > number + 1,
+            (None, _) => true,
+            (Some(_), None) => false,
+        };
+        if gap {
+            take(Err(Trouble::Gone { count: None }));
+            *taken += 1;
+        }
+        match next.cloned() {
+            Some((number, path)) => self.open(&path, Some(number)),
+            None => {
+                if let (Some(open), Some(number)) = (&mut self.open, number) {
+                    open.number = Some(number);
+                }
+                let path = self.path.clone();
+                self.open(&path, None)
+            }
+        }
+    }
+
+    /// The records of the next piece.
+    fn read(&mut self, take: &mut dyn FnMut(Result<Record, Trouble>)) -> io::Result<usize> {
+        let Some(open) = &mut self.open else {
+            return Ok(0);
+        };
+        let length = open.file.read(&mut self.piece)?;
+        let mut taken = 0;
+        for part in self.piece[..length].split_inclusive(|byte| *byte == b'\n') {
+            let ends = part.last() == Some(&b'\n');
+            if !self.skipping {
+                self.line.extend_from_slice(part);
+            }
+            if self.line.len() > LONGEST_LINE {
+                self.skipping = true;
+                self.line.clear();
+                let reason = format!("it is longer than {LONGEST_LINE} bytes");
+                take(Err(Trouble::Line { reason }));
+                taken += 1;
+            }
+            if !ends {
+                continue;
+            }
+            if !std::mem::take(&mut self.skipping) && self.line.len() > 1 {
+                let record = serde_json::from_slice(&self.line);
+                take(record.map_err(|error: serde_json::Error| Trouble::Line {
+                    reason: error.to_string(),
+                }));
+                taken += 1;
+            }
+            self.line.clear();
+        }
+        Ok(taken)
+    }
+}
+
+#[cfg(test)]
+mod tests;
