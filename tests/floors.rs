@@ -20,6 +20,7 @@ const FLOORS: &[&[&str]] = &[
         "understudy-seal",
     ],
     &[
+        "understudy-allocation",
         "understudy-interchange",
         "understudy-node",
         "understudy-plant",
@@ -33,6 +34,7 @@ const FLOORS: &[&[&str]] = &[
     ],
     &[
         "understudy-bus",
+        "understudy-catalogue",
         "understudy-field",
         "understudy-keys",
         "understudy-network",

@@ -1,0 +1,336 @@
+//! The plan: for every box of a plant the controllers that could be it, ranked, and the boxes to take.
+//!
+//! Two rules come from the redundancy itself. An understudy never shares a box with a program of its own group, nor with another
+//! understudy of it: when that box fails, what is to be restored and what restores it are gone together. And programs of one group share no
+//! box unless the user says so: a box that fails would take two of them, and then one understudy of the paper's kind cannot restore either.
+//! A remote I/O stands at the plant and shares with nobody.
+
+mod preference;
+mod stock;
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::controller::{Catalogue, Controller};
+use crate::fit::{Dimension, Fit, Verdict, fit};
+use crate::need::{Need, Terms};
+use crate::packing::{BoxType, PackingError, pack};
+use crate::requirement::Role;
+use crate::resources::Resources;
+
+pub use preference::Preference;
+pub use stock::Stock;
+
+/// What was proved about the program of a box.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case", tag = "verdict", content = "message")]
+pub enum Verification {
+    /// Everything that is asked of it, in these words.
+    Passed(String),
+    /// Something does not hold, or was not decided.
+    NotPassed(String),
+    /// Nobody asked.
+    NotAsked,
+}
+
+impl Verification {
+    /// Whether it may be recommended.
+    pub fn has_passed(&self) -> bool {
+        matches!(self, Self::Passed(_))
+    }
+
+    /// What is to be read.
+    pub fn message(&self) -> &str {
+        match self {
+            Self::Passed(message) | Self::NotPassed(message) => message,
+            Self::NotAsked => "not verified",
+        }
+    }
+}
+
+/// A box that is wanted.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Item {
+    /// Its name in the plant.
+    pub name: String,
+    /// Programs with one understudy; programs without one have no group.
+    pub group: Option<usize>,
+    /// What it must have.
+    pub need: Need,
+    /// What was proved about its program.
+    pub verification: Verification,
+}
+
+/// How to choose.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// How needs are compared.
+    pub terms: Terms,
+    /// What is best among what fits.
+    pub preference: Preference,
+    /// Whether programs of one group may share a box.
+    pub share_members: bool,
+    /// Whether programs are placed that did not pass verification.
+    pub unverified: bool,
+    /// The only boxes that there are; every model of the catalogue where this is empty.
+    pub stock: Vec<Stock>,
+}
+
+/// A controller beside one box.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Candidate {
+    /// Who makes it.
+    pub vendor: String,
+    /// Its model.
+    pub model: String,
+    /// Every criterion.
+    #[serde(flatten)]
+    pub fit: Fit,
+    /// What a reader of its figures has to know.
+    pub notes: String,
+}
+
+/// A box that is wanted, with the controllers that could be it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Placed {
+    /// Its name in the plant.
+    pub name: String,
+    /// What it is for.
+    pub role: Role,
+    /// Counts of its program.
+    pub program: Option<Resources>,
+    /// Terminals that are wired to it.
+    pub inputs: u64,
+    /// Terminals that are wired to it.
+    pub outputs: u64,
+    /// What was proved.
+    pub verification: Verification,
+    /// The best first; none where its program has not passed verification.
+    pub candidates: Vec<Candidate>,
+    /// Why it is on no box.
+    pub left_over: Option<String>,
+}
+
+impl Placed {
+    /// How many candidates have this verdict.
+    pub fn count(&self, verdict: Verdict) -> usize {
+        let candidates = self.candidates.iter();
+        candidates
+            .filter(|found| found.fit.verdict == verdict)
+            .count()
+    }
+}
+
+/// A part of a box that is taken.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Taken {
+    /// Of what.
+    pub dimension: Dimension,
+    /// By all that is on the box.
+    pub takes: u64,
+    /// What may be used.
+    pub usable: u64,
+}
+
+/// A box to take.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BoxOnPlan {
+    /// The model.
+    pub controller: Controller,
+    /// Names of what is on it.
+    pub items: Vec<String>,
+    /// Of what adds up.
+    pub taken: Vec<Taken>,
+}
+
+/// The plan.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Allocation {
+    /// Each box that is wanted.
+    pub items: Vec<Placed>,
+    /// The boxes to take.
+    pub boxes: Vec<BoxOnPlan>,
+    /// Whether no better packing exists by what is preferred.
+    pub best: bool,
+    /// What a reader has to know.
+    pub remarks: Vec<String>,
+}
+
+impl Allocation {
+    /// Whether every box that is wanted has its controller.
+    pub fn is_complete(&self) -> bool {
+        self.items.iter().all(|item| item.left_over.is_none())
+    }
+}
+
+/// Why there is no plan.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum AllocationError {
+    /// A model of the stock is not in the catalogue.
+    #[error("U1131: the catalogue has no `{name}`{}", if like.is_empty() { String::new() } else { format!("; there is {}", like.join(", ")) })]
+    NoModel {
+        /// As it was written.
+        name: String,
+        /// What it has.
+        like: Vec<String>,
+    },
+    /// Several vendors have such a model.
+    #[error("U1132: `{name}` is made by several: {}", vendors.join(", "))]
+    Ambiguous {
+        /// As it was written.
+        name: String,
+        /// Who makes it.
+        vendors: Vec<String>,
+    },
+    /// Prices of several currencies cannot be compared.
+    #[error("U1133: prices are in {}: one currency is needed to prefer by cost", .0.join(", "))]
+    Currencies(Vec<String>),
+    /// No packing.
+    #[error(transparent)]
+    Packing(#[from] PackingError),
+}
+
+impl AllocationError {
+    /// Stable code.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::NoModel { .. } => "U1131",
+            Self::Ambiguous { .. } => "U1132",
+            Self::Currencies(_) => "U1133",
+            Self::Packing(_) => "U1140",
+        }
+    }
+}
+
+/// Ranks the controllers of the catalogue for every item, and packs the items.
+///
+/// # Errors
+/// Every model of the stock that the catalogue does not have; prices of several currencies; the solver failed.
+pub fn allocate(
+    catalogue: &Catalogue,
+    items: &[Item],
+    options: &Options,
+) -> Result<Allocation, Vec<AllocationError>> {
+    let types = stock::types(catalogue, &options.stock)?;
+    let mut remarks = Vec::new();
+    let order =
+        preference::order(&types, options.preference, &mut remarks).map_err(|error| vec![error])?;
+    let may_be_placed = |item: &Item| {
+        options.unverified || item.verification.has_passed() || item.need.program.is_none()
+    };
+    let fits: Vec<Vec<Fit>> = items
+        .iter()
+        .map(|item| {
+            if !may_be_placed(item) {
+                return Vec::new();
+            }
+            let of_type = |(controller, _): &(&Controller, _)| {
+                let family = catalogue.families.get(&controller.family);
+                fit(controller, family, &item.need, &options.terms)
+            };
+            types.iter().map(of_type).collect()
+        })
+        .collect();
+    let box_types: Vec<BoxType> = (0..types.len())
+        .map(|place| {
+            let on_it = fits.iter().map(|of_item| of_item.get(place));
+            let loads = on_it.map(|fit| {
+                let fit = fit.filter(|fit| fit.verdict == Verdict::Fits)?;
+                Some(fit.loads.clone())
+            });
+            let loads: Vec<_> = loads.collect();
+            BoxType {
+                cost: order.cost(place, fits.iter().filter_map(|of_item| of_item.get(place))),
+                stock: types[place].1,
+                loads,
+            }
+        })
+        .collect();
+    let packing = pack(items.len(), &box_types, &|left, right| {
+        apart(&items[left], &items[right], options.share_members)
+    })
+    .map_err(|error| vec![error.into()])?;
+    let boxes = packing.boxes.iter().map(|packed| {
+        let box_type = &box_types[packed.box_type];
+        let loads = packed.items.iter();
+        let loads = loads.filter_map(|&item| box_type.loads[item].as_ref());
+        BoxOnPlan {
+            controller: types[packed.box_type].0.clone(),
+            items: packed
+                .items
+                .iter()
+                .map(|&item| items[item].name.clone())
+                .collect(),
+            taken: taken(loads),
+        }
+    });
+    let boxes = boxes.collect();
+    let placed = items.iter().zip(&fits).enumerate();
+    let placed = placed.map(|(place, (item, of_item))| {
+        let candidates = order.rank(&types, of_item);
+        let left_over = packing.left_over.contains(&place);
+        Placed {
+            name: item.name.clone(),
+            role: item.need.role,
+            program: item.need.program,
+            inputs: item.need.inputs,
+            outputs: item.need.outputs,
+            verification: item.verification.clone(),
+            left_over: left_over.then(|| why(item, &candidates, may_be_placed(item))),
+            candidates,
+        }
+    });
+    Ok(Allocation {
+        items: placed.collect(),
+        boxes,
+        best: packing.best,
+        remarks,
+    })
+}
+
+/// Whether one failure must not take both.
+fn apart(left: &Item, right: &Item, share_members: bool) -> bool {
+    let roles = [left.need.role, right.need.role];
+    if roles.contains(&Role::RemoteIo) {
+        return true;
+    }
+    let same_group = left.group.is_some() && left.group == right.group;
+    same_group && (roles.contains(&Role::Understudy) || !share_members)
+}
+
+fn taken<'a>(loads: impl Iterator<Item = &'a BTreeMap<Dimension, crate::fit::Load>>) -> Vec<Taken> {
+    let mut sums: BTreeMap<Dimension, Taken> = BTreeMap::new();
+    for (&dimension, load) in loads.flatten() {
+        let entry = sums.entry(dimension).or_insert(Taken {
+            dimension,
+            takes: 0,
+            usable: load.usable,
+        });
+        entry.takes += load.takes;
+    }
+    sums.into_values().collect()
+}
+
+/// Why an item is on no box.
+fn why(item: &Item, candidates: &[Candidate], may_be_placed: bool) -> String {
+    if !may_be_placed {
+        return format!("it is not recommended: {}", item.verification.message());
+    }
+    let count = |verdict| {
+        let of_it = candidates
+            .iter()
+            .filter(|found| found.fit.verdict == verdict);
+        of_it.count()
+    };
+    match (count(Verdict::Fits), count(Verdict::Unknown)) {
+        (0, 0) => format!("none of {} controllers fits", candidates.len()),
+        (0, unknown) => format!(
+            "no controller is known to fit: {unknown} of {} lack a figure, the others do not fit",
+            candidates.len()
+        ),
+        (fitting, _) => {
+            format!("there are not enough boxes: of {fitting} that fit all are taken")
+        }
+    }
+}

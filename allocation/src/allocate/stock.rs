@@ -1,0 +1,47 @@
+//! The boxes that there are.
+
+use super::AllocationError;
+use crate::controller::{Catalogue, Controller};
+
+/// So many boxes of a model.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Stock {
+    /// A model, or vendor and model with a blank between.
+    pub name: String,
+    /// How many.
+    pub count: usize,
+}
+
+/// Each controller that may be taken, with the number of boxes where it is limited; all that are wrong with the stock.
+pub(super) fn types<'a>(
+    catalogue: &'a Catalogue,
+    stock: &[Stock],
+) -> Result<Vec<(&'a Controller, Option<usize>)>, Vec<AllocationError>> {
+    if stock.is_empty() {
+        let controllers = catalogue.controllers();
+        return Ok(controllers.map(|controller| (controller, None)).collect());
+    }
+    let mut types: Vec<(&Controller, Option<usize>)> = Vec::new();
+    let mut errors = Vec::new();
+    for Stock { name, count } in stock {
+        match catalogue.named(name).as_slice() {
+            [] => errors.push(AllocationError::NoModel {
+                name: name.clone(),
+                like: catalogue.like(name),
+            }),
+            [controller] => match types.iter_mut().find(|(known, _)| known == controller) {
+                Some((_, known)) => *known = known.map(|known| known.saturating_add(*count)),
+                None => types.push((controller, Some(*count))),
+            },
+            several => errors.push(AllocationError::Ambiguous {
+                name: name.clone(),
+                vendors: several.iter().map(|found| found.vendor.clone()).collect(),
+            }),
+        }
+    }
+    if errors.is_empty() {
+        Ok(types)
+    } else {
+        Err(errors)
+    }
+}

@@ -1,0 +1,216 @@
+//! Controllers that can be bought, as the catalogue knows them.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use serde::Serialize;
+
+use crate::figures::{FamilyQuantity, Figure, Quantity, Statement};
+
+/// What a device is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// A programmable logic controller.
+    Plc,
+    /// An embedded controller or a board.
+    Embedded,
+}
+
+impl Kind {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Plc, Self::Embedded];
+
+    /// Its name in files and in the database.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Plc => "plc",
+            Self::Embedded => "embedded",
+        }
+    }
+
+    /// The kind of a name.
+    pub fn of(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+}
+
+/// One model.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Controller {
+    /// Who makes it.
+    pub vendor: String,
+    /// Unique for its vendor.
+    pub model: String,
+    /// Models that store programs in the same way.
+    pub family: String,
+    /// PLC or embedded.
+    pub kind: Kind,
+    /// What is known in numbers.
+    pub numbers: BTreeMap<Quantity, Figure<u64>>,
+    /// What is known in words.
+    pub texts: BTreeMap<Statement, Figure<String>>,
+    /// What a reader of its figures has to know, such as that sources conflict.
+    pub notes: String,
+}
+
+impl Controller {
+    /// Without figures.
+    pub fn new(vendor: &str, model: &str, family: &str, kind: Kind) -> Self {
+        Self {
+            vendor: vendor.to_owned(),
+            model: model.to_owned(),
+            family: family.to_owned(),
+            kind,
+            numbers: BTreeMap::new(),
+            texts: BTreeMap::new(),
+            notes: String::new(),
+        }
+    }
+
+    /// A number, if it is known.
+    pub fn number(&self, quantity: Quantity) -> Option<u64> {
+        self.numbers.get(&quantity).map(|figure| figure.value)
+    }
+
+    /// A text, if it is known.
+    pub fn text(&self, statement: Statement) -> Option<&str> {
+        let figure = self.texts.get(&statement)?;
+        Some(&figure.value)
+    }
+
+    /// Names of what is not known.
+    pub fn unknown(&self) -> Vec<&'static str> {
+        let numbers = Quantity::ALL.into_iter();
+        let numbers = numbers.filter(|quantity| !self.numbers.contains_key(quantity));
+        let texts = Statement::ALL.into_iter();
+        let texts = texts.filter(|statement| !self.texts.contains_key(statement));
+        let texts = texts.map(Statement::name);
+        numbers.map(Quantity::name).chain(texts).collect()
+    }
+
+    /// Takes over figures of `other`, which is the same model; answers with the names of those that were there already and differ.
+    pub fn update(&mut self, other: Self) -> Vec<&'static str> {
+        let mut changed = Vec::new();
+        for (quantity, figure) in other.numbers {
+            if let Some(old) = self.numbers.insert(quantity, figure.clone())
+                && old.value != figure.value
+            {
+                changed.push(quantity.name());
+            }
+        }
+        for (statement, figure) in other.texts {
+            if let Some(old) = self.texts.insert(statement, figure.clone())
+                && old.value != figure.value
+            {
+                changed.push(statement.name());
+            }
+        }
+        if !other.notes.is_empty() {
+            self.notes = other.notes;
+        }
+        changed
+    }
+}
+
+impl fmt::Display for Controller {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{} {}", self.vendor, self.model)
+    }
+}
+
+/// How a family stores programs, as far as it is known.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct Family {
+    /// Each with its source.
+    pub numbers: BTreeMap<FamilyQuantity, Figure<u64>>,
+    /// What a reader of these figures has to know.
+    pub notes: String,
+}
+
+impl Family {
+    /// A number, if it is known.
+    pub fn number(&self, quantity: FamilyQuantity) -> Option<u64> {
+        self.numbers.get(&quantity).map(|figure| figure.value)
+    }
+}
+
+/// All that is known.
+///
+/// Invariant: no two controllers have the same vendor and model.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Catalogue {
+    controllers: BTreeMap<(String, String), Controller>,
+    /// By name; a controller's family need not stand here.
+    pub families: BTreeMap<String, Family>,
+}
+
+impl Catalogue {
+    /// By vendor and model.
+    pub fn controllers(&self) -> impl Iterator<Item = &Controller> {
+        self.controllers.values()
+    }
+
+    /// How many.
+    pub fn len(&self) -> usize {
+        self.controllers.len()
+    }
+
+    /// Whether it has none.
+    pub fn is_empty(&self) -> bool {
+        self.controllers.is_empty()
+    }
+
+    /// The controller of this vendor and model.
+    pub fn get(&self, vendor: &str, model: &str) -> Option<&Controller> {
+        self.controllers.get(&(vendor.to_owned(), model.to_owned()))
+    }
+
+    /// Those that a person means by `name`: the model, or vendor and model with a blank between.
+    pub fn named(&self, name: &str) -> Vec<&Controller> {
+        self.controllers()
+            .filter(|found| found.model == name || found.to_string() == name)
+            .collect()
+    }
+
+    /// Models whose names are like `name`, the most alike first.
+    pub fn like(&self, name: &str) -> Vec<String> {
+        let wanted = name.to_lowercase();
+        let mut found: Vec<(usize, String)> = self
+            .controllers()
+            .map(|controller| {
+                let model = controller.model.to_lowercase();
+                let distance = if model.contains(&wanted) {
+                    0
+                } else {
+                    strsim::damerau_levenshtein(&model, &wanted)
+                };
+                (distance, controller.model.clone())
+            })
+            .filter(|(distance, _)| *distance <= wanted.chars().count() / 3 + 1)
+            .collect();
+        found.sort();
+        found.into_iter().take(5).map(|(_, model)| model).collect()
+    }
+
+    /// Adds a controller, or new figures for one that is there; answers with the names of figures that it had and that changed.
+    pub fn put(&mut self, controller: Controller) -> Vec<&'static str> {
+        let key = (controller.vendor.clone(), controller.model.clone());
+        match self.controllers.get_mut(&key) {
+            Some(old) => old.update(controller),
+            None => {
+                self.controllers.insert(key, controller);
+                Vec::new()
+            }
+        }
+    }
+
+    /// Adds figures of a family.
+    pub fn put_family(&mut self, name: &str, family: Family) {
+        let old = self.families.entry(name.to_owned()).or_default();
+        old.numbers.extend(family.numbers);
+        if !family.notes.is_empty() {
+            old.notes = family.notes;
+        }
+    }
+}

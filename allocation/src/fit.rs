@@ -1,0 +1,221 @@
+//! Whether a controller has what a box needs: yes, no, or not known.
+//!
+//! Invariant: a criterion that is not decided by figures of the catalogue is [`Verdict::Unknown`] and names what is missing; nothing unknown
+//! counts as 0 or as enough. A controller fits when every criterion fits, fails when one fails, and is unknown otherwise.
+
+mod asked;
+mod judge;
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::controller::{Controller, Family};
+use crate::ethernet::{Ethernet, ethernet};
+use crate::figures::{FamilyQuantity, Quantity, Statement};
+use crate::memory::{Bytes, Memory, memory};
+use crate::need::{Need, Terms};
+use judge::Judge;
+
+/// Three-valued; the better is the smaller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Every figure is there, and enough.
+    Fits,
+    /// Some figure is missing.
+    Unknown,
+    /// Some figure is not enough.
+    DoesNotFit,
+}
+
+impl Verdict {
+    /// As a person reads it.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Fits => "fits",
+            Self::Unknown => "unknown",
+            Self::DoesNotFit => "does not fit",
+        }
+    }
+}
+
+/// What adds up when several programs share a box.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Dimension {
+    /// Terminals.
+    DigitalInputs,
+    /// Terminals.
+    DigitalOutputs,
+    /// Of the program.
+    Timers,
+    /// Of the program.
+    Counters,
+    /// Bytes for programs.
+    ProgramMemory,
+    /// Bytes for data.
+    DataMemory,
+    /// Millionths of the processor's time.
+    ScanTime,
+}
+
+/// A part of a box that a program takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Load {
+    /// What the program takes.
+    pub takes: u64,
+    /// What of the box may be used.
+    pub usable: u64,
+}
+
+/// One criterion.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    /// Its name, such as `digital_inputs`.
+    pub criterion: String,
+    /// What came of it.
+    pub verdict: Verdict,
+    /// The amount that is needed, where it is one.
+    pub need: Option<u64>,
+    /// The amount that is there, where it is known.
+    pub has: Option<u64>,
+    /// Part of what is there that is left, 0 to 1.
+    pub margin: Option<f64>,
+    /// With the numbers, or with what is missing.
+    pub message: String,
+    /// Who says so.
+    pub sources: Vec<String>,
+}
+
+/// A controller beside the needs of a box.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Fit {
+    /// Of all criteria together.
+    pub verdict: Verdict,
+    /// Each criterion.
+    pub findings: Vec<Finding>,
+    /// An estimate: instructions times the time of an instruction on bits; nothing where that time is not known.
+    pub scan_ns: Option<u64>,
+    /// What adds up with other programs on the box.
+    #[serde(skip)]
+    pub loads: BTreeMap<Dimension, Load>,
+}
+
+impl Fit {
+    /// The smallest margin of its criteria.
+    pub fn smallest_margin(&self) -> Option<f64> {
+        let margins = self.findings.iter().filter_map(|finding| finding.margin);
+        margins.min_by(f64::total_cmp)
+    }
+
+    /// The findings with this verdict.
+    pub fn with(&self, verdict: Verdict) -> impl Iterator<Item = &Finding> {
+        self.findings
+            .iter()
+            .filter(move |finding| finding.verdict == verdict)
+    }
+}
+
+/// Compares.
+pub fn fit(controller: &Controller, family: Option<&Family>, need: &Need, terms: &Terms) -> Fit {
+    let mut judge = Judge::new(controller, terms);
+    judge.points(
+        Quantity::DigitalInputs,
+        need.inputs,
+        Dimension::DigitalInputs,
+    );
+    judge.points(
+        Quantity::DigitalOutputs,
+        need.outputs,
+        Dimension::DigitalOutputs,
+    );
+    let mut scan_ns = None;
+    if let Some(program) = &need.program {
+        judge.count(Quantity::Timers, program.timers, Dimension::Timers);
+        judge.count(Quantity::Counters, program.counters, Dimension::Counters);
+        match memory(program, family, terms) {
+            Memory::Apart { program, data } => {
+                let capacity = Quantity::ProgramMemoryBytes;
+                memory_of(&mut judge, capacity, Dimension::ProgramMemory, &program);
+                let capacity = Quantity::DataMemoryBytes;
+                memory_of(&mut judge, capacity, Dimension::DataMemory, &data);
+            }
+            Memory::Together(bytes) => {
+                let capacity = Quantity::ProgramMemoryBytes;
+                memory_of(&mut judge, capacity, Dimension::ProgramMemory, &bytes);
+            }
+        }
+        let instruction = controller.number(Quantity::BoolInstructionNs);
+        scan_ns = instruction.map(|time| time.saturating_mul(program.instructions));
+        if let Some(within) = need.scan_within {
+            judge.scan_time(program.instructions, within);
+        }
+    }
+    if need.ethernet {
+        network(&mut judge);
+    }
+    for requirement in &terms.requirements {
+        if requirement.is_of(need.role) {
+            asked::judge(&mut judge, requirement, need);
+        }
+    }
+    let Judge {
+        findings, loads, ..
+    } = judge;
+    let verdicts = findings.iter().map(|finding| finding.verdict);
+    Fit {
+        verdict: verdicts.max().unwrap_or(Verdict::Fits),
+        findings,
+        scan_ns,
+        loads,
+    }
+}
+
+fn memory_of(judge: &mut Judge<'_>, capacity: Quantity, dimension: Dimension, bytes: &Bytes) {
+    match bytes {
+        Bytes::Known { bytes: 0, .. } => {}
+        Bytes::Known {
+            bytes,
+            fixed,
+            sources,
+        } => judge.memory(capacity, dimension, *bytes, *fixed, sources),
+        Bytes::Unknown { missing, units } => {
+            let missing: Vec<String> = missing.iter().map(FamilyQuantity::to_string).collect();
+            judge.memory_unknown(capacity, &missing.join(", "), *units);
+        }
+    }
+}
+
+fn network(judge: &mut Judge<'_>) {
+    let controller = judge.controller;
+    let Some(figure) = controller.texts.get(&Statement::CommPorts) else {
+        judge.unknown(
+            "ethernet",
+            "needs an Ethernet port; which ports it has is not known".into(),
+        );
+        return;
+    };
+    let sources = vec![figure.source.clone()];
+    let ports = &figure.value;
+    match ethernet(ports) {
+        Ethernet::Present => judge.said(
+            "ethernet",
+            Verdict::Fits,
+            format!("has an Ethernet port ({ports})"),
+            sources,
+        ),
+        Ethernet::Absent => judge.said(
+            "ethernet",
+            Verdict::DoesNotFit,
+            format!("needs an Ethernet port and has {ports}"),
+            sources,
+        ),
+        Ethernet::Undecided => judge.said(
+            "ethernet",
+            Verdict::Unknown,
+            format!("needs an Ethernet port; its ports are said to be \"{ports}\""),
+            sources,
+        ),
+    }
+}

@@ -1,0 +1,67 @@
+//! What a box must have, for what it is to do.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use crate::controller::Family;
+use crate::figures::{FamilyQuantity, Figure};
+use crate::requirement::{Requirement, Role};
+use crate::resources::Resources;
+
+/// Largest part of a capacity that may be kept free, in percent.
+pub const MOST_RESERVE_PERCENT: u8 = 90;
+
+/// Needs of one box.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Need {
+    /// What the box is for.
+    pub role: Role,
+    /// Digital inputs that are wired to it.
+    pub inputs: u64,
+    /// Digital outputs that are wired to it.
+    pub outputs: u64,
+    /// The program that it runs; a remote I/O runs none.
+    pub program: Option<Resources>,
+    /// Time in which a scan has to be over, where it matters.
+    pub scan_within: Option<Duration>,
+    /// Whether it needs an Ethernet port.
+    pub ethernet: bool,
+}
+
+/// How needs are compared with what a controller has.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Terms {
+    /// Part of each capacity that stays free, in percent; at most [`MOST_RESERVE_PERCENT`].
+    pub reserve_percent: u8,
+    /// Whether inputs and outputs of expansion modules count.
+    pub expansion: bool,
+    /// What is asked beside.
+    pub requirements: Vec<Requirement>,
+    /// How families store programs, for families of which the catalogue does not say it.
+    pub assumptions: BTreeMap<FamilyQuantity, u64>,
+}
+
+impl Terms {
+    /// What of a capacity may be used.
+    pub(crate) fn usable(&self, capacity: u64) -> u64 {
+        let percent = 100 - u64::from(self.reserve_percent.min(MOST_RESERVE_PERCENT));
+        // Capacities are below 2^41, so the product fits.
+        capacity * percent / 100
+    }
+
+    /// A figure of a family, or what is assumed in its place.
+    pub(crate) fn of_family(
+        &self,
+        family: Option<&Family>,
+        quantity: FamilyQuantity,
+    ) -> Option<Figure<u64>> {
+        let known = family.and_then(|family| family.numbers.get(&quantity));
+        let assumed = self.assumptions.get(&quantity);
+        known.cloned().or_else(|| {
+            assumed.map(|&value| Figure {
+                value,
+                source: format!("assumed: {quantity} = {value}"),
+            })
+        })
+    }
+}

@@ -1,0 +1,293 @@
+//! What a person asks of a controller beside what the program needs: `digital_inputs>=24`, `vendor=Siemens`, `remote-io:ethernet`.
+
+use std::fmt;
+use std::time::Duration;
+
+use serde::Serialize;
+use understudy_ladder::parse_time;
+
+use crate::controller::Kind;
+use crate::figures::{Quantity, Statement};
+
+/// What a box is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Role {
+    /// Runs one program.
+    Controller,
+    /// Runs the program that is generated from all others of its group.
+    Understudy,
+    /// Has the terminals of one program.
+    RemoteIo,
+}
+
+impl Role {
+    /// All.
+    pub const ALL: [Self; 3] = [Self::Controller, Self::Understudy, Self::RemoteIo];
+
+    /// As a person writes it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Controller => "controller",
+            Self::Understudy => "understudy",
+            Self::RemoteIo => "remote-io",
+        }
+    }
+}
+
+impl fmt::Display for Role {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(self.name())
+    }
+}
+
+/// How a number is compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bound {
+    /// `>=`
+    AtLeast,
+    /// `<=`
+    AtMost,
+    /// `=`
+    Exactly,
+}
+
+/// What is asked.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Asked {
+    /// Of a number.
+    Number(Quantity, Bound, u64),
+    /// A text that contains this, whatever the capitals.
+    Contains(Statement, String),
+    /// Who makes it.
+    Vendor(String),
+    /// Its family.
+    Family(String),
+    /// Its model.
+    Model(String),
+    /// PLC or embedded.
+    Kind(Kind),
+    /// The scan takes no longer.
+    ScanTime(Duration),
+    /// It has an Ethernet port.
+    Ethernet,
+}
+
+/// One requirement.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Requirement {
+    /// Of which boxes; of all where nothing is said.
+    pub role: Option<Role>,
+    /// What is asked.
+    pub asked: Asked,
+    /// As it was written.
+    pub text: String,
+}
+
+/// A requirement that is none.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("U1130: `{text}` is no requirement: {reason}")]
+pub struct RequirementError {
+    /// As it was written.
+    pub text: String,
+    /// What is wrong with it.
+    pub reason: String,
+}
+
+impl Requirement {
+    /// Reads `[role:]name>=number`, `[role:]name~words`, `[role:]name=word` or `[role:]ethernet`.
+    ///
+    /// # Errors
+    /// An unknown role or name, a number that is none, or a comparison that the name does not have.
+    pub fn parse(text: &str) -> Result<Self, RequirementError> {
+        let wrong = |reason: String| RequirementError {
+            text: text.to_owned(),
+            reason,
+        };
+        let (role, rest) = match text.split_once(':') {
+            // A blank belongs to a name (`vendor=A: B`), a role has none.
+            Some((role, rest)) if !role.contains(['=', '~', ' ', '<', '>']) => {
+                let found = Role::ALL.into_iter().find(|known| known.name() == role);
+                let role = found.ok_or_else(|| {
+                    wrong(format!(
+                        "`{role}` is no role; roles are controller, understudy and remote-io"
+                    ))
+                })?;
+                (Some(role), rest)
+            }
+            _ => (None, text),
+        };
+        Ok(Self {
+            role,
+            asked: asked(rest.trim()).map_err(wrong)?,
+            text: text.to_owned(),
+        })
+    }
+
+    /// Whether it is asked of boxes of this role.
+    pub fn is_of(&self, role: Role) -> bool {
+        self.role.is_none_or(|asked| asked == role)
+    }
+}
+
+fn asked(text: &str) -> Result<Asked, String> {
+    if text.eq_ignore_ascii_case("ethernet") {
+        return Ok(Asked::Ethernet);
+    }
+    let Some(at) = text.find(['=', '~', '<', '>']) else {
+        let help = "a comparison such as digital_inputs>=24, vendor=Siemens or languages~ladder is meant, or ethernet";
+        return Err(help.to_owned());
+    };
+    let (name, rest) = text.split_at(at);
+    let signs = [">=", "<=", "=", "~"];
+    let Some(sign) = signs.into_iter().find(|sign| rest.starts_with(sign)) else {
+        return Err("the comparisons are >=, <=, = and ~ (contains)".to_owned());
+    };
+    let name = name.trim().replace('-', "_");
+    let value = rest[sign.len()..].trim();
+    if value.is_empty() {
+        return Err("nothing stands behind the comparison".to_owned());
+    }
+    if let Some(quantity) = quantity(&name) {
+        return number(quantity, sign, value);
+    }
+    let only = |allowed: &str, asked: Asked| {
+        if sign == allowed {
+            Ok(asked)
+        } else {
+            Err(format!("`{name}` is compared by `{allowed}`"))
+        }
+    };
+    let statement = Statement::ALL.into_iter();
+    if let Some(statement) = statement.into_iter().find(|known| known.name() == name) {
+        return only("~", Asked::Contains(statement, value.to_lowercase()));
+    }
+    match name.as_str() {
+        "vendor" => only("=", Asked::Vendor(value.to_owned())),
+        "family" => only("=", Asked::Family(value.to_owned())),
+        "model" => only("=", Asked::Model(value.to_owned())),
+        "kind" => match Kind::of(value) {
+            Some(kind) => only("=", Asked::Kind(kind)),
+            None => Err(format!("`{value}` is no kind; kinds are plc and embedded")),
+        },
+        "scan_time" => match parse_time(value).filter(|time| !time.is_zero()) {
+            Some(time) => only("<=", Asked::ScanTime(time)),
+            None => Err(format!("`{value}` is no time such as 10ms")),
+        },
+        _ => Err(format!("there is no `{name}`; {}", known_names())),
+    }
+}
+
+fn quantity(name: &str) -> Option<Quantity> {
+    match name {
+        "inputs" => Some(Quantity::DigitalInputs),
+        "outputs" => Some(Quantity::DigitalOutputs),
+        "program_memory" => Some(Quantity::ProgramMemoryBytes),
+        "data_memory" => Some(Quantity::DataMemoryBytes),
+        _ => Quantity::ALL.into_iter().find(|known| known.name() == name),
+    }
+}
+
+fn number(quantity: Quantity, sign: &str, value: &str) -> Result<Asked, String> {
+    let bound = match sign {
+        ">=" => Bound::AtLeast,
+        "<=" => Bound::AtMost,
+        "=" => Bound::Exactly,
+        _ => return Err(format!("{quantity} is compared by >=, <= or =")),
+    };
+    let is_memory = matches!(
+        quantity,
+        Quantity::ProgramMemoryBytes | Quantity::DataMemoryBytes
+    );
+    let units = [
+        ("KiB", 1 << 10),
+        ("MiB", 1 << 20),
+        ("KB", 1000),
+        ("MB", 1_000_000),
+    ];
+    let unit = units
+        .into_iter()
+        .find(|(unit, _)| is_memory && value.ends_with(unit));
+    let (digits, scale) = unit.map_or((value, 1), |(unit, scale)| {
+        (value[..value.len() - unit.len()].trim_end(), scale)
+    });
+    let number = quantity.parse(digits);
+    let number = number.and_then(|number| number.checked_mul(scale));
+    let number = number.filter(|number| *number <= quantity.most());
+    match number {
+        Some(number) => Ok(Asked::Number(quantity, bound, number)),
+        None => Err(format!("`{value}` is no {quantity}")),
+    }
+}
+
+fn known_names() -> String {
+    let quantities = Quantity::ALL.map(Quantity::name).join(", ");
+    let statements = Statement::ALL.map(Statement::name).join(", ");
+    format!(
+        "known are {quantities}, {statements}, vendor, family, model, kind, scan_time, ethernet"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(text: &str, role: Option<Role>, expected: Asked) {
+        let found = Requirement::parse(text).expect(text);
+        assert_eq!((found.role, found.asked), (role, expected), "{text}");
+    }
+
+    #[test]
+    fn requirements_are_read() {
+        let number = Asked::Number;
+        let inputs = Quantity::DigitalInputs;
+        check("inputs>=24", None, number(inputs, Bound::AtLeast, 24));
+        check(
+            "digital-inputs = 8",
+            None,
+            number(inputs, Bound::Exactly, 8),
+        );
+        let memory = number(Quantity::ProgramMemoryBytes, Bound::AtLeast, 64 << 10);
+        check(
+            "understudy:program-memory>=64KiB",
+            Some(Role::Understudy),
+            memory,
+        );
+        check(
+            "price<=99.5",
+            None,
+            number(Quantity::Price, Bound::AtMost, 9950),
+        );
+        check("remote-io:ethernet", Some(Role::RemoteIo), Asked::Ethernet);
+        let languages = Asked::Contains(Statement::Languages, "ladder".into());
+        check("languages~Ladder", None, languages);
+        check("vendor=A: B", None, Asked::Vendor("A: B".into()));
+        check(
+            "scan_time<=10ms",
+            None,
+            Asked::ScanTime(Duration::from_millis(10)),
+        );
+    }
+
+    #[test]
+    fn what_is_no_requirement_is_refused() {
+        for text in [
+            "",
+            "inputs",
+            "inputs>24",
+            "inputs>=",
+            "inputs>=x",
+            "inputs~3",
+            "inputs>=99999999999",
+            "vendor>=A",
+            "brain:inputs>=3",
+            "scan_time<=0ms",
+            "kind=toaster",
+            "colour=red",
+            "timers>=4KiB",
+            "price>=1.234",
+        ] {
+            assert!(Requirement::parse(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,9 @@
+//! What programs need, what controllers have, and which are taken.
+
+mod files;
+mod fitting;
+mod instruction_list;
+mod packing;
+mod plan;
+mod resources;
+mod support;

@@ -1,0 +1,285 @@
+//! Whole plans: ranked, packed, explained.
+
+use understudy_allocation::{
+    Allocation, AllocationError, Catalogue, Figure, Item, Need, Options, Preference, Provenance,
+    Quantity, Role, Statement, Stock, Terms, Verdict, Verification, allocate, csv, html, text,
+};
+
+use crate::support::{catalogue, controller, resources};
+
+const MEMORY: Quantity = Quantity::ProgramMemoryBytes;
+
+/// Small, medium and large, and one of which the memory is not known.
+fn three_sizes() -> Catalogue {
+    let sizes = [("S", 60, 900), ("M", 200, 700), ("L", 2000, 300)];
+    let models = sizes.map(|(model, memory, time)| {
+        controller(
+            model,
+            &[
+                (MEMORY, memory),
+                (Quantity::DataMemoryBytes, 10),
+                (Quantity::BoolInstructionNs, time),
+                (Quantity::DigitalInputs, 8),
+                (Quantity::DigitalOutputs, 8),
+            ],
+        )
+    });
+    let mut models = models.to_vec();
+    models.push(controller("X", &[(Quantity::DataMemoryBytes, 10)]));
+    catalogue(models)
+}
+
+/// 4 instructions, 16 bytes in the family W; with one bit that remembers.
+fn program(name: &str, group: Option<usize>, role: Role) -> Item {
+    let text = "program p\ninput a\ninput b\noutput y\nmemory m\nrung [ a | m ] /b ( m )\n";
+    let program = (role != Role::RemoteIo).then(|| resources(text));
+    Item {
+        name: name.to_owned(),
+        group,
+        need: Need {
+            role,
+            inputs: if role == Role::RemoteIo { 2 } else { 0 },
+            outputs: if role == Role::RemoteIo { 1 } else { 0 },
+            program,
+            scan_within: None,
+            ethernet: false,
+        },
+        verification: Verification::Passed("proved".to_owned()),
+    }
+}
+
+fn cell() -> Vec<Item> {
+    vec![
+        program("robot", Some(0), Role::Controller),
+        program("press", Some(0), Role::Controller),
+        program("understudy", Some(0), Role::Understudy),
+        program("robot-io", Some(0), Role::RemoteIo),
+    ]
+}
+
+fn planned(items: &[Item], options: &Options) -> Allocation {
+    allocate(&three_sizes(), items, options).expect("a plan")
+}
+
+fn boxes(plan: &Allocation) -> Vec<String> {
+    let boxes = plan.boxes.iter();
+    let mut found: Vec<String> = boxes
+        .map(|taken| format!("{}: {}", taken.controller.model, taken.items.join(" ")))
+        .collect();
+    found.sort();
+    found
+}
+
+fn share() -> Options {
+    Options {
+        share_members: true,
+        ..Options::default()
+    }
+}
+
+#[test]
+fn one_failure_must_not_take_two() {
+    let plan = planned(&cell(), &Options::default());
+    assert_eq!(
+        boxes(&plan),
+        ["S: press", "S: robot", "S: robot-io", "S: understudy"]
+    );
+    // Members may share where the user says so; the understudy and the remote I/O never do.
+    let plan = planned(&cell(), &share());
+    assert_eq!(
+        boxes(&plan),
+        ["S: robot press", "S: robot-io", "S: understudy"]
+    );
+    assert!(plan.is_complete() && plan.best);
+}
+
+#[test]
+fn programs_without_an_understudy_share_what_holds_them() {
+    let items: Vec<Item> = (0..5)
+        .map(|number| program(&format!("p{number}"), None, Role::Controller))
+        .collect();
+    // 80 bytes: one M of 200, for it is one box; S holds three.
+    assert_eq!(
+        boxes(&planned(&items, &Options::default())),
+        ["M: p0 p1 p2 p3 p4"]
+    );
+    let stock = |name: &str, count| Stock {
+        name: name.to_owned(),
+        count,
+    };
+    let few = Options {
+        stock: vec![stock("S", 1), stock("Works S", 1)],
+        ..Options::default()
+    };
+    assert_eq!(planned(&items, &few).boxes.len(), 2);
+    let one = Options {
+        stock: vec![stock("S", 1)],
+        ..Options::default()
+    };
+    let plan = planned(&items, &one);
+    assert_eq!(plan.boxes[0].items.len(), 3);
+    let why: Vec<_> = plan
+        .items
+        .iter()
+        .filter_map(|item| item.left_over.clone())
+        .collect();
+    assert_eq!(
+        why,
+        vec!["there are not enough boxes: of 1 that fit all are taken"; 2]
+    );
+}
+
+#[test]
+fn groups_may_share_boxes_with_each_other() {
+    let mut items = cell();
+    items.truncate(3);
+    items.extend([
+        program("mixer", Some(1), Role::Controller),
+        program("second", Some(1), Role::Understudy),
+    ]);
+    let plan = planned(&items, &Options::default());
+    assert_eq!(plan.boxes.len(), 3, "{:?}", boxes(&plan));
+    assert!(plan.is_complete());
+}
+
+#[test]
+fn what_is_preferred_comes_first() {
+    let first = |preference| {
+        let options = Options {
+            preference,
+            ..Options::default()
+        };
+        let plan = planned(&cell()[..1], &options);
+        let ranked: Vec<String> = plan.items[0]
+            .candidates
+            .iter()
+            .map(|it| it.model.clone())
+            .collect();
+        assert_eq!(ranked[3], "X", "what is not known is last");
+        assert_eq!(plan.boxes[0].controller.model, ranked[0]);
+        ranked[..3].concat()
+    };
+    assert_eq!(first(Preference::Memory), "SML");
+    assert_eq!(first(Preference::Speed), "LMS");
+    assert_eq!(
+        first(Preference::Reserve),
+        "MLS",
+        "10 % of the data memory is taken in M and in L alike"
+    );
+    // Nobody knows a price.
+    assert_eq!(first(Preference::Cost), "SML");
+}
+
+fn priced(prices: [(&str, u64, &str); 2]) -> Catalogue {
+    let mut catalogue = three_sizes();
+    for (model, price, currency) in prices {
+        let mut update = controller(model, &[(Quantity::Price, price)]);
+        let source = "a quotation".to_owned();
+        let value = currency.to_owned();
+        update
+            .texts
+            .insert(Statement::Currency, Figure { value, source });
+        catalogue.put(update);
+    }
+    catalogue
+}
+
+#[test]
+fn prices_decide_where_they_are_known() {
+    let catalogue = priced([("M", 9000, "EUR"), ("L", 5000, "EUR")]);
+    let plan = allocate(&catalogue, &cell()[..2], &Options::default()).expect("a plan");
+    assert_eq!(boxes(&plan), ["L: press", "L: robot"]);
+    assert!(
+        plan.remarks[0].starts_with("2 of 4 prices are not known"),
+        "{:?}",
+        plan.remarks
+    );
+    let catalogue = priced([("M", 9000, "EUR"), ("L", 5000, "USD")]);
+    let errors = allocate(&catalogue, &cell(), &Options::default()).expect_err("two currencies");
+    assert_eq!(
+        errors,
+        [AllocationError::Currencies(vec![
+            "EUR".into(),
+            "USD".into()
+        ])]
+    );
+}
+
+#[test]
+fn a_stock_of_unknown_models_is_refused_whole() {
+    let mut catalogue = three_sizes();
+    let mut twin = controller("S", &[]);
+    twin.vendor = "Others".to_owned();
+    catalogue.put(twin);
+    let stock = |name: &str| Stock {
+        name: name.to_owned(),
+        count: 1,
+    };
+    let options = Options {
+        stock: vec![stock("S"), stock("T"), stock("Works L")],
+        ..Options::default()
+    };
+    let errors = allocate(&catalogue, &cell(), &options).expect_err("a wrong stock");
+    let codes: Vec<&str> = errors.iter().map(AllocationError::code).collect();
+    assert_eq!(codes, ["U1132", "U1131"]);
+}
+
+#[test]
+fn what_is_not_verified_is_not_recommended_unless_the_user_insists() {
+    let mut items = cell();
+    items[0].verification = Verification::NotPassed("y can never be on".to_owned());
+    items[1].verification = Verification::NotAsked;
+    let plan = planned(&items, &Options::default());
+    assert_eq!(boxes(&plan), ["S: robot-io", "S: understudy"]);
+    assert!(plan.items[0].candidates.is_empty());
+    let why = plan.items[0].left_over.as_deref();
+    assert_eq!(why, Some("it is not recommended: y can never be on"));
+    let insisted = Options {
+        unverified: true,
+        ..Options::default()
+    };
+    assert!(planned(&items, &insisted).is_complete());
+}
+
+#[test]
+fn a_controller_of_which_a_figure_is_missing_is_never_taken() {
+    let catalogue = catalogue(vec![controller("X", &[(MEMORY, 100_000)])]);
+    let plan = allocate(&catalogue, &cell()[..1], &Options::default()).expect("a plan");
+    assert_eq!(plan.items[0].count(Verdict::Unknown), 1);
+    assert_eq!(
+        plan.items[0].left_over.as_deref(),
+        Some("no controller is known to fit: 1 of 1 lack a figure, the others do not fit")
+    );
+}
+
+#[test]
+fn the_plan_as_lines_as_a_table_and_as_a_page() {
+    let plan = planned(&cell(), &share());
+    insta::assert_snapshot!("text", text(&plan, false));
+    let table = csv(&plan);
+    assert_eq!(
+        table.lines().next().map(|line| line.split(',').count()),
+        Some(14)
+    );
+    assert!(
+        table.contains(
+            "robot,controller,1,Works,S,yes,fits,program_memory_bytes,fits,16,60,0.7333,"
+        ),
+        "{table}"
+    );
+    let about = Provenance {
+        title: "a <cell>".to_owned(),
+        version: "0".to_owned(),
+        date: "today".to_owned(),
+        repeat: "understudy allocate cell.toml --require \"vendor=A&B\"".to_owned(),
+        catalogue: "the catalogue of the tests".to_owned(),
+    };
+    let page = html(&plan, &Terms::default(), &about).expect("a page");
+    assert!(page.contains("Controllers for a &lt;cell&gt;"));
+    assert!(page.contains("<strong>3 boxes</strong> for 4 places"));
+    assert!(
+        !page.contains("vendor=A&B"),
+        "what comes from outside is escaped"
+    );
+    assert!(!page.contains("<script"), "a page without code");
+}
