@@ -11,6 +11,7 @@
 mod blocks;
 mod number;
 mod observer;
+mod writes;
 
 use std::collections::{HashMap, HashSet};
 use std::ops::RangeInclusive;
@@ -22,6 +23,7 @@ use understudy_logic::{Circuit, CircuitBuilder, Expression, Graph, RegisterId, V
 use self::number::Number;
 pub use self::observer::Observer;
 use self::observer::{Tapped, Wires};
+pub use self::writes::Write;
 use crate::check::check;
 use crate::program::{CoilKind, Contact, ContactKind, Element, Program, Rung, Series};
 

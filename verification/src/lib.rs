@@ -1,5 +1,6 @@
 //! Independent proofs about circuits, by code that shares nothing with what made them.
 
+mod drawing;
 pub mod induction;
 mod parity;
 pub mod program;
@@ -8,5 +9,11 @@ pub mod smv;
 pub mod symbolic;
 mod table;
 
+pub use drawing::{MAXIMUM_DRAWN, Shown, draw_runs, rungs_behind};
 pub use parity::{Assignment, Place, Proof, Refutation, prove_parity, prove_parity_within};
 pub use table::scan_table;
+
+/// The examples of the codes of this crate are run with its own.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/errors/U04.md")]
+pub struct ErrorPages;

@@ -1,5 +1,7 @@
 //! A ladder against its properties, and against what everybody wants of a ladder without saying so.
 
+mod remarks;
+mod sampled;
 mod unasked;
 
 use std::time::Duration;
@@ -12,6 +14,7 @@ use understudy_logic::bdd::{BddError, Diagrams};
 use crate::property::{Named, Property};
 use crate::symbolic::{Checker, Resolved, Signal, Trace, Verdict, resolve};
 
+pub use remarks::{Remark, Remarks};
 pub use unasked::{Lamp, OutputFinding};
 
 /// Bounds of a proof.

@@ -4,3 +4,4 @@ mod ladders;
 mod naive;
 mod random;
 mod reading;
+mod remarks;

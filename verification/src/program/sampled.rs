@@ -1,0 +1,101 @@
+//! Many runs at random, before anything is proved: what is seen there can happen, and needs no proof that it can.
+
+use understudy_logic::{Circuit, Scan, Scratch};
+
+use crate::property::Formula;
+use crate::symbolic::{Resolved, Signal};
+
+/// Scans of each of the 64 runs.
+const SCANS: usize = 256;
+
+/// Where something was seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Seen {
+    scan: usize,
+    run: usize,
+}
+
+/// 64 runs from the start.
+pub(super) struct Sampled {
+    inputs: Vec<Vec<u64>>,
+    /// For each question the first scan in which it was so.
+    seen: Vec<Option<Seen>>,
+}
+
+impl Sampled {
+    /// Looks in every scan whether `questions`, each of one scan, hold.
+    pub(super) fn new(circuit: &Circuit, questions: &[Resolved]) -> Self {
+        let scan = Scan::new(circuit);
+        let mut scratch = Scratch::default();
+        let initial = circuit.registers().iter();
+        let mut state: Vec<u64> = initial
+            .map(|register| u64::from(register.initial).wrapping_neg())
+            .collect();
+        let mut outputs = vec![0; scan.output_count()];
+        let mut inputs = vec![0; scan.input_count()];
+        let mut seen = vec![None; questions.len()];
+        let mut rows = Vec::with_capacity(SCANS);
+        let mut mixed = 1_u64;
+        for number in 0..SCANS {
+            for input in &mut inputs {
+                *input ^= flips(&mut mixed);
+            }
+            scan.step_lanes(&mut scratch, &mut state, &inputs, &mut outputs);
+            rows.push(inputs.clone());
+            for (question, seen) in questions.iter().zip(&mut seen) {
+                if seen.is_none() {
+                    let runs = word(question, &outputs, &inputs);
+                    *seen = (runs != 0).then(|| Seen {
+                        scan: number,
+                        run: runs.trailing_zeros() as usize,
+                    });
+                }
+            }
+        }
+        Self { inputs: rows, seen }
+    }
+
+    /// Where the question of this number was so.
+    pub(super) fn seen(&self, question: usize) -> Option<Seen> {
+        self.seen[question]
+    }
+
+    /// The inputs of the run, from its start to that scan.
+    pub(super) fn inputs(&self, seen: Seen) -> Vec<Vec<bool>> {
+        let rows = self.inputs[..=seen.scan].iter();
+        let bit = |word: &u64| word >> seen.run & 1 == 1;
+        rows.map(|row| row.iter().map(bit).collect()).collect()
+    }
+}
+
+/// Which runs an input changes in: half of them every second scan, others every eighth, others every thirty-second, as timers need it.
+fn flips(mixed: &mut u64) -> u64 {
+    let mut draw = || {
+        // SplitMix64.
+        *mixed = mixed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut word = *mixed;
+        word = (word ^ (word >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        word = (word ^ (word >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        word ^ (word >> 31)
+    };
+    let often = draw();
+    let seldom = often & draw() & draw();
+    let rarely = seldom & draw() & draw();
+    often & 0xffff_ffff | seldom & 0xffff << 32 | rarely & 0xffff << 48
+}
+
+/// In which runs the formula holds; what speaks of more than one scan holds in none.
+fn word(formula: &Resolved, outputs: &[u64], inputs: &[u64]) -> u64 {
+    let of = |formula: &Resolved| word(formula, outputs, inputs);
+    match formula {
+        Formula::Constant(value) => u64::from(*value).wrapping_neg(),
+        Formula::Signal(Signal::Output(output)) => outputs[*output],
+        Formula::Signal(Signal::Input(input)) => inputs[*input],
+        Formula::Not(inner) => !of(inner),
+        Formula::And(left, right) => of(left) & of(right),
+        Formula::Or(left, right) => of(left) | of(right),
+        Formula::Implies(left, right) => !of(left) | of(right),
+        Formula::Same(left, right) => !(of(left) ^ of(right)),
+        _ => 0,
+    }
+}
