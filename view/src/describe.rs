@@ -186,6 +186,17 @@ fn remote_io(event: &RemoteIoEvent, parties: &Parties) -> Words {
             Notice,
             "an operator has released its outputs and whom it had accused".to_owned(),
         ),
+        RemoteIoEvent::RecalledExclusion { stations: who, .. } => {
+            let who = stations(*who, parties);
+            let text = format!(
+                "{who} stays excluded, as other stations recall, until an operator releases it"
+            );
+            ("recalled-exclusion", Alarm, text)
+        }
+        RemoteIoEvent::Diagnosed { failed, .. } => {
+            let text = format!("its diagnosis finds these channels failed: {failed}");
+            ("diagnosed", Warning, text)
+        }
         RemoteIoEvent::Flagged { station, .. } => flagged(*station, parties),
         RemoteIoEvent::Cleared { station, .. } => cleared(*station, parties),
         RemoteIoEvent::Syndrome {

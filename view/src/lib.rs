@@ -26,6 +26,7 @@ mod source;
 mod station;
 mod timeline;
 mod timing;
+mod why;
 
 pub use alarm::Alarm;
 pub use describe::{Description, describe};
@@ -45,3 +46,4 @@ pub use source::{Feed, Source, Trouble};
 pub use station::StationState;
 pub use timeline::{Span, Timeline};
 pub use timing::CycleTiming;
+pub use why::{Addend, Reason, Restored, Why};

@@ -224,6 +224,7 @@ fn turn(station: StationId, holds: ProgramSet, words: Vec<Word>) -> Arc<Frame> {
             heard: StationSet::EMPTY,
             holdings: holdings.collect(),
             words: words.into_iter().collect(),
+            recalled: Vec::new(),
         }),
     })
 }

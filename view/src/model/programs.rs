@@ -121,6 +121,10 @@ impl Model {
                 }
                 alarm = Some("value-fault");
             }
+            RemoteIoEvent::RecalledExclusion { stations, .. } => {
+                track.excluded = track.excluded.or(*stations);
+                alarm = Some("value-fault");
+            }
             RemoteIoEvent::AdoptedLineage { .. } => self.alarms.over(&subject("disputed"), cycle),
             RemoteIoEvent::Flagged { station, .. } | RemoteIoEvent::Cleared { station, .. } => {
                 let flagged = matches!(event, RemoteIoEvent::Flagged { .. });

@@ -1,0 +1,256 @@
+//! Why an output is as it is: the chain of contacts that made it so, through memory bits and earlier cycles, and where it was
+//! restored the word, its members and the lineage that proves it.
+
+mod explain;
+mod power;
+mod text;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use understudy_scenarios::source_word;
+use understudy_wire::{Party, ProgramId, Source, StationId};
+
+use crate::describe::missing_text;
+use crate::error::{ViewError, suggest};
+use crate::history::{Driven, History, Step};
+use crate::model::Model;
+use explain::Explainer;
+
+/// Why an output or a memory bit of a program is as it is.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Why {
+    /// Its name.
+    pub signal: String,
+    /// Of which program.
+    pub program: String,
+    /// The remote I/O that drives it.
+    pub remote_io: String,
+    /// From the origin of the run.
+    pub cycle: i64,
+    /// As it was driven; a memory bit as it was after the scan.
+    pub value: bool,
+    /// `direct`, `reconstructed`, `held` or `fail-safe`; nothing for a cycle whose deadline is not in the journal.
+    pub source: Option<&'static str>,
+    /// Why nothing true was there, where that is so.
+    pub missing: Option<&'static str>,
+    /// What the program's own scan says, where that was not driven.
+    pub scanned: Option<bool>,
+    /// How it was restored.
+    pub restored: Option<Restored>,
+    /// The chain of contacts; nothing for a fail-safe value.
+    pub because: Option<Reason>,
+}
+
+/// How an output was restored: equation (12) with its numbers.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Restored {
+    /// Who said the word.
+    pub word_of: String,
+    /// The programs whose sum it is.
+    pub members: Vec<String>,
+    /// The word, element 1 first.
+    pub word: String,
+    /// The outputs of the other members, as their controllers said them.
+    pub others: Vec<Addend>,
+    /// The sum of them all.
+    pub sum: String,
+    /// L(t+1) of the program: who speaks from it has seen the same inputs since the same start.
+    pub lineage: String,
+    /// Whether the sum is what the samples lead to.
+    pub proved: bool,
+    /// Who was silent in that cycle.
+    pub silent: Vec<String>,
+}
+
+/// The outputs of one member.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Addend {
+    /// Who said them.
+    pub said_by: String,
+    /// Element 1 first.
+    pub outputs: String,
+}
+
+/// A signal in a cycle, and what made it so.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Reason {
+    /// A signal, a pin of a block, or a comparison.
+    pub signal: String,
+    /// What it was in that place of the scan.
+    pub value: bool,
+    /// From the origin of the run.
+    pub cycle: i64,
+    /// The rung that decided it, counted from 1.
+    pub rung: Option<usize>,
+    /// The title of that rung.
+    pub title: Option<String>,
+    /// How.
+    pub text: String,
+    /// What that rests on.
+    pub because: Vec<Reason>,
+}
+
+impl Model {
+    /// Why a signal is as it is: `ram_down`, or `press.ram_down` where several programs have one of that name; an address such as
+    /// `%QX0.0` will do. Without a cycle, in the newest one that is known.
+    ///
+    /// # Errors
+    /// Where there is no such signal, or nothing is known of the cycle.
+    pub fn why(&self, signal: &str, cycle: Option<i64>) -> Result<Why, ViewError> {
+        let (program, name) = self.find_signal(signal)?;
+        let history = self.history_of(program)?;
+        let place = match cycle {
+            Some(cycle) => history.place_of(cycle),
+            None => {
+                let decided = |step: &Step| step.driven.is_some();
+                history.steps().iter().rposition(decided)
+            }
+        };
+        let place = place.ok_or_else(|| self.no_cycle(program, cycle.unwrap_or(0)))?;
+        self.why_at(program, history, &name, place)
+    }
+
+    fn why_at(
+        &self,
+        program: ProgramId,
+        history: &History,
+        name: &str,
+        place: usize,
+    ) -> Result<Why, ViewError> {
+        let step = &history.steps()[place];
+        let controller = &self.cluster.controllers()[program.index()];
+        let outputs = controller.circuit.outputs();
+        let output = outputs.iter().position(|output| output.name == name);
+        let source = step.driven.as_ref().map(|driven| driven.source);
+        // What is held was true in an earlier cycle; the fail-safe values were never computed.
+        let explained = match source {
+            Some(Source::Held) if output.is_some() => last_true(history, place),
+            Some(Source::FailSafe) if output.is_some() => None,
+            _ => Some(place),
+        };
+        let mut explainer = Explainer::new(self, history, &controller.program);
+        let because = match explained {
+            None => None,
+            Some(explained) => Some(explainer.root(name, explained)?),
+        };
+        let scanned = match (output, &step.sampled) {
+            (Some(output), Some(sampled)) => Some(sampled.outputs.get(output)),
+            _ => None,
+        };
+        let driven = step
+            .driven
+            .as_ref()
+            .and_then(|driven| Some(driven.outputs.get(output?)));
+        let value = driven
+            .or(because.as_ref().map(|reason| reason.value))
+            .unwrap_or_default();
+        Ok(Why {
+            signal: name.to_owned(),
+            program: controller.name.clone(),
+            remote_io: self.parties.name(Party::RemoteIo(program)).to_owned(),
+            cycle: step.cycle,
+            value,
+            source: source.map(source_word),
+            missing: step
+                .driven
+                .as_ref()
+                .and_then(|driven| driven.missing)
+                .map(missing_text),
+            scanned: scanned.filter(|scanned| *scanned != value),
+            restored: step
+                .driven
+                .as_ref()
+                .and_then(|driven| self.restored(program, step, driven)),
+            because,
+        })
+    }
+
+    /// The program and the name of an output or a memory bit.
+    fn find_signal(&self, asked: &str) -> Result<(ProgramId, String), ViewError> {
+        let controllers = self.cluster.controllers();
+        let mut found = Vec::new();
+        let mut known = Vec::new();
+        for (place, controller) in controllers.iter().enumerate() {
+            let prefix = format!("{}.", controller.name);
+            let name = asked.strip_prefix(&prefix).unwrap_or(asked);
+            for signal in controller.program.writable() {
+                known.push(signal.name.to_string());
+                let address = signal.address.as_ref().map(ToString::to_string);
+                if signal.name.as_str() == name || address.as_deref() == Some(name) {
+                    let program = ProgramId(place as u8);
+                    found.push((program, signal.name.to_string(), name != asked));
+                }
+            }
+        }
+        if found.iter().any(|(_, _, named)| *named) {
+            found.retain(|(_, _, named)| *named);
+        }
+        match found.as_slice() {
+            [] => Err(ViewError::NoOutput {
+                name: asked.to_owned(),
+                hint: suggest(asked, known.iter().map(String::as_str)),
+            }),
+            [(program, name, _)] => Ok((*program, name.clone())),
+            several => Err(ViewError::SeveralOutputs {
+                name: asked.to_owned(),
+                programs: several
+                    .iter()
+                    .map(|(program, _, _)| self.program_name(*program).to_owned())
+                    .collect(),
+            }),
+        }
+    }
+
+    /// The word that restored the outputs of a program, with what was added to it.
+    fn restored(&self, program: ProgramId, step: &Step, driven: &Driven) -> Option<Restored> {
+        let station = driven
+            .word_of
+            .filter(|_| driven.source == Source::Reconstructed)?;
+        let turns = self.spoken(step.moment);
+        let turn = turns.iter().find(|turn| turn.station == station)?;
+        let word = turn
+            .words
+            .iter()
+            .find(|word| word.members.contains(program))?;
+        let mut sum = word.sum.clone();
+        let mut others = Vec::new();
+        for other in word.members.iter().filter(|other| *other != program) {
+            let own = StationId(other.0);
+            let said = turns.iter().find(|turn| turn.station == own);
+            let said = said.and_then(|turn| turn.words.first())?;
+            sum.add(&said.sum);
+            others.push(Addend {
+                said_by: self.parties.name(Party::Station(own)).to_owned(),
+                outputs: said.sum.to_string(),
+            });
+        }
+        let sum = sum.narrowed(driven.outputs.width()).unwrap_or(sum);
+        let silent = (0..self.cluster.agreement().schedule.stations() as u8)
+            .map(StationId)
+            .filter(|station| !driven.heard.contains(*station))
+            .map(|station| self.parties.name(Party::Station(station)).to_owned());
+        let sampled = step.sampled.as_ref();
+        Some(Restored {
+            word_of: self.parties.name(Party::Station(station)).to_owned(),
+            members: word
+                .members
+                .iter()
+                .map(|member| self.program_name(member).to_owned())
+                .collect(),
+            word: word.sum.to_string(),
+            others,
+            lineage: sampled.map_or_else(String::new, |sampled| sampled.after.to_string()),
+            proved: sampled.is_some_and(|sampled| sampled.outputs == sum),
+            sum: sum.to_string(),
+            silent: silent.collect(),
+        })
+    }
+}
+
+/// The place of the cycle whose outputs are held at `place`.
+fn last_true(history: &History, place: usize) -> Option<usize> {
+    (0..place).rev().find(|&earlier| {
+        let driven = history.steps()[earlier].driven.as_ref();
+        driven.is_some_and(|driven| driven.missing.is_none())
+    })
+}

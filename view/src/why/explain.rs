@@ -1,0 +1,560 @@
+//! Follows a signal back: through the rungs above, through blocks, and through the cycles before.
+//!
+//! Bounded by [`DEEPEST`] and [`MOST`]; where that ends it, the reason says so.
+
+use std::collections::{HashMap, HashSet};
+use std::rc::Rc;
+
+use understudy_ladder::{
+    BlockKind, CoilKind, ContactKind, Element, Evaluation, Program, Reading, visit,
+};
+
+use super::Reason;
+use super::power::{AtBlock, Node, at_block, behind, nodes};
+use crate::error::ViewError;
+use crate::history::History;
+use crate::model::Model;
+
+/// Reasons within reasons.
+const DEEPEST: usize = 24;
+
+/// Reasons in all.
+const MOST: usize = 300;
+
+/// Cycles that are gone back through to find what set a latch or started a timer.
+const FARTHEST: usize = 4096;
+
+pub(super) struct Explainer<'m> {
+    model: &'m Model,
+    history: &'m History,
+    program: &'m Program,
+    evaluations: HashMap<usize, Option<Rc<Evaluation>>>,
+    told: HashSet<(String, usize, usize)>,
+    count: usize,
+}
+
+/// A coil that decided a signal in a scan.
+struct Decision {
+    rung: usize,
+    kind: CoilKind,
+}
+
+impl<'m> Explainer<'m> {
+    pub(super) fn new(model: &'m Model, history: &'m History, program: &'m Program) -> Self {
+        Self {
+            model,
+            history,
+            program,
+            evaluations: HashMap::new(),
+            told: HashSet::new(),
+            count: 0,
+        }
+    }
+
+    /// A signal as it was after the scan of the step at `place`.
+    pub(super) fn root(&mut self, name: &str, place: usize) -> Result<Reason, ViewError> {
+        let evaluation = self.model.evaluation_at(self.history, place)?;
+        let of = |signals: &[understudy_ladder::Signal], values: &[bool]| {
+            let found = signals
+                .iter()
+                .position(|signal| signal.name.as_str() == name);
+            found.and_then(|found| values.get(found).copied())
+        };
+        let value = of(&self.program.outputs, &evaluation.outputs)
+            .or_else(|| of(&self.program.memory, &evaluation.memory))
+            .unwrap_or_default();
+        self.evaluations.insert(place, Some(Rc::new(evaluation)));
+        Ok(self.signal(name, value, place, self.program.rungs.len(), 0))
+    }
+
+    fn evaluation(&mut self, place: usize) -> Option<Rc<Evaluation>> {
+        let found = self.evaluations.get(&place).cloned();
+        found.unwrap_or_else(|| {
+            let evaluation = self.model.evaluation_at(self.history, place).ok();
+            let evaluation = evaluation.map(Rc::new);
+            self.evaluations.insert(place, evaluation.clone());
+            evaluation
+        })
+    }
+
+    fn cycle(&self, place: usize) -> i64 {
+        self.history.steps()[place].cycle
+    }
+
+    fn leaf(&self, signal: &str, value: bool, place: usize, text: impl Into<String>) -> Reason {
+        Reason {
+            signal: signal.to_owned(),
+            value,
+            cycle: self.cycle(place),
+            rung: None,
+            title: None,
+            text: text.into(),
+            because: Vec::new(),
+        }
+    }
+
+    /// A signal as a contact in the rung `below` reads it: as the rungs above have left it.
+    fn signal(
+        &mut self,
+        name: &str,
+        value: bool,
+        place: usize,
+        below: usize,
+        depth: usize,
+    ) -> Reason {
+        if let Some(input) = self
+            .program
+            .inputs
+            .iter()
+            .position(|input| input.name.as_str() == name)
+        {
+            return self.input(name, input, value, place);
+        }
+        self.count += 1;
+        if depth > DEEPEST || self.count > MOST {
+            return self.leaf(name, value, place, "and so on");
+        }
+        if !self.told.insert((name.to_owned(), place, below)) {
+            return self.leaf(name, value, place, "as said already");
+        }
+        let mut at = place;
+        let mut limit = below;
+        for _ in 0..FARTHEST {
+            let Some(evaluation) = self.evaluation(at) else {
+                return self.leaf(name, value, at, "the state before is not known");
+            };
+            if let Some(decision) = self.decision(name, &evaluation, limit) {
+                return self.decided(name, value, [place, at], &decision, &evaluation, depth);
+            }
+            if at == place && !value {
+                // A latch that is off: what does not set it says more than what once reset it.
+                let reasons = self.not_set(name, &evaluation, limit, at, depth);
+                if !reasons.is_empty() {
+                    let mut reason = self.leaf(name, value, place, "nothing sets it");
+                    reason.because = reasons;
+                    return reason;
+                }
+            }
+            match self.history.before(at) {
+                Some(before) => (at, limit) = (before, self.program.rungs.len()),
+                None => break,
+            }
+        }
+        self.leaf(name, value, place, self.end_of_history(at))
+    }
+
+    /// Why there is nothing before the step at `place`.
+    fn end_of_history(&self, place: usize) -> &'static str {
+        if place == 0 && self.history.is_cut() {
+            "kept since before what is remembered of the run"
+        } else {
+            "its initial value"
+        }
+    }
+
+    fn input(&self, name: &str, input: usize, value: bool, place: usize) -> Reason {
+        let mut since = place;
+        for _ in 0..FARTHEST {
+            let Some(before) = self.history.before(since) else {
+                break;
+            };
+            let sampled = self.history.steps()[before].sampled.as_ref();
+            if sampled.is_none_or(|sampled| sampled.inputs.get(input) != value) {
+                break;
+            }
+            since = before;
+        }
+        let text = if since == place {
+            "input, new in this cycle".to_owned()
+        } else {
+            format!("input, since cycle {}", self.cycle(since))
+        };
+        self.leaf(name, value, place, text)
+    }
+
+    /// The last coil above the rung `below` that decided a signal in a scan.
+    fn decision(&self, name: &str, evaluation: &Evaluation, below: usize) -> Option<Decision> {
+        let rungs = self.program.rungs[..below].iter().enumerate().rev();
+        for (rung, written) in rungs {
+            for coil in written.coils.iter().rev() {
+                let decides = !coil.kind.is_latch() || evaluation.rungs[rung].power;
+                if coil.target.as_str() == name && decides {
+                    let kind = coil.kind;
+                    return Some(Decision { rung, kind });
+                }
+            }
+        }
+        None
+    }
+
+    fn decided(
+        &mut self,
+        name: &str,
+        value: bool,
+        [place, at]: [usize; 2],
+        decision: &Decision,
+        evaluation: &Rc<Evaluation>,
+        depth: usize,
+    ) -> Reason {
+        let power = evaluation.rungs[decision.rung].power;
+        let how = match (decision.kind, power) {
+            (CoilKind::Set, _) => "is set",
+            (CoilKind::Reset, _) => "is reset",
+            (CoilKind::Plain, true) => "has power",
+            (CoilKind::Plain, false) => "has no power",
+            (CoilKind::Negated, true) => "has power, and the coil is negated",
+            (CoilKind::Negated, false) => "has no power, and the coil is negated",
+            (CoilKind::Rising, _) if value => "its rung has just got power",
+            (CoilKind::Rising, true) => "its rung had power already",
+            (CoilKind::Rising, false) => "its rung has no power",
+            (CoilKind::Falling, _) if value => "its rung has just lost power",
+            (CoilKind::Falling, true) => "its rung has power",
+            (CoilKind::Falling, false) => "its rung had no power before",
+        };
+        let when = if at == place {
+            String::new()
+        } else {
+            format!(" in cycle {}, and kept since", self.cycle(at))
+        };
+        let rung = &self.program.rungs[decision.rung];
+        Reason {
+            signal: name.to_owned(),
+            value,
+            cycle: self.cycle(place),
+            rung: Some(decision.rung + 1),
+            title: rung.title.clone().filter(|title| !title.is_empty()),
+            text: format!("{how}{when}"),
+            because: self.power_of(decision.rung, evaluation, at, depth + 1),
+        }
+    }
+
+    /// Why the set coils of a signal have no power.
+    fn not_set(
+        &mut self,
+        name: &str,
+        evaluation: &Rc<Evaluation>,
+        below: usize,
+        place: usize,
+        depth: usize,
+    ) -> Vec<Reason> {
+        let sets = self.program.rungs[..below].iter().enumerate();
+        let sets: Vec<usize> = sets
+            .filter(|(_, rung)| {
+                let mut coils = rung.coils.iter();
+                coils.any(|coil| coil.kind == CoilKind::Set && coil.target.as_str() == name)
+            })
+            .map(|(rung, _)| rung)
+            .collect();
+        let mut reasons = Vec::new();
+        for rung in sets {
+            reasons.extend(self.power_of(rung, evaluation, place, depth + 1));
+        }
+        reasons
+    }
+
+    /// Why a rung has power, or why not.
+    fn power_of(
+        &mut self,
+        rung: usize,
+        evaluation: &Rc<Evaluation>,
+        place: usize,
+        depth: usize,
+    ) -> Vec<Reason> {
+        let flow = &evaluation.rungs[rung];
+        let network = nodes(&self.program.rungs[rung].network, &mut flow.elements.iter());
+        let elements = behind(&network, flow.power);
+        self.elements(&elements, rung, place, depth)
+    }
+
+    fn elements(
+        &mut self,
+        elements: &[&Node<'_>],
+        rung: usize,
+        place: usize,
+        depth: usize,
+    ) -> Vec<Reason> {
+        elements
+            .iter()
+            .map(|node| self.element(node, rung, place, depth))
+            .collect()
+    }
+
+    fn element(&mut self, node: &Node<'_>, rung: usize, place: usize, depth: usize) -> Reason {
+        match node.element {
+            Element::Contact(contact) => {
+                let value = node.flow.reading == Reading::Bit(true);
+                let mut reason = self.operand(&contact.operand, value, rung, place, depth);
+                let edge = match (contact.kind, node.flow.passes) {
+                    (ContactKind::Rising, true) => "has just come; ",
+                    (ContactKind::Rising, false) => "has not just come; ",
+                    (ContactKind::Falling, true) => "has just gone; ",
+                    (ContactKind::Falling, false) => "has not just gone; ",
+                    _ => "",
+                };
+                reason.text.insert_str(0, edge);
+                reason
+            }
+            Element::Comparison(comparison) => {
+                let number = match node.flow.reading {
+                    Reading::Number(number) => number,
+                    _ => 0,
+                };
+                let relation = comparison.relation.sign();
+                let signal = format!("{}.CV {relation} {}", comparison.counter, comparison.value);
+                let mut reason =
+                    self.leaf(&signal, node.flow.passes, place, format!("CV is {number}"));
+                reason.because = self
+                    .block(&comparison.counter, rung, place, depth + 1)
+                    .into_iter()
+                    .collect();
+                reason
+            }
+            Element::Block(block) => {
+                let found = self.block_at(&block.name, rung, place, depth);
+                found.unwrap_or_else(|| self.leaf(&block.name, node.flow.leaves, place, ""))
+            }
+            Element::Branches(_) => self.leaf("branches", node.flow.leaves, place, ""),
+        }
+    }
+
+    fn operand(
+        &mut self,
+        operand: &str,
+        value: bool,
+        rung: usize,
+        place: usize,
+        depth: usize,
+    ) -> Reason {
+        let block = operand.split_once('.').map(|(block, _)| block);
+        let explained = block.and_then(|block| self.block(block, rung, place, depth));
+        match explained {
+            Some(reason) => Reason {
+                signal: operand.to_owned(),
+                value,
+                ..reason
+            },
+            None => self.signal(operand, value, place, rung, depth + 1),
+        }
+    }
+
+    /// A block as the rung `below` sees it: of this scan where it stands above, of the one before otherwise.
+    fn block(&mut self, name: &str, below: usize, place: usize, depth: usize) -> Option<Reason> {
+        let rung = self.program.rungs.iter().position(|rung| {
+            let mut found = false;
+            visit(&rung.network, &mut |element| {
+                found |= matches!(element, Element::Block(block) if block.name.as_str() == name);
+            });
+            found
+        })?;
+        let place = if rung <= below {
+            place
+        } else {
+            self.history.before(place)?
+        };
+        self.block_at(name, rung, place, depth)
+    }
+
+    fn block_at(&mut self, name: &str, rung: usize, place: usize, depth: usize) -> Option<Reason> {
+        self.count += 1;
+        let evaluation = self.evaluation(place)?;
+        let flows = &evaluation.rungs[rung].elements;
+        let network = nodes(&self.program.rungs[rung].network, &mut flows.iter());
+        let found = at_block(&network, name)?;
+        let kind = found.block.kind;
+        let mut reason = self.leaf(name, found.node.flow.leaves, place, "");
+        reason.rung = Some(rung + 1);
+        reason.title = self.program.rungs[rung]
+            .title
+            .clone()
+            .filter(|title| !title.is_empty());
+        if depth > DEEPEST || self.count > MOST {
+            reason.text = "and so on".to_owned();
+            return Some(reason);
+        }
+        if !self.told.insert((name.to_owned(), place, usize::MAX)) {
+            reason.text = "as said already".to_owned();
+            return Some(reason);
+        }
+        let word = kind.word();
+        let (text, at) = self.block_text(&found, rung, place);
+        reason.text = format!("{word}: {text}");
+        reason.because = match at {
+            Some(at) if at != place => self.wire_at(name, rung, at, depth),
+            _ => {
+                let reset = match kind {
+                    BlockKind::Sr => found.feed("R"),
+                    BlockKind::Rs => found.feed("R1"),
+                    _ => (false, Vec::new()),
+                };
+                let elements = if reset.0 && !found.node.flow.leaves {
+                    reset.1
+                } else {
+                    found.wire.clone()
+                };
+                self.elements(&elements, rung, place, depth + 1)
+            }
+        };
+        Some(reason)
+    }
+
+    /// Why there was power at the wire of a block in an earlier scan, or why not.
+    fn wire_at(&mut self, name: &str, rung: usize, place: usize, depth: usize) -> Vec<Reason> {
+        let Some(evaluation) = self.evaluation(place) else {
+            return Vec::new();
+        };
+        let flows = &evaluation.rungs[rung].elements;
+        let network = nodes(&self.program.rungs[rung].network, &mut flows.iter());
+        match at_block(&network, name) {
+            Some(found) => self.elements(&found.wire, rung, place, depth + 1),
+            None => Vec::new(),
+        }
+    }
+
+    /// What a block does, and the step that explains it where that is an earlier one.
+    fn block_text(
+        &mut self,
+        found: &AtBlock<'_, '_>,
+        rung: usize,
+        place: usize,
+    ) -> (String, Option<usize>) {
+        let name = found.block.name.as_str();
+        let flow = found.node.flow;
+        let (enters, leaves) = (flow.enters, flow.leaves);
+        let elapsed = match flow.reading {
+            Reading::Time(elapsed) => format!("{elapsed:?}"),
+            Reading::Number(number) => number.to_string(),
+            _ => String::new(),
+        };
+        let preset = found.block.kind.preset_time().unwrap_or_default();
+        match found.block.kind {
+            BlockKind::Ton(_) | BlockKind::Tof(_) => {
+                let on = matches!(found.block.kind, BlockKind::Ton(_));
+                if enters != on {
+                    let power = if enters {
+                        "its input has power"
+                    } else {
+                        "its input has no power"
+                    };
+                    return (power.to_owned(), None);
+                }
+                let (since, known) = self.unchanged(name, rung, place, |flow| flow.enters);
+                let since = if known {
+                    format!("since cycle {}", self.cycle(since))
+                } else {
+                    "for long".to_owned()
+                };
+                let what = if on {
+                    "its input has power"
+                } else {
+                    "its input has no power"
+                };
+                let over = if leaves == on {
+                    format!("its {preset:?} are over")
+                } else {
+                    format!("{elapsed} of {preset:?}")
+                };
+                (format!("{what} {since}, {over}"), None)
+            }
+            BlockKind::Tp(_) => {
+                if !leaves {
+                    let what = if enters {
+                        "its pulse is over, and its input still has power"
+                    } else {
+                        "its input has no power"
+                    };
+                    return (what.to_owned(), None);
+                }
+                let (since, _) = self.unchanged(name, rung, place, |flow| flow.leaves);
+                (
+                    format!(
+                        "its pulse began in cycle {}, {elapsed} of {preset:?}",
+                        self.cycle(since)
+                    ),
+                    Some(since),
+                )
+            }
+            BlockKind::Ctu(preset) | BlockKind::Ctd(preset) | BlockKind::Ctud(preset) => {
+                let (since, known) = self.unchanged(name, rung, place, |flow| flow.reading);
+                let since_text = if known {
+                    format!(" since cycle {}", self.cycle(since))
+                } else {
+                    String::new()
+                };
+                (
+                    format!("CV is {elapsed}, PV {preset}{since_text}"),
+                    Some(since),
+                )
+            }
+            BlockKind::Sr | BlockKind::Rs => {
+                if leaves && !enters {
+                    let (since, _) = self.unchanged(name, rung, place, |flow| flow.enters);
+                    let set = self.history.before(since).unwrap_or(since);
+                    return (
+                        format!("set in cycle {}, and kept since", self.cycle(set)),
+                        Some(set),
+                    );
+                }
+                let what = match (leaves, enters) {
+                    (true, _) => "it is set",
+                    (false, true) => "it is reset, and that wins",
+                    (false, false) => "nothing sets it",
+                };
+                (what.to_owned(), None)
+            }
+            BlockKind::RTrig | BlockKind::FTrig => {
+                let what = if leaves {
+                    "its input has just changed"
+                } else {
+                    "its input has not just changed"
+                };
+                (what.to_owned(), None)
+            }
+        }
+    }
+
+    /// The first of the steps up to `place` in which something of a block was as it is, and whether the one before is known.
+    fn unchanged<T: PartialEq>(
+        &mut self,
+        name: &str,
+        rung: usize,
+        place: usize,
+        what: impl Fn(&understudy_ladder::ElementFlow) -> T,
+    ) -> (usize, bool) {
+        let Some(element) = self.place_of_block(name, rung) else {
+            return (place, false);
+        };
+        let mut at = place;
+        let Some(now) = self
+            .evaluation(place)
+            .and_then(|evaluation| Some(what(evaluation.rungs[rung].elements.get(element)?)))
+        else {
+            return (place, false);
+        };
+        for _ in 0..FARTHEST {
+            let Some(before) = self.history.before(at) else {
+                return (at, self.end_of_history(at) == "its initial value");
+            };
+            let evaluation = self.evaluation(before);
+            let was = evaluation
+                .as_ref()
+                .and_then(|evaluation| evaluation.rungs[rung].elements.get(element));
+            match was {
+                Some(was) if what(was) == now => at = before,
+                Some(_) => return (at, true),
+                None => return (at, false),
+            }
+        }
+        (at, false)
+    }
+
+    fn place_of_block(&self, name: &str, rung: usize) -> Option<usize> {
+        let (mut place, mut found) = (0, None);
+        visit(&self.program.rungs[rung].network, &mut |element| {
+            if matches!(element, Element::Block(block) if block.name.as_str() == name) {
+                found = Some(place);
+            }
+            place += 1;
+        });
+        found
+    }
+}

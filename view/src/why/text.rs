@@ -1,0 +1,97 @@
+//! A chain of reasons as a tree in text.
+
+use std::fmt::Write as _;
+
+use super::{Reason, Why};
+
+impl Why {
+    /// For a terminal; lines end in a newline.
+    pub fn to_text(&self) -> String {
+        let mut text = String::new();
+        let value = u8::from(self.value);
+        let _ = writeln!(
+            text,
+            "{}.{} is {value} in cycle {}",
+            self.program, self.signal, self.cycle
+        );
+        if let Some(source) = self.source {
+            let why = self
+                .missing
+                .map_or(String::new(), |missing| format!(": {missing}"));
+            let _ = writeln!(text, "  {} drives it, {source}{why}", self.remote_io);
+        }
+        if let Some(scanned) = self.scanned {
+            let _ = writeln!(text, "  the scan of this cycle says {}", u8::from(scanned));
+        }
+        if let Some(restored) = &self.restored {
+            let silent = if restored.silent.is_empty() {
+                "nobody".to_owned()
+            } else {
+                restored.silent.join(", ")
+            };
+            let _ = writeln!(text, "  silent: {silent}");
+            let members = restored.members.join(" + ");
+            let _ = writeln!(
+                text,
+                "  word of {} over {members}: {}",
+                restored.word_of, restored.word
+            );
+            for other in &restored.others {
+                let _ = writeln!(text, "  + {} of {}", other.outputs, other.said_by);
+            }
+            let proof = if restored.proved {
+                "what the samples lead to"
+            } else {
+                "NOT what the samples lead to"
+            };
+            let _ = writeln!(
+                text,
+                "  = {}, {proof}; lineage {}",
+                restored.sum, restored.lineage
+            );
+        }
+        match &self.because {
+            None => {
+                let _ = writeln!(text, "  it is the configured fail-safe value");
+            }
+            Some(reason) => {
+                line(&mut text, reason, self.cycle, "");
+                children(&mut text, reason, "");
+            }
+        }
+        text
+    }
+}
+
+fn children(text: &mut String, reason: &Reason, indent: &str) {
+    let last = reason.because.len().saturating_sub(1);
+    for (place, child) in reason.because.iter().enumerate() {
+        let (branch, below) = if place == last {
+            ("└ ", "  ")
+        } else {
+            ("├ ", "│ ")
+        };
+        let _ = write!(text, "{indent}{branch}");
+        line(text, child, reason.cycle, "");
+        children(text, child, &format!("{indent}{below}"));
+    }
+}
+
+fn line(text: &mut String, reason: &Reason, parent: i64, indent: &str) {
+    let value = u8::from(reason.value);
+    let when = if reason.cycle == parent {
+        String::new()
+    } else {
+        format!(" in cycle {}", reason.cycle)
+    };
+    let rung = reason.rung.map_or(String::new(), |rung| {
+        let title = reason.title.as_ref();
+        let title = title.map_or(String::new(), |title| format!(" \"{title}\""));
+        format!(" [rung {rung}{title}]")
+    });
+    let _ = writeln!(
+        text,
+        "{indent}{} = {value}{when}: {}{rung}",
+        reason.signal, reason.text
+    );
+}
