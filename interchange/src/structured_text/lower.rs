@@ -6,7 +6,8 @@
 
 mod rungs;
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
+use std::ops::Range;
 
 use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{Name, Program, Relation};
@@ -19,8 +20,8 @@ use super::program::{Action, Cell, Kind, Number, Resolved, Role, Step, Truth};
 
 /// The widest number that is calculated with, in bits.
 const MAXIMUM_WIDTH: usize = 63;
-/// Operations of the rungs of one step.
-const MAXIMUM_OPERATIONS: usize = 400_000;
+/// Operations of all steps together.
+const MAXIMUM_OPERATIONS: usize = 1_000_000;
 
 /// What a contact of a rung reads.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -36,33 +37,34 @@ pub(super) fn lower(
     name: &Name,
     resolved: &Resolved,
     intervals: &[Interval],
-) -> (Program, Vec<Diagnostic>) {
+) -> (Program, Option<Diagnostic>) {
     let mut lowering = Lowering {
         cells: &resolved.cells,
         intervals,
-        assigned: resolved.assigned(),
+        written: resolved.written(),
+        blocks: resolved.blocks(),
         graph: Graph::new(),
         leaves: Vec::new(),
         places: HashMap::new(),
         known: HashMap::new(),
         overlays: vec![HashMap::new()],
         rungs: Rungs::new(&resolved.cells, intervals),
-        diagnostics: Vec::new(),
+        place: 0..0,
+        operations: 0,
+        trouble: None,
     };
     for step in &resolved.steps {
         lowering.outermost(step);
-        if lowering.rungs.is_full() || !lowering.diagnostics.is_empty() {
+        if lowering.rungs.is_full() {
+            lowering.trouble = Some("the text makes more rungs than a ladder can have".into());
+        }
+        if lowering.trouble.is_some() {
             break;
         }
     }
-    if lowering.rungs.is_full() {
-        let message = "the text makes more rungs than a ladder can have";
-        lowering
-            .diagnostics
-            .push(Diagnostic::error("U1048", message, 0..0));
-    }
-    let program = lowering.rungs.finish(name);
-    (program, lowering.diagnostics)
+    let trouble = lowering.trouble.take();
+    let error = trouble.map(|message| Diagnostic::error("U1048", message, lowering.place.clone()));
+    (lowering.rungs.finish(name), error)
 }
 
 /// The signals of a cell, the low bit first.
@@ -97,7 +99,10 @@ impl Value {
 struct Lowering<'a> {
     cells: &'a [Cell],
     intervals: &'a [Interval],
-    assigned: Vec<bool>,
+    /// Whether a step writes the cell; what nothing writes keeps its initial value.
+    written: Vec<bool>,
+    /// Those that are called.
+    blocks: HashSet<&'a str>,
     /// Of the present step.
     graph: Graph,
     /// What its variables stand for.
@@ -108,7 +113,12 @@ struct Lowering<'a> {
     /// What has been assigned since the step began, in the choices around.
     overlays: Vec<HashMap<usize, Value>>,
     rungs: Rungs<'a>,
-    diagnostics: Vec<Diagnostic>,
+    /// Of the present step in the text.
+    place: Range<usize>,
+    /// Made by the steps before.
+    operations: usize,
+    /// Why lowering was given up.
+    trouble: Option<String>,
 }
 
 impl Lowering<'_> {
@@ -128,6 +138,7 @@ impl Lowering<'_> {
             feeds,
         } = &step.action
         {
+            self.place = step.span.clone();
             let wire = self.truth(wire);
             let fed: Vec<(&'static str, Expression)> = feeds
                 .iter()
@@ -141,6 +152,7 @@ impl Lowering<'_> {
             self.rungs.comment(&step.comments);
             self.flush();
         }
+        self.operations += self.graph.operations().len();
         self.graph = Graph::new();
         self.leaves.clear();
         self.places.clear();
@@ -188,15 +200,20 @@ impl Lowering<'_> {
         self.rungs.assign(&mut self.graph, &self.leaves, targets);
     }
 
+    /// Whether lowering is given up, which is where the networks have become too large.
+    fn is_lost(&mut self) -> bool {
+        if self.operations + self.graph.operations().len() > MAXIMUM_OPERATIONS {
+            let message = "the networks of the text become too large";
+            self.trouble.get_or_insert_with(|| message.into());
+        }
+        self.trouble.is_some()
+    }
+
     fn step(&mut self, step: &Step) {
-        if self.graph.operations().len() > MAXIMUM_OPERATIONS {
-            if self.diagnostics.is_empty() {
-                let message = "one statement makes a network that is too large";
-                self.diagnostics
-                    .push(Diagnostic::error("U1048", message, step.span.clone()));
-            }
+        if self.is_lost() {
             return;
         }
+        self.place = step.span.clone();
         match &step.action {
             Action::SetTruth(cell, truth) => {
                 let value = self.truth(truth);
@@ -204,10 +221,6 @@ impl Lowering<'_> {
             }
             Action::SetNumber(cell, number) => {
                 let Some(number) = self.number(number) else {
-                    let message =
-                        format!("a number in this statement needs more than {MAXIMUM_WIDTH} bits");
-                    self.diagnostics
-                        .push(Diagnostic::error("U1048", message, step.span.clone()));
                     return;
                 };
                 let stored = number.stored(&mut self.graph, self.intervals[*cell]);
@@ -292,7 +305,7 @@ impl Lowering<'_> {
             return value.clone();
         }
         let content = &self.cells[cell];
-        let fixed = !self.assigned[cell] && !matches!(content.role, Role::Input | Role::Pin);
+        let fixed = !self.written[cell] && content.role != Role::Input;
         let known = self
             .known
             .get(&cell)
@@ -356,15 +369,11 @@ impl Lowering<'_> {
             Truth::Compare(relation, left, right) => {
                 match (self.number(left), self.number(right)) {
                     (Some(left), Some(right)) => left.compare(&mut self.graph, *relation, &right),
-                    _ => {
-                        let message = format!(
-                            "a number of a comparison needs more than {MAXIMUM_WIDTH} bits"
-                        );
-                        self.diagnostics
-                            .push(Diagnostic::error("U1048", message, 0..0));
-                        self.graph.constant(false)
-                    }
+                    _ => self.graph.constant(false),
                 }
+            }
+            Truth::Counter(counter, relation, value) if !self.blocks.contains(counter.as_str()) => {
+                self.graph.constant(relation.holds(0, *value))
             }
             Truth::Counter(counter, relation, value) => {
                 self.variable(Leaf::Counter(counter.clone(), *relation, *value))
@@ -372,8 +381,11 @@ impl Lowering<'_> {
         }
     }
 
-    /// `None` where it is too wide.
+    /// `None` where lowering is given up.
     fn number(&mut self, number: &Number) -> Option<Bits> {
+        if self.is_lost() {
+            return None;
+        }
         let found = match number {
             Number::Constant(value) => Bits::constant(&mut self.graph, *value),
             Number::Cell(cell) => match self.present(*cell) {
@@ -381,15 +393,17 @@ impl Lowering<'_> {
                 Value::Truth(_) => Bits::constant(&mut self.graph, 0),
             },
             Number::Sum(parts) => {
-                let mut sum = Bits::constant(&mut self.graph, 0);
-                for (negative, part) in parts {
+                // Constants are added up first, so that a long sum of them is short.
+                let constant = Number::Sum(parts.iter().filter(is_constant).cloned().collect());
+                let mut sum = Bits::constant(&mut self.graph, constant.constant().unwrap_or(0));
+                for (negative, part) in parts.iter().filter(|part| !is_constant(part)) {
                     let part = self.number(part)?;
                     sum = if *negative {
                         sum.minus(&mut self.graph, &part)
                     } else {
                         sum.plus(&mut self.graph, &part)
                     };
-                    fits(&sum)?;
+                    self.fits(sum.interval)?;
                 }
                 sum
             }
@@ -398,10 +412,7 @@ impl Lowering<'_> {
                 for factor in factors {
                     let factor = self.number(factor)?;
                     // Looked at before it is made: a product is as large as it is wide, squared.
-                    let (width, _) = product.interval.times(factor.interval).width();
-                    if width > MAXIMUM_WIDTH {
-                        return None;
-                    }
+                    self.fits(product.interval.times(factor.interval))?;
                     product = product.times(&mut self.graph, &factor);
                 }
                 product
@@ -415,11 +426,20 @@ impl Lowering<'_> {
                 otherwise.chosen(&mut self.graph, condition, &then)
             }
         };
-        fits(&found)?;
+        self.fits(found.interval)?;
         Some(found)
+    }
+
+    fn fits(&mut self, interval: Interval) -> Option<()> {
+        if interval.width().0 <= MAXIMUM_WIDTH {
+            return Some(());
+        }
+        let message = format!("a number here needs more than {MAXIMUM_WIDTH} bits");
+        self.trouble.get_or_insert(message);
+        None
     }
 }
 
-fn fits(number: &Bits) -> Option<()> {
-    (number.interval.width().0 <= MAXIMUM_WIDTH).then_some(())
+fn is_constant(part: &&(bool, Number)) -> bool {
+    matches!(part.1, Number::Constant(_))
 }

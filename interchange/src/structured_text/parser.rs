@@ -79,11 +79,17 @@ const KEYWORDS: [&str; 52] = [
     "CONTINUE",
 ];
 
+fn is_keyword(word: &str) -> bool {
+    KEYWORDS
+        .iter()
+        .any(|keyword| keyword.eq_ignore_ascii_case(word))
+}
+
 /// A text with everything that was wrong with it.
 pub(super) fn parse(text: &str) -> (File, Vec<Diagnostic>) {
     let mut parser = match Parser::new(text) {
         Ok(parser) => parser,
-        Err(diagnostic) => return (File::default(), vec![diagnostic]),
+        Err(diagnostic) => return (File::default(), vec![*diagnostic]),
     };
     let file = parser.file();
     (file, parser.finish())
@@ -93,7 +99,7 @@ pub(super) fn parse(text: &str) -> (File, Vec<Diagnostic>) {
 pub(super) fn parse_body(text: &str) -> (Vec<Statement>, Vec<Diagnostic>) {
     let mut parser = match Parser::new(text) {
         Ok(parser) => parser,
-        Err(diagnostic) => return (Vec::new(), vec![diagnostic]),
+        Err(diagnostic) => return (Vec::new(), vec![*diagnostic]),
     };
     let mut body = parser.statements(&[]);
     while *parser.peek() != Lexeme::End {
@@ -115,7 +121,7 @@ pub(super) fn parse_type(text: &str) -> (Option<super::syntax::TypeName>, Vec<Di
             }
             (found, parser.finish())
         }
-        Err(diagnostic) => (None, vec![diagnostic]),
+        Err(diagnostic) => (None, vec![*diagnostic]),
     }
 }
 
@@ -133,7 +139,7 @@ pub(super) fn parse_expression(text: &str) -> (super::syntax::Expression, Vec<Di
             let kind = super::syntax::ExpressionKind::Faulty;
             (
                 super::syntax::Expression { kind, span: 0..0 },
-                vec![diagnostic],
+                vec![*diagnostic],
             )
         }
     }
@@ -147,13 +153,13 @@ struct Parser {
 }
 
 impl Parser {
-    fn new(text: &str) -> Result<Self, Diagnostic> {
+    fn new(text: &str) -> Result<Self, Box<Diagnostic>> {
         if text.len() > MAXIMUM_TEXT_BYTES {
             let message = format!(
                 "the text has {} bytes; at most {MAXIMUM_TEXT_BYTES} are read",
                 text.len()
             );
-            return Err(Diagnostic::error("U1033", message, 0..0));
+            return Err(Box::new(Diagnostic::error("U1033", message, 0..0)));
         }
         let (lexemes, diagnostics) = lex(text);
         Ok(Self {
@@ -273,13 +279,12 @@ impl Parser {
 
     /// An identifier.
     fn name(&mut self, what: &str) -> Option<Name> {
-        if let Lexeme::Word(word) = self.peek() {
-            let capitals = word.to_ascii_uppercase();
-            if !KEYWORDS.contains(&capitals.as_str()) {
-                let name = Name::at(word.clone(), self.span());
-                self.skip();
-                return Some(name);
-            }
+        if let Lexeme::Word(word) = self.peek()
+            && !is_keyword(word)
+        {
+            let name = Name::at(word.clone(), self.span());
+            self.skip();
+            return Some(name);
         }
         self.expected(what);
         None

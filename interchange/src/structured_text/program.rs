@@ -3,6 +3,7 @@
 //! A step is an assignment, a choice, or a function block of the ladder. Calls of other blocks and of functions, loops and
 //! CASE are gone, so that a walk over the steps in their order is one execution.
 
+use std::collections::HashSet;
 use std::ops::Range;
 
 use understudy_ladder::{Address, BlockKind, Relation};
@@ -128,15 +129,31 @@ pub(super) struct Resolved {
 }
 
 impl Resolved {
-    /// For each cell, whether some step assigns it.
-    pub(super) fn assigned(&self) -> Vec<bool> {
-        let mut assigned = vec![false; self.cells.len()];
+    /// For each cell, whether some step writes it.
+    pub(super) fn written(&self) -> Vec<bool> {
+        let blocks = self.blocks();
+        let pins = self.cells.iter().map(|cell| {
+            let block = cell.name.rsplit_once('.').map(|(block, _)| block);
+            cell.role == Role::Pin && block.is_some_and(|block| blocks.contains(block))
+        });
+        let mut written: Vec<bool> = pins.collect();
         walk(&self.steps, &mut |step| {
             if let Action::SetTruth(cell, _) | Action::SetNumber(cell, _) = step.action {
-                assigned[cell] = true;
+                written[cell] = true;
             }
         });
-        assigned
+        written
+    }
+
+    /// The blocks that are called.
+    pub(super) fn blocks(&self) -> HashSet<&str> {
+        let mut blocks = HashSet::new();
+        walk(&self.steps, &mut |step| {
+            if let Action::Block { name, .. } = &step.action {
+                blocks.insert(name.as_str());
+            }
+        });
+        blocks
     }
 }
 

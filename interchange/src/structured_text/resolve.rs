@@ -6,7 +6,9 @@
 mod call;
 mod declare;
 mod expression;
+mod function;
 mod statement;
+mod types;
 mod uses;
 
 use std::collections::{HashMap, HashSet};
@@ -17,7 +19,7 @@ use std::time::Duration;
 use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{KEYWORDS, MAXIMUM_NAME_LENGTH, Name};
 
-use self::declare::Types;
+use self::types::Types;
 use self::uses::UsesByName;
 use super::parser::{MAXIMUM_FINDINGS, parse};
 use super::program::{Cell, Resolved, Step};
@@ -104,6 +106,7 @@ pub(super) fn resolve(
         step_count: 0,
         conditional: 0,
         names: HashSet::new(),
+        namesakes: HashMap::new(),
         blame: None,
         is_full: false,
         findings: HashSet::new(),
@@ -138,6 +141,8 @@ struct Resolver {
     conditional: usize,
     /// Names of cells and blocks.
     names: HashSet<String>,
+    /// The last number behind each name that is wanted more than once.
+    namesakes: HashMap<String, usize>,
     /// Where a text that is not the user's was called from.
     blame: Option<Range<usize>>,
     is_full: bool,
@@ -172,13 +177,17 @@ impl Resolver {
             base.truncate(MAXIMUM_NAME_LENGTH - 16);
             base = base.trim_end_matches('.').to_owned();
         }
-        let mut name = base.clone();
-        let mut count = 2;
-        while !self.names.insert(name.clone()) {
-            name = format!("{base}_{count}");
-            count += 1;
+        if self.names.insert(base.clone()) {
+            return base;
         }
-        name
+        loop {
+            let count = self.namesakes.entry(base.clone()).or_insert(1);
+            *count += 1;
+            let name = format!("{base}_{count}");
+            if self.names.insert(name.clone()) {
+                return name;
+            }
+        }
     }
 
     /// Adds a cell; past the bound the last one again, and the program is given up.

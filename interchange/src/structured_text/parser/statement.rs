@@ -2,7 +2,7 @@
 
 use super::super::lexer::Lexeme;
 use super::super::syntax::{Label, Loop, Statement, StatementKind};
-use super::Parser;
+use super::{Parser, is_keyword};
 
 /// Words at which a list of statements ends.
 const ENDS: [&str; 15] = [
@@ -61,6 +61,7 @@ impl Parser {
         while let Some(next) = self.lexemes.get(place).filter(|_| place < self.place + 400) {
             match &next.lexeme {
                 Lexeme::Sign(":") => return place > self.place,
+                Lexeme::Word(word) if is_keyword(word) => return false,
                 Lexeme::Number(_) | Lexeme::Word(_) | Lexeme::Sign("," | ".." | "-" | ".") => {
                     place += 1
                 }

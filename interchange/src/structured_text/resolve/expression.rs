@@ -6,6 +6,7 @@ use std::time::Duration;
 use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{Name, Relation};
 
+use super::super::bounds::mirrored;
 use super::super::program::{Action, Cell, Kind, Number, Role, Truth};
 use super::super::syntax::{Expression, ExpressionKind, Operator, Path};
 use super::{Entity, Resolver};
@@ -221,13 +222,16 @@ impl Resolver {
             Operator::Equal | Operator::NotEqual if matches!(left, Value::Truth(_)) => {
                 let left = self.as_truth(left, left_span);
                 let right = self.as_truth(right, right_span);
-                // A long chain of these nests, and is of no use.
-                let odd = Truth::Odd(vec![left, right]);
-                Value::Truth(if operator == Operator::Equal {
-                    Truth::Not(Box::new(odd))
-                } else {
-                    odd
-                })
+                // a = b is an odd number of a, b and TRUE; a long chain stays flat.
+                let mut parts = match left {
+                    Truth::Odd(parts) => parts,
+                    left => vec![left],
+                };
+                parts.push(right);
+                if operator == Operator::Equal {
+                    parts.push(Truth::Constant(true));
+                }
+                Value::Truth(Truth::Odd(parts))
             }
             _ => {
                 let left = self.as_number(left, left_span);
@@ -407,15 +411,4 @@ fn relation(operator: Operator) -> Option<Relation> {
         Operator::GreaterOrEqual => Relation::GreaterOrEqual,
         _ => return None,
     })
-}
-
-/// The relation with its sides exchanged.
-fn mirrored(relation: Relation) -> Relation {
-    match relation {
-        Relation::Less => Relation::Greater,
-        Relation::LessOrEqual => Relation::GreaterOrEqual,
-        Relation::Greater => Relation::Less,
-        Relation::GreaterOrEqual => Relation::LessOrEqual,
-        same => same,
-    }
 }
