@@ -1,1 +1,184 @@
 //! PLCopen TC6 XML 2.01 and 2.0: ladders of OpenPLC Editor, Beremiz, CODESYS and others.
+//!
+//! [`read`] takes a file apart in stages, each of which reports everything that it finds: well-formed and bounded (`xml`), by the
+//! schema (`schema`), what stands in it (`document`), who is connected to whom and who acts when (`plan`), and then rungs
+//! (`ladder`). [`write()`] makes a file that the schema takes and that reads back as the same circuit.
+
+mod document;
+mod fidelity;
+mod ladder;
+mod literal;
+mod plan;
+mod power;
+mod schema;
+mod standard;
+mod write;
+mod xml;
+
+use std::time::Duration;
+
+use understudy_diagnostic::{Diagnostic, has_errors};
+use understudy_ladder::{Program, check};
+
+pub use fidelity::{Count, Fidelity, Note};
+pub use write::write;
+pub use xml::{MAXIMUM_BYTES, MAXIMUM_DEPTH, MAXIMUM_NODES};
+
+use document::{Body, Language, Pou, PouKind, Project};
+
+/// The namespaces of 2.01 and 2.0.
+const NAMESPACES: [&str; 2] = [
+    "http://www.plcopen.org/xml/tc6_0201",
+    "http://www.plcopen.org/xml/tc6_0200",
+];
+
+/// What a file says.
+#[derive(Debug, Default)]
+pub struct Reading {
+    /// The program, where nothing was wrong with it.
+    pub program: Option<Program>,
+    /// What its task waits from one scan to the next.
+    pub period: Option<Duration>,
+    /// Everything that is wrong or odd, with its place.
+    pub diagnostics: Vec<Diagnostic>,
+    /// What was kept, and what was not.
+    pub fidelity: Fidelity,
+}
+
+/// Reads the program that the file's first task runs, or the one called `unit`.
+pub fn read(text: &str, unit: Option<&str>) -> Reading {
+    let mut reading = Reading::default();
+    let document = match xml::parse(text) {
+        Ok(document) => document,
+        Err(error) => {
+            reading.diagnostics.push(error);
+            return reading;
+        }
+    };
+    let root = document.root_element();
+    let namespace = root.tag_name().namespace().unwrap_or_default();
+    if root.tag_name().name() != "project" || !NAMESPACES.contains(&namespace) {
+        let message = format!(
+            "this is no PLCopen XML 2.01 or 2.0: its root is `{}` in the namespace {namespace:?}",
+            root.tag_name().name()
+        );
+        let error = Diagnostic::error("U1001", message, xml::start_tag(root));
+        let help = format!(
+            "it should be `project` in the namespace {:?}",
+            NAMESPACES[0]
+        );
+        reading.diagnostics.push(error.with_help(help));
+        return reading;
+    }
+    reading.diagnostics = schema::validate(root);
+    let (project, found) = document::read(root);
+    reading.diagnostics.extend(found);
+    if let Some(pou) = chosen(&project, unit, &mut reading.diagnostics) {
+        translate(&project, pou, &mut reading);
+    }
+    reading.diagnostics.sort_by_key(|found| found.span.start);
+    if has_errors(&reading.diagnostics) {
+        reading.program = None;
+    }
+    reading
+}
+
+/// The unit that is asked for, that a task runs, or the only program.
+fn chosen<'a>(
+    project: &'a Project,
+    unit: Option<&str>,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<&'a Pou> {
+    let programs = || {
+        project
+            .pous
+            .iter()
+            .filter(|pou| pou.kind == PouKind::Program)
+    };
+    let names: Vec<String> = programs().map(|pou| format!("`{}`", pou.name)).collect();
+    let find = |name: &str| {
+        project
+            .pous
+            .iter()
+            .find(|pou| pou.name.eq_ignore_ascii_case(name))
+    };
+    if let Some(unit) = unit {
+        let found = find(unit).filter(|pou| pou.kind != PouKind::Function);
+        if found.is_none() {
+            let message = format!("the file has no program `{unit}`");
+            let error = Diagnostic::error("U1013", message, 0..0);
+            diagnostics.push(error.with_help(format!("it has {}", names.join(", "))));
+        }
+        return found;
+    }
+    for instance in &project.instances {
+        if let Some(pou) = find(&instance.type_name) {
+            return Some(pou);
+        }
+        let message = format!("the file has no unit `{}`", instance.type_name);
+        let span = instance.type_name.span();
+        diagnostics.push(Diagnostic::error("U1013", message, span));
+    }
+    let mut programs = programs();
+    match (programs.next(), programs.next()) {
+        (Some(only), None) => Some(only),
+        (first, _) => {
+            let message = if first.is_none() {
+                "the file has no program".to_owned()
+            } else {
+                "the file has several programs, and no task that runs one of them".to_owned()
+            };
+            let error = Diagnostic::error("U1013", message, 0..0);
+            diagnostics.push(match first {
+                Some(_) => error.with_help(format!("choose one of {}", names.join(", "))),
+                None => error,
+            });
+            None
+        }
+    }
+}
+
+fn translate(project: &Project, pou: &Pou, reading: &mut Reading) {
+    let instance = project
+        .instances
+        .iter()
+        .find(|instance| instance.type_name.eq_ignore_ascii_case(&pou.name));
+    reading.period = instance.and_then(|instance| instance.interval);
+    let drawn = match &pou.body {
+        Some(Body::Graph(graph)) if graph.language != Language::Sequence => {
+            let is_block = |name: &str| {
+                standard::StandardBlock::of(name).is_some()
+                    || project.pous.iter().any(|pou| {
+                        pou.kind == PouKind::FunctionBlock && pou.name.eq_ignore_ascii_case(name)
+                    })
+            };
+            let plan = plan::plan(graph, &is_block, &mut reading.diagnostics);
+            let drawn = ladder::draw(pou, &project.globals, &plan);
+            reading.fidelity.plan(plan.notes);
+            drawn
+        }
+        _ => {
+            let message = format!("the body of `{}` is not taken", pou.name);
+            let span = pou.name.span();
+            reading
+                .diagnostics
+                .push(Diagnostic::error("U1010", message, span));
+            return;
+        }
+    };
+    let general = !drawn.general.is_empty();
+    for general in drawn.general {
+        let message = format!("{} is not taken", general.what);
+        reading
+            .diagnostics
+            .push(Diagnostic::error("U1010", message, general.span));
+    }
+    reading.fidelity.ignored(drawn.ignored);
+    reading.fidelity.ignored(project.ignored.clone());
+    reading.diagnostics.extend(drawn.diagnostics);
+    if !general {
+        reading.diagnostics.extend(check(&drawn.program));
+    }
+    reading.fidelity.count(project, pou, &drawn.program);
+    reading.program = Some(drawn.program);
+}

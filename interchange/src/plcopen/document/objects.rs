@@ -1,0 +1,320 @@
+//! The objects of a graph and what they are connected to.
+
+use std::collections::HashMap;
+
+use roxmltree::Node;
+use understudy_diagnostic::Diagnostic;
+use understudy_ladder::Name;
+
+use super::read::Reader;
+use super::rungs::rung;
+use super::{
+    Action, ActionContent, Block, Condition, Edge, Graph, Kind, Language, Modifier, Object, Pin,
+    Storage, Transition, Wire,
+};
+use crate::plcopen::xml::{attribute, child, children, elements, start_tag, text, word};
+
+/// The input of a transition whose condition is wired to it.
+pub(crate) const CONDITION: &str = "condition";
+
+/// The most objects of one graph.
+const MAXIMUM_OBJECTS: usize = 200_000;
+
+/// Reads all objects of a body.
+pub(super) fn graph(reader: &mut Reader, body: Node<'_, '_>, language: Language) -> Graph {
+    let mut graph = Graph {
+        language,
+        objects: Vec::new(),
+    };
+    let mut rungs = 0;
+    for node in elements(body) {
+        if graph.objects.len() >= MAXIMUM_OBJECTS {
+            let message = format!("a body has more than {MAXIMUM_OBJECTS} objects");
+            reader.error("U1001", message, node);
+            break;
+        }
+        if node.tag_name().name() == "rung" {
+            rungs += 1;
+            rung(reader, node, rungs, &mut graph.objects);
+        } else if let Some(object) = object(reader, node) {
+            graph.objects.push(object);
+        }
+    }
+    unique(reader, &graph);
+    graph
+}
+
+fn unique(reader: &mut Reader, graph: &Graph) {
+    let mut places = HashMap::new();
+    for object in &graph.objects {
+        if let Some(first) = places.insert(object.id, object.span.clone()) {
+            let error = Diagnostic::error(
+                "U1003",
+                format!("two objects have the localId {}", object.id),
+                object.span.clone(),
+            );
+            let error = error.with_related(first, "the first is here");
+            reader.diagnostics.push(error);
+        }
+    }
+}
+
+fn object(reader: &mut Reader, node: Node<'_, '_>) -> Option<Object> {
+    let name = node.tag_name().name();
+    if name == "addData" {
+        reader.ignore("additional data of a tool", node);
+        return None;
+    }
+    let Some(id) = attribute(node, "localId").and_then(|id| id.parse::<u64>().ok()) else {
+        reader.error(
+            "U1002",
+            format!("`{name}` has no localId that is a number"),
+            node,
+        );
+        return None;
+    };
+    let mut inputs = Vec::new();
+    let mut outputs = Vec::new();
+    for part in elements(node) {
+        match part.tag_name().name() {
+            "connectionPointIn" => {
+                inputs.push(input(reader, part, Name::default(), Modifier::default()))
+            }
+            "connectionPointOut" => {
+                let name = attribute(part, "formalParameter").unwrap_or_default();
+                outputs.push(Pin {
+                    name,
+                    ..Pin::default()
+                });
+            }
+            "inputVariables" => inputs.extend(pins(reader, part)),
+            "inOutVariables" => {
+                let both = pins(reader, part);
+                outputs.extend(both.iter().map(|pin| Pin {
+                    wires: Vec::new(),
+                    ..pin.clone()
+                }));
+                inputs.extend(both);
+            }
+            "outputVariables" => outputs.extend(pins(reader, part)),
+            "addData" => reader.ignore("additional data of a tool", part),
+            "documentation" => reader.ignore("the documentation of an object", part),
+            _ => {}
+        }
+    }
+    let variable = || child(node, "variable").map(word).unwrap_or_default();
+    let expression = || child(node, "expression").map(word).unwrap_or_default();
+    let kind = match name {
+        "leftPowerRail" => Kind::LeftRail,
+        "rightPowerRail" => Kind::RightRail,
+        "contact" => Kind::Contact(variable(), modifier(node, "")),
+        "coil" => Kind::Coil(variable(), modifier(node, "")),
+        "block" => Kind::Block(Block {
+            type_name: reader.needed(node, "typeName")?,
+            instance: attribute(node, "instanceName").filter(|name| !name.is_empty()),
+        }),
+        "inVariable" => Kind::InVariable(expression(), modifier(node, "")),
+        "outVariable" => Kind::OutVariable(expression(), modifier(node, "")),
+        "inOutVariable" => {
+            Kind::InOutVariable(expression(), modifier(node, "In"), modifier(node, "Out"))
+        }
+        "connector" => Kind::Connector(reader.needed(node, "name")?),
+        "continuation" => Kind::Continuation(reader.needed(node, "name")?),
+        "comment" => Kind::Comment(
+            child(node, "content")
+                .map(text)
+                .unwrap_or_default()
+                .trim()
+                .to_owned(),
+        ),
+        "step" => {
+            let initial = attribute(node, "initialStep")
+                .is_some_and(|value| matches!(value.as_str(), "true" | "1"));
+            Kind::Step(reader.needed(node, "name")?, initial)
+        }
+        "transition" => Kind::Transition(transition(reader, node, &mut inputs)),
+        "selectionDivergence" => Kind::SelectionDivergence,
+        "selectionConvergence" => Kind::SelectionConvergence,
+        "simultaneousDivergence" => Kind::SimultaneousDivergence,
+        "simultaneousConvergence" => Kind::SimultaneousConvergence,
+        "jumpStep" => Kind::JumpStep(reader.needed(node, "targetName")?),
+        "actionBlock" => Kind::Actions(actions(reader, node)),
+        "label" => Kind::Other("a label"),
+        "jump" => Kind::Other("a jump"),
+        "return" => Kind::Other("a return"),
+        "macroStep" => Kind::Other("a macro step"),
+        "vendorElement" => Kind::Other("a vendor's element"),
+        "error" => Kind::Other("an error mark"),
+        _ => {
+            reader.error("U1010", format!("`{name}` is not known"), node);
+            return None;
+        }
+    };
+    Some(Object {
+        id,
+        span: start_tag(node),
+        position: position(node),
+        order: attribute(node, "executionOrderId")
+            .and_then(|order| order.parse().ok())
+            .unwrap_or(0),
+        kind,
+        inputs,
+        outputs,
+    })
+}
+
+fn pins(reader: &mut Reader, list: Node<'_, '_>) -> Vec<Pin> {
+    let mut pins = Vec::new();
+    for node in children(list, "variable") {
+        let name =
+            attribute(node, "formalParameter").unwrap_or_else(|| Name::at("", start_tag(node)));
+        let modifier = modifier(node, "");
+        match child(node, "connectionPointIn") {
+            Some(point) => pins.push(input(reader, point, name, modifier)),
+            None => pins.push(Pin {
+                name,
+                modifier,
+                wires: Vec::new(),
+            }),
+        }
+    }
+    pins
+}
+
+fn input(reader: &mut Reader, point: Node<'_, '_>, name: Name, modifier: Modifier) -> Pin {
+    let mut wires = Vec::new();
+    for node in elements(point) {
+        match node.tag_name().name() {
+            "connection" => match attribute(node, "refLocalId").and_then(|id| id.parse().ok()) {
+                Some(from) => wires.push(Wire {
+                    from,
+                    pin: attribute(node, "formalParameter").filter(|pin| !pin.is_empty()),
+                    span: start_tag(node),
+                }),
+                None => reader.error(
+                    "U1002",
+                    "a connection has no refLocalId that is a number".to_owned(),
+                    node,
+                ),
+            },
+            "expression" => reader.error(
+                "U1010",
+                "an expression at a connection point is not taken".to_owned(),
+                node,
+            ),
+            _ => {}
+        }
+    }
+    Pin {
+        name,
+        modifier,
+        wires,
+    }
+}
+
+/// `negated`, `edge` and `storage`, with a suffix for objects that have two of each.
+pub(super) fn modifier(node: Node<'_, '_>, suffix: &str) -> Modifier {
+    let value = |name: &str| attribute(node, &format!("{name}{suffix}"));
+    let is = |name: &str, word: &str| value(name).is_some_and(|value| value.as_str() == word);
+    Modifier {
+        // "negated" is what one tool writes for "true".
+        negated: is("negated", "true") || is("negated", "1") || is("negated", "negated"),
+        edge: match () {
+            () if is("edge", "rising") => Some(Edge::Rising),
+            () if is("edge", "falling") => Some(Edge::Falling),
+            () => None,
+        },
+        storage: match () {
+            () if is("storage", "set") || is("kind", "set") => Some(Storage::Set),
+            () if is("storage", "reset") || is("kind", "reset") => Some(Storage::Reset),
+            () => None,
+        },
+    }
+}
+
+fn transition(reader: &mut Reader, node: Node<'_, '_>, inputs: &mut Vec<Pin>) -> Transition {
+    let priority = attribute(node, "priority").and_then(|priority| priority.parse().ok());
+    let mut found = Transition {
+        priority: priority.unwrap_or(0),
+        negated: false,
+        condition: Condition::Missing,
+    };
+    let Some(condition) = child(node, "condition") else {
+        return found;
+    };
+    found.negated = modifier(condition, "").negated;
+    for part in elements(condition) {
+        match part.tag_name().name() {
+            "reference" => {
+                if let Some(name) = reader.needed(part, "name") {
+                    found.condition = Condition::Reference(name);
+                }
+            }
+            "inline" => {
+                if let Some(body) = reader.body(part) {
+                    found.condition = Condition::Inline(body);
+                }
+            }
+            "connectionPointIn" => {
+                let name = Name::at(CONDITION, start_tag(part));
+                inputs.push(input(reader, part, name, Modifier::default()));
+                found.condition = Condition::Wired;
+            }
+            // 2.0 has the connections without a connection point.
+            "connection" => {
+                let name = Name::at(CONDITION, start_tag(condition));
+                if found.condition_is_missing() {
+                    inputs.push(input(reader, condition, name, Modifier::default()));
+                    found.condition = Condition::Wired;
+                }
+            }
+            _ => {}
+        }
+    }
+    found
+}
+
+impl Transition {
+    fn condition_is_missing(&self) -> bool {
+        matches!(self.condition, Condition::Missing)
+    }
+}
+
+fn actions(reader: &mut Reader, node: Node<'_, '_>) -> Vec<Action> {
+    let mut actions = Vec::new();
+    for action in children(node, "action") {
+        let qualifier =
+            attribute(action, "qualifier").unwrap_or_else(|| Name::at("N", start_tag(action)));
+        let mut content = ActionContent::Missing;
+        for part in elements(action) {
+            match part.tag_name().name() {
+                "reference" => {
+                    if let Some(name) = attribute(part, "name").filter(|name| !name.is_empty()) {
+                        content = ActionContent::Reference(name);
+                    }
+                }
+                "inline" => {
+                    if let Some(body) = reader.body(part) {
+                        content = ActionContent::Inline(body);
+                    }
+                }
+                _ => {}
+            }
+        }
+        actions.push(Action { qualifier, content });
+    }
+    actions
+}
+
+/// The top left corner; nought where none is given.
+fn position(node: Node<'_, '_>) -> (i64, i64) {
+    let coordinate = |name| {
+        let place = child(node, "position").and_then(|position| attribute(position, name));
+        let value = place
+            .and_then(|value| value.parse::<f64>().ok())
+            .unwrap_or(0.0);
+        // Saturates, and is 0 for what is no number.
+        (value * 1000.0).round() as i64
+    };
+    (coordinate("x"), coordinate("y"))
+}

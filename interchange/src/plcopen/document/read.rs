@@ -1,0 +1,306 @@
+//! From elements to a [`Project`]: projects, units, variables, types.
+
+use roxmltree::Node;
+use understudy_diagnostic::Diagnostic;
+use understudy_ladder::Name;
+
+use super::objects::graph;
+use super::{
+    Body, Ignored, Instance, Language, Part, Pou, PouKind, Project, Section, Variable, VariableType,
+};
+use crate::plcopen::literal::time;
+use crate::plcopen::xml::{attribute, child, children, elements, start_tag, text, word};
+
+/// The elementary types whose elements stand for themselves.
+const ELEMENTARY: [&str; 18] = [
+    "BOOL", "BYTE", "WORD", "DWORD", "LWORD", "SINT", "INT", "DINT", "LINT", "USINT", "UINT",
+    "UDINT", "ULINT", "REAL", "LREAL", "TIME", "DATE", "TOD",
+];
+
+/// Reads a project as far as it can be understood, and says what cannot.
+pub(crate) fn read(root: Node<'_, '_>) -> (Project, Vec<Diagnostic>) {
+    let mut reader = Reader {
+        project: Project::default(),
+        diagnostics: Vec::new(),
+    };
+    for part in elements(root) {
+        match part.tag_name().name() {
+            "types" => {
+                for list in elements(part) {
+                    match list.tag_name().name() {
+                        "pous" => reader.pous(list),
+                        "dataTypes" => {
+                            for data_type in children(list, "dataType") {
+                                reader.ignore("a data type of the file", data_type);
+                            }
+                        }
+                        _ => {}
+                    }
+                }
+            }
+            // Some tools leave the types out.
+            "pous" => reader.pous(part),
+            "instances" => reader.instances(part),
+            "addData" => reader.ignore("additional data of a tool", part),
+            _ => {}
+        }
+    }
+    (reader.project, reader.diagnostics)
+}
+
+pub(super) struct Reader {
+    pub(super) project: Project,
+    pub(super) diagnostics: Vec<Diagnostic>,
+}
+
+impl Reader {
+    pub(super) fn error(&mut self, code: &'static str, message: String, node: Node<'_, '_>) {
+        let error = Diagnostic::error(code, message, start_tag(node));
+        self.diagnostics.push(error);
+    }
+
+    pub(super) fn ignore(&mut self, what: impl Into<String>, node: Node<'_, '_>) {
+        self.project.ignored.push(Ignored {
+            what: what.into(),
+            span: start_tag(node),
+        });
+    }
+
+    /// An attribute that the reader cannot do without.
+    pub(super) fn needed(&mut self, node: Node<'_, '_>, name: &str) -> Option<Name> {
+        let found = attribute(node, name).filter(|value| !value.is_empty());
+        if found.is_none() {
+            let element = node.tag_name().name();
+            self.error("U1002", format!("`{element}` lacks its `{name}`"), node);
+        }
+        found
+    }
+
+    fn pous(&mut self, list: Node<'_, '_>) {
+        for pou in children(list, "pou") {
+            let (Some(name), Some(kind)) = (self.needed(pou, "name"), self.needed(pou, "pouType"))
+            else {
+                continue;
+            };
+            let kind = match kind.as_str() {
+                "program" => PouKind::Program,
+                "functionBlock" => PouKind::FunctionBlock,
+                "function" => PouKind::Function,
+                other => {
+                    let message = format!(
+                        "a unit is a program, functionBlock or function, and `{other}` is none"
+                    );
+                    self.error("U1002", message, pou);
+                    continue;
+                }
+            };
+            let unit = self.pou(pou, name, kind);
+            let twin = self
+                .project
+                .pous
+                .iter()
+                .find(|known| known.name.eq_ignore_ascii_case(&unit.name));
+            if let Some(twin) = twin {
+                let error = Diagnostic::error(
+                    "U1003",
+                    format!("two units are called `{}`", unit.name),
+                    unit.name.span(),
+                );
+                let error = error.with_related(twin.name.span(), "the first is here");
+                self.diagnostics.push(error);
+                continue;
+            }
+            self.project.pous.push(unit);
+        }
+    }
+
+    fn pou(&mut self, pou: Node<'_, '_>, name: Name, kind: PouKind) -> Pou {
+        let mut unit = Pou {
+            name,
+            kind,
+            documentation: documentation(pou),
+            variables: Vec::new(),
+            result: None,
+            body: None,
+            actions: Vec::new(),
+            transitions: Vec::new(),
+        };
+        for part in elements(pou) {
+            match part.tag_name().name() {
+                "interface" => self.interface(part, &mut unit),
+                "actions" => unit.actions = self.parts(part, "action"),
+                "transitions" => unit.transitions = self.parts(part, "transition"),
+                "body" if unit.body.is_some() => {
+                    let message = format!("`{}` has more than one body", unit.name);
+                    self.error("U1010", message, part);
+                }
+                "body" => unit.body = self.body(part),
+                "addData" => self.ignore("additional data of a tool", part),
+                _ => {}
+            }
+        }
+        unit
+    }
+
+    fn parts(&mut self, list: Node<'_, '_>, element: &str) -> Vec<Part> {
+        let mut parts = Vec::new();
+        for part in children(list, element) {
+            if let Some(name) = self.needed(part, "name") {
+                let body = child(part, "body").and_then(|body| self.body(body));
+                parts.push(Part { name, body });
+            }
+        }
+        parts
+    }
+
+    pub(super) fn body(&mut self, body: Node<'_, '_>) -> Option<Body> {
+        for language in elements(body) {
+            let found = match language.tag_name().name() {
+                "LD" => Body::Graph(graph(self, language, Language::Ladder)),
+                "FBD" => Body::Graph(graph(self, language, Language::FunctionBlocks)),
+                "SFC" => Body::Graph(graph(self, language, Language::Sequence)),
+                "ST" => Body::StructuredText(text(language)),
+                "IL" => Body::Foreign("an instruction list", start_tag(language)),
+                _ => continue,
+            };
+            return Some(found);
+        }
+        None
+    }
+
+    fn interface(&mut self, interface: Node<'_, '_>, unit: &mut Pou) {
+        for list in elements(interface) {
+            let section = match list.tag_name().name() {
+                "inputVars" => Section::Input,
+                "outputVars" => Section::Output,
+                "inOutVars" => Section::InOut,
+                "localVars" => Section::Local,
+                "tempVars" => Section::Temporary,
+                "externalVars" => Section::External,
+                "globalVars" => Section::Global,
+                "returnType" => {
+                    unit.result = self.data_type(list);
+                    continue;
+                }
+                "accessVars" => {
+                    self.ignore("access paths", list);
+                    continue;
+                }
+                "addData" => {
+                    self.ignore("additional data of a tool", list);
+                    continue;
+                }
+                _ => continue,
+            };
+            self.variables(list, section, &mut unit.variables);
+        }
+    }
+
+    fn variables(&mut self, list: Node<'_, '_>, section: Section, into: &mut Vec<Variable>) {
+        let flag = |name: &str| {
+            attribute(list, name).is_some_and(|value| matches!(value.as_str(), "true" | "1"))
+        };
+        for node in children(list, "variable") {
+            let Some(name) = self.needed(node, "name") else {
+                continue;
+            };
+            let Some(kind) = child(node, "type").and_then(|kind| self.data_type(kind)) else {
+                let message = format!("the variable `{name}` has no type");
+                self.error("U1002", message, node);
+                continue;
+            };
+            let initial = child(node, "initialValue").and_then(|value| {
+                let simple =
+                    child(value, "simpleValue").and_then(|simple| attribute(simple, "value"));
+                if simple.is_none() {
+                    let message = format!("the initial value of `{name}` is not a single one");
+                    self.error("U1010", message, value);
+                }
+                simple
+            });
+            into.push(Variable {
+                name,
+                section,
+                constant: flag("constant"),
+                retain: flag("retain") || flag("persistent"),
+                kind,
+                address: attribute(node, "address").filter(|address| !address.is_empty()),
+                initial,
+                documentation: documentation(node),
+            });
+        }
+    }
+
+    fn data_type(&mut self, node: Node<'_, '_>) -> Option<VariableType> {
+        let kind = elements(node).next()?;
+        let name = kind.tag_name().name();
+        Some(match name {
+            "derived" => VariableType::Derived(self.needed(kind, "name")?),
+            "subrangeSigned" | "subrangeUnsigned" => {
+                let range = child(kind, "range");
+                let bound = |which| {
+                    let text = attribute(range?, which)?;
+                    text.parse::<i64>().ok()
+                };
+                let base = child(kind, "baseType").and_then(|base| elements(base).next());
+                match (base, bound("lower"), bound("upper")) {
+                    (Some(base), Some(lower), Some(upper)) => {
+                        VariableType::Range(base.tag_name().name().to_owned(), lower, upper)
+                    }
+                    _ => {
+                        self.error(
+                            "U1002",
+                            "a subrange has two whole numbers as its bounds".into(),
+                            kind,
+                        );
+                        return None;
+                    }
+                }
+            }
+            _ if ELEMENTARY.contains(&name) => VariableType::Elementary(name.to_owned()),
+            _ => VariableType::Foreign(name.to_owned()),
+        })
+    }
+
+    fn instances(&mut self, part: Node<'_, '_>) {
+        for node in part.descendants().filter(Node::is_element) {
+            match node.tag_name().name() {
+                "globalVars" => {
+                    let mut globals = Vec::new();
+                    self.variables(node, Section::Global, &mut globals);
+                    self.project.globals.extend(globals);
+                }
+                "pouInstance" => {
+                    let Some(type_name) = self.needed(node, "typeName") else {
+                        continue;
+                    };
+                    let task = node
+                        .parent_element()
+                        .filter(|task| task.tag_name().name() == "task");
+                    let interval = task
+                        .and_then(|task| attribute(task, "interval"))
+                        .and_then(|interval| time(&interval));
+                    self.project.instances.push(Instance {
+                        type_name,
+                        interval,
+                    });
+                }
+                "task" if attribute(node, "single").is_some_and(|single| !single.is_empty()) => {
+                    self.ignore(
+                        "a task that an event starts; it is scanned with the period here",
+                        node,
+                    );
+                }
+                "addData" => self.ignore("additional data of a tool", node),
+                _ => {}
+            }
+        }
+    }
+}
+
+/// The text of an element's documentation on one line.
+fn documentation(node: Node<'_, '_>) -> Option<String> {
+    let text = word(child(node, "documentation")?);
+    let words: Vec<&str> = text.split_whitespace().collect();
+    (!words.is_empty()).then(|| words.join(" "))
+}

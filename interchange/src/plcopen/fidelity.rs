@@ -1,0 +1,120 @@
+//! What of a file was kept, and what was not.
+
+use std::ops::Range;
+
+use understudy_ladder::{Element, Program, visit};
+
+use super::document::{Body, Ignored, Kind, Pou, Project};
+
+/// What was kept, and what was not.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Fidelity {
+    /// How many of each kind the unit has in the file and in the program.
+    pub counts: Vec<Count>,
+    /// Contents of the file that are not kept, or not as they are, and do not change what the program does.
+    pub notes: Vec<Note>,
+}
+
+/// A kind of content.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Count {
+    /// Such as "contacts".
+    pub what: &'static str,
+    /// How many the file has.
+    pub in_file: usize,
+    /// How many the program has; it may have more, where a bit is kept or a branch is written twice.
+    pub in_program: usize,
+}
+
+/// Something that is not kept as it is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Note {
+    /// What, and what becomes of it.
+    pub message: String,
+    /// Bytes of the file.
+    pub span: Range<usize>,
+}
+
+impl Fidelity {
+    pub(super) fn plan(&mut self, notes: Vec<(String, Range<usize>)>) {
+        let notes = notes
+            .into_iter()
+            .map(|(message, span)| Note { message, span });
+        self.notes.extend(notes);
+    }
+
+    pub(super) fn ignored(&mut self, ignored: Vec<Ignored>) {
+        let notes = ignored.into_iter().map(|ignored| Note {
+            message: format!("{} is not kept", ignored.what),
+            span: ignored.span,
+        });
+        self.notes.extend(notes);
+    }
+
+    pub(super) fn count(&mut self, project: &Project, pou: &Pou, program: &Program) {
+        let objects: Vec<&Kind> = match &pou.body {
+            Some(Body::Graph(graph)) => graph.objects.iter().map(|object| &object.kind).collect(),
+            _ => Vec::new(),
+        };
+        let in_file = |is: &dyn Fn(&Kind) -> bool| objects.iter().filter(|kind| is(kind)).count();
+        let coils = program.rungs.iter().map(|rung| rung.coils.len()).sum();
+        let signals = program.inputs.len() + program.outputs.len() + program.memory.len();
+        let comments: usize = program
+            .rungs
+            .iter()
+            .map(|rung| usize::from(!rung.comments.is_empty()))
+            .sum();
+        let mut contacts = 0;
+        for rung in &program.rungs {
+            visit(&rung.network, &mut |element| {
+                contacts += usize::from(matches!(element, Element::Contact(_)));
+            });
+        }
+        let count = |what, in_file, in_program| Count {
+            what,
+            in_file,
+            in_program,
+        };
+        self.counts = vec![
+            count(
+                "BOOL variables",
+                pou.variables
+                    .iter()
+                    .filter(|variable| variable.kind.is_bool())
+                    .count(),
+                signals,
+            ),
+            count(
+                "contacts",
+                in_file(&|kind| matches!(kind, Kind::Contact(..))),
+                contacts,
+            ),
+            count(
+                "coils and written variables",
+                in_file(&|kind| matches!(kind, Kind::Coil(..) | Kind::OutVariable(..))),
+                coils,
+            ),
+            count(
+                "blocks and functions",
+                in_file(&|kind| matches!(kind, Kind::Block(_))),
+                program.blocks().len(),
+            ),
+            count(
+                "comments",
+                in_file(&|kind| matches!(kind, Kind::Comment(text) if !text.is_empty())),
+                comments,
+            ),
+        ];
+        for other in &project.pous {
+            if other.name != pou.name {
+                let message = format!("the unit `{}` is not used by `{}`", other.name, pou.name);
+                self.notes.push(Note {
+                    message,
+                    span: other.name.span(),
+                });
+            }
+        }
+        self.notes.sort_by_key(|note| note.span.start);
+        self.notes.dedup();
+    }
+}

@@ -1,0 +1,241 @@
+//! In which order the objects of a graph act, and on what: the graph as a list of steps.
+//!
+//! Coils, written variables and blocks act in the order of `executionOrderId` where they have one, and else as a person reads: by y, then by x
+//! (as xml2st and Beremiz do). Before something acts, the blocks that feed it act. Power is what it is at the moment when
+//! it is first asked for, and stays so: what an object has let through is not asked again when a coil has changed the
+//! variable meanwhile. Where that matters, the power is *kept* in a bit of its own.
+
+mod links;
+mod walk;
+
+use std::collections::{HashMap, HashSet};
+use std::ops::Range;
+
+use understudy_diagnostic::Diagnostic;
+use understudy_ladder::Name;
+
+use self::links::{Links, Source};
+use self::walk::{Trace, Walk};
+use super::document::{Graph, Kind, Language, Modifier};
+use super::power::Power;
+
+/// What a graph does in one scan.
+#[derive(Debug, Default)]
+pub(crate) struct Plan {
+    pub(crate) steps: Vec<Step>,
+    /// Comments that stand below everything.
+    pub(crate) footer: Vec<String>,
+    /// What is worth knowing and changes nothing.
+    pub(crate) notes: Vec<(String, Range<usize>)>,
+}
+
+/// One step with the comments above it.
+#[derive(Debug)]
+pub(crate) struct Step {
+    pub(crate) comments: Vec<String>,
+    pub(crate) span: Range<usize>,
+    pub(crate) action: Action,
+}
+
+#[derive(Debug)]
+pub(crate) enum Action {
+    /// Coils or a variable that take the same power.
+    Write {
+        targets: Vec<(Name, Modifier)>,
+        power: Power,
+        /// Nothing is written without it.
+        guard: Option<Power>,
+    },
+    /// A function block's turn.
+    Call(Call),
+    /// The power of an object is kept for later steps of this scan; with a guard, for later scans too.
+    Keep {
+        object: usize,
+        power: Power,
+        guard: Option<Power>,
+    },
+}
+
+/// A call of a function block.
+#[derive(Debug)]
+pub(crate) struct Call {
+    pub(crate) type_name: Name,
+    pub(crate) instance: Name,
+    pub(crate) inputs: Vec<Input>,
+    /// The power at EN; without it the block does not act.
+    pub(crate) enable: Option<Power>,
+    /// Only one object asks for the block's first output, and at once: it may stand in that wire.
+    pub(crate) in_wire: bool,
+}
+
+/// What a call gives to one input.
+#[derive(Debug)]
+pub(crate) struct Input {
+    pub(crate) pin: Name,
+    pub(crate) modifier: Modifier,
+    pub(crate) power: Power,
+}
+
+impl Action {
+    pub(crate) fn powers(&self) -> Vec<&Power> {
+        match self {
+            Self::Write { power, guard, .. } | Self::Keep { power, guard, .. } => {
+                guard.iter().chain([power]).collect()
+            }
+            Self::Call(call) => {
+                let inputs = call.inputs.iter().map(|input| &input.power);
+                inputs.chain(&call.enable).collect()
+            }
+        }
+    }
+}
+
+/// Plans a graph of LD or FBD; `is_block` tells instances' types from functions.
+pub(crate) fn plan(
+    graph: &Graph,
+    is_block: &dyn Fn(&str) -> bool,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Plan {
+    let links = Links::new(graph, is_block, diagnostics);
+    let mut found = Vec::new();
+    let (mut plan, trace) = Walk::new(graph, &links, &HashSet::new()).run(&mut found);
+    let stale = stale(graph, &links, &plan, &trace);
+    if !stale.is_empty() {
+        found.clear();
+        plan = Walk::new(graph, &links, &stale).run(&mut found).0;
+    }
+    diagnostics.append(&mut found);
+    for object in stale {
+        let message = "it is asked for again after its variable has been written: it keeps what it let through first, where tools that \
+                       write Structured Text read the variable again";
+        let span = graph.objects[object].span.clone();
+        plan.notes.push((message.to_owned(), span));
+    }
+    plan.notes.sort_by_key(|(_, span)| span.start);
+    comments(graph, &mut plan);
+    plan
+}
+
+/// The objects whose reading would differ between the first and the last step that asks for them.
+fn stale(graph: &Graph, links: &Links, plan: &Plan, trace: &Trace) -> HashSet<usize> {
+    // Who asks later has finished later, so the last step that asks is known when its sources are looked at.
+    let mut last = vec![0; graph.objects.len()];
+    for &place in trace.finished.iter().rev() {
+        let asks = trace.step[place].unwrap_or(last[place]);
+        last[place] = asks;
+        for source in links.sources[place].iter().flatten() {
+            if let Source::Output(from, _) = source {
+                last[*from] = last[*from].max(asks);
+            }
+        }
+    }
+    let mut writes: HashMap<String, Vec<usize>> = HashMap::new();
+    for (place, step) in plan.steps.iter().enumerate() {
+        match &step.action {
+            Action::Write { targets, .. } => {
+                for (target, _) in targets {
+                    writes.entry(target.to_uppercase()).or_default().push(place);
+                }
+            }
+            Action::Call(call) => {
+                let key = format!("{}.", call.instance.to_uppercase());
+                writes.entry(key).or_default().push(place);
+            }
+            Action::Keep { .. } => {}
+        }
+    }
+    let changed = |text: &str, first: usize, last: usize| {
+        let places = writes.get(text);
+        places.is_some_and(|places| {
+            let next = places.partition_point(|&place| place < first);
+            places.get(next).is_some_and(|&place| place < last)
+        })
+    };
+    let mut stale = HashSet::new();
+    for &place in &trace.finished {
+        let text = match &graph.objects[place].kind {
+            Kind::Contact(text, _) | Kind::InVariable(text, _) => text.to_uppercase(),
+            Kind::InOutVariable(text, ..) => text.to_uppercase(),
+            _ => continue,
+        };
+        let instance = text
+            .split_once('.')
+            .map(|(instance, _)| format!("{instance}."));
+        let asked = (trace.first[place], last[place]);
+        if changed(&text, asked.0, asked.1)
+            || instance.is_some_and(|instance| changed(&instance, asked.0, asked.1))
+        {
+            stale.insert(place);
+        }
+    }
+    answers(graph, links, &mut stale);
+    stale
+}
+
+/// A number is kept as what a function makes of it: a comparison is one bit.
+fn answers(graph: &Graph, links: &Links, stale: &mut HashSet<usize>) {
+    let mut asked: HashMap<usize, usize> = HashMap::new();
+    for (place, object) in graph.objects.iter().enumerate() {
+        if matches!(object.kind, Kind::Block(_)) && !links.is_block[place] {
+            for source in links.sources[place].iter().flatten() {
+                if let Source::Output(from, _) = source
+                    && matches!(graph.objects[*from].kind, Kind::InVariable(..))
+                    && stale.contains(from)
+                {
+                    stale.insert(place);
+                    *asked.entry(*from).or_default() += 1;
+                }
+            }
+        }
+    }
+    // What only functions ask for needs no bit itself.
+    stale.retain(|place| asked.get(place) != Some(&links.fan_out[*place]));
+}
+
+/// Gives each comment to the nearest step below it; there may be several columns of rungs on a sheet.
+fn comments(graph: &Graph, plan: &mut Plan) {
+    let mut comments: Vec<((i64, i64), &String)> = graph
+        .objects
+        .iter()
+        .filter_map(|object| match &object.kind {
+            Kind::Comment(text) if !text.is_empty() => {
+                Some(((object.position.1, object.position.0), text))
+            }
+            _ => None,
+        })
+        .collect();
+    comments.sort_by_key(|(place, _)| *place);
+    let places: HashMap<usize, (i64, i64)> = graph
+        .objects
+        .iter()
+        .map(|object| (object.span.start, object.position))
+        .collect();
+    for ((y, x), text) in comments {
+        let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+        let lines = lines.map(str::to_owned);
+        let distance = |step: &Step| {
+            let place = places.get(&step.span.start)?;
+            let (right, down) = (place.0.saturating_sub(x), place.1.saturating_sub(y));
+            let sideways = if right < 0 {
+                right.saturating_mul(-8)
+            } else {
+                right
+            };
+            (down >= 0).then(|| down.saturating_mul(2).saturating_add(sideways))
+        };
+        let below = plan
+            .steps
+            .iter_mut()
+            .filter(|step| distance(step).is_some());
+        let below = below.min_by_key(|step| distance(step));
+        match below {
+            Some(step) => step.comments.extend(lines),
+            None => plan.footer.extend(lines),
+        }
+    }
+}
+
+/// Whether the graph is drawn from left to right.
+fn is_ladder(graph: &Graph) -> bool {
+    graph.language == Language::Ladder
+}

@@ -1,0 +1,219 @@
+//! Who is connected to whom: references resolved, coils and connectors looked through, current from left to right.
+
+use std::collections::HashMap;
+
+use understudy_diagnostic::Diagnostic;
+use understudy_ladder::Name;
+
+use super::is_ladder;
+use crate::plcopen::document::{Graph, Kind, Object, Pin, Wire};
+use crate::plcopen::standard::StandardBlock;
+
+/// Where power comes from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Source {
+    Rail,
+    /// An output of the object of that number, by its name where it has one.
+    Output(usize, Option<Name>),
+}
+
+/// All connections of a graph.
+pub(super) struct Links {
+    /// By object and input.
+    pub(super) sources: Vec<Vec<Vec<Source>>>,
+    /// How many inputs of other objects each object feeds.
+    pub(super) fan_out: Vec<usize>,
+    /// Calls of function blocks, as opposed to functions.
+    pub(super) is_block: Vec<bool>,
+}
+
+struct Resolver<'a> {
+    graph: &'a Graph,
+    places: HashMap<u64, usize>,
+    connectors: HashMap<&'a str, usize>,
+    is_block: &'a [bool],
+}
+
+impl Links {
+    pub(super) fn new(
+        graph: &Graph,
+        is_block: &dyn Fn(&str) -> bool,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Self {
+        let blocks: Vec<bool> = graph
+            .objects
+            .iter()
+            .map(|object| match &object.kind {
+                Kind::Block(block) => is_block(&block.type_name),
+                _ => false,
+            })
+            .collect();
+        let mut places = HashMap::new();
+        let mut connectors = HashMap::new();
+        for (place, object) in graph.objects.iter().enumerate() {
+            places.entry(object.id).or_insert(place);
+            if let Kind::Connector(name) = &object.kind {
+                connectors.entry(name.as_str()).or_insert(place);
+            }
+        }
+        let resolver = Resolver {
+            graph,
+            places,
+            connectors,
+            is_block: &blocks,
+        };
+        let mut sources = Vec::with_capacity(graph.objects.len());
+        let mut fan_out = vec![0; graph.objects.len()];
+        for object in &graph.objects {
+            let mut inputs = Vec::new();
+            for pin in &object.inputs {
+                resolver.check(object, pin, diagnostics);
+                let found = resolver.sources(pin);
+                if counts(object) {
+                    for source in &found {
+                        if let Source::Output(from, _) = source {
+                            fan_out[*from] += 1;
+                        }
+                    }
+                }
+                inputs.push(found);
+            }
+            sources.push(inputs);
+        }
+        for object in &graph.objects {
+            if let Kind::Continuation(name) = &object.kind
+                && !resolver.connectors.contains_key(name.as_str())
+            {
+                let message = format!("no connector is called `{name}`");
+                diagnostics.push(Diagnostic::error("U1005", message, object.span.clone()));
+            }
+        }
+        Self {
+            sources,
+            fan_out,
+            is_block: blocks,
+        }
+    }
+}
+
+/// A right power rail, and what is looked through, do not use power.
+fn counts(object: &Object) -> bool {
+    !matches!(object.kind, Kind::RightRail | Kind::Connector(_))
+}
+
+impl Resolver<'_> {
+    /// The sources of an input behind coils and connectors, each once.
+    fn sources(&self, pin: &Pin) -> Vec<Source> {
+        let mut found = Vec::new();
+        let mut seen = Vec::new();
+        let mut waiting: Vec<&Wire> = pin.wires.iter().rev().collect();
+        while let Some(wire) = waiting.pop() {
+            let Some(&place) = self.places.get(&wire.from) else {
+                continue;
+            };
+            let object = &self.graph.objects[place];
+            let through = match &object.kind {
+                Kind::Coil(..) | Kind::Connector(_) => Some(place),
+                Kind::Continuation(name) => self.connectors.get(name.as_str()).copied(),
+                _ => None,
+            };
+            if let Some(through) = through {
+                if !seen.contains(&through) {
+                    seen.push(through);
+                    let inputs = &self.graph.objects[through].inputs;
+                    waiting.extend(inputs.iter().flat_map(|pin| &pin.wires).rev());
+                }
+                continue;
+            }
+            let source = match &object.kind {
+                Kind::LeftRail => Source::Rail,
+                Kind::Continuation(_) => continue,
+                _ => Source::Output(place, wire.pin.clone()),
+            };
+            if !found.contains(&source) {
+                found.push(source);
+            }
+        }
+        found
+    }
+
+    fn check(&self, object: &Object, pin: &Pin, diagnostics: &mut Vec<Diagnostic>) {
+        for wire in &pin.wires {
+            let Some(&place) = self.places.get(&wire.from) else {
+                let message = format!("nothing has the localId {}", wire.from);
+                diagnostics.push(
+                    Diagnostic::error("U1005", message, wire.span.clone())
+                        .with_related(object.span.clone(), "connected to this"),
+                );
+                continue;
+            };
+            let from = &self.graph.objects[place];
+            if !has_output(from) {
+                let message = format!("object {} has nothing that goes out", from.id);
+                diagnostics.push(
+                    Diagnostic::error("U1005", message, wire.span.clone())
+                        .with_related(from.span.clone(), "this object"),
+                );
+            }
+            if let Some(name) = &wire.pin {
+                self.check_pin(place, name, wire, diagnostics);
+            }
+            let flows_back = is_ladder(self.graph)
+                && is_element(from)
+                && (is_element(object) || matches!(object.kind, Kind::RightRail))
+                && from.position.0 > object.position.0;
+            if flows_back {
+                let message = format!(
+                    "current would flow from right to left, from object {} to object {}",
+                    from.id, object.id
+                );
+                diagnostics.push(
+                    Diagnostic::error("U1007", message, wire.span.clone())
+                        .with_related(from.span.clone(), "it comes from here")
+                        .with_help("draw what feeds a contact or coil to the left of it"),
+                );
+            }
+        }
+    }
+
+    /// A named output of a block must be one that the block has.
+    fn check_pin(&self, from: usize, name: &Name, wire: &Wire, diagnostics: &mut Vec<Diagnostic>) {
+        let object = &self.graph.objects[from];
+        let Kind::Block(block) = &object.kind else {
+            return;
+        };
+        let declared = object
+            .outputs
+            .iter()
+            .any(|output| output.name.eq_ignore_ascii_case(name));
+        let standard = StandardBlock::of(&block.type_name);
+        let known = match standard {
+            Some(standard) => standard.has_output(name) || name.eq_ignore_ascii_case("ENO"),
+            // What a unit of the file has is checked where it is called.
+            None => declared || object.outputs.is_empty() || self.is_block[from],
+        };
+        if !known {
+            let message = format!("{} has no output `{name}`", block.type_name);
+            diagnostics.push(
+                Diagnostic::error("U1008", message, wire.span.clone())
+                    .with_related(object.span.clone(), "this block"),
+            );
+        }
+    }
+}
+
+fn has_output(object: &Object) -> bool {
+    !matches!(
+        object.kind,
+        Kind::RightRail
+            | Kind::OutVariable(..)
+            | Kind::Connector(_)
+            | Kind::Comment(_)
+            | Kind::Actions(_)
+            | Kind::JumpStep(_)
+    )
+}
+
+fn is_element(object: &Object) -> bool {
+    matches!(object.kind, Kind::Contact(..) | Kind::Coil(..))
+}

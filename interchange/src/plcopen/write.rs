@@ -1,0 +1,252 @@
+//! A program as PLCopen XML 2.01 that editors open and that compiles there to the same scan.
+//!
+//! Each rung stands below the one before it, between rails of its own, and its coils below each other, so that the order by y is
+//! the order of the scan in every tool. Tools that write Structured Text ask a rung's contacts again for each coil, and call a block
+//! that nothing asks for after everything else; so a rung whose coils change what it reads gets a bit that keeps its power,
+//! and a block at the end of a rung gets a coil.
+
+mod names;
+mod sheet;
+mod tree;
+
+use std::time::Duration;
+
+use understudy_ladder::{
+    Coil, CoilKind, Contact, ContactKind, Element, Program, Rung, Series, Signal, time_text, visit,
+};
+
+use self::names::Names;
+use self::sheet::Sheet;
+use self::tree::Tree;
+
+/// The file of a program that runs every `period`.
+///
+/// Names become names of IEC 61131-3; memory bits that rungs need (see above) follow those of the program. The dates in the
+/// header are fixed, so that the same program is the same file.
+pub fn write(program: &Program, period: Duration) -> String {
+    let mut names = Names::of(program);
+    let rungs = prepared(program, &mut names);
+    let sheet = Sheet::of(&rungs, &program.footer, &names);
+    let mut tree = Tree::new();
+    tree.open(
+        "project",
+        &[
+            ("xmlns", "http://www.plcopen.org/xml/tc6_0201"),
+            ("xmlns:xhtml", "http://www.w3.org/1999/xhtml"),
+        ],
+    );
+    header(&mut tree, names.program());
+    tree.open("types", &[]);
+    tree.empty("dataTypes", &[]);
+    tree.open("pous", &[]);
+    tree.open("pou", &[("name", names.program()), ("pouType", "program")]);
+    interface(&mut tree, program, &names);
+    tree.open("body", &[]);
+    tree.open("LD", &[]);
+    sheet.write(&mut tree);
+    tree.close("LD");
+    tree.close("body");
+    let about: Vec<&str> = program
+        .comments
+        .iter()
+        .chain(&program.description)
+        .map(String::as_str)
+        .collect();
+    if !about.is_empty() {
+        tree.formatted("documentation", &about.join("\n"));
+    }
+    tree.close("pou");
+    tree.close("pous");
+    tree.close("types");
+    instances(&mut tree, names.program(), period);
+    tree.close("project");
+    tree.finish()
+}
+
+fn header(tree: &mut Tree, name: &str) {
+    tree.empty(
+        "fileHeader",
+        &[
+            ("companyName", "Understudy"),
+            ("productName", "Understudy"),
+            ("productVersion", env!("CARGO_PKG_VERSION")),
+            ("creationDateTime", "2000-01-01T00:00:00"),
+        ],
+    );
+    tree.open("contentHeader", &[("name", name)]);
+    tree.open("coordinateInfo", &[]);
+    for language in ["fbd", "ld", "sfc"] {
+        tree.open(language, &[]);
+        tree.empty("scaling", &[("x", "10"), ("y", "10")]);
+        tree.close(language);
+    }
+    tree.close("coordinateInfo");
+    tree.close("contentHeader");
+}
+
+/// Inputs and outputs with an address are local variables, as compilers want them.
+fn interface(tree: &mut Tree, program: &Program, names: &Names) {
+    tree.open("interface", &[]);
+    let mut list: Option<&str> = None;
+    let inputs = program.inputs.iter().map(|signal| ("inputVars", signal));
+    let outputs = program.outputs.iter().map(|signal| ("outputVars", signal));
+    let memory = program.memory.iter().map(|signal| ("localVars", signal));
+    for (section, signal) in inputs.chain(outputs).chain(memory) {
+        let section = if signal.address.is_some() {
+            "localVars"
+        } else {
+            section
+        };
+        enter(tree, &mut list, section);
+        variable(tree, signal, names.signal(&signal.name));
+    }
+    for name in names.added() {
+        enter(tree, &mut list, "localVars");
+        variable(tree, &Signal::default(), name);
+    }
+    for block in program.blocks() {
+        enter(tree, &mut list, "localVars");
+        tree.open("variable", &[("name", names.signal(&block.name))]);
+        tree.open("type", &[]);
+        tree.empty("derived", &[("name", block.kind.word())]);
+        tree.close("type");
+        tree.close("variable");
+    }
+    if let Some(open) = list {
+        tree.close(open);
+    }
+    tree.close("interface");
+}
+
+fn enter<'a>(tree: &mut Tree, list: &mut Option<&'a str>, section: &'a str) {
+    if *list != Some(section) {
+        if let Some(open) = *list {
+            tree.close(open);
+        }
+        tree.open(section, &[]);
+        *list = Some(section);
+    }
+}
+
+fn variable(tree: &mut Tree, signal: &Signal, name: &str) {
+    let address = signal.address.as_ref().map(ToString::to_string);
+    let mut attributes = vec![("name", name)];
+    if let Some(address) = &address {
+        attributes.push(("address", address));
+    }
+    tree.open("variable", &attributes);
+    tree.open("type", &[]);
+    tree.empty("BOOL", &[]);
+    tree.close("type");
+    if let Some(initial) = signal.initial {
+        tree.open("initialValue", &[]);
+        tree.empty(
+            "simpleValue",
+            &[("value", if initial { "TRUE" } else { "FALSE" })],
+        );
+        tree.close("initialValue");
+    }
+    let about: Vec<&str> = signal
+        .comments
+        .iter()
+        .chain(&signal.description)
+        .map(String::as_str)
+        .collect();
+    if !about.is_empty() {
+        tree.formatted("documentation", &about.join("\n"));
+    }
+    tree.close("variable");
+}
+
+fn instances(tree: &mut Tree, program: &str, period: Duration) {
+    let interval = format!("T#{}", time_text(period));
+    tree.open("instances", &[]);
+    tree.open("configurations", &[]);
+    tree.open("configuration", &[("name", "configuration0")]);
+    tree.open("resource", &[("name", "resource0")]);
+    tree.open(
+        "task",
+        &[
+            ("name", "task0"),
+            ("interval", &interval),
+            ("priority", "0"),
+        ],
+    );
+    tree.empty(
+        "pouInstance",
+        &[("name", "instance0"), ("typeName", program)],
+    );
+    tree.close("task");
+    tree.close("resource");
+    tree.close("configuration");
+    tree.close("configurations");
+    tree.close("instances");
+}
+
+/// The rungs with the bits that make other tools scan them as they are scanned here.
+fn prepared(program: &Program, names: &mut Names) -> Vec<Rung> {
+    let mut rungs = Vec::with_capacity(program.rungs.len());
+    for rung in &program.rungs {
+        if rung.coils.is_empty() {
+            let wanted = program_block(&rung.network).unwrap_or("rung");
+            let target = names.add(&format!("{wanted}_out")).into();
+            rungs.push(Rung {
+                coils: vec![Coil {
+                    kind: CoilKind::Plain,
+                    target,
+                }],
+                ..rung.clone()
+            });
+        } else if changes_itself(rung) {
+            let power = names.add("power");
+            let keep = Coil {
+                kind: CoilKind::Plain,
+                target: power.as_str().into(),
+            };
+            rungs.push(Rung {
+                coils: vec![keep],
+                ..rung.clone()
+            });
+            for coil in &rung.coils {
+                let operand = power.as_str().into();
+                let contact = Contact {
+                    kind: ContactKind::NormallyOpen,
+                    operand,
+                };
+                rungs.push(Rung {
+                    network: vec![Element::Contact(contact)],
+                    coils: vec![coil.clone()],
+                    ..Rung::default()
+                });
+            }
+        } else {
+            rungs.push(rung.clone());
+        }
+    }
+    rungs
+}
+
+/// The last block of a network.
+fn program_block(network: &Series) -> Option<&str> {
+    let mut last = None;
+    visit(network, &mut |element| {
+        if let Element::Block(block) = element {
+            last = Some(block.name.as_str());
+        }
+    });
+    last
+}
+
+/// Whether a coil changes what the rung reads for the next coil.
+fn changes_itself(rung: &Rung) -> bool {
+    let Some((_, changing)) = rung.coils.split_last() else {
+        return false;
+    };
+    let mut reads = false;
+    visit(&rung.network, &mut |element| {
+        if let Element::Contact(contact) = element {
+            reads |= changing.iter().any(|coil| coil.target == contact.operand);
+        }
+    });
+    reads
+}

@@ -1,0 +1,11 @@
+//! PLCopen XML, from outside.
+
+mod bad_input;
+mod meaning;
+mod public_ladders;
+#[path = "../../../ladder/tests/ladder/random.rs"]
+#[allow(dead_code, reason = "the generator of the ladder's own tests")]
+mod random;
+mod round_trip;
+mod schema;
+mod support;
