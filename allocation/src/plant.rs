@@ -1,0 +1,112 @@
+//! From the programs of a plant to the boxes that it wants.
+//!
+//! Where remote I/Os have the terminals, a group of programs wants a controller for each, its understudies, and a remote I/O for each;
+//! all of them speak over a network, and scan once a period. A program that stands alone wants one controller with its terminals.
+
+use std::time::Duration;
+
+use crate::allocate::{Item, Verification};
+use crate::need::Need;
+use crate::requirement::Role;
+use crate::resources::Resources;
+
+/// A program that is to run somewhere.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Member {
+    /// Its name in the plant.
+    pub name: String,
+    /// What it consists of.
+    pub program: Resources,
+    /// What was proved about it.
+    pub verification: Verification,
+    /// The name of the remote I/O with its terminals.
+    pub remote_io: String,
+}
+
+/// Programs with one generated understudy.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Group {
+    /// Its programs.
+    pub members: Vec<Member>,
+    /// The names of its understudies.
+    pub understudies: Vec<String>,
+    /// What the generated program consists of.
+    pub understudy: Resources,
+    /// What was proved about the generated program, beside its members.
+    pub parity: Verification,
+    /// From one scan to the next.
+    pub period: Duration,
+}
+
+impl Group {
+    /// The boxes that the group wants; `number` tells it from other groups.
+    pub fn items(&self, number: usize) -> Vec<Item> {
+        let station = |role, program| Need {
+            role,
+            inputs: 0,
+            outputs: 0,
+            program: Some(program),
+            scan_within: Some(self.period),
+            ethernet: true,
+        };
+        let controllers = self.members.iter().map(|member| Item {
+            name: member.name.clone(),
+            group: Some(number),
+            need: station(Role::Controller, member.program),
+            verification: member.verification.clone(),
+        });
+        let verification = self.verification();
+        let understudies = self.understudies.iter().map(|name| Item {
+            name: name.clone(),
+            group: Some(number),
+            need: station(Role::Understudy, self.understudy),
+            verification: verification.clone(),
+        });
+        let remote_ios = self.members.iter().map(|member| Item {
+            name: member.remote_io.clone(),
+            group: Some(number),
+            need: Need {
+                role: Role::RemoteIo,
+                inputs: member.program.inputs,
+                outputs: member.program.outputs,
+                program: None,
+                scan_within: None,
+                ethernet: true,
+            },
+            verification: member.verification.clone(),
+        });
+        controllers.chain(understudies).chain(remote_ios).collect()
+    }
+
+    /// An understudy is every member at once: it has passed when all of them have.
+    fn verification(&self) -> Verification {
+        let failed = self
+            .members
+            .iter()
+            .find(|member| !member.verification.has_passed());
+        match (&self.parity, failed) {
+            (Verification::Passed(_), Some(member)) => {
+                let message = member.verification.message();
+                Verification::NotPassed(format!("it runs {} too: {message}", member.name))
+            }
+            (parity, _) => parity.clone(),
+        }
+    }
+}
+
+/// The box that a program without a group wants: with its terminals, and no network.
+pub fn alone(member: &Member) -> Item {
+    Item {
+        name: member.name.clone(),
+        group: None,
+        need: Need {
+            role: Role::Controller,
+            inputs: member.program.inputs,
+            outputs: member.program.outputs,
+            program: Some(member.program),
+            scan_within: None,
+            ethernet: false,
+        },
+        verification: member.verification.clone(),
+    }
+}
