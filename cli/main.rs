@@ -16,6 +16,7 @@ mod des;
 mod doctor;
 mod draw;
 mod endurance;
+mod explain;
 mod failover;
 mod field;
 mod files;
@@ -76,6 +77,7 @@ enum Command {
     Lab(lab::Arguments),
     Simulate(simulate::Arguments),
     Check(check::Arguments),
+    Explain(explain::Arguments),
     Parity(parity::Arguments),
     Verify(verify::Arguments),
     Draw(draw::Arguments),
@@ -110,6 +112,7 @@ impl Command {
             Self::Lab(_) => "lab",
             Self::Simulate(_) => "simulate",
             Self::Check(_) => "check",
+            Self::Explain(_) => "explain",
             Self::Parity(_) => "parity",
             Self::Verify(_) => "verify",
             Self::Draw(_) => "draw",
@@ -144,6 +147,7 @@ impl Command {
             Self::Lab(arguments) => lab::run(&arguments, console),
             Self::Simulate(arguments) => simulate::run(&arguments),
             Self::Check(arguments) => check::run(&arguments),
+            Self::Explain(arguments) => explain::run(&arguments),
             Self::Parity(arguments) => parity::run(&arguments),
             Self::Verify(arguments) => verify::run(&arguments, console),
             Self::Draw(arguments) => draw::run(&arguments),

@@ -2,7 +2,9 @@
 //!
 //! Readers of files return what they understood *and* a list of [`Diagnostic`]s, so that one run shows everything that is
 //! wrong. A diagnostic has a stable code (`U0123`), a place in its source and, where one can be named, the way out. This
-//! crate only holds the data; the command line draws it.
+//! crate only holds the data; the command line draws it. [`pages`] holds what is to be known about each code.
+
+pub mod pages;
 
 use std::fmt;
 use std::ops::Range;

@@ -2,3 +2,8 @@
 
 pub mod plcopen;
 pub mod structured_text;
+
+/// The examples of the codes of this crate are run with its own.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/errors/U10.md")]
+pub struct ErrorPages;

@@ -63,3 +63,8 @@ pub use system::{
 };
 pub use three_state::{StateProbabilities, ThreeState};
 pub use transient::{AfterFailure, Transient};
+
+/// The examples of the codes of this crate are run with its own.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/errors/U07.md")]
+pub struct ErrorPages;

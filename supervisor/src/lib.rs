@@ -44,3 +44,8 @@ pub use symbolic::{
     synthesise_symbolically,
 };
 pub use synthesis::{synthesise, unknown_events};
+
+/// The examples of the codes of this crate are run with its own.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/errors/U08.md")]
+pub struct ErrorPages;

@@ -4,12 +4,13 @@ use insta::assert_snapshot;
 
 use crate::understudy;
 
-const COMMANDS: [&str; 23] = [
+const COMMANDS: [&str; 24] = [
     "campaign",
     "demo",
     "lab",
     "simulate",
     "check",
+    "explain",
     "parity",
     "draw",
     "supervisor-to-ladder",

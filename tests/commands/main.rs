@@ -1,10 +1,12 @@
 //! The command line as a person sees it: help, answers, errors, exit statuses.
 
 mod bench;
+mod book;
 mod campaign;
 mod check;
 mod des;
 mod examples;
+mod explain;
 mod help;
 mod model_check;
 mod others;

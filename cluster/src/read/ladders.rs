@@ -47,9 +47,15 @@ impl<'a> Ladders<'a> {
                 return None;
             }
         };
-        let (_, _, parsed) = &self.read[place];
+        let (_, _, parsed) = &mut self.read[place];
         if has_errors(&parsed.diagnostics) {
             return None;
+        }
+        // Several controllers may run one ladder.
+        for warning in parsed.program.preset_warnings(period) {
+            if !parsed.diagnostics.contains(&warning) {
+                parsed.diagnostics.push(warning);
+            }
         }
         let mut program = parsed.program.clone();
         program.name = name.into();
