@@ -260,7 +260,14 @@ impl Model {
 
     fn run(&mut self, record: &Record, event: &RunEvent) {
         // What is done is felt in the next cycle.
-        let cycle = self.cycles.of(None) + i64::from(self.cycles.latest().is_some());
+        let cycle = match event {
+            RunEvent::Origin { moment, .. } => self.cycles.of(Some(*moment)),
+            RunEvent::Finished => self.cycles.of(None),
+            _ => self.cycles.of(None) + i64::from(self.cycles.latest().is_some()),
+        };
+        if let Some(latest) = self.cycles.latest() {
+            self.close_up_to(latest);
+        }
         match event {
             RunEvent::Started {
                 party: Party::Station(station),

@@ -102,6 +102,7 @@ impl StationTrack {
         let heard = self.heard;
         *self = Self {
             process: Process::Running,
+            joining: true,
             flagged_by: flags.0,
             flagged_by_remote_ios: flags.1,
             heard,

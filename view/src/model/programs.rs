@@ -305,7 +305,7 @@ impl Model {
     }
 
     /// What every station was up to `cycle`, of which all remote I/Os have told but for the slowest.
-    fn close_up_to(&mut self, cycle: i64) {
+    pub(super) fn close_up_to(&mut self, cycle: i64) {
         if self.closed.is_some_and(|closed| closed >= cycle) {
             return;
         }

@@ -79,23 +79,22 @@ impl Follower {
         if self.open.is_none() && !self.open_first(take)? {
             return Ok(0);
         }
-        let mut taken = self.read(take)?;
         // Until there is something, or nothing follows.
-        while taken == 0 {
-            if !self.is_closed()? {
-                return Ok(0);
+        loop {
+            let mut taken = self.read(take)?;
+            if taken > 0 || !self.is_closed()? {
+                return Ok(taken);
             }
             // It may have been written to after it was read and before it was closed.
             taken = self.read(take)?;
             if taken > 0 {
-                break;
-            }
-            if !self.open_next(take, &mut taken)? {
                 return Ok(taken);
             }
-            taken += self.read(take)?;
+            let opened = self.open_next(take, &mut taken)?;
+            if taken > 0 || !opened {
+                return Ok(taken);
+            }
         }
-        Ok(taken)
     }
 
     /// The oldest segment that there is.
@@ -200,10 +199,23 @@ impl Follower {
         }
     }
 
-    /// The records of the next piece.
+    /// The records of the next piece that has one.
     fn read(&mut self, take: &mut dyn FnMut(Result<Record, Trouble>)) -> io::Result<usize> {
+        loop {
+            let (length, taken) = self.read_piece(take)?;
+            if taken > 0 || length == 0 {
+                return Ok(taken);
+            }
+        }
+    }
+
+    /// How many bytes, and how many records and troubles they came to.
+    fn read_piece(
+        &mut self,
+        take: &mut dyn FnMut(Result<Record, Trouble>),
+    ) -> io::Result<(usize, usize)> {
         let Some(open) = &mut self.open else {
-            return Ok(0);
+            return Ok((0, 0));
         };
         let length = open.file.read(&mut self.piece)?;
         let mut taken = 0;
@@ -231,7 +243,7 @@ impl Follower {
             }
             self.line.clear();
         }
-        Ok(taken)
+        Ok((length, taken))
     }
 }
 

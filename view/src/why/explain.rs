@@ -117,30 +117,50 @@ impl<'m> Explainer<'m> {
         if !self.told.insert((name.to_owned(), place, below)) {
             return self.leaf(name, value, place, "as said already");
         }
-        let mut at = place;
-        let mut limit = below;
-        for _ in 0..FARTHEST {
-            let Some(evaluation) = self.evaluation(at) else {
-                return self.leaf(name, value, at, "the state before is not known");
-            };
-            if let Some(decision) = self.decision(name, &evaluation, limit) {
-                return self.decided(name, value, [place, at], &decision, &evaluation, depth);
-            }
-            if at == place && !value {
-                // A latch that is off: what does not set it says more than what once reset it.
-                let reasons = self.not_set(name, &evaluation, limit, at, depth);
-                if !reasons.is_empty() {
-                    let mut reason = self.leaf(name, value, place, "nothing sets it");
-                    reason.because = reasons;
-                    return reason;
-                }
-            }
-            match self.history.before(at) {
-                Some(before) => (at, limit) = (before, self.program.rungs.len()),
-                None => break,
+        let Some(evaluation) = self.evaluation(place) else {
+            return self.leaf(name, value, place, "the state before is not known");
+        };
+        if let Some(decision) = self.decision(name, &evaluation, below) {
+            return self.decided(name, value, [place, place], &decision, &evaluation, depth);
+        }
+        if !value {
+            // A latch that is off: what does not set it says more than what once reset it.
+            let because = self.not_set(name, &evaluation, below, place, depth);
+            if !because.is_empty() {
+                let reason = self.leaf(name, value, place, "nothing sets it");
+                return Reason { because, ..reason };
             }
         }
-        self.leaf(name, value, place, self.end_of_history(at))
+        let at = match self.changed(name, value, place) {
+            Ok(at) => at,
+            Err(end) => return self.leaf(name, value, place, self.end_of_history(end)),
+        };
+        let Some(evaluation) = self.evaluation(at) else {
+            return self.leaf(name, value, place, "the state before is not known");
+        };
+        match self.decision(name, &evaluation, self.program.rungs.len()) {
+            Some(decision) => self.decided(name, value, [place, at], &decision, &evaluation, depth),
+            None => self.leaf(name, value, place, self.end_of_history(at)),
+        }
+    }
+
+    /// The last step before the one at `place` whose scan changed a signal to `value`; the first step that is known where none did.
+    fn changed(&self, name: &str, value: bool, place: usize) -> Result<usize, usize> {
+        let registers = self.model.cluster.controllers()[self.history.program().index()]
+            .circuit
+            .registers();
+        let register = registers.iter().position(|register| register.name == name);
+        let mut at = place;
+        for _ in 0..FARTHEST {
+            let before = self.history.before(at).ok_or(at)?;
+            let state = self.history.steps()[before].sampled.as_ref();
+            let was = register.and_then(|register| Some(state?.state.get(register)));
+            if was != Some(value) {
+                return Ok(before);
+            }
+            at = before;
+        }
+        Err(at)
     }
 
     /// Why there is nothing before the step at `place`.
@@ -534,7 +554,8 @@ impl<'m> Explainer<'m> {
             let Some(before) = self.history.before(at) else {
                 return (at, self.end_of_history(at) == "its initial value");
             };
-            let evaluation = self.evaluation(before);
+            // Not kept: there may be thousands.
+            let evaluation = self.model.evaluation_at(self.history, before).ok();
             let was = evaluation
                 .as_ref()
                 .and_then(|evaluation| evaluation.rungs[rung].elements.get(element));
