@@ -11,6 +11,7 @@ use std::time::Duration;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::spelling::suggestion;
 
 use crate::duration::{parse_time, spoken};
 use crate::format::{Key, Kind, Section};
@@ -20,9 +21,6 @@ pub const MAXIMUM_NAME_LENGTH: usize = 48;
 
 /// Names of one place that are looked up and not found; those past it are only counted, so that no file takes long.
 pub(crate) const MAXIMUM_MISFITS: usize = 100;
-
-/// Names that a suggestion lists.
-const MAXIMUM_LISTED: usize = 12;
 
 /// A value and where it stands, or where it would stand.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -338,38 +336,4 @@ pub(crate) fn unknown_key(
     let message = format!("{owner} has no key `{name}`");
     Diagnostic::error("U0202", message, key.span())
         .with_help(suggestion(name, known.iter().copied()))
-}
-
-/// The known name that is nearest to a misspelt one, if one is near.
-pub(crate) fn nearest<'n>(name: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
-    let furthest = (name.chars().count() / 3).max(1);
-    let near = |known: &'n str| {
-        // The distance is never less than what the lengths differ by.
-        let differ = known.len().abs_diff(name.len()) > 4 * furthest;
-        let distance = if differ {
-            usize::MAX
-        } else {
-            strsim::damerau_levenshtein(name, known)
-        };
-        (distance <= furthest).then_some((distance, known))
-    };
-    let nearest = known.into_iter().filter_map(near).min();
-    nearest.map(|(_, nearest)| nearest)
-}
-
-/// The nearest known name, or the first of all where none is near.
-pub(crate) fn suggestion<'n>(name: &str, known: impl IntoIterator<Item = &'n str>) -> String {
-    let known: Vec<&str> = known.into_iter().collect();
-    if let Some(nearest) = nearest(name, known.iter().copied()) {
-        return format!("did you mean `{nearest}`?");
-    }
-    match known.len() {
-        0 => "none is known here".into(),
-        count @ ..=MAXIMUM_LISTED => format!("known: {}", known[..count].join(", ")),
-        count => format!(
-            "known: {}, and {} more",
-            known[..MAXIMUM_LISTED].join(", "),
-            count - MAXIMUM_LISTED
-        ),
-    }
 }

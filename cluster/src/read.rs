@@ -40,6 +40,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_diagnostic::{Diagnostic, Report};
+use understudy_diagnostic::spelling::suggestion;
 use understudy_ladder::Program as LadderProgram;
 use understudy_logic::{Circuit, Scan};
 use understudy_node::Program;
@@ -53,7 +54,7 @@ use self::names::Names;
 use crate::canonical::program_hash;
 use crate::cluster::{Cluster, Controller, Link, RemoteIo, Security, Understudy};
 use crate::configuration::configuration_text;
-use crate::fields::{MAXIMUM_MISFITS, suggestion};
+use crate::fields::MAXIMUM_MISFITS;
 use crate::file::{self, ClusterFile, ControllerSection};
 
 /// The longest cluster file in bytes.

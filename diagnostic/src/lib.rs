@@ -5,6 +5,7 @@
 //! crate only holds the data; the command line draws it. [`pages`] holds what is to be known about each code.
 
 pub mod pages;
+pub mod spelling;
 
 use std::fmt;
 use std::ops::Range;

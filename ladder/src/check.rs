@@ -366,19 +366,3 @@ impl<'a> Checker<'a> {
         }
     }
 }
-
-/// The known word that `word` is probably a misspelling of: at most a third of its letters differ.
-pub(crate) fn nearest<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    let allowed = (word.chars().count() / 3).max(1);
-    known
-        .filter_map(|known| {
-            let distance = if known.eq_ignore_ascii_case(word) {
-                0
-            } else {
-                strsim::damerau_levenshtein(word, known)
-            };
-            (distance <= allowed).then_some((distance, known))
-        })
-        .min()
-        .map(|(_, known)| known)
-}

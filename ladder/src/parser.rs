@@ -9,9 +9,10 @@ pub use rung::MAXIMUM_PRESET_VALUE;
 
 use std::ops::Range;
 
+use understudy_diagnostic::spelling::nearest;
 use understudy_diagnostic::{Diagnostic, has_errors};
 
-use crate::check::{check, nearest};
+use crate::check::check;
 use crate::lexer::{Lexeme, Placed, lex};
 use crate::program::{Name, Program, Rung, Signal};
 

@@ -8,6 +8,7 @@ use std::time::Duration;
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
 use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::spelling::suggestion;
 
 /// A value and where it stands.
 pub(crate) type Placed<T> = (T, Range<usize>);
@@ -231,7 +232,7 @@ impl<'a, 't> Fields<'a, 't> {
             diagnostics.push(
                 Diagnostic::error("U0302", message, key.span())
                     .with_label("unknown key")
-                    .with_help(suggest(name, known)),
+                    .with_help(suggestion(name, known)),
             );
         }
     }
@@ -270,21 +271,6 @@ fn count(value: &Spanned<DeValue<'_>>, diagnostics: &mut Vec<Diagnostic>) -> Opt
         "a whole number that is not negative",
         diagnostics,
     )
-}
-
-/// The known name that is nearest to a misspelt one, or all of them where none is near.
-pub(crate) fn suggest<'n>(name: &str, known: impl Iterator<Item = &'n str>) -> String {
-    let known: Vec<&str> = known.collect();
-    let nearest = known
-        .iter()
-        .map(|known| (strsim::damerau_levenshtein(name, known), *known))
-        .min();
-    match nearest {
-        Some((distance, nearest)) if distance <= (name.chars().count() / 3).max(1) => {
-            format!("did you mean `{nearest}`?")
-        }
-        _ => format!("known are: {}", known.join(", ")),
-    }
 }
 
 /// `10ms`, `1.5s`, `200us`, `3ns`; at most an hour.

@@ -19,10 +19,11 @@ use std::ops::Range;
 
 use toml::de::DeTable;
 use understudy_diagnostic::{Diagnostic, Report, has_errors};
+use understudy_diagnostic::spelling::suggestion;
 use understudy_simulator::{Disturbance, Network};
 use understudy_wire::{Party, ProgramId, Source};
 
-use crate::fields::{Fields, suggest};
+use crate::fields::Fields;
 use crate::parties::Parties;
 use crate::scenario::{During, Expectation, SOURCES, Scenario, source_word};
 
@@ -226,7 +227,7 @@ impl Reader<'_> {
                 Some(source) => sources.push(source),
                 None => {
                     let message = format!("there is no source `{word}`");
-                    let help = suggest(word, SOURCES.into_iter().map(source_word));
+                    let help = suggestion(word, SOURCES.into_iter().map(source_word));
                     found.push(Diagnostic::error("U0306", message, place).with_help(help));
                 }
             }
@@ -239,7 +240,7 @@ impl Reader<'_> {
             _ => {
                 let known = self.parties.map(|parties| {
                     let names = parties.remote_ios().map(|(_, name)| name);
-                    suggest(name, names)
+                    suggestion(name, names)
                 });
                 self.unfit(name, "a remote I/O", place, known);
                 return None;
@@ -259,7 +260,7 @@ impl Reader<'_> {
             _ => {
                 let known = self.parties.map(|parties| {
                     let names = parties.plants().map(|(_, name)| name);
-                    suggest(name, names)
+                    suggestion(name, names)
                 });
                 self.unfit(name, "a plant", place.clone(), known);
                 None
@@ -280,7 +281,7 @@ impl Reader<'_> {
         let party = parties.find(name);
         if party.is_none() {
             let message = format!("the cluster has no station, remote I/O or plant `{name}`");
-            let help = suggest(name, parties.iter().map(|(_, name)| name));
+            let help = suggestion(name, parties.iter().map(|(_, name)| name));
             self.diagnostics
                 .push(Diagnostic::error("U0307", message, place.clone()).with_help(help));
         }

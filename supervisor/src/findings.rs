@@ -1,6 +1,7 @@
 //! What synthesis found, in words: each finding with the shortest sequence of events that shows it.
 
 use understudy_diagnostic::Severity;
+use understudy_diagnostic::spelling::nearest;
 
 use crate::alphabet::Label;
 use crate::model::Model;
@@ -47,9 +48,8 @@ pub fn model_findings(model: &Model) -> Vec<Finding> {
             .plants
             .iter()
             .flat_map(|plant| plant.alphabet().labels());
-        let known = known.map(|label| model.alphabet.name(label));
-        let near = known.min_by_key(|other| strsim::damerau_levenshtein(other, &event));
-        let help = match near.filter(|near| strsim::damerau_levenshtein(near, &event) <= 2) {
+        let known: Vec<String> = known.map(|label| model.alphabet.name(label)).collect();
+        let help = match nearest(&event, known.iter().map(String::as_str)) {
             Some(near) => format!("; perhaps {near} is meant"),
             None => String::new(),
         };

@@ -7,6 +7,7 @@ use std::time::Duration;
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
 use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::spelling::nearest;
 use understudy_ladder::{Name, parse_time};
 
 /// A place in the text, in bytes.
@@ -299,13 +300,4 @@ pub(crate) fn key(word: &str) -> String {
     } else {
         quoted(word)
     }
-}
-
-/// The known name that is near to `name`.
-pub(crate) fn nearest<'n>(name: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
-    let distance = |other: &str| strsim::damerau_levenshtein(name, other);
-    let near = known
-        .into_iter()
-        .min_by_key(|other| (distance(other), other.to_owned()))?;
-    (distance(near) <= 1 + name.len() / 4).then_some(near)
 }

@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::spelling::suggestion;
 use understudy_logic::Circuit;
 
 use super::Member;
 use crate::cluster::RemoteIo;
 use crate::device::{FieldDevice, Point};
-use crate::fields::{MAXIMUM_MISFITS, Placed, suggestion};
+use crate::fields::{MAXIMUM_MISFITS, Placed};
 use crate::file::FieldSection;
 
 /// The device of a remote I/O; nothing where its section has errors.

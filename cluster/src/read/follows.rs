@@ -1,12 +1,13 @@
 //! Sensors of other plants that the terminals of a plant follow: `{ pilot_flame = "pilot-burner.flame" }`.
 
 use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::spelling::suggestion;
 use understudy_plant::Followed;
 use understudy_wire::ProgramId;
 
 use super::Member;
 use super::plants::Draft;
-use crate::fields::{Placed, suggestion};
+use crate::fields::Placed;
 
 /// Each terminal with what it follows; those that nothing has are reported and left out.
 pub(crate) fn resolve(

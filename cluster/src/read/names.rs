@@ -5,9 +5,10 @@ use std::net::SocketAddr;
 use std::ops::Range;
 
 use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::spelling::suggestion;
 
 use super::Member;
-use crate::fields::{Placed, suggestion};
+use crate::fields::Placed;
 
 /// All that were given so far, each with its place.
 #[derive(Default)]

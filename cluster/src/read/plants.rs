@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::time::Duration;
 
 use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::spelling::{nearest, suggestion};
 use understudy_logic::Circuit;
 use understudy_plant::{BindingProblem, Direction, Followed, ModelKind, Plant, Signals};
 use understudy_wire::ProgramId;
@@ -16,7 +17,7 @@ use super::limits::too_wide;
 use super::names::{Names, find_controller};
 use crate::cluster::PlantPlace;
 use crate::configuration::plant_text;
-use crate::fields::{MAXIMUM_MISFITS, Placed, nearest, suggestion};
+use crate::fields::{MAXIMUM_MISFITS, Placed};
 use crate::file::{ModelSection, PlantSection};
 
 /// The plants by program, and what the configuration hash has to know of each.

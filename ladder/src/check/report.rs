@@ -1,8 +1,9 @@
 //! What becomes of the reads, writes and undefined names that the check has met.
 
 use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::spelling::nearest;
 
-use super::{Checker, Role, Symbol, nearest};
+use super::{Checker, Role, Symbol};
 
 /// Misspelt names for which the nearest known one is searched; past it a text is wrong as a whole.
 const MAXIMUM_SUGGESTIONS: usize = 50;

@@ -4,9 +4,9 @@ use std::ops::Range;
 use std::time::Duration;
 
 use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::spelling::nearest;
 
 use super::{MAXIMUM_NESTING, Parser};
-use crate::check::nearest;
 use crate::lexer::Lexeme;
 use crate::program::{
     Block, BlockKind, Coil, CoilKind, Comparison, Contact, ContactKind, Element, Feed, Name,

@@ -6,6 +6,7 @@ use std::time::Duration;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::spelling::suggestion;
 
 /// One table of the file.
 pub(super) struct Fields<'a, 't> {
@@ -16,24 +17,8 @@ pub(super) struct Fields<'a, 't> {
 
 /// A name that nothing has.
 pub(super) fn unknown(what: &str, name: &str, span: Range<usize>, known: &[&str]) -> Diagnostic {
-    let nearest = known
-        .iter()
-        .map(|known| (strsim::damerau_levenshtein(known, name), known))
-        .min()
-        .filter(|(distance, _)| *distance <= 2);
-    let help = match nearest {
-        Some((_, nearest)) => format!("did you mean `{nearest}`?"),
-        None => format!(
-            "known: {}",
-            known
-                .iter()
-                .take(12)
-                .copied()
-                .collect::<Vec<_>>()
-                .join(", ")
-        ),
-    };
-    Diagnostic::error("U1205", format!("there is no {what} `{name}`"), span).with_help(help)
+    Diagnostic::error("U1205", format!("there is no {what} `{name}`"), span)
+        .with_help(suggestion(name, known.iter().copied()))
 }
 
 impl<'a, 't> Fields<'a, 't> {

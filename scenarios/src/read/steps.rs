@@ -5,11 +5,12 @@ use std::ops::{Range, RangeInclusive};
 use std::time::Duration;
 
 use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::spelling::suggestion;
 use understudy_simulator::{Action, Fault};
 use understudy_wire::{Party, ProgramId};
 
 use super::{MAXIMUM_NUMBER, MAXIMUM_STEPS, Reader};
-use crate::fields::{Fields, Placed, suggest};
+use crate::fields::{Fields, Placed};
 use crate::scenario::{ACTIONS, action_word};
 
 /// Keys that only some actions have.
@@ -85,7 +86,7 @@ impl Reader<'_> {
             let known = ACTIONS.into_iter().find(|known| *known == word);
             if known.is_none() {
                 let message = format!("there is no action `{word}`");
-                let help = suggest(word, ACTIONS.into_iter());
+                let help = suggestion(word, ACTIONS.into_iter());
                 found.push(Diagnostic::error("U0306", message, place).with_help(help));
             }
             known
@@ -289,7 +290,7 @@ impl Reader<'_> {
         if program.is_none() && asked.is_some() {
             let message = "whose state is it? `program` names a controller".to_owned();
             let names = self.parties?.stations().take(programs);
-            let help = suggest("", names.map(|(_, name)| name));
+            let help = suggestion("", names.map(|(_, name)| name));
             self.diagnostics
                 .push(Diagnostic::error("U0309", message, place).with_help(help));
         }

@@ -2,10 +2,11 @@
 
 use toml::de::DeTable;
 use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::spelling::nearest;
 use understudy_ladder::{Address, Area, Name, Program, parse_address};
 
 use super::names::{ILLEGAL_NAME, is_legal};
-use crate::form::{Form, nearest};
+use crate::form::Form;
 use crate::model::Signal;
 
 /// A signal with its address.

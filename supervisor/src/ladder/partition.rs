@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, HashMap};
 
 use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::spelling::nearest;
 use understudy_ladder::Name;
 
 use super::map::InputOutputMap;
 use super::names::{ILLEGAL_NAME, is_legal};
-use crate::form::nearest;
 use crate::{Alphabet, Automaton, Event, Label};
 
 /// The most positions that a switch has, besides off.

@@ -5,12 +5,13 @@ use std::collections::HashMap;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::spelling::nearest;
 
 use super::read::Loader;
 use crate::alphabet::{Alphabet, Event, Label};
 use crate::automaton::{Automaton, State, Transition};
 use crate::events::Events;
-use crate::form::{Form, Place, Word, nearest, trimmed};
+use crate::form::{Form, Place, Word, trimmed};
 
 const KEYS: [&str; 7] = [
     "name",

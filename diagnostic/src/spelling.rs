@@ -1,0 +1,75 @@
+//! What a misspelt name was meant to be: one rule for every reader of files.
+
+/// Names that a suggestion lists.
+const MAXIMUM_LISTED: usize = 12;
+
+/// The known name that `name` is probably a misspelling of: at most a third of its letters differ, or one; case alone is no
+/// difference.
+pub fn nearest<'n>(name: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
+    let furthest = (name.chars().count() / 3).max(1);
+    let near = |known: &'n str| {
+        // The distance is never less than what the lengths differ by, and a letter has four bytes at most.
+        if known.len().abs_diff(name.len()) > 4 * furthest {
+            return None;
+        }
+        let distance = if known.eq_ignore_ascii_case(name) {
+            0
+        } else {
+            strsim::damerau_levenshtein(name, known)
+        };
+        (distance <= furthest).then_some((distance, known))
+    };
+    let nearest = known.into_iter().filter_map(near).min();
+    nearest.map(|(_, nearest)| nearest)
+}
+
+/// The way out for a name that nothing has: the nearest known one, or the first of all where none is near.
+pub fn suggestion<'n>(name: &str, known: impl IntoIterator<Item = &'n str>) -> String {
+    let known: Vec<&str> = known.into_iter().collect();
+    if let Some(nearest) = nearest(name, known.iter().copied()) {
+        return format!("did you mean `{nearest}`?");
+    }
+    match known.len() {
+        0 => "none is known here".into(),
+        count @ ..=MAXIMUM_LISTED => format!("known: {}", known[..count].join(", ")),
+        count => format!(
+            "known: {}, and {} more",
+            known[..MAXIMUM_LISTED].join(", "),
+            count - MAXIMUM_LISTED
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_name_is_near() {
+        let check = |name, expected| {
+            let known = ["period", "deadline", "Press", "ü"];
+            assert_eq!(nearest(name, known), expected, "{name}");
+        };
+        check("perod", Some("period"));
+        check("PERIOD", Some("period"));
+        check("paeriods", Some("period"));
+        check("press", Some("Press"));
+        check("dead", None);
+        check("u", Some("ü"));
+        check("", Some("ü"));
+    }
+
+    #[test]
+    fn a_suggestion_lists_what_is_known_where_nothing_is_near() {
+        let many: Vec<String> = (0..14).map(|number| format!("signal{number}")).collect();
+        let many = || many.iter().map(String::as_str);
+        assert_eq!(suggestion("signl3", many()), "did you mean `signal3`?");
+        assert_eq!(
+            suggestion("x", many()),
+            "known: signal0, signal1, signal2, signal3, signal4, signal5, signal6, signal7, signal8, signal9, signal10, \
+             signal11, and 2 more"
+        );
+        assert_eq!(suggestion("x", ["one", "two"]), "known: one, two");
+        assert_eq!(suggestion("x", []), "none is known here");
+    }
+}
