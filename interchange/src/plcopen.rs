@@ -13,7 +13,7 @@ mod power;
 mod schema;
 mod standard;
 mod write;
-mod xml;
+pub(crate) mod xml;
 
 use std::time::Duration;
 

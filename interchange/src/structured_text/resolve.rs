@@ -240,31 +240,12 @@ impl Resolver {
     }
 
     /// The known name that is nearest to a misspelt one.
-    fn nearest(&self, instance: usize, name: &Name) -> Option<String> {
+    fn nearest(&self, instance: usize, name: &Name) -> Option<&str> {
         let unit = &self.units[self.instances[instance].unit];
-        let wanted = name.to_ascii_uppercase();
-        let near = unit
+        let known = unit
             .declarations
             .iter()
             .map(|declaration| declaration.name.as_str());
-        let near = near.map(|known| (distance(&known.to_ascii_uppercase(), &wanted), known));
-        let (far, known) = near.min_by_key(|(far, _)| *far)?;
-        (far <= 2 && far < wanted.len()).then(|| known.to_owned())
+        understudy_diagnostic::spelling::nearest(name, known)
     }
-}
-
-/// Letters to change, add or leave out to make one word of the other.
-fn distance(left: &str, right: &str) -> usize {
-    let right: Vec<char> = right.chars().collect();
-    let mut row: Vec<usize> = (0..=right.len()).collect();
-    for (place, letter) in left.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = place + 1;
-        for (column, &other) in right.iter().enumerate() {
-            let change = diagonal + usize::from(letter != other);
-            diagonal = row[column + 1];
-            row[column + 1] = change.min(diagonal + 1).min(row[column] + 1);
-        }
-    }
-    row[right.len()]
 }

@@ -357,6 +357,7 @@ impl Resolver {
         }
         let finding = Diagnostic::error("U1041", format!("`{name}` is not declared"), name.span());
         let near = self.nearest(instance, name).filter(|_| native.is_none());
+        let near = near.map(str::to_owned);
         self.say(match near {
             Some(near) => finding.with_help(format!("did you mean `{near}`?")),
             None => finding,
