@@ -251,7 +251,9 @@ pub fn allocate(
         apart(&items[left], &items[right], options.share_members)
     })
     .map_err(|error| vec![error.into()])?;
-    let boxes = packing.boxes.iter().map(|packed| {
+    let mut packed = packing.boxes;
+    packed.sort_by_key(|packed| packed.items.first().copied());
+    let boxes = packed.iter().map(|packed| {
         let box_type = &box_types[packed.box_type];
         let loads = packed.items.iter();
         let loads = loads.filter_map(|&item| box_type.loads[item].as_ref());

@@ -175,11 +175,13 @@ pub enum FamilyQuantity {
     MemoryBytesBase,
     /// Of a rule for program and data together: bytes for each input and each output.
     MemoryBytesPerPoint,
+    /// 1 where a program may have as many timers and counters as its memory holds.
+    TimersByMemory,
 }
 
 impl FamilyQuantity {
     /// All.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::ProgramBytesPerInstruction,
         Self::ProgramBytesPerTimer,
         Self::ProgramBytesPerCounter,
@@ -188,6 +190,7 @@ impl FamilyQuantity {
         Self::DataBytesPerCounter,
         Self::MemoryBytesBase,
         Self::MemoryBytesPerPoint,
+        Self::TimersByMemory,
     ];
 
     /// The largest number that is believed.
@@ -204,6 +207,7 @@ impl FamilyQuantity {
             Self::DataBytesPerCounter => "data_bytes_per_counter",
             Self::MemoryBytesBase => "memory_bytes_base",
             Self::MemoryBytesPerPoint => "memory_bytes_per_point",
+            Self::TimersByMemory => "timers_by_memory",
         }
     }
 

@@ -132,8 +132,21 @@ pub fn fit(controller: &Controller, family: Option<&Family>, need: &Need, terms:
     );
     let mut scan_ns = None;
     if let Some(program) = &need.program {
-        judge.count(Quantity::Timers, program.timers, Dimension::Timers);
-        judge.count(Quantity::Counters, program.counters, Dimension::Counters);
+        let by_memory = terms.of_family(family, FamilyQuantity::TimersByMemory);
+        let by_memory = by_memory.filter(|figure| figure.value > 0);
+        let by_memory = by_memory.as_ref().map(|figure| figure.source.as_str());
+        judge.count(
+            Quantity::Timers,
+            program.timers,
+            Dimension::Timers,
+            by_memory,
+        );
+        judge.count(
+            Quantity::Counters,
+            program.counters,
+            Dimension::Counters,
+            by_memory,
+        );
         match memory(program, family, terms) {
             Memory::Apart { program, data } => {
                 let capacity = Quantity::ProgramMemoryBytes;

@@ -5,8 +5,8 @@
 //! data    = bits * data_bytes_per_bit + timers * data_bytes_per_timer + counters * data_bytes_per_counter
 //! ```
 //!
-//! or, where only a rule for both together is known, `memory_bytes_base + points * memory_bytes_per_point`. A term whose factor is not known
-//! makes the sum unknown, unless the program has nothing of its kind.
+//! or, where only a rule for both together is known, `memory_bytes_base + points * memory_bytes_per_point`, and what timers and counters take where
+//! that is known. A term of the sums whose factor is not known makes the sum unknown, unless the program has nothing of its kind.
 
 use crate::controller::Family;
 use crate::figures::FamilyQuantity;
@@ -47,8 +47,18 @@ pub(crate) fn memory(program: &Resources, family: Option<&Family>, terms: &Terms
     // What is known of each instruction is nearer to the truth than a rule of thumb.
     let by_instruction = figure(FamilyQuantity::ProgramBytesPerInstruction);
     if let ((Some(base), Some(per_point)), None) = (rule, by_instruction) {
-        let bytes = program.points().saturating_mul(per_point.value);
+        let mut bytes = program.points().saturating_mul(per_point.value);
         let mut sources = vec![base.source, per_point.source];
+        let blocks = [
+            (program.timers, FamilyQuantity::DataBytesPerTimer),
+            (program.counters, FamilyQuantity::DataBytesPerCounter),
+        ];
+        for (count, quantity) in blocks {
+            if let (Some(each), true) = (figure(quantity), count > 0) {
+                bytes = bytes.saturating_add(count.saturating_mul(each.value));
+                sources.push(each.source);
+            }
+        }
         sources.dedup();
         return Memory::Together(Bytes::Known {
             bytes: bytes.saturating_add(base.value),

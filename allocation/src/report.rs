@@ -1,5 +1,6 @@
 //! The plan for people: a page that prints well, a table, and lines on a terminal.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use minijinja::value::Serde;
@@ -47,9 +48,16 @@ pub fn html(
 ) -> Result<String, ReportError> {
     let refused = |error: minijinja::Error| ReportError(format!("{error:#}"));
     let mut environment = Environment::new();
-    environment.add_filter("percent", |part: f64| format!("{:.0} %", 100.0 * part));
+    environment.add_filter("percent", percent);
     environment.add_filter("words", |name: String| name.replace('_', " "));
     environment.add_filter("links", links);
+    let numbered = sources(allocation);
+    let numbers: BTreeMap<String, usize> = numbered.iter().cloned().zip(1..).collect();
+    environment.add_filter("cite", move |source: String| {
+        // Every source of the plan has its number.
+        let number = numbers.get(&source).copied().unwrap_or_default();
+        Value::from_safe_string(format!("<a href=\"#source-{number}\">{number}</a>"))
+    });
     environment
         .add_template("report.html", TEMPLATE)
         .map_err(refused)?;
@@ -71,12 +79,36 @@ pub fn html(
             chosen => Value::from(Serde(&chosen)),
             programs => Value::from(Serde(&counts(allocation))),
             about => Value::from(Serde(provenance)),
+            sources => numbered,
             reserve => terms.reserve_percent,
             expansion => terms.expansion,
             requirements => requirements,
             assumptions => assumptions,
         })
         .map_err(refused)
+}
+
+/// Every source that a finding of a controller that may do names, in the order in which they are met.
+fn sources(allocation: &Allocation) -> Vec<String> {
+    let candidates = allocation.items.iter().flat_map(|item| &item.candidates);
+    let findings = candidates
+        .filter(|candidate| candidate.fit.verdict == Verdict::Fits)
+        .flat_map(|candidate| &candidate.fit.findings);
+    let mut seen = BTreeSet::new();
+    findings
+        .flat_map(|finding| &finding.sources)
+        .filter(|source| seen.insert(*source))
+        .cloned()
+        .collect()
+}
+
+/// A part, 0 to 1; what is there is not said to be nothing.
+fn percent(part: f64) -> String {
+    if part > 0.0 && part < 0.005 {
+        "under 1 %".to_owned()
+    } else {
+        format!("{:.0} %", 100.0 * part)
+    }
 }
 
 /// An address in a source is a link; all else is text.
@@ -284,9 +316,9 @@ fn push_box(text: &mut String, number: usize, taken: &BoxOnPlan) {
         taken.items.join(", ")
     );
     for part in &taken.taken {
-        let percent = 100.0 * part.takes as f64 / part.usable.max(1) as f64;
+        let percent = percent(part.takes as f64 / part.usable.max(1) as f64);
         let name = dimension_words(part.dimension);
-        let _ = write!(text, "; {name} {percent:.0} %");
+        let _ = write!(text, "; {name} {percent}");
     }
     text.push('\n');
 }

@@ -122,21 +122,31 @@ impl<'a> Judge<'a> {
                 }
             }
             (None, _) => {
-                let message = format!("needs {need} {words}; how many it has is not known");
+                let message = format!("needs {need}; how many {words} it has is not known");
                 self.unknown(name, message);
             }
         }
     }
 
-    /// Timers and counters.
-    pub(super) fn count(&mut self, quantity: Quantity, need: u64, dimension: Dimension) {
+    /// Timers and counters; `by_memory` says that only the memory limits them, which is a criterion of its own.
+    pub(super) fn count(
+        &mut self,
+        quantity: Quantity,
+        need: u64,
+        dimension: Dimension,
+        by_memory: Option<&str>,
+    ) {
         if need == 0 {
             return;
         }
         let name = quantity.name();
         let Some(has) = self.controller.number(quantity) else {
-            let message = format!("needs {need} {name}; how many it has is not known");
-            return self.unknown(name, message);
+            let Some(source) = by_memory else {
+                let message = format!("needs {need}; how many {name} it has is not known");
+                return self.unknown(name, message);
+            };
+            let message = format!("needs {need}, and has as many as its memory holds");
+            return self.said(name, Verdict::Fits, message, vec![source.to_owned()]);
         };
         self.compare(name, "", need, has, self.source(quantity));
         let usable = self.terms.usable(has);
@@ -205,7 +215,7 @@ impl<'a> Judge<'a> {
         let Some(time) = self.controller.number(Quantity::BoolInstructionNs) else {
             let most = usable / instructions.max(1);
             let message = format!(
-                "the time of an instruction is not known; at most {most} ns would do for {instructions} in {within:?}"
+                "the time of an instruction is not known; up to {most} ns would do for {instructions} in {within:?}"
             );
             return self.unknown(criterion, message);
         };

@@ -7,6 +7,7 @@ mod attack;
 use std::time::Duration;
 
 use attack::attack;
+use understudy_allocation::file;
 use understudy_bus::{Endpoints, Peer};
 use understudy_ladder::{MAXIMUM_NESTING, check, parse, print};
 use understudy_reconfiguration::{Signals, project, record};
@@ -183,4 +184,18 @@ fn nesting_has_a_bound() {
         );
         assert!(parse(&text).into_result().is_err());
     }
+}
+
+#[test]
+fn catalogue() {
+    let seeds = ["catalogue/data/controllers.csv", "catalogue/data/families.csv"];
+    attack("catalogue", &seeds, |bytes| {
+        let Some(catalogue) = file::read("fuzz", &text(bytes)).catalogue else {
+            return;
+        };
+        // What is right is the same after it was written.
+        let again = file::read("fuzz", &file::write(&catalogue));
+        assert_eq!(again.report.diagnostics, []);
+        assert_eq!(again.catalogue, Some(catalogue));
+    });
 }
