@@ -22,6 +22,7 @@ const FLOORS: &[&[&str]] = &[
     &[
         "understudy-allocation",
         "understudy-interchange",
+        "understudy-native",
         "understudy-node",
         "understudy-plant",
         "understudy-remote-io",
