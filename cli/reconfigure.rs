@@ -148,6 +148,9 @@ fn written(
         ("mega-controller.dot", draw_dot(&mega)),
         ("result.json", format!("{result:#}\n")),
     ];
+    if let Some(diagnosis) = &outcome.diagnosis {
+        files.push(("diagnosis.ladder", print(diagnosis)));
+    }
     // What is too large to be read as a picture is left as DOT.
     if let Ok(picture) = draw_automaton_svg(&controller) {
         files.push(("automaton.svg", picture));

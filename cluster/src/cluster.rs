@@ -73,6 +73,17 @@ pub struct DiagnosisPlace {
     pub compiled: Arc<Diagnosis>,
 }
 
+impl DiagnosisPlace {
+    /// Whether it drives this input of the program: the status of a channel.
+    pub(crate) fn drives(&self, input: &str) -> bool {
+        let channel = input.strip_suffix(".failed");
+        let mut outputs = self.circuit.outputs().iter();
+        channel.is_some_and(|channel| {
+            outputs.any(|output| output.name.strip_suffix(".diagnosed") == Some(channel))
+        })
+    }
+}
+
 /// The plant's side of a controller.
 #[derive(Debug, Clone)]
 pub struct RemoteIo {

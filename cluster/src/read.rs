@@ -175,6 +175,7 @@ fn build(
         file.plants,
         period,
         &members,
+        &remote_ios,
         ladders,
         &mut names,
         diagnostics,

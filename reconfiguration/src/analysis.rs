@@ -1,7 +1,10 @@
 //! From a project to everything that `understudy reconfigure` writes.
 
+use understudy_ladder::Program;
+
 use crate::command::Posed;
 use crate::controller::Controller;
+use crate::diagnosis::{Ground, diagnose};
 use crate::explore::{Bounds, Explored, MAXIMUM_FREE_INPUTS, Unexplored, explore};
 use crate::mega::{MegaController, Question, Unbuilt, failed_channels};
 use crate::module_two::{Combined, MAXIMUM_RUNGS, combine};
@@ -11,6 +14,7 @@ use crate::record::{self, Missed, RecordError};
 use crate::relation::Relation;
 use crate::settle::NoCommand;
 use crate::signals::{Bits, Signals};
+use crate::timing::Timing;
 
 /// Past so many states of the mega-controller the analysis is given up.
 const MAXIMUM_MEGA_STATES: usize = 2_000_000;
@@ -42,6 +46,8 @@ pub struct Outcome {
     pub combined: Combined,
     /// That it is right.
     pub proof: Proof,
+    /// The ladder that finds failed channels, where the project asks for one.
+    pub diagnosis: Option<Program>,
 }
 
 /// Why nothing came of it.
@@ -89,6 +95,11 @@ pub enum Failure {
         "U1232: module 2 would have {0} rungs, and {MAXIMUM_RUNGS} are possible; ask about fewer channels or fewer at once"
     )]
     TooLong(usize),
+    /// The diagnosing ladder would be too long.
+    #[error(
+        "U1233: the diagnosing ladder would have {0} rungs, and {MAXIMUM_RUNGS} are possible; lengthen the period"
+    )]
+    DiagnosisTooLong(usize),
     /// The proof.
     #[error("{0}")]
     NotProved(#[from] NotProved),
@@ -105,6 +116,7 @@ impl Failure {
             Self::TooLarge { .. } => "U1223",
             Self::NoCommand(_) => "U1231",
             Self::TooLong(_) => "U1232",
+            Self::DiagnosisTooLong(_) => "U1233",
             Self::NotProved(error) => error.code(),
         }
     }
@@ -120,6 +132,7 @@ pub fn analyse(project: &Project) -> Result<Outcome, Failure> {
         joint_states,
         unseen_inputs,
         missed,
+        timing,
     } = automaton(project)?;
     let (relation, idle) = RelationEntry::compile(&project.relation, &controller);
     let question = Question {
@@ -160,7 +173,23 @@ pub fn analyse(project: &Project) -> Result<Outcome, Failure> {
         period: project.period,
         maximum_states: MAXIMUM_PROOF_STATES,
     })?;
+    let diagnosis = match (project.patience, &timing) {
+        (Some(patience), Some(timing)) => {
+            let ground = Ground {
+                controller: &controller,
+                relation: &relation,
+                timing,
+                channels: &question.channels,
+                period: project.period,
+                patience,
+            };
+            let name = project.ladder.name.to_string();
+            Some(diagnose(&name, ground).map_err(Failure::DiagnosisTooLong)?)
+        }
+        _ => None,
+    };
     Ok(Outcome {
+        diagnosis,
         joint_states,
         unseen_inputs,
         controller,
@@ -181,6 +210,7 @@ struct Known {
     joint_states: Option<usize>,
     unseen_inputs: Vec<String>,
     missed: Option<Missed>,
+    timing: Option<Timing>,
 }
 
 /// S by exploration where there is a plant, else from the records.
@@ -211,9 +241,10 @@ fn automaton(project: &Project) -> Result<Known, Failure> {
             joint_states: None,
             unseen_inputs: Vec::new(),
             missed: None,
+            timing: None,
         });
     };
-    let lower = |program: &understudy_ladder::Program| {
+    let lower = |program: &Program| {
         let lowered = program.lower(project.period);
         lowered.map_err(|error| Failure::NoCircuit(error.to_string()))
     };
@@ -227,6 +258,7 @@ fn automaton(project: &Project) -> Result<Known, Failure> {
         controller,
         joint_states,
         unseen_inputs,
+        timing,
     } = explored.map_err(not_explored)?;
     let missed = recorded.map(|recorded| record::missed(&recorded, &controller));
     Ok(Known {
@@ -234,6 +266,7 @@ fn automaton(project: &Project) -> Result<Known, Failure> {
         joint_states: Some(joint_states),
         unseen_inputs,
         missed,
+        timing: Some(timing),
     })
 }
 

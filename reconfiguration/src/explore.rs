@@ -10,6 +10,7 @@ use understudy_logic::{Circuit, Scan, Scratch};
 use crate::controller::Controller;
 use crate::quotient::{Seen, quotient};
 use crate::signals::{Bits, Signals};
+use crate::timing::{Timing, timing};
 
 /// More free inputs than this make too many combinations a scan.
 pub const MAXIMUM_FREE_INPUTS: usize = 10;
@@ -54,6 +55,8 @@ pub struct Explored {
     pub joint_states: usize,
     /// Inputs of the ladder that the plant does not show.
     pub unseen_inputs: Vec<String>,
+    /// How long states and pulses last.
+    pub timing: Timing,
 }
 
 /// The registers of both and what the plant shows.
@@ -127,7 +130,8 @@ pub fn explore(
     let names = remembered
         .iter()
         .map(|&place| registers[place].name.clone());
-    let controller = quotient(signals, names.collect(), &seen, &hidden, &remembers, &edges);
+    let (controller, state_of) =
+        quotient(signals, names.collect(), &seen, &hidden, &remembers, &edges);
     if let Some(&state) = controller.deadlocks().first() {
         let way = controller.way_to(state);
         let name = |events: &Vec<_>| match events.as_slice() {
@@ -139,7 +143,10 @@ pub fn explore(
             way: way.iter().map(name).collect(),
         });
     }
+    let shown = |node: usize, input: usize| seen[node].inputs.0[input];
+    let inputs = ladder.inputs().len();
     Ok(Explored {
+        timing: timing(controller.states().len(), &state_of, inputs, &shown, &edges),
         joint_states: walk.nodes.len(),
         unseen_inputs: walk.wiring.unseen(ladder),
         controller,

@@ -11,6 +11,7 @@ mod advice;
 mod analysis;
 pub mod command;
 mod controller;
+mod diagnosis;
 mod drawing;
 pub mod explore;
 mod mega;
@@ -23,13 +24,16 @@ mod relation;
 mod report;
 mod settle;
 mod signals;
+mod timing;
 
 pub use advice::{ChannelAdvice, Effect};
 pub use analysis::{Failure, Outcome, analyse};
 pub use controller::{Controller, Move, State};
+pub use diagnosis::Patience;
 pub use mega::{
     Analysis, Label, MegaController, MegaState, Question, Trimming, Unbuilt, failed_channels,
 };
 pub use relation::{Feedback, Relation, Row, feedback, joint_feedback};
 pub use settle::{Command, NoCommand};
 pub use signals::{Bits, Event, Signals};
+pub use timing::Timing;

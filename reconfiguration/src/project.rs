@@ -13,6 +13,7 @@
 //! | U1251 | warning: a relation that concerns no state |
 
 mod fields;
+mod patience;
 mod relations;
 
 use std::collections::BTreeMap;
@@ -24,8 +25,10 @@ use understudy_diagnostic::{Diagnostic, Report, has_errors};
 use understudy_ladder::{Program, parse};
 
 use self::fields::Fields;
+use self::patience::patience;
 pub use self::relations::{Pattern, RelationEntry};
 use crate::command::Objective;
+use crate::diagnosis::Patience;
 use crate::mega::Analysis;
 
 /// The longest project file in bytes.
@@ -52,6 +55,8 @@ pub struct Project {
     pub objective: Objective,
     /// Λ, entry by entry.
     pub relation: Vec<RelationEntry>,
+    /// How patient a diagnosing ladder is, where one is asked for.
+    pub patience: Option<Patience>,
 }
 
 impl Project {
@@ -160,7 +165,7 @@ impl Reader<'_> {
             "the file",
             table.get_ref(),
             span,
-            &["project", "relation"],
+            &["project", "relation", "diagnosis"],
             &mut self.diagnostics,
         );
         let section = top.table("project", &mut self.diagnostics);
@@ -228,6 +233,16 @@ impl Reader<'_> {
             None if objective == 1 => Objective::Nearest,
             None => Objective::Fewest,
         };
+        let patience = patience(&top, period, &mut self.diagnostics);
+        if let Some(span) = top.place("diagnosis")
+            && plant.is_none()
+            && fields.lacks("plant")
+        {
+            let message =
+                "[diagnosis] needs a `plant`: records do not say how long a state may last";
+            self.diagnostics
+                .push(Diagnostic::error("U1203", message, span));
+        }
         let relation = relations::read(&top, &inputs, &outputs, &mut self.diagnostics);
         Some(Project {
             plant,
@@ -242,6 +257,7 @@ impl Reader<'_> {
             },
             objective,
             relation,
+            patience,
             ladder,
         })
     }

@@ -21,7 +21,7 @@ pub(crate) struct Seen {
 pub(crate) type Hidden = Vec<u64>;
 
 /// Merges `nodes`, of which the first is the first scan; `edges` go from a scan to the next. `hidden` has, for each node,
-/// equally many keys. `memory` are the bits of [`State::memory`], one per node, or none.
+/// equally many keys. `memory` are the bits of [`State::memory`], one per node, or none. Answers with the state of each node too.
 pub(crate) fn quotient(
     signals: Signals,
     memory_names: Vec<String>,
@@ -29,7 +29,7 @@ pub(crate) fn quotient(
     hidden: &[Hidden],
     memory: &[Bits],
     edges: &[(u32, u32)],
-) -> Controller {
+) -> (Controller, Vec<usize>) {
     let mut vectors: FxHashMap<&Seen, usize> = FxHashMap::default();
     let vector_of: Vec<usize> = nodes
         .iter()
@@ -83,7 +83,8 @@ pub(crate) fn quotient(
         .iter()
         .map(|&(from, to)| (blocks[from as usize], blocks[to as usize]))
         .collect();
-    Controller::new(signals, memory_names, states, pairs)
+    let controller = Controller::new(signals, memory_names, states, pairs);
+    (controller, blocks)
 }
 
 /// Numbers the blocks in the order in which their first nodes come.

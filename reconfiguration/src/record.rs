@@ -265,14 +265,8 @@ pub fn learn(
             last = Some(scan);
         }
     }
-    Ok(quotient(
-        signals.clone(),
-        Vec::new(),
-        &nodes,
-        &hidden,
-        &[],
-        &edges,
-    ))
+    let (controller, _) = quotient(signals.clone(), Vec::new(), &nodes, &hidden, &[], &edges);
+    Ok(controller)
 }
 
 fn hash(scan: &(Bits, Bits)) -> u64 {

@@ -15,7 +15,7 @@ use super::follows;
 use super::ladders::Ladders;
 use super::limits::too_wide;
 use super::names::{Names, find_controller};
-use crate::cluster::PlantPlace;
+use crate::cluster::{PlantPlace, RemoteIo};
 use crate::configuration::plant_text;
 use crate::fields::{MAXIMUM_MISFITS, Placed};
 use crate::file::{ModelSection, PlantSection};
@@ -38,6 +38,7 @@ pub(crate) fn place(
     sections: Vec<PlantSection>,
     period: Duration,
     members: &[Member],
+    remote_ios: &[RemoteIo],
     ladders: &mut Ladders<'_>,
     names: &mut Names,
     diagnostics: &mut Vec<Diagnostic>,
@@ -100,7 +101,15 @@ pub(crate) fn place(
             continue;
         };
         plants.texts[draft.program] = plant_text(kind, &signals(&draft.section), fed_by, &follows);
-        plants.places[draft.program] = bound(draft, kind, circuit, fed_by, follows, diagnostics);
+        plants.places[draft.program] = bound(
+            draft,
+            kind,
+            circuit,
+            fed_by,
+            follows,
+            &remote_ios[draft.program],
+            diagnostics,
+        );
     }
     plants
 }
@@ -119,12 +128,20 @@ fn bound(
     circuit: &Circuit,
     fed_by: Option<ProgramId>,
     follows: Vec<(String, Followed)>,
+    remote_io: &RemoteIo,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<PlantPlace> {
     let section = &draft.section;
     let (terminals, follows): (Vec<_>, Vec<_>) = follows.into_iter().unzip();
     let signals = signals(section);
-    let (plant, problems) = Plant::following(kind, circuit, &signals, &terminals, fed_by.is_some());
+    let (plant, mut problems) =
+        Plant::following(kind, circuit, &signals, &terminals, fed_by.is_some());
+    if let Some(diagnosis) = &remote_io.diagnosis {
+        problems.retain(|problem| match problem {
+            BindingProblem::InputStaysZero { input } => !diagnosis.drives(input),
+            _ => true,
+        });
+    }
     let more = problems.len().saturating_sub(MAXIMUM_MISFITS);
     let problems = problems.into_iter().take(MAXIMUM_MISFITS);
     diagnostics.extend(problems.map(|problem| describe(problem, draft)));

@@ -52,6 +52,11 @@ impl<'a, 't> Fields<'a, 't> {
         !self.table.contains_key(key)
     }
 
+    /// Where a key's value stands.
+    pub(super) fn place(&self, key: &str) -> Option<Range<usize>> {
+        self.table.get(key).map(Spanned::span)
+    }
+
     fn expected(key: &str, expected: &str, value: &Spanned<DeValue<'_>>) -> Diagnostic {
         let message = format!("`{key}` is not {expected}");
         Diagnostic::error("U1204", message, value.span()).with_label(format!("expected {expected}"))
