@@ -174,7 +174,7 @@ pub fn analyse(project: &Project) -> Result<Outcome, Failure> {
         maximum_states: MAXIMUM_PROOF_STATES,
     })?;
     let diagnosis = match (project.patience, &timing) {
-        (Some(patience), Some(timing)) => {
+        (Some(patience), Some(timing)) if !question.channels.is_empty() => {
             let ground = Ground {
                 controller: &controller,
                 relation: &relation,

@@ -106,11 +106,10 @@ fn off(name: &Name) -> Element {
     contact(name, false)
 }
 
-/// Passes when one of `branches` does; of none a contact that never passes.
+/// Passes when one of `branches` does; there is one at least.
 fn any(mut branches: Vec<Vec<Element>>) -> Vec<Element> {
     match branches.len() {
-        0 => vec![on(&Name::from(NEVER))],
-        1 => branches.pop().unwrap_or_default(),
+        0 | 1 => branches.pop().unwrap_or_default(),
         _ => vec![Element::Branches(branches)],
     }
 }
@@ -129,9 +128,6 @@ fn block(name: Name, kind: BlockKind) -> Element {
         pins: Vec::new(),
     })
 }
-
-/// A bit that nothing sets.
-const NEVER: &str = "diagnosis.never";
 
 impl<'a> Writer<'a> {
     fn new(name: &str, ground: Ground<'a>) -> Self {
@@ -249,11 +245,11 @@ impl<'a> Writer<'a> {
         ));
         for (name, text) in [
             ("diagnosis.started", "there was a scan before"),
-            (NEVER, ""),
             ("diagnosis.out", "a channel is failed"),
             ("diagnosis.change", "an input is seen to have changed"),
             ("diagnosis.possible", "the plant may be somewhere"),
-            ("diagnosis.explained", "a failed channel explains it"),
+            ("diagnosis.anywhere", "the plant may be anywhere"),
+            ("diagnosis.lost", "nothing explained the scan before"),
             ("diagnosis.one", "the plant may be in one state at least"),
             ("diagnosis.two", "and in another"),
             ("diagnosis.tracked", "which was concluded, not supposed"),
@@ -270,8 +266,11 @@ impl<'a> Writer<'a> {
         for state in 0..self.ground.controller.states().len() {
             let name = self.ground.controller.state_name(state);
             bits.push(memory(self.bit("m", state), &name));
-            for what in ["at", "old", "left", "n"] {
+            for what in ["at", "left", "n"] {
                 bits.push(memory(self.bit(what, state), ""));
+            }
+            if self.ground.timing.longest_stay[state].is_some() {
+                bits.push(memory(self.bit("old", state), ""));
             }
         }
         self.program.inputs = declared;

@@ -206,8 +206,22 @@ fn a_complete_record_agrees_with_the_exploration_and_a_short_one_says_what_it_mi
         !states.is_empty() && moves.len() > states.len(),
         "{states:?} {moves:?}"
     );
+    // A record does not say how long a state may last, which a diagnosis has to know.
+    let (rest, _) = PROJECT
+        .split_once("[diagnosis]")
+        .expect("the example asks for one");
+    let without = PROJECT.replace("plant = \"plant.ladder\"", "records = [\"r.csv\"]");
+    let refused = project::read("p", &without, &mut |name| match name {
+        "r.csv" => Ok(table.clone()),
+        name => open(name),
+    });
+    let codes = refused.reports[0]
+        .diagnostics
+        .iter()
+        .map(|found| found.code);
+    assert_eq!(codes.collect::<Vec<_>>(), ["U1203"]);
     // Without a plant the record is all there is, and it comes to the same.
-    let text = PROJECT
+    let text = rest
         .replace("plant = \"plant.ladder\"", "records = [\"r.csv\"]")
         .replace("simultaneous = 2", "simultaneous = 1");
     let project = project::read("p", &text, &mut |name| match name {

@@ -46,13 +46,32 @@ fn the_example_runs_what_is_generated() {
         assert!(folder.join(file).exists(), "{file}");
     }
     let generated = fs::read_to_string(folder.join("combined.ladder")).expect("a ladder");
-    let kept =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/filling-line/reconfigured.ladder");
-    let kept = fs::read_to_string(kept).expect("a ladder");
-    assert!(
-        generated == kept,
-        "examples/filling-line/reconfigured.ladder is another one"
-    );
+    let diagnosis = fs::read_to_string(folder.join("diagnosis.ladder")).expect("a ladder");
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/filling-line");
+    for (name, generated) in [
+        ("reconfigured.ladder", generated),
+        ("diagnosis.ladder", diagnosis),
+    ] {
+        let kept = fs::read_to_string(examples.join(name)).expect("a ladder");
+        assert!(
+            generated == kept,
+            "examples/filling-line/{name} is another one"
+        );
+    }
+}
+
+/// Sensors that flicker and stick, nobody who says so, and a controller that is killed meanwhile.
+#[test]
+fn the_diagnosed_line_needs_nobody() {
+    let answer = understudy(&[
+        "simulate",
+        "examples/filling-line/diagnosed.toml",
+        "--scenario",
+        "examples/filling-line/silent-sensors-and-kills.toml",
+        "--seed",
+        "1",
+    ]);
+    assert_eq!(answer.status, 0, "{}", answer.shown());
 }
 
 #[test]

@@ -154,6 +154,35 @@ parameters = { ram_cycle = 3, feed_cycles = -1 }
 }
 
 #[test]
+fn a_diagnosis_speaks_of_channels_that_the_program_has() {
+    let ladder = "program belt\ninput go\noutput there\noutput lots\nrung go ( there ) ( lots )\n";
+    let diagnosis = ladder
+        .replace("output there", "output there.diagnosed")
+        .replace("( there )", "( there.diagnosed )")
+        .replace("input go", "input goes")
+        .replace("rung go", "rung goes");
+    let cluster = HEAD.to_owned()
+        + r#"
+[[remote_io]]
+controller = "robot"
+diagnosis = "diagnosis.ladder"
+"#;
+    let files = [("robot.ladder", ROBOT), ("diagnosis.ladder", &diagnosis)];
+    let loaded = load(&cluster, &files);
+    assert!(loaded.cluster.is_none());
+    insta::assert_snapshot!(findings(&loaded.reports));
+    // With the channel's status among the inputs, and a signal that the program has, it fits.
+    let program = ROBOT.replace("input lost", "input lost\ninput there.failed");
+    let fitting = diagnosis.replace("goes", "go");
+    let files = [
+        ("robot.ladder", program.as_str()),
+        ("diagnosis.ladder", &fitting),
+    ];
+    let cluster = load(&cluster, &files).cluster.expect("it fits");
+    assert!(cluster.canonical_text().contains("diagnosis"));
+}
+
+#[test]
 fn plants_that_follow_what_is_not_there() {
     let cluster = HEAD.to_owned()
         + r#"

@@ -42,12 +42,18 @@ impl Writer<'_> {
             let network = vec![off(&started), on(&recalled)];
             self.rung(network, vec![coil(Set, &diagnosed)]);
         }
-        let states: Vec<_> = self
-            .states()
-            .map(|state| coil(Set, &self.bit("m", state)))
-            .collect();
-        let network = any(vec![vec![off(&started)], vec![on(&release)]]);
-        self.titled("the plant may be anywhere", network, states);
+        let anywhere = Name::from("diagnosis.anywhere");
+        let lost = Name::from("diagnosis.lost");
+        let network = any(vec![
+            vec![off(&started)],
+            vec![on(&release)],
+            vec![on(&lost)],
+        ]);
+        self.titled(
+            "may the plant be anywhere?",
+            network,
+            vec![coil(Plain, &anywhere)],
+        );
         let outputs = self.ground.controller.signals.outputs.clone();
         for number in 0..self.rows.len() {
             let wanted = self.rows[number].0.iter().zip(&outputs);
@@ -141,6 +147,7 @@ impl Writer<'_> {
     pub(super) fn follow(&mut self) {
         let followed = Name::from("diagnosis.followed");
         let two = Name::from("diagnosis.two");
+        let anywhere = Name::from("diagnosis.anywhere");
         for state in self.states() {
             let stays = on(&self.bit("m", state));
             let (at, old, left) = (
@@ -162,8 +169,11 @@ impl Writer<'_> {
         let mut into: Vec<Vec<Vec<Element>>> = self
             .states()
             .map(|state| {
-                let [stays, old] = ["m", "old"].map(|what| self.bit(what, state));
-                vec![vec![on(&stays), off(&old)]]
+                let mut stays = vec![on(&self.bit("m", state))];
+                if self.ground.timing.longest_stay[state].is_some() {
+                    stays.push(off(&self.bit("old", state)));
+                }
+                vec![vec![on(&anywhere)], stays]
             })
             .collect();
         for state in self.states() {
@@ -207,8 +217,9 @@ impl Writer<'_> {
         network
     }
 
-    /// Whether the inputs show what a state shows, but for failed channels and, where given, the channel `but`.
-    fn shows(&self, state: usize, but: Option<usize>) -> Vec<Element> {
+    /// Whether the inputs show what a state shows, but for failed channels and, where given, the channel `but`; with those that are
+    /// `accused` in this scan.
+    fn shows(&self, state: usize, but: Option<usize>, accused: bool) -> Vec<Element> {
         let signals = &self.ground.controller.signals;
         let own = &self.ground.controller.states()[state].inputs.0;
         let places = own
@@ -219,7 +230,11 @@ impl Writer<'_> {
             let name = &signals.inputs[place];
             if self.ground.channels.contains(&place) {
                 let seen = contact(&of(name, "seen"), value);
-                Element::Branches(vec![vec![seen], vec![on(&of(name, "out"))]])
+                let mut branches = vec![vec![seen], vec![on(&of(name, "out"))]];
+                if accused {
+                    branches.push(vec![on(&of(name, "accused"))]);
+                }
+                Element::Branches(branches)
             } else {
                 contact(&Name::from(name.clone()), value)
             }
@@ -234,7 +249,7 @@ impl Writer<'_> {
             ["change", "tracked", "followed"].map(|what| Name::from(format!("diagnosis.{what}")));
         let branches = self.states().map(|state| {
             let mut network = vec![on(&self.bit("n", state))];
-            network.extend(self.shows(state, None));
+            network.extend(self.shows(state, None, false));
             network
         });
         self.titled(
@@ -242,11 +257,10 @@ impl Writer<'_> {
             any(branches.collect()),
             vec![coil(Plain, &possible)],
         );
-        let mut explained = Vec::new();
         for (&place, channel) in self.ground.channels.iter().zip(self.channels()) {
             let branches = self.states().map(|state| {
                 let mut network = vec![on(&self.bit("n", state))];
-                network.extend(self.shows(state, Some(place)));
+                network.extend(self.shows(state, Some(place), false));
                 network
             });
             let explains = of(&channel, "explains");
@@ -258,25 +272,15 @@ impl Writer<'_> {
             network.extend(any(branches.collect()));
             let title = format!("{channel}: if it is failed, is there one?");
             self.titled(&title, network, vec![coil(Plain, &explains)]);
-            explained.push(vec![on(&explains)]);
         }
-        let explained_bit = Name::from("diagnosis.explained");
-        self.rung(any(explained), vec![coil(Plain, &explained_bit)]);
         for channel in self.channels() {
-            let [explains, gone, accused, diagnosed, moved, out] =
-                ["explains", "gone", "accused", "diagnosed", "moved", "out"]
+            let [explains, gone, accused, diagnosed, moved] =
+                ["explains", "gone", "accused", "diagnosed", "moved"]
                     .map(|what| of(&channel, what));
             let network = any(vec![vec![on(&explains)], vec![on(&gone)]]);
             let title = format!("{channel}: failed");
-            let coils = [
-                coil(Plain, &accused),
-                coil(Set, &diagnosed),
-                coil(Set, &out),
-            ];
-            // The plain coil sees the power of its rung alone; the latches follow it.
-            let [plain, latch, failed] = coils;
-            self.titled(&title, network, vec![plain]);
-            self.rung(vec![on(&accused)], vec![latch, failed]);
+            self.titled(&title, network, vec![coil(Plain, &accused)]);
+            self.rung(vec![on(&accused)], vec![coil(Set, &diagnosed)]);
             let release = vec![on(&Name::from("diagnosis.release"))];
             let counter = Element::Block(understudy_ladder::Block {
                 name: of(&channel, "count"),
@@ -305,20 +309,17 @@ impl Writer<'_> {
                 vec![on(&next), off(&left)],
                 vec![on(&may), off(&possible)],
             ]);
-            network.extend(self.shows(state, None));
+            network.extend(self.shows(state, None, true));
             self.rung(network, vec![coil(Plain, &may)]);
         }
         self.count(&one, &two);
         let tracked = Name::from("diagnosis.tracked");
         self.rung(vec![on(&one)], vec![coil(Plain, &tracked)]);
-        let states: Vec<_> = self
-            .states()
-            .map(|state| coil(Set, &self.bit("m", state)))
-            .collect();
+        let lost = Name::from("diagnosis.lost");
         self.titled(
             "nothing explains it: the plant may be anywhere",
             vec![off(&one)],
-            states,
+            vec![coil(Plain, &lost)],
         );
         let network = any(vec![
             vec![off(&one)],
