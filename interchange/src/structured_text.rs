@@ -32,6 +32,7 @@ use std::time::Duration;
 use understudy_diagnostic::{Diagnostic, Severity, has_errors};
 use understudy_ladder::{Name, Program};
 
+pub(crate) use self::parser::is_keyword;
 pub use self::syntax::Class;
 use self::syntax::{Declaration, File, Unit, UnitKind};
 

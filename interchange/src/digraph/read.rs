@@ -1,19 +1,19 @@
 //! XML to a program.
 
+mod edge;
+
 use std::collections::HashMap;
 use std::ops::Range;
 
 use roxmltree::Node;
 use understudy_diagnostic::{Diagnostic, has_errors};
 use understudy_ladder::{
-    Block, BlockKind, Coil, Comparison, Contact, Element, Feed, MAXIMUM_PRESET_VALUE,
-    MAXIMUM_RUNGS, Name, Program, Relation, Rung, Series, Signal, check, parse_time, visit,
+    Element, Feed, MAXIMUM_RUNGS, Name, Program, Rung, Series, Signal, check, visit,
 };
 
 use super::Reading;
-use super::graph::{coil_kind, contact_kind, edge_types};
-use super::infer::{Names, signals};
-use super::network::{Content, Network, RawEdge, network};
+use super::infer::{Names, Use, signals};
+use super::network::{Network, network};
 use crate::plcopen::xml;
 
 /// Findings past which no more are said.
@@ -168,12 +168,7 @@ impl Reader {
         }
     }
 
-    fn graph(
-        &mut self,
-        node: Node<'_, '_>,
-        program: &mut Program,
-        used: &mut Vec<super::infer::Use>,
-    ) {
+    fn graph(&mut self, node: Node<'_, '_>, program: &mut Program, used: &mut Vec<Use>) {
         self.only(node, &["Comment", "Vertices", "Edges"]);
         let place = xml::start_tag(node);
         let number = program.rungs.len() + 1;
@@ -292,194 +287,6 @@ impl Reader {
                 Element::Contact(_) | Element::Comparison(_) => {}
             }
         }
-    }
-
-    fn whole(&mut self, node: Node<'_, '_>, word: &Name, what: &str) -> Option<usize> {
-        let found = word.parse().ok();
-        if found.is_none() {
-            let span = if word.is_empty() {
-                xml::start_tag(node)
-            } else {
-                word.span()
-            };
-            self.error(
-                "U1061",
-                format!("{what} is a whole number, and `{}` is none", word.as_str()),
-                span,
-            );
-        }
-        found
-    }
-
-    fn vertex(&mut self, node: Node<'_, '_>) -> Option<usize> {
-        let number = xml::attribute(node, "number").unwrap_or_default();
-        self.whole(node, &number, "the number of a vertex")
-    }
-
-    fn edge(
-        &mut self,
-        node: Node<'_, '_>,
-        vertices: Option<&[usize]>,
-        used: &mut Vec<super::infer::Use>,
-    ) -> Option<RawEdge> {
-        self.only(
-            node,
-            &[
-                "from", "to", "address", "symbol", "relation", "value", "block", "preset",
-            ],
-        );
-        let end = |reader: &mut Self, name: &str| {
-            let word = xml::child(node, name).map(xml::word).unwrap_or_default();
-            let number = reader.whole(node, &word, "the end of an edge")?;
-            if vertices.is_some_and(|vertices| !vertices.contains(&number)) {
-                reader.error("U1062", format!("there is no vertex {number}"), word.span());
-                return None;
-            }
-            Some(number)
-        };
-        let (from, to) = (end(self, "from"), end(self, "to"));
-        let symbol = xml::child(node, "symbol")
-            .map(xml::word)
-            .unwrap_or_default();
-        if symbol.is_empty() {
-            self.error("U1061", "an edge needs a symbol", xml::start_tag(node));
-            return None;
-        }
-        let content = self.content(node, &symbol)?;
-        used.push(super::infer::Use {
-            name: match &content {
-                Content::Coil(coil) => Some(coil.target.clone()),
-                Content::Element(Element::Contact(contact)) => Some(contact.operand.clone()),
-                Content::Element(_) => None,
-            },
-            is_written: matches!(content, Content::Coil(_)),
-            block: match &content {
-                Content::Element(Element::Block(block)) => Some(block.name.to_string()),
-                _ => None,
-            },
-            address: xml::child(node, "address")
-                .map(xml::word)
-                .filter(|word| !word.is_empty()),
-            symbol,
-        });
-        let (from, to) = (from?, to?);
-        if from == to {
-            self.error(
-                "U1063",
-                format!("an edge leads from vertex {from} to itself"),
-                xml::start_tag(node),
-            );
-            return None;
-        }
-        Some(RawEdge {
-            from,
-            to,
-            content,
-            span: xml::start_tag(node),
-        })
-    }
-
-    fn content(&mut self, node: Node<'_, '_>, symbol: &Name) -> Option<Content> {
-        let Some(word) = xml::attribute(node, "type") else {
-            self.error("U1061", "an edge needs a type", xml::start_tag(node));
-            return None;
-        };
-        // The paper marks closed contacts in their symbol too.
-        let plain = symbol.trim_start_matches('!').trim();
-        let is_marked = plain.len() < symbol.len();
-        let plain = Name::at(plain, symbol.span());
-        let name = self.names.legal(&plain, &mut self.diagnostics);
-        if let Some(kind) = contact_kind(&word) {
-            use understudy_ladder::ContactKind::{NormallyClosed, NormallyOpen};
-            let kind = if kind == NormallyOpen && is_marked {
-                NormallyClosed
-            } else {
-                kind
-            };
-            return Some(Content::Element(Element::Contact(Contact {
-                kind,
-                operand: name,
-            })));
-        }
-        if let Some(kind) = coil_kind(&word) {
-            return Some(Content::Coil(Coil { kind, target: name }));
-        }
-        match word.as_str() {
-            "ComparisonEdge" => {
-                let relation = xml::child(node, "relation")
-                    .map(xml::word)
-                    .unwrap_or_default();
-                let found = Relation::ALL
-                    .into_iter()
-                    .find(|known| known.sign() == relation.as_str());
-                let value = xml::child(node, "value").map(xml::word).unwrap_or_default();
-                let value = self.whole(node, &value, "the value of a comparison")?;
-                let value = u16::try_from(value)
-                    .ok()
-                    .filter(|value| u64::from(*value) <= u64::from(MAXIMUM_PRESET_VALUE));
-                let (Some(relation), Some(value)) = (found, value) else {
-                    self.error("U1061", format!("a comparison has a relation such as >= and a number up to {MAXIMUM_PRESET_VALUE}"), xml::start_tag(node));
-                    return None;
-                };
-                Some(Content::Element(Element::Comparison(Comparison {
-                    counter: name,
-                    relation,
-                    value,
-                })))
-            }
-            "BlockEdge" => {
-                let kind = self.block_kind(node)?;
-                let pins = Vec::new();
-                Some(Content::Element(Element::Block(Block { name, kind, pins })))
-            }
-            _ => {
-                let finding = Diagnostic::error(
-                    "U1061",
-                    format!("an edge cannot be a `{}`", word.as_str()),
-                    word.span(),
-                );
-                self.diagnostics
-                    .push(finding.with_help(format!("edges are {}", edge_types())));
-                None
-            }
-        }
-    }
-
-    fn block_kind(&mut self, node: Node<'_, '_>) -> Option<BlockKind> {
-        let word = xml::child(node, "block").map(xml::word).unwrap_or_default();
-        let preset = xml::child(node, "preset")
-            .map(xml::word)
-            .unwrap_or_default();
-        let time = parse_time(&preset).filter(|_| !preset.is_empty());
-        let number = preset
-            .parse::<u16>()
-            .ok()
-            .filter(|value| u64::from(*value) <= u64::from(MAXIMUM_PRESET_VALUE));
-        let kind = match word.as_str() {
-            "TON" => time.map(BlockKind::Ton),
-            "TOF" => time.map(BlockKind::Tof),
-            "TP" => time.map(BlockKind::Tp),
-            "CTU" => number.map(BlockKind::Ctu),
-            "CTD" => number.map(BlockKind::Ctd),
-            "CTUD" => number.map(BlockKind::Ctud),
-            "SR" => Some(BlockKind::Sr),
-            "RS" => Some(BlockKind::Rs),
-            "R_TRIG" => Some(BlockKind::RTrig),
-            "F_TRIG" => Some(BlockKind::FTrig),
-            other => {
-                self.error(
-                    "U1061",
-                    format!("`{other}` is no block that is known here"),
-                    xml::start_tag(node),
-                );
-                return None;
-            }
-        };
-        if kind.is_none() {
-            let message = format!("`{}` is no preset of a {}", preset.as_str(), word.as_str());
-            self.error("U1061", message, xml::start_tag(node));
-        }
-        kind
     }
 }
 

@@ -79,7 +79,8 @@ const KEYWORDS: [&str; 52] = [
     "CONTINUE",
 ];
 
-fn is_keyword(word: &str) -> bool {
+/// Whether no variable can be called so.
+pub(crate) fn is_keyword(word: &str) -> bool {
     KEYWORDS
         .iter()
         .any(|keyword| keyword.eq_ignore_ascii_case(word))
