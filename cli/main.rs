@@ -5,10 +5,12 @@
     reason = "the command line names runs by the time, and measures speed"
 )]
 
+mod allocate;
 mod answer;
 mod automata;
 mod bench;
 mod campaign;
+mod catalogue;
 mod check;
 mod console;
 mod demo;
@@ -35,6 +37,7 @@ mod petri;
 mod proxy;
 mod reconfigure;
 mod reliability;
+mod resources;
 mod run;
 mod schema;
 mod shell;
@@ -87,6 +90,9 @@ enum Command {
     Petri(petri::Arguments),
     Reconfigure(reconfigure::Arguments),
     Reliability(reliability::Arguments),
+    Resources(resources::Arguments),
+    Allocate(Box<allocate::Arguments>),
+    Catalogue(catalogue::Arguments),
     Measure(measure::Arguments),
     Outlook(outlook::Arguments),
     Campaign(campaign::Arguments),
@@ -122,6 +128,9 @@ impl Command {
             Self::Petri(_) => "petri",
             Self::Reconfigure(_) => "reconfigure",
             Self::Reliability(_) => "reliability",
+            Self::Resources(_) => "resources",
+            Self::Allocate(_) => "allocate",
+            Self::Catalogue(_) => "catalogue",
             Self::Measure(_) => "measure",
             Self::Outlook(_) => "outlook",
             Self::Campaign(_) => "campaign",
@@ -157,6 +166,9 @@ impl Command {
             Self::Petri(arguments) => petri::run(&arguments),
             Self::Reconfigure(arguments) => reconfigure::run(&arguments),
             Self::Reliability(arguments) => reliability::run(&arguments),
+            Self::Resources(arguments) => resources::run(&arguments),
+            Self::Allocate(arguments) => allocate::run(&arguments),
+            Self::Catalogue(arguments) => catalogue::run(&arguments),
             Self::Measure(arguments) => measure::run(&arguments, console),
             Self::Outlook(arguments) => outlook::run(&arguments),
             Self::ModelCheck(arguments) => model_check::run(&arguments),

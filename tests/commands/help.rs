@@ -4,7 +4,10 @@ use insta::assert_snapshot;
 
 use crate::understudy;
 
-const COMMANDS: [&str; 24] = [
+const COMMANDS: [&str; 27] = [
+    "allocate",
+    "catalogue",
+    "resources",
     "campaign",
     "demo",
     "lab",

@@ -1,0 +1,166 @@
+//! The programs that a command is given: ladders, and clusters of them.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use understudy_cluster::{Cluster, Overrides};
+use understudy_diagnostic::Report;
+use understudy_ladder::{Program, parse, parse_time};
+use understudy_logic::Circuit;
+use understudy_parity::{ParityController, generate};
+
+use crate::answer::{Answer, Status};
+use crate::files;
+
+/// A period that is longer than nothing.
+pub(crate) fn period(text: &str) -> Result<Duration, String> {
+    let time = parse_time(text).filter(|time| !time.is_zero());
+    time.ok_or_else(|| format!("{text:?} is no time such as 10ms"))
+}
+
+/// All that was read.
+pub(crate) struct Programs {
+    /// The ladders together, if there are any, and each cluster.
+    pub(crate) groups: Vec<Group>,
+    /// The files, with what was found in them.
+    pub(crate) reports: Vec<Report>,
+}
+
+/// Programs of one understudy.
+pub(crate) struct Group {
+    pub(crate) cluster: Option<Box<Cluster>>,
+    pub(crate) members: Vec<Member>,
+    /// The generated controller; nothing where a single ladder stands alone.
+    pub(crate) parity: Option<ParityController>,
+    pub(crate) period: Duration,
+    /// In front of its names, where there are several groups.
+    prefix: String,
+}
+
+/// A program with its circuit.
+pub(crate) struct Member {
+    pub(crate) name: String,
+    pub(crate) ladder: Program,
+    pub(crate) circuit: Circuit,
+}
+
+impl Group {
+    /// A name that no other group has.
+    pub(crate) fn name(&self, name: &str) -> String {
+        format!("{}{name}", self.prefix)
+    }
+}
+
+impl Programs {
+    /// Reads all of them; what is wrong with any is said in one run.
+    pub(crate) fn read(paths: &[PathBuf], period: Duration) -> Result<Self, Answer> {
+        let mut reports = Vec::new();
+        let mut wrong = Answer::done("", serde_json::Value::Null);
+        let mut ladders = Vec::new();
+        let mut clusters = Vec::new();
+        for path in paths {
+            let read = if path
+                .extension()
+                .is_some_and(|extension| extension == "toml")
+            {
+                files::cluster(path, Overrides::default()).map(|(cluster, found)| {
+                    reports.extend(found);
+                    clusters.push(cluster);
+                })
+            } else {
+                ladder(path, period).map(|(member, report)| {
+                    reports.push(report);
+                    ladders.push(member);
+                })
+            };
+            if let Err(answer) = read {
+                wrong.status = answer.status;
+                wrong.failures.extend(answer.failures);
+                wrong.reports.extend(answer.reports);
+            }
+        }
+        if wrong.status != Status::Done {
+            return Err(wrong);
+        }
+        let several = clusters.len() + usize::from(!ladders.is_empty()) > 1;
+        let prefix = |name: &str| {
+            if several {
+                format!("{name}/")
+            } else {
+                String::new()
+            }
+        };
+        let mut groups = Vec::new();
+        if !ladders.is_empty() {
+            groups.push(of_ladders(ladders, period, prefix("ladders"))?);
+        }
+        for cluster in clusters {
+            let prefix = prefix(cluster.name());
+            groups.push(of_cluster(cluster, prefix));
+        }
+        Ok(Self { groups, reports })
+    }
+
+    /// What a person calls all of them.
+    pub(crate) fn title(&self) -> String {
+        let names = self.groups.iter().map(|group| match &group.cluster {
+            Some(cluster) => cluster.name().to_owned(),
+            None => {
+                let names = group.members.iter().map(|member| member.name.as_str());
+                names.collect::<Vec<_>>().join(", ")
+            }
+        });
+        names.collect::<Vec<_>>().join(", ")
+    }
+}
+
+fn ladder(path: &Path, period: Duration) -> Result<(Member, Report), Answer> {
+    let text = files::text(path)?;
+    let parsed = parse(&text);
+    let report = Report {
+        name: path.display().to_string(),
+        text,
+        diagnostics: parsed.diagnostics,
+    };
+    if report.has_errors() {
+        return Err(Answer::bad_files(vec![report]));
+    }
+    let circuit = parsed
+        .program
+        .lower(period)
+        .map_err(|error| Answer::failed(Status::BadInput, "U0436", error.to_string()))?;
+    let member = Member {
+        name: parsed.program.name.to_string(),
+        ladder: parsed.program,
+        circuit,
+    };
+    Ok((member, report))
+}
+
+fn of_ladders(members: Vec<Member>, period: Duration, prefix: String) -> Result<Group, Answer> {
+    let circuits: Vec<&Circuit> = members.iter().map(|member| &member.circuit).collect();
+    let parity = generate(&circuits)
+        .map_err(|error| Answer::failed(Status::BadInput, error.code(), super::message(&error)))?;
+    Ok(Group {
+        cluster: None,
+        parity: (members.len() > 1).then_some(parity),
+        members,
+        period,
+        prefix,
+    })
+}
+
+fn of_cluster(cluster: Cluster, prefix: String) -> Group {
+    let members = cluster.controllers().iter().map(|controller| Member {
+        name: controller.name.clone(),
+        ladder: controller.program.clone(),
+        circuit: controller.circuit.clone(),
+    });
+    Group {
+        members: members.collect(),
+        parity: Some(cluster.parity().clone()),
+        period: cluster.agreement().schedule.period(),
+        cluster: Some(Box::new(cluster)),
+        prefix,
+    }
+}

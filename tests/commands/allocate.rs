@@ -1,0 +1,228 @@
+//! Resources, the catalogue and the allocation, from outside.
+
+use std::fs;
+
+use insta::assert_snapshot;
+use serde_json::Value;
+
+use crate::{empty_folder, understudy};
+
+const PRESS_CELL: &str = "examples/press-cell/cluster.toml";
+const PAINTING: &str = "examples/painting-system/painting-system.ladder";
+
+fn models(item: &Value, verdict: &str) -> Vec<String> {
+    let candidates = item["candidates"].as_array().expect("candidates");
+    candidates
+        .iter()
+        .filter(|candidate| candidate["verdict"] == verdict)
+        .map(|candidate| candidate["model"].as_str().expect("a model").to_owned())
+        .collect()
+}
+
+#[test]
+fn allocate_explains_itself() {
+    assert_snapshot!(understudy(&["allocate", "--help"]).shown());
+}
+
+#[test]
+fn resources_are_counted_for_every_program_and_for_the_understudy() {
+    assert_snapshot!(understudy(&["resources", PRESS_CELL]).shown());
+    let listed = understudy(&["resources", PAINTING, "--instructions"]);
+    assert_snapshot!(listed.shown());
+}
+
+#[test]
+fn the_press_cell_gets_a_box_for_every_party() {
+    let answer = understudy(&["allocate", PRESS_CELL]);
+    assert_snapshot!(answer.shown());
+    let document = understudy(&["allocate", PRESS_CELL, "--json"]).json();
+    let boxes = document["result"]["boxes"].as_array().expect("boxes");
+    assert_eq!(
+        boxes.len(),
+        5,
+        "two controllers, the understudy, two remote I/Os"
+    );
+    let items = document["result"]["items"].as_array().expect("items");
+    for item in items {
+        assert_eq!(item["left_over"], Value::Null, "{}", item["name"]);
+        let all = item["candidates"].as_array().map(Vec::len);
+        assert_eq!(all, Some(87), "every controller has its answer");
+    }
+    // LOGO! has no known port, and the S7-200 has no Ethernet.
+    assert!(models(&items[0], "does-not-fit").contains(&"CPU 224".to_owned()));
+    assert!(!models(&items[0], "fits").contains(&"CPU 224".to_owned()));
+}
+
+#[test]
+fn a_single_program_has_its_terminals_on_its_own_controller() {
+    let document = understudy(&["allocate", PAINTING, "--json"]).json();
+    let items = document["result"]["items"].as_array().expect("items");
+    assert_eq!(items.len(), 1, "no understudy and no remote I/O");
+    let fitting = models(&items[0], "fits");
+    assert!(fitting.contains(&"CPU 1214C".to_owned()), "{fitting:?}");
+    // Six outputs are needed, and it has four.
+    assert!(models(&items[0], "does-not-fit").contains(&"CPU 1211C".to_owned()));
+}
+
+#[test]
+fn the_report_is_a_page_and_a_table() {
+    let folder = empty_folder("allocation_report");
+    let out = folder.to_str().expect("text");
+    let answer = understudy(&["allocate", PRESS_CELL, "--reserve", "20%", "--report", out]);
+    assert_eq!(answer.status, 0, "{}", answer.shown());
+    let page = fs::read_to_string(folder.join("allocation.html")).expect("a page");
+    assert!(page.contains("Controllers for press-cell"));
+    assert!(page.contains("20 % of every capacity stay free"));
+    let table = fs::read_to_string(folder.join("allocation.csv")).expect("a table");
+    assert!(table.lines().count() > 87 * 5);
+}
+
+#[test]
+fn a_property_that_does_not_hold_keeps_a_program_from_its_controller() {
+    let folder = empty_folder("allocation_properties");
+    let file = folder.join("painting.properties");
+    fs::write(&file, "never cw_motor and ccw_motor\n").expect("written");
+    let asked = format!("painting={}", file.display());
+    let answer = understudy(&["allocate", PAINTING, "--properties", &asked]);
+    assert_eq!(answer.status, 1);
+    assert!(
+        answer
+            .output
+            .contains("no box for painting: it is not recommended"),
+        "{}",
+        answer.output
+    );
+    let insisted = understudy(&["allocate", PAINTING, "--properties", &asked, "--unverified"]);
+    assert_eq!(insisted.status, 0, "{}", insisted.shown());
+    assert!(
+        insisted.output.contains("does not hold"),
+        "{}",
+        insisted.output
+    );
+}
+
+#[test]
+fn what_is_asked_wrongly_is_said_whole() {
+    let arguments = [
+        "allocate",
+        PAINTING,
+        "--require",
+        "inputs>3",
+        "--require",
+        "colour=red",
+    ];
+    let answer = understudy(&arguments);
+    assert_eq!(answer.status, 2);
+    assert_snapshot!(answer.shown());
+    let arguments = [
+        "allocate",
+        PAINTING,
+        "--stock",
+        "CPU 1214=1",
+        "--stock",
+        "Nothing=2",
+    ];
+    assert_snapshot!(understudy(&arguments).shown());
+}
+
+#[test]
+fn a_catalogue_of_ones_own_is_made_filled_and_exported() {
+    let folder = empty_folder("catalogue");
+    let file = |name: &str| folder.join(name).display().to_string();
+    let (database, prices, exported) = (file("ours.db"), file("prices.csv"), file("out.csv"));
+    let figures = [
+        "--vendor",
+        "Works",
+        "--model",
+        "A1",
+        "--family",
+        "A",
+        "--source",
+        "data sheet",
+        "digital_inputs=16",
+        "comm_ports=1x Ethernet",
+    ];
+    let added = understudy(
+        &[
+            &["catalogue", "add", "--catalogue", &database],
+            &figures[..],
+        ]
+        .concat(),
+    );
+    assert_eq!(added.status, 0, "{}", added.shown());
+    assert!(
+        added.output.contains("1 added, 0 updated"),
+        "{}",
+        added.output
+    );
+    let again = understudy(
+        &[
+            &["catalogue", "add", "--catalogue", &database],
+            &figures[..],
+        ]
+        .concat(),
+    );
+    assert_eq!(again.status, 2);
+    assert!(again.errors.contains("U1125"), "{}", again.errors);
+
+    let text = "vendor,model,family,kind,price,currency,source_url\nWorks,A1,A,plc,249.50,EUR,quotation 17\n";
+    fs::write(&prices, text).expect("written");
+    let imported = understudy(&[
+        "catalogue",
+        "import",
+        &prices,
+        "--catalogue",
+        &database,
+        "--update",
+    ]);
+    assert!(
+        imported.output.contains("0 added, 1 updated"),
+        "{}",
+        imported.shown()
+    );
+    let shown = understudy(&["catalogue", "show", "A1", "--catalogue", &database]);
+    assert_snapshot!(shown.shown());
+
+    let written = understudy(&[
+        "catalogue",
+        "export",
+        "--catalogue",
+        &database,
+        "--output",
+        &exported,
+    ]);
+    assert_eq!(written.status, 0, "{}", written.shown());
+    let copy = file("copy.db");
+    let copied = understudy(&[
+        "catalogue",
+        "import",
+        &exported,
+        "--catalogue",
+        &copy,
+        "--empty",
+    ]);
+    assert!(copied.output.contains("88 added"), "{}", copied.shown());
+    let listed =
+        |name: &str| understudy(&["catalogue", "list", "--catalogue", name, "--json"]).json();
+    assert_eq!(listed(&database)["result"], listed(&copy)["result"]);
+}
+
+#[test]
+fn bad_catalogues_are_refused_and_nothing_is_written() {
+    let folder = empty_folder("catalogue_bad");
+    let file = |name: &str| folder.join(name).display().to_string();
+    let (bad, database) = (file("bad.csv"), file("ours.db"));
+    let text = "vendor,model,family,kind,digital_inputs,source_url\nWorks,A,W,plc,many,x\nWorks,A,W,plc,8,\n";
+    fs::write(&bad, text).expect("written");
+    let answer = understudy(&["catalogue", "import", &bad, "--catalogue", &database]);
+    assert_eq!(answer.status, 2);
+    for code in ["U1107", "U1108", "U1109"] {
+        assert!(answer.errors.contains(code), "{}", answer.errors);
+    }
+    assert!(!folder.join("ours.db").exists());
+    let answer = understudy(&["allocate", PAINTING, "--catalogue", &bad]);
+    assert_eq!(answer.status, 2);
+    assert!(answer.errors.contains("U1121"), "{}", answer.errors);
+    let answer = understudy(&["catalogue", "show", "CPU 1214"]);
+    assert!(answer.errors.contains("CPU 1214C"), "{}", answer.errors);
+}
