@@ -19,6 +19,7 @@
 //! wire; so a rung is written out as statements and lowered as Structured Text is. What each element does is described in
 //! `docs/ldmicro.md`; what only a microcontroller has is listed with its line.
 
+mod limits;
 mod parse;
 mod statements;
 

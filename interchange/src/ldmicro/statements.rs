@@ -3,6 +3,8 @@
 //! Power is an expression while only contacts have been passed. Before something is written, power that is still needed is held
 //! in a variable, since what is written may be what a contact has read.
 
+mod leaf;
+
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt::Write;
 use std::ops::Range;
@@ -10,7 +12,8 @@ use std::time::Duration;
 
 use understudy_diagnostic::Diagnostic;
 
-use super::parse::{Coil, Counter, Edge, Element, File, Kind, Timer};
+use super::limits::limits;
+use super::parse::{Coil, Element, File, Kind};
 
 /// A text, and which line of the file each of its parts comes from.
 pub(super) struct Written {
@@ -84,60 +87,6 @@ fn acts(element: &Element) -> bool {
         Kind::Parallel(branches) => branches.iter().flatten().any(acts),
         _ => true,
     }
-}
-
-/// How far a counter can be told from one that goes on: past the numbers that it is compared with, nothing sees its value.
-///
-/// None where more is done with it than to count one way, to compare it, and to set it to numbers.
-fn limits(rungs: &[Vec<Element>]) -> HashMap<String, Option<(i64, i64)>> {
-    let mut limits = HashMap::new();
-    let mut directions: HashMap<String, Counter> = HashMap::new();
-    rungs
-        .iter()
-        .for_each(|rung| find_limits(rung, &mut limits, &mut directions));
-    limits
-}
-
-fn find_limits(
-    series: &[Element],
-    limits: &mut HashMap<String, Option<(i64, i64)>>,
-    directions: &mut HashMap<String, Counter>,
-) {
-    for element in series {
-        match &element.kind {
-            Kind::Counter(direction, name, value) => {
-                let first = *directions.entry(name.clone()).or_insert(*direction);
-                see(limits, name, (first == *direction).then_some(*value));
-            }
-            Kind::Move(name, value) => {
-                see(limits, name, value.parse().ok());
-                see(limits, value, None);
-            }
-            Kind::Compare(_, left, right) => {
-                see(limits, left, right.parse().ok());
-                see(limits, right, left.parse().ok());
-            }
-            Kind::Calculate(_, to, left, right) => [to, left, right]
-                .into_iter()
-                .for_each(|name| see(limits, name, None)),
-            Kind::Timer(Timer::Retentive, name, _) => see(limits, name, None),
-            Kind::Parallel(branches) => {
-                for branch in branches {
-                    find_limits(branch, limits, directions);
-                }
-            }
-            _ => {}
-        }
-    }
-}
-
-/// Notes that the name is compared with or set to a number, or used in another way.
-fn see(limits: &mut HashMap<String, Option<(i64, i64)>>, name: &str, value: Option<i64>) {
-    let known = limits.entry(name.to_owned()).or_insert(Some((0, 0)));
-    *known = match (*known, value) {
-        (Some((low, high)), Some(value)) => Some((low.min(value), high.max(value))),
-        _ => None,
-    };
 }
 
 struct Writer {
@@ -349,136 +298,6 @@ impl Writer {
         }
     }
 
-    fn acting_leaf(&mut self, element: &Element, power: String, is_last: bool) -> String {
-        let span = &element.span;
-        match &element.kind {
-            Kind::Edge(Edge::Rising) => {
-                let block = self.helper("one_shot", "R_TRIG");
-                self.line(&format!("{block}(CLK := {power});"), span);
-                format!("{block}.Q")
-            }
-            Kind::Edge(Edge::Falling) => {
-                // Unlike an F_TRIG, it does not fire in the first cycle.
-                let (shot, before) = (
-                    self.helper("one_shot", "BOOL"),
-                    self.helper("one_shot_before", "BOOL"),
-                );
-                let power = self.held(power, span);
-                self.line(&format!("{shot} := NOT {power} AND {before};"), span);
-                self.line(&format!("{before} := {power};"), span);
-                shot
-            }
-            Kind::Timer(Timer::Retentive, name, delay) => {
-                let name = self.name(name, Use::Number, span);
-                let scans = delay.as_nanos().div_ceil(self.period.as_nanos()).max(1);
-                if scans > 0x7fff {
-                    let message =
-                        format!("the timer counts {scans} cycles, more than 16 bits hold");
-                    self.diagnostics
-                        .push(Diagnostic::error("U1072", message, span.clone()));
-                }
-                let full = self.helper("full", "BOOL");
-                let power = self.held(power, span);
-                self.line(&format!("{full} := {name} >= {scans};"), span);
-                self.line(
-                    &format!("IF {power} AND {name} < {scans} THEN {name} := {name} + 1; END_IF;"),
-                    span,
-                );
-                full
-            }
-            Kind::Timer(timer, name, delay) => {
-                let is_new = !self.names.contains_key(name);
-                let name = self.name(name, Use::Timer, span);
-                if !is_new {
-                    let message =
-                        format!("two elements share the timer `{name}`; that is not taken");
-                    self.diagnostics
-                        .push(Diagnostic::error("U1074", message, span.clone()));
-                }
-                let word = if *timer == Timer::OnDelay {
-                    "TON"
-                } else {
-                    "TOF"
-                };
-                self.blocks.push((name.clone(), word));
-                let delay = delay.as_micros();
-                self.line(&format!("{name}(IN := {power}, PT := T#{delay}us);"), span);
-                format!("{name}.Q")
-            }
-            Kind::Counter(counter, name, value) => {
-                let limits = self.limits.get(name).copied().flatten();
-                let name = self.name(name, Use::Number, span);
-                let clock = self.helper("clock", "R_TRIG");
-                let power = self.held(power, span);
-                self.line(&format!("{clock}(CLK := {power});"), span);
-                let step = match (counter, limits) {
-                    (Counter::Up, Some((_, high))) => {
-                        format!("IF {name} <= {high} THEN {name} := {name} + 1; END_IF;")
-                    }
-                    (Counter::Down, Some((low, _))) => {
-                        format!("IF {name} >= {low} THEN {name} := {name} - 1; END_IF;")
-                    }
-                    (Counter::Up, None) => format!("{name} := {name} + 1;"),
-                    (Counter::Down, None) => format!("{name} := {name} - 1;"),
-                    (Counter::Circular, _) => format!(
-                        "IF {name} >= {value} THEN {name} := 0; ELSE {name} := {name} + 1; END_IF;"
-                    ),
-                };
-                self.line(&format!("IF {clock}.Q THEN {step} END_IF;"), span);
-                match counter {
-                    Counter::Circular => power,
-                    Counter::Up | Counter::Down => format!("{name} >= {value}"),
-                }
-            }
-            Kind::Reset(name) => {
-                let power = if is_last {
-                    power
-                } else {
-                    self.held(power, span)
-                };
-                let name = self.name(name, Use::Number, span);
-                self.line(&format!("IF {power} THEN {name} := 0; END_IF;"), span);
-                power
-            }
-            Kind::Move(to, from) => {
-                let power = if is_last {
-                    power
-                } else {
-                    self.held(power, span)
-                };
-                let (to, from) = (self.name(to, Use::Number, span), self.operand(from, span));
-                self.line(&format!("IF {power} THEN {to} := {from}; END_IF;"), span);
-                power
-            }
-            Kind::Calculate(sign, to, left, right) => {
-                let power = if is_last {
-                    power
-                } else {
-                    self.held(power, span)
-                };
-                let to = self.name(to, Use::Number, span);
-                let (left, right) = (self.operand(left, span), self.operand(right, span));
-                self.line(
-                    &format!("IF {power} THEN {to} := {left} {sign} {right}; END_IF;"),
-                    span,
-                );
-                power
-            }
-            Kind::MasterRelay => {
-                // It switches the rungs below it off, or on again where they are off.
-                let power = self.held(power, span);
-                self.line(&format!("rungs_run := NOT rungs_run OR {power};"), span);
-                power
-            }
-            Kind::Comment(_)
-            | Kind::Contacts(..)
-            | Kind::Coil(..)
-            | Kind::Wire(_)
-            | Kind::Compare(..)
-            | Kind::Parallel(_) => power,
-        }
-    }
-
     fn finish(self, file: &File) -> (Written, Vec<Diagnostic>) {
         let mut diagnostics = self.diagnostics;
         let mut head = String::from("PROGRAM ldmicro\n");
@@ -506,7 +325,7 @@ impl Writer {
             for (name, made) in &names {
                 let use_of = self.uses.get(*made).copied().unwrap_or(Use::Bit);
                 let is_pin = name.starts_with(['X', 'Y']) && use_of == Use::Bit;
-                if is_pin != !first.is_empty() || !name.starts_with(first) {
+                if is_pin == first.is_empty() || !name.starts_with(first) {
                     continue;
                 }
                 let type_name = match use_of {

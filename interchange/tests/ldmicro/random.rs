@@ -193,12 +193,16 @@ impl Execution {
                     }
             }
             Element::Master => {
-                self.runs = !(self.runs && !power);
+                self.runs = !self.runs || power;
                 power
             }
-            Element::Parallel(branches) => branches
-                .iter()
-                .fold(false, |any, branch| self.series(branch, power) || any),
+            Element::Parallel(branches) => {
+                let mut any = false;
+                for branch in branches {
+                    any |= self.series(branch, power);
+                }
+                any
+            }
         }
     }
 }
