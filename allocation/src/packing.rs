@@ -4,18 +4,19 @@
 //! min  Σ c_t y_tk + B Σ v_i            k-th copy of type t is taken; item i is left over, which costs more than all boxes
 //! (1)  Σ_tk x_itk + v_i = 1            every item is on one box, or left over
 //! (2)  x_itk <= y_tk                   and that box is taken
-//! (3)  x_itk + x_jtk <= y_tk           items that must not share do not
+//! (3)  x_itk + x_jtk + .. <= y_tk      of items that must not share with each other there is one at most
 //! (4)  Σ_i d_itm x_itk <= D_tm y_tk    every dimension m of a box holds what is on it
 //! (5)  y_t,k+1 <= y_tk                 copies are alike
 //! ```
 //!
-//! What the solver answers is checked against the rules before it is used, so nothing rests on its arithmetic.
+//! Items that share with nobody, on types of which there are as many as wanted, are not part of it: each takes what is cheapest for it. What
+//! the solver answers is checked against the rules before it is used, so nothing rests on its arithmetic; where it is stopped, or the program
+//! would be too large for it, there is still the packing that takes the items one after the other.
+
+mod greedy;
+mod program;
 
 use std::collections::BTreeMap;
-
-use good_lp::{
-    Expression, ProblemVariables, Solution, SolverModel, Variable, constraint, microlp, variable,
-};
 
 use crate::fit::{Dimension, Load};
 
@@ -49,11 +50,11 @@ pub struct Packing {
     pub boxes: Vec<PackedBox>,
     /// Items that are on no box.
     pub left_over: Vec<usize>,
-    /// False where types were left out because the program would have been too large: there may be a better packing.
+    /// False where it is not proved that none is better.
     pub best: bool,
 }
 
-/// The solver failed.
+/// The solver's answer breaks the rules.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("U1140: no packing was found: {0}")]
 pub struct PackingError(String);
@@ -61,22 +62,27 @@ pub struct PackingError(String);
 /// The cheapest packing of `items` items; `apart(i, j)` says whether i and j must not share a box.
 ///
 /// # Errors
-/// The solver failed, or answered what breaks the rules.
+/// The solver answered what breaks the rules.
 pub fn pack(
     items: usize,
     types: &[BoxType],
     apart: &dyn Fn(usize, usize) -> bool,
 ) -> Result<Packing, PackingError> {
-    let useful = undominated(items, types, apart);
-    let (chosen, best) = within_bound(items, types, &useful);
-    if chosen.is_empty() {
-        return Ok(Packing {
-            boxes: Vec::new(),
-            left_over: (0..items).collect(),
-            best: true,
-        });
-    }
-    let boxes = solve(items, types, &chosen, apart)?;
+    let (mut boxes, rest) = settled(items, types, apart);
+    // The rest among itself, with numbers of its own.
+    let rest_types: Vec<BoxType> = types
+        .iter()
+        .map(|one| BoxType {
+            loads: rest.iter().map(|&item| one.loads[item].clone()).collect(),
+            ..one.clone()
+        })
+        .collect();
+    let rest_apart = |left: usize, right: usize| apart(rest[left], rest[right]);
+    let (packed, best) = pack_rest(rest.len(), &rest_types, &rest_apart);
+    boxes.extend(packed.into_iter().map(|packed| PackedBox {
+        box_type: packed.box_type,
+        items: packed.items.into_iter().map(|item| rest[item]).collect(),
+    }));
     check(items, types, &boxes, apart)?;
     let placed = |item: &usize| boxes.iter().any(|packed| packed.items.contains(item));
     Ok(Packing {
@@ -84,6 +90,73 @@ pub fn pack(
         boxes,
         best,
     })
+}
+
+/// Boxes for the items that share with nobody and want nothing that is scarce, and all other items.
+fn settled(
+    items: usize,
+    types: &[BoxType],
+    apart: &dyn Fn(usize, usize) -> bool,
+) -> (Vec<PackedBox>, Vec<usize>) {
+    let (mut boxes, mut rest) = (Vec::new(), Vec::new());
+    for item in 0..items {
+        let usable = (0..types.len()).filter(|&one| types[one].loads[item].is_some());
+        let usable: Vec<usize> = usable.collect();
+        let alone = (0..items).all(|other| other == item || apart(item, other));
+        let scarce = usable.iter().any(|&one| types[one].stock.is_some());
+        let cheapest = usable
+            .iter()
+            .min_by(|&&left, &&right| types[left].cost.total_cmp(&types[right].cost));
+        match cheapest {
+            Some(&box_type) if alone && !scarce => boxes.push(PackedBox {
+                box_type,
+                items: vec![item],
+            }),
+            _ => rest.push(item),
+        }
+    }
+    (boxes, rest)
+}
+
+/// The packing of items that may share, and whether it is proved that none is better.
+fn pack_rest(
+    items: usize,
+    types: &[BoxType],
+    apart: &dyn Fn(usize, usize) -> bool,
+) -> (Vec<PackedBox>, bool) {
+    let useful = undominated(items, types, apart);
+    let (chosen, all) = within_bound(items, types, &useful);
+    if chosen.is_empty() {
+        return (Vec::new(), true);
+    }
+    // Of all types: where one that was left out for its cost is the only one of which there are enough, it is here.
+    let simple = greedy::pack(items, types, &useful, apart);
+    if unknowns(items, types, &chosen) > MAXIMUM_UNKNOWNS {
+        return (simple, false);
+    }
+    let first = if all {
+        simple.clone()
+    } else {
+        greedy::pack(items, types, &chosen, apart)
+    };
+    match program::solve(items, types, &chosen, &first, apart) {
+        Some((boxes, proved)) if !is_better(items, types, &simple, &boxes) => {
+            (boxes, proved && all)
+        }
+        _ => (simple, false),
+    }
+}
+
+/// Whether fewer items are left over, or as many and the boxes cost less.
+fn is_better(items: usize, types: &[BoxType], one: &[PackedBox], other: &[PackedBox]) -> bool {
+    let measure = |boxes: &[PackedBox]| {
+        let placed: usize = boxes.iter().map(|packed| packed.items.len()).sum();
+        let costs = boxes.iter().map(|packed| types[packed.box_type].cost);
+        (items.saturating_sub(placed), costs.sum::<f64>())
+    };
+    let (one, other) = (measure(one), measure(other));
+    // What the solver rounds is no difference.
+    one.0 < other.0 || one.0 == other.0 && one.1 < other.1 * (1.0 - 1e-9)
 }
 
 fn usable_items(items: usize, box_type: &BoxType) -> Vec<usize> {
@@ -147,20 +220,12 @@ fn within_bound(items: usize, types: &[BoxType], useful: &[usize]) -> (Vec<usize
         .collect();
     chosen.sort_unstable();
     chosen.dedup();
-    let unknowns = |chosen: &[usize]| -> usize {
-        let of_type = |&one: &usize| {
-            let usable = usable_items(items, &types[one]).len();
-            let copies = types[one].stock.unwrap_or(usable).min(usable);
-            copies * (usable + 1)
-        };
-        chosen.iter().map(of_type).sum()
-    };
     for &one in &by_cost {
         if chosen.contains(&one) {
             continue;
         }
         chosen.push(one);
-        if unknowns(&chosen) > MAXIMUM_UNKNOWNS {
+        if unknowns(items, types, &chosen) > MAXIMUM_UNKNOWNS {
             chosen.pop();
             chosen.sort_unstable();
             return (chosen, false);
@@ -170,116 +235,14 @@ fn within_bound(items: usize, types: &[BoxType], useful: &[usize]) -> (Vec<usize
     (chosen, true)
 }
 
-/// A copy of a type and the unknowns of what is on it.
-struct Copy {
-    box_type: usize,
-    taken: Variable,
-    on_it: Vec<(usize, Variable)>,
-}
-
-fn solve(
-    items: usize,
-    types: &[BoxType],
-    chosen: &[usize],
-    apart: &dyn Fn(usize, usize) -> bool,
-) -> Result<Vec<PackedBox>, PackingError> {
-    let mut variables = ProblemVariables::new();
-    let mut binary = || variables.add(variable().binary());
-    let mut copies = Vec::new();
-    for &box_type in chosen {
-        let usable = usable_items(items, &types[box_type]);
-        let stock = types[box_type].stock.unwrap_or(usable.len());
-        for number in 0..stock.min(usable.len()) {
-            // The n-th item can always be on one of the first n copies, so the others need not be tried.
-            let candidates = usable.iter().skip(number);
-            copies.push(Copy {
-                box_type,
-                taken: binary(),
-                on_it: candidates.map(|&item| (item, binary())).collect(),
-            });
-        }
-    }
-    let left_over: Vec<Variable> = (0..items).map(|_| binary()).collect();
-    let dearest = chosen.iter().map(|&one| types[one].cost);
-    let dearest = dearest.fold(0.0, f64::max).max(1e-9);
-    // In units of the dearest box a left-over item costs more than all boxes together.
-    let lost = items as f64 + 1.0;
-    let mut objective = Expression::from(0.0);
-    for copy in &copies {
-        objective += types[copy.box_type].cost / dearest * copy.taken;
-    }
-    for &item in &left_over {
-        objective += lost * item;
-    }
-    let mut constraints = Vec::new();
-    for (item, &lost) in left_over.iter().enumerate() {
-        let mut sum = Expression::from(lost);
-        for copy in &copies {
-            for &(_, on_it) in copy.on_it.iter().filter(|(other, _)| *other == item) {
-                sum += on_it;
-            }
-        }
-        constraints.push(constraint!(sum == 1.0)); // (1)
-    }
-    for (place, copy) in copies.iter().enumerate() {
-        for (index, &(item, on_it)) in copy.on_it.iter().enumerate() {
-            constraints.push(constraint!(on_it <= copy.taken)); // (2)
-            for &(other, beside) in &copy.on_it[index + 1..] {
-                if apart(item, other) {
-                    constraints.push(constraint!(on_it + beside <= copy.taken)); // (3)
-                }
-            }
-        }
-        for (usable, parts) in dimensions(&types[copy.box_type], &copy.on_it) {
-            let mut sum = Expression::from(0.0);
-            for (on_it, takes) in parts {
-                sum += takes as f64 / usable as f64 * on_it;
-            }
-            constraints.push(constraint!(sum <= copy.taken)); // (4)
-        }
-        if let Some(next) = copies.get(place + 1)
-            && next.box_type == copy.box_type
-        {
-            constraints.push(constraint!(next.taken <= copy.taken)); // (5)
-        }
-    }
-    let mut model = variables.minimise(objective).using(microlp);
-    for constraint in constraints {
-        model = model.with(constraint);
-    }
-    let solution = model
-        .solve()
-        .map_err(|error| PackingError(error.to_string()))?;
-    let is_one = |variable: Variable| solution.value(variable) > 0.5;
-    let packed = copies.iter().map(|copy| PackedBox {
-        box_type: copy.box_type,
-        items: copy
-            .on_it
-            .iter()
-            .filter(|(_, on_it)| is_one(*on_it))
-            .map(|(item, _)| *item)
-            .collect(),
-    });
-    Ok(packed.filter(|packed| !packed.items.is_empty()).collect())
-}
-
-/// For each dimension that the candidates together could overfill: what is usable, and who takes how much.
-fn dimensions(box_type: &BoxType, on_it: &[(usize, Variable)]) -> Vec<(u64, Vec<(Variable, u64)>)> {
-    let mut found: BTreeMap<Dimension, (u64, Vec<(Variable, u64)>)> = BTreeMap::new();
-    for &(item, variable) in on_it {
-        for (&dimension, load) in box_type.loads[item].iter().flatten() {
-            let entry = found.entry(dimension).or_insert((load.usable, Vec::new()));
-            entry.0 = entry.0.min(load.usable);
-            entry.1.push((variable, load.takes));
-        }
-    }
-    found
-        .into_values()
-        .filter(|(usable, parts)| {
-            let sum: u128 = parts.iter().map(|(_, takes)| u128::from(*takes)).sum();
-            *usable > 0 && sum > u128::from(*usable)
-        })
-        .collect()
+/// How many unknowns the program of these types has.
+fn unknowns(items: usize, types: &[BoxType], chosen: &[usize]) -> usize {
+    let of_type = |&one: &usize| {
+        let usable = usable_items(items, &types[one]).len();
+        let copies = types[one].stock.unwrap_or(usable).min(usable);
+        copies * (usable + 1)
+    };
+    chosen.iter().map(of_type).sum()
 }
 
 /// The rules, without the solver.

@@ -172,6 +172,40 @@ fn nothing_to_place_and_nothing_to_place_it_on() {
     assert_eq!(alone.left_over, [0, 1]);
 }
 
+/// A plant of sixty programs that must all be apart wants no solver; without a stock the cheapest for each is the best.
+#[test]
+fn items_that_share_with_nobody_take_what_is_cheapest_for_each() {
+    let case = Case {
+        takes: (0..60).map(|item| [1 + item % 5, 0]).collect(),
+        types: (2..6)
+            .map(|size| ([size, 0], 10 * size, None, vec![false; 60]))
+            .collect(),
+        apart: (0..60)
+            .flat_map(|left| (left + 1..60).map(move |right| (left, right)))
+            .collect(),
+    };
+    let packing = case.packed();
+    assert!(packing.best);
+    // Each fifth of them takes 1, 2, 3, 4 and 5; the smallest box holds 2.
+    assert_eq!(case.cost(&packing), (0, 12 * (20 + 20 + 30 + 40 + 50)));
+}
+
+/// A hundred programs that may all share: too much for the solver. The cheaper boxes are too few for all of them.
+#[test]
+fn a_hundred_programs_are_packed_one_after_the_other() {
+    let case = Case {
+        takes: (0..100).map(|item| [1 + item % 4, 1]).collect(),
+        types: vec![
+            ([20, 50], 10, None, vec![false; 100]),
+            ([7, 50], 5, Some(1), vec![false; 100]),
+        ],
+        apart: vec![(0, 4), (1, 5)],
+    };
+    let packing = case.packed();
+    assert!(!packing.best && packing.left_over.is_empty());
+    assert!(packing.boxes.len() < 30, "{}", packing.boxes.len());
+}
+
 /// Forty models and a dozen programs that may share: more than the solver gets, and still every rule holds.
 #[test]
 fn what_is_too_large_is_packed_and_said_to_be_perhaps_not_the_best() {
