@@ -2,8 +2,11 @@
 
 pub mod digraph;
 pub mod ldmicro;
+mod format;
 pub mod plcopen;
 pub mod structured_text;
+
+pub use format::{Format, Reading, parse_program, read};
 
 /// The examples of the codes of this crate are run with its own.
 #[cfg(doctest)]

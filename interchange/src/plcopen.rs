@@ -11,7 +11,10 @@ mod literal;
 mod plan;
 mod power;
 mod schema;
+mod sequence;
 mod standard;
+mod statements;
+mod units;
 mod write;
 pub(crate) mod xml;
 
@@ -31,6 +34,9 @@ const NAMESPACES: [&str; 2] = [
     "http://www.plcopen.org/xml/tc6_0201",
     "http://www.plcopen.org/xml/tc6_0200",
 ];
+
+/// From one scan to the next, where no task says it.
+const USUAL_PERIOD: Duration = Duration::from_millis(10);
 
 /// What a file says.
 #[derive(Debug, Default)]
@@ -138,47 +144,45 @@ fn chosen<'a>(
     }
 }
 
+/// A ladder of bits and standard blocks stays the ladder that it is; all else goes by way of Structured Text.
 fn translate(project: &Project, pou: &Pou, reading: &mut Reading) {
-    let instance = project
+    let runs = project
         .instances
         .iter()
         .find(|instance| instance.type_name.eq_ignore_ascii_case(&pou.name));
-    reading.period = instance.and_then(|instance| instance.interval);
-    let drawn = match &pou.body {
-        Some(Body::Graph(graph)) if graph.language != Language::Sequence => {
-            let is_block = |name: &str| {
-                standard::StandardBlock::of(name).is_some()
-                    || project.pous.iter().any(|pou| {
-                        pou.kind == PouKind::FunctionBlock && pou.name.eq_ignore_ascii_case(name)
-                    })
-            };
-            let plan = plan::plan(graph, &is_block, &mut reading.diagnostics);
-            let drawn = ladder::draw(pou, &project.globals, &plan);
+    reading.period = runs.and_then(|instance| instance.interval);
+    reading.fidelity.ignored(project.ignored.clone());
+    if let Some(Body::Graph(graph)) = &pou.body
+        && graph.language != Language::Sequence
+    {
+        let mut found = Vec::new();
+        let period = reading.period.unwrap_or(USUAL_PERIOD);
+        let plan = plan::plan(graph, &|name| units::is_block(project, name), &mut found);
+        let drawn = ladder::draw(pou, &project.globals, &plan, period);
+        let is_wrong = has_errors(&found) || has_errors(&drawn.diagnostics);
+        if drawn.general.is_empty() || is_wrong {
+            for general in drawn.general {
+                let message = format!("{} is not taken with these errors", general.what);
+                found.push(Diagnostic::warning("U1022", message, general.span));
+            }
+            reading.diagnostics.extend(found);
+            reading.diagnostics.extend(drawn.diagnostics);
             reading.fidelity.plan(plan.notes);
-            drawn
-        }
-        _ => {
-            let message = format!("the body of `{}` is not taken", pou.name);
-            let span = pou.name.span();
-            reading
-                .diagnostics
-                .push(Diagnostic::error("U1010", message, span));
+            reading.fidelity.ignored(drawn.ignored);
+            if !is_wrong {
+                reading.diagnostics.extend(check(&drawn.program));
+            }
+            reading.fidelity.count(project, pou, &drawn.program);
+            reading.program = Some(drawn.program);
             return;
         }
-    };
-    let general = !drawn.general.is_empty();
-    for general in drawn.general {
-        let message = format!("{} is not taken", general.what);
-        reading
-            .diagnostics
-            .push(Diagnostic::error("U1010", message, general.span));
     }
-    reading.fidelity.ignored(drawn.ignored);
-    reading.fidelity.ignored(project.ignored.clone());
-    reading.diagnostics.extend(drawn.diagnostics);
-    if !general {
-        reading.diagnostics.extend(check(&drawn.program));
+    let lowered = units::lower(project, pou);
+    reading.diagnostics.extend(lowered.diagnostics);
+    reading.fidelity.plan(lowered.notes);
+    reading.fidelity.ignored(lowered.ignored);
+    if let Some(program) = lowered.program {
+        reading.fidelity.count(project, pou, &program);
+        reading.program = Some(program);
     }
-    reading.fidelity.count(project, pou, &drawn.program);
-    reading.program = Some(drawn.program);
 }

@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use understudy_ladder::Name;
 
+pub(crate) use objects::CONDITION;
 pub(crate) use read::read;
 
 /// A whole file.
@@ -214,6 +215,8 @@ pub(crate) enum Condition {
 #[derive(Debug)]
 pub(crate) struct Action {
     pub(crate) qualifier: Name,
+    /// Of the qualifiers that take their time.
+    pub(crate) duration: Option<Name>,
     pub(crate) content: ActionContent,
 }
 

@@ -9,6 +9,7 @@ mod series;
 
 use std::collections::HashMap;
 use std::ops::Range;
+use std::time::Duration;
 
 use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{
@@ -31,11 +32,12 @@ pub(crate) struct Drawn {
     pub(crate) general: Vec<Ignored>,
 }
 
-/// Draws the plan of a program.
-pub(crate) fn draw(pou: &Pou, globals: &[Variable], plan: &Plan) -> Drawn {
+/// Draws the plan of a program that runs every `period`.
+pub(crate) fn draw(pou: &Pou, globals: &[Variable], plan: &Plan, period: Duration) -> Drawn {
     let mut drawing = Drawing {
         scope: Scope::new(pou, globals),
         plan,
+        period,
         program: Program {
             name: Name::at(pou.name.as_str(), pou.name.span()),
             description: pou.documentation.clone(),
@@ -87,6 +89,8 @@ pub(crate) fn draw(pou: &Pou, globals: &[Variable], plan: &Plan) -> Drawn {
 struct Drawing<'a> {
     scope: Scope<'a>,
     plan: &'a Plan,
+    /// From one scan to the next.
+    period: Duration,
     program: Program,
     /// The bits of objects whose power is kept.
     kept: HashMap<usize, Name>,
@@ -187,7 +191,7 @@ impl Drawing<'_> {
                     if matches!(power, Power::Output(..)) && !self.is_read(target) =>
                 {
                     let what = format!(
-                        "`{target}` shows a number or time of a block, and nothing reads it"
+                        "`{target}`, which shows a number or time of a block and which nothing reads,"
                     );
                     self.ignored.push(Ignored {
                         what,

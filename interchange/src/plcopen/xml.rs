@@ -16,6 +16,7 @@ pub const MAXIMUM_NODES: u32 = 1_000_000;
 pub const MAXIMUM_DEPTH: usize = 64;
 
 /// A tree within the bounds, or why there is none.
+#[expect(clippy::result_large_err, reason = "once for a file")]
 pub(crate) fn parse(text: &str) -> Result<Document<'_>, Diagnostic> {
     if text.len() > MAXIMUM_BYTES {
         let message = format!(
@@ -31,11 +32,8 @@ pub(crate) fn parse(text: &str) -> Result<Document<'_>, Diagnostic> {
     let document = Document::parse_with_options(text, options).map_err(|error| {
         let place = error.pos();
         let offset = offset(text, place.row as usize, place.col as usize);
-        Diagnostic::error(
-            "U1001",
-            format!("this is not well-formed XML: {error}"),
-            offset..offset,
-        )
+        let message = format!("this is not well-formed XML: {error}");
+        Diagnostic::error("U1001", message, offset..offset)
     })?;
     match too_deep(document.root_element()) {
         None => Ok(document),
@@ -90,7 +88,7 @@ pub(crate) fn start_tag(node: Node<'_, '_>) -> Range<usize> {
     let text = &node.document().input_text()[range.clone()];
     let end = node
         .attributes()
-        .last()
+        .next_back()
         .map_or(range.start + 1 + node.tag_name().name().len(), |last| {
             last.range().end
         });

@@ -374,3 +374,100 @@ fn addresses_and_connectors() {
     ];
     insta::assert_snapshot!(shown(&variables(&BITS), &objects.concat()));
 }
+
+/// A chart of a parallel branch: two steps run together until both are done.
+const CHART: &str = r#"<SFC>
+<step localId="1" name="rest" initialStep="true"><position x="0" y="0"/><connectionPointOut formalParameter=""/><connectionPointOutAction formalParameter=""/></step>
+<transition localId="2"><position x="0" y="10"/><connectionPointIn><connection refLocalId="1"/></connectionPointIn><connectionPointOut/><condition><reference name="begin"/></condition></transition>
+<simultaneousDivergence localId="3"><position x="0" y="20"/><connectionPointIn><connection refLocalId="2"/></connectionPointIn><connectionPointOut formalParameter=""/></simultaneousDivergence>
+<step localId="4" name="left"><position x="0" y="30"/><connectionPointIn><connection refLocalId="3"/></connectionPointIn><connectionPointOut formalParameter=""/><connectionPointOutAction formalParameter=""/></step>
+<step localId="5" name="right"><position x="50" y="30"/><connectionPointIn><connection refLocalId="3"/></connectionPointIn><connectionPointOut formalParameter=""/><connectionPointOutAction formalParameter=""/></step>
+<simultaneousConvergence localId="6"><position x="0" y="40"/><connectionPointIn><connection refLocalId="4"/></connectionPointIn><connectionPointIn><connection refLocalId="5"/></connectionPointIn><connectionPointOut/></simultaneousConvergence>
+<transition localId="7"><position x="0" y="50"/><connectionPointIn><connection refLocalId="6"/></connectionPointIn><connectionPointOut/><condition><inline name=""><ST><xhtml:p>b AND right.X</xhtml:p></ST></inline></condition></transition>
+<jumpStep localId="8" targetName="rest"><position x="0" y="60"/><connectionPointIn><connection refLocalId="7"/></connectionPointIn></jumpStep>
+<actionBlock localId="9"><position x="90" y="30"/><connectionPointIn><connection refLocalId="4"/></connectionPointIn><action localId="0"><relPosition x="0" y="0"/><reference name="work"/></action></actionBlock>
+<actionBlock localId="10"><position x="90" y="40"/><connectionPointIn><connection refLocalId="5"/></connectionPointIn><action localId="0" qualifier="D" duration="T#200ms"><relPosition x="0" y="0"/><reference name="z"/></action></actionBlock>
+</SFC>"#;
+
+#[test]
+fn a_sequence_steps_as_its_chart_says() {
+    let declared = variables(&[
+        ("input", "a", "<BOOL/>"),
+        ("input", "b", "<BOOL/>"),
+        ("output", "y", "<BOOL/>"),
+        ("output", "z", "<BOOL/>"),
+    ]);
+    let coils = [
+        RAIL.to_owned(),
+        contact(1, "a", &[0]),
+        coil(2, "begin", &[1]),
+    ]
+    .concat();
+    let actions = format!(
+        "<actions><action name=\"work\"><body><LD>{RAIL}{}{}</LD></body></action></actions>",
+        contact(1, "b", &[0]),
+        coil(2, "y", &[1])
+    );
+    let transitions = format!(
+        "<transitions><transition name=\"begin\"><body><LD>{coils}</LD></body></transition></transitions>"
+    );
+    let text = file(&declared, "").replace(
+        "<body><LD>\n</LD></body>",
+        &format!("{actions}{transitions}<body>{CHART}</body>"),
+    );
+    let program = program(&text);
+    let circuit = program.lower(PERIOD).expect("it was checked");
+    let mut run = Run::new(&circuit);
+    // a, b and then y, z: both branches begin together; y follows b while its step is active and is left as it is after that; z comes
+    // two scans after its step.
+    let scans = [
+        ("00", "00"),
+        ("01", "00"),
+        ("10", "00"),
+        ("00", "00"),
+        ("00", "01"),
+        ("00", "01"),
+        ("01", "00"),
+        ("11", "10"),
+        ("01", "10"),
+    ];
+    for (number, (inputs, outputs)) in scans.iter().enumerate() {
+        let inputs: Vec<bool> = inputs.chars().map(|bit| bit == '1').collect();
+        let shown: String = run
+            .step(&inputs)
+            .iter()
+            .map(|on| if *on { '1' } else { '0' })
+            .collect();
+        assert_eq!(shown, *outputs, "scan {number}\n{}", print(&program));
+    }
+}
+
+#[test]
+fn units_of_the_file_stand_in_place_of_their_calls() {
+    let path = format!(
+        "{}/../examples/plcopen/probes.xml",
+        env!("CARGO_MANIFEST_DIR")
+    );
+    let text = std::fs::read_to_string(path).expect("an example");
+    let program = program(&text);
+    let circuit = program.lower(PERIOD).expect("it was checked");
+    let mut run = Run::new(&circuit);
+    let mut dice = Dice::new(3);
+    let mut doubts = 0;
+    for scan in 0..200 {
+        let [a, b, c] = [dice.rarely(6), dice.rarely(6), false];
+        doubts = if a != b || a != c {
+            (doubts + 1).min(9)
+        } else {
+            0
+        };
+        let agreed = u8::from(a) + u8::from(b) + u8::from(c) >= 2;
+        let expected = vec![agreed, doubts >= 5];
+        assert_eq!(
+            run.step(&[a, b, c]),
+            expected,
+            "scan {scan}\n{}",
+            print(&program)
+        );
+    }
+}

@@ -301,7 +301,11 @@ fn actions(reader: &mut Reader, node: Node<'_, '_>) -> Vec<Action> {
                 _ => {}
             }
         }
-        actions.push(Action { qualifier, content });
+        actions.push(Action {
+            qualifier,
+            duration: attribute(action, "duration"),
+            content,
+        });
     }
     actions
 }

@@ -4,13 +4,13 @@ use std::ops::Range;
 use std::time::Duration;
 
 use understudy_ladder::{
-    Block, BlockKind, CoilKind, Contact, ContactKind, Element, Feed, MAXIMUM_PRESET_VALUE, Name,
-    Series,
+    Block, BlockKind, CoilKind, Contact, ContactKind, Element, Feed, MAXIMUM_PRESET_TIME,
+    MAXIMUM_PRESET_VALUE, Name, Series,
 };
 
 use super::Drawing;
 use super::scope::Binding;
-use crate::plcopen::document::Edge;
+use crate::plcopen::document::{Edge, Ignored};
 use crate::plcopen::literal::{integer, time};
 use crate::plcopen::plan::{Action, Call, Input};
 use crate::plcopen::power::Power;
@@ -221,6 +221,21 @@ impl Drawing<'_> {
         };
         if let Some(time) = time(&read.text) {
             return Some(time);
+        }
+        let number = match (integer(&read.text), self.scope.find(&read.text)) {
+            (Some(number), _) => Some(number),
+            (None, Some(Binding::Number(number))) if !self.writes(&read.text) => Some(number),
+            _ => None,
+        };
+        if let Some(scans) = number.and_then(|number| u32::try_from(number).ok()) {
+            // Not of the standard: one tool counts scans.
+            let what = format!(
+                "the type of the preset `{}`, which counts scans of {:?},",
+                read.text, self.period
+            );
+            let span = read.text.span();
+            self.ignored.push(Ignored { what, span });
+            return Some(self.period.saturating_mul(scans).min(MAXIMUM_PRESET_TIME));
         }
         match self.scope.find(&read.text) {
             Some(Binding::Time(time)) if !self.writes(&read.text) => Some(time),

@@ -213,7 +213,7 @@ impl<'a> Scope<'a> {
             };
             if variable.retain {
                 ignore(format!(
-                    "`{}` is to outlive a loss of power; here the other stations keep states",
+                    "the retention of `{}` over a loss of power",
                     variable.name
                 ));
             }
@@ -223,14 +223,14 @@ impl<'a> Scope<'a> {
             };
             if self.aliases.contains(&key) {
                 ignore(format!(
-                    "`{}` is a second name of `{name}`: they have one address",
+                    "`{}` as a second name of `{name}`, whose address it has,",
                     variable.name
                 ));
                 continue;
             }
             if *name != variable.name.as_str() {
                 ignore(format!(
-                    "`{}` is called `{name}`, as names are here",
+                    "the name `{}`, which is `{name}` here,",
                     variable.name
                 ));
             }

@@ -6,7 +6,7 @@ use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Name;
 
 use super::is_ladder;
-use crate::plcopen::document::{Graph, Kind, Object, Pin, Wire};
+use crate::plcopen::document::{CONDITION, Graph, Kind, Object, Pin, Wire};
 use crate::plcopen::standard::StandardBlock;
 
 /// Where power comes from.
@@ -68,7 +68,12 @@ impl Links {
             let mut inputs = Vec::new();
             for pin in &object.inputs {
                 resolver.check(object, pin, diagnostics);
-                let found = resolver.sources(pin);
+                // The ways of a sequence carry no power.
+                let found = if is_sequence(object) && pin.name.as_str() != CONDITION {
+                    Vec::new()
+                } else {
+                    resolver.sources(pin)
+                };
                 if counts(object) {
                     for source in &found {
                         if let Source::Output(from, _) = source {
@@ -94,6 +99,20 @@ impl Links {
             is_block: blocks,
         }
     }
+}
+
+fn is_sequence(object: &Object) -> bool {
+    matches!(
+        object.kind,
+        Kind::Step(..)
+            | Kind::Transition(_)
+            | Kind::Actions(_)
+            | Kind::JumpStep(_)
+            | Kind::SelectionDivergence
+            | Kind::SelectionConvergence
+            | Kind::SimultaneousDivergence
+            | Kind::SimultaneousConvergence
+    )
 }
 
 /// A right power rail, and what is looked through, do not use power.

@@ -7,8 +7,9 @@ use understudy_ladder::Name;
 
 use super::links::{Links, Source};
 use super::{Action, Call, Input, Plan, Step};
-use crate::plcopen::document::{Graph, Kind, Modifier, Object, Pin};
+use crate::plcopen::document::{CONDITION, Condition, Graph, Kind, Modifier, Object, Pin};
 use crate::plcopen::power::{Power, Read};
+use crate::plcopen::sequence::wired;
 use crate::plcopen::standard::StandardBlock;
 
 /// Power that is used more than once and has more readings is kept.
@@ -112,6 +113,7 @@ impl<'a> Walk<'a> {
             Kind::Coil(..) | Kind::OutVariable(..) => true,
             Kind::InOutVariable(..) => !self.graph.objects[place].inputs.is_empty(),
             Kind::Block(_) => self.links.is_block[place],
+            Kind::Transition(transition) => matches!(transition.condition, Condition::Wired),
             _ => false,
         }
     }
@@ -294,6 +296,23 @@ impl<'a> Walk<'a> {
                 }
                 let power = read(variable, *from, place);
                 self.pass(place, power);
+            }
+            Kind::Transition(_) => {
+                let input = object
+                    .inputs
+                    .iter()
+                    .position(|pin| pin.name.as_str() == CONDITION);
+                let power = self.power(place, input.unwrap_or(0));
+                let target = Name::at(wired(object), object.span.clone());
+                let targets = vec![(target, Modifier::default())];
+                self.step(
+                    place,
+                    Action::Write {
+                        targets,
+                        power,
+                        guard: None,
+                    },
+                );
             }
             Kind::Block(_) if self.links.is_block[place] => self.call(place),
             Kind::Block(_) => self.function(place),

@@ -341,10 +341,7 @@ impl<'a> Sheet<'a> {
             inputs.push((pin, vec![source]));
         }
         let mut outputs = block.kind.outputs().to_vec();
-        match pin_of_value(block) {
-            Some(pin) => outputs.push(pin),
-            None => {}
-        }
+        outputs.extend(pin_of_value(block));
         let rows = i64::try_from(inputs.len().max(outputs.len())).unwrap_or(1);
         let place = Place {
             x,
