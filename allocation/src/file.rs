@@ -74,7 +74,7 @@ fn read_records(text: &str, wrong: &mut Vec<Diagnostic>) -> Catalogue {
     let before = wrong.len();
     let columns = Columns::of(header, known, required, wrong);
     let is_missing = |name: &&str| !columns.places.contains_key(*name);
-    if wrong.len() > before && required.iter().any(|name| is_missing(&name)) {
+    if wrong.len() > before && required.iter().any(is_missing) {
         // Every line would lack what the header lacks.
         return Catalogue::default();
     }

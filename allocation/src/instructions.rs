@@ -163,7 +163,7 @@ impl Writer {
                         writer.put(operator, comparison.value.to_string());
                     });
                 }
-                Element::Branches(branches) if branches.iter().any(|branch| calls(branch)) => {
+                Element::Branches(branches) if branches.iter().any(calls) => {
                     self.branches_that_call(branches, power);
                 }
                 Element::Branches(branches) => {

@@ -6,12 +6,14 @@ use proptest::prelude::*;
 use understudy_allocation::packing::{BoxType, Packing, pack};
 use understudy_allocation::{Dimension, Load};
 
+/// Capacity, cost, stock, and which items must not be there.
+type Kind = ([u64; 2], u64, Option<usize>, Vec<bool>);
+
 /// What items take in two dimensions, and what boxes have.
 #[derive(Debug, Clone)]
 struct Case {
     takes: Vec<[u64; 2]>,
-    /// Capacity, cost, stock, and which items must not be there.
-    types: Vec<([u64; 2], u64, Option<usize>, Vec<bool>)>,
+    types: Vec<Kind>,
     apart: Vec<(usize, usize)>,
 }
 
