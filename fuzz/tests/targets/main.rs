@@ -3,6 +3,7 @@
 #![allow(clippy::print_stderr, reason = "a finding names its file")]
 
 mod attack;
+mod other_tools;
 
 use std::time::Duration;
 
@@ -37,6 +38,24 @@ fn ladder() {
             Ok(print(&program))
         );
         let _ = program.lower(Duration::from_millis(10));
+    });
+}
+
+#[test]
+fn plcopen() {
+    let seeds = ["examples/plcopen/pump.xml", "examples/plcopen/probes.xml"];
+    attack("plcopen", &seeds, |bytes| {
+        let reading = understudy_interchange::plcopen::read(&text(bytes), None);
+        let Some(program) = reading.program else {
+            assert!(!reading.diagnostics.is_empty(), "no program, and no reason");
+            return;
+        };
+        // What was read is sound, and what is written of it is read again.
+        let period = Duration::from_millis(10);
+        assert!(program.lower(period).is_ok());
+        let written = understudy_interchange::plcopen::write(&program, period);
+        let again = understudy_interchange::plcopen::read(&written, None);
+        assert!(again.program.is_some(), "{:?}", again.diagnostics);
     });
 }
 
