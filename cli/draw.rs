@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use understudy_diagnostic::Report;
-use understudy_ladder::{draw_svg, draw_text, parse};
+use understudy_interchange::{digraph, parse_program};
+use understudy_ladder::{draw_svg, draw_text};
 
 use crate::answer::Answer;
 use crate::files;
@@ -15,7 +16,8 @@ use crate::files;
 #[command(after_help = "\
 Example:
   understudy draw examples/press-cell/robot.ladder
-  understudy draw robot.ladder --as svg --output robot.svg")]
+  understudy draw robot.ladder --as svg --output robot.svg
+  understudy draw robot.ladder --as digraph --output robot.svg")]
 pub(crate) struct Arguments {
     /// The ladder program
     #[arg(value_name = "FILE.ladder")]
@@ -34,6 +36,8 @@ enum Form {
     Text,
     /// A picture for pages and print
     Svg,
+    /// A picture of its digraphs: elements are edges, connections are vertices
+    Digraph,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Answer {
@@ -41,7 +45,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         Ok(source) => source,
         Err(answer) => return answer,
     };
-    let parsed = parse(&source);
+    let parsed = parse_program(&arguments.ladder.display().to_string(), &source);
     let report = Report {
         name: arguments.ladder.display().to_string(),
         text: source,
@@ -53,6 +57,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     let text = match arguments.form {
         Form::Text => draw_text(&parsed.program),
         Form::Svg => draw_svg(&parsed.program),
+        Form::Digraph => digraph::draw_svg(&parsed.program),
     };
     let answer = match &arguments.output {
         None => {
