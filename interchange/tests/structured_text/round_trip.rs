@@ -82,6 +82,12 @@ proptest! {
     fn random_circuits_come_back(seed: u64) {
         check(&random_circuit(seed), seed);
     }
+
+    #[test]
+    fn random_ladders_come_back(seed: u64) {
+        let ladder = crate::random_ladder::random_program(seed, 6);
+        check(&ladder.lower(PERIOD).expect("a sound program"), seed);
+    }
 }
 
 #[test]

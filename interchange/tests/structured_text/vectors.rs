@@ -58,3 +58,90 @@ fn the_text_of_all_blocks_does_what_matiec_makes_of_it() {
         );
     }
 }
+
+/// The cases of the ladder's own tests, once as blocks of the ladder and once, called under a condition, as their definitions.
+#[test]
+fn the_standard_blocks_do_what_the_standard_says() {
+    let text = include_str!("../../../ladder/tests/ladder/vectors/semantics.txt");
+    let lines: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).collect();
+    let mut count = 0;
+    for case in lines
+        .split(|line| line.is_empty())
+        .filter(|case| !case.is_empty())
+    {
+        let (block, _) = case[0]
+            .split_once(':')
+            .expect("a block and what is to be seen");
+        let (kind, preset) = block.split_once(' ').unwrap_or((block, ""));
+        let rows = case[1..]
+            .iter()
+            .map(|line| line.split_once(' ').expect("a name and its values"));
+        let rows: Vec<(&str, Vec<bool>)> = rows
+            .map(|(name, values)| (name, bits(values.trim())))
+            .collect();
+        let (outputs, inputs): (Vec<_>, Vec<_>) = rows
+            .into_iter()
+            .partition(|(name, _)| name.starts_with('Q'));
+        let names = |rows: &[(&str, Vec<bool>)], prefix: &str| -> String {
+            let names: Vec<String> = rows
+                .iter()
+                .map(|(name, _)| format!("{prefix}{name}"))
+                .collect();
+            names.join(", ")
+        };
+        let given: Vec<String> = inputs
+            .iter()
+            .map(|(name, _)| format!("{name} := in_{name}"))
+            .collect();
+        let preset = match preset {
+            "" => String::new(),
+            time if time.ends_with("ms") => format!(", PT := T#{time}"),
+            number => format!(", PV := {number}"),
+        };
+        let call = format!("block({}{preset});", given.join(", "));
+        let shown: String = outputs
+            .iter()
+            .map(|(name, _)| format!("out_{name} := block.{name}; "))
+            .collect();
+        let mut calls = vec![call.clone()];
+        if !matches!(kind, "TON" | "TOF" | "TP") {
+            calls.push(format!("IF always THEN {call} END_IF;"));
+        }
+        for call in calls {
+            let source = format!(
+                "PROGRAM semantics VAR_INPUT {} : BOOL; END_VAR VAR_OUTPUT {} : BOOL; END_VAR \
+                 VAR block : {kind}; always : BOOL := TRUE; END_VAR {call} {shown} END_PROGRAM",
+                names(&inputs, "in_"),
+                names(&outputs, "out_")
+            );
+            let program = program(&source);
+            assert_eq!(
+                program.blocks().is_empty(),
+                call.starts_with("IF"),
+                "{source}"
+            );
+            let period = Duration::from_millis(100);
+            let mut scans = Interpreter::new(&program, period).expect("a sound program");
+            let mut circuit = Running::new(&program.lower(period).expect("a sound program"));
+            for scan in 0..inputs[0].1.len() {
+                let at = |rows: &[(&str, Vec<bool>)]| -> Vec<bool> {
+                    rows.iter().map(|(_, values)| values[scan]).collect()
+                };
+                assert_eq!(
+                    scans.scan(&at(&inputs)),
+                    at(&outputs),
+                    "{}, scan {scan}\n{source}",
+                    case[0]
+                );
+                assert_eq!(
+                    circuit.step(&at(&inputs)),
+                    at(&outputs),
+                    "{}, scan {scan}\n{source}",
+                    case[0]
+                );
+                count += 1;
+            }
+        }
+    }
+    assert!(count > 150, "{count}");
+}

@@ -9,6 +9,7 @@ mod generated;
 mod lowering;
 mod printing;
 mod random;
+mod semantics;
 mod structured_text_reader;
 mod support;
 mod vectors;
