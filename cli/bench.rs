@@ -225,7 +225,7 @@ pub(crate) fn kills(
         },
         ..Scenario::default()
     };
-    cell.run(&scenario, arguments, console)
+    cell.run(&scenario, arguments, None, console)
 }
 
 fn exchange(cycles: u64, real_time: bool) -> Answer {

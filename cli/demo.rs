@@ -11,6 +11,7 @@ use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
 use crate::lab::{Judged, RunArguments, in_laboratory, judged};
+use crate::watch::{BesideArguments, Page};
 
 /// Run the robot and the press of the paper on real processes, and kill each station once
 #[derive(Debug, Args)]
@@ -24,6 +25,8 @@ Exit status 0 only when every plant stayed functional and nothing wrong was appl
 pub(crate) struct Arguments {
     #[command(flatten)]
     run: RunArguments,
+    #[command(flatten)]
+    beside: BesideArguments,
 }
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
@@ -36,7 +39,8 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
     let Some(scenario) = found.scenario else {
         return Answer::bad_files(vec![found.report]);
     };
-    cell.run(&scenario, &arguments.run, console)
+    let page = arguments.beside.page();
+    cell.run(&scenario, &arguments.run, page.as_ref(), console)
 }
 
 /// The cluster of section V, written into the directory of its run.
@@ -80,6 +84,7 @@ impl PressCell {
             file,
             arguments,
             &self.directory,
+            None,
             console,
         )
     }
@@ -88,6 +93,7 @@ impl PressCell {
         &self,
         scenario: &Scenario,
         arguments: &RunArguments,
+        page: Option<&Page>,
         console: &mut Console,
     ) -> Answer {
         let scenario = scenario.clone().shortened(arguments.cycles);
@@ -98,6 +104,7 @@ impl PressCell {
             file,
             arguments,
             &self.directory,
+            page,
             console,
         )
     }

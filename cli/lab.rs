@@ -8,7 +8,7 @@ use understudy_cluster::Cluster;
 use understudy_network::Share;
 use understudy_scenarios::{
     HostKind, JOURNAL_LIMIT_BYTES, LaboratoryError, LaboratorySettings, NetworkSettings,
-    RunDirectory, RunDirectoryError, Scenario, Summary, World, run_laboratory,
+    RunDirectory, RunDirectoryError, Scenario, Summary, World, run_commanded,
 };
 
 use crate::answer::{Answer, Status};
@@ -17,13 +17,15 @@ use crate::files;
 use crate::overrides::{OverrideArguments, link_kind, parse_size};
 use crate::proxy::ImpairmentArguments;
 use crate::run::{answer, circumstances, command_line, machine};
+use crate::watch::{BesideArguments, Page};
 
 /// Run a cluster on real processes of this machine, and break it as a scenario says
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy lab examples/press-cell/cluster.toml --scenario scenarios/kill-each.toml --link udp
-  understudy lab examples/press-cell/cluster.toml --hosts netns --loss 1%")]
+  understudy lab examples/press-cell/cluster.toml --hosts netns --loss 1%
+  understudy lab examples/press-cell/cluster.toml --watch")]
 pub(crate) struct Arguments {
     /// The cluster file
     #[arg(value_name = "CLUSTER.toml")]
@@ -33,6 +35,8 @@ pub(crate) struct Arguments {
     /// The scenario file; without one the cluster runs undisturbed
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
+    #[command(flatten)]
+    beside: BesideArguments,
 }
 
 #[derive(Debug, Clone, Args)]
@@ -129,6 +133,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
         cluster_file,
         &arguments.run,
         &directory,
+        arguments.beside.page().as_ref(),
         console,
     )
     .with_reports(reports)
@@ -176,6 +181,7 @@ pub(crate) fn in_laboratory(
     cluster_file: PathBuf,
     arguments: &RunArguments,
     directory: &RunDirectory,
+    page: Option<&Page>,
     console: &mut Console,
 ) -> Answer {
     let (summary, run) = match judged(
@@ -184,6 +190,7 @@ pub(crate) fn in_laboratory(
         cluster_file,
         arguments,
         directory,
+        page,
         console,
     ) {
         Ok(judged) => judged,
@@ -212,15 +219,22 @@ pub(crate) fn judged(
     cluster_file: PathBuf,
     arguments: &RunArguments,
     directory: &RunDirectory,
+    page: Option<&Page>,
     console: &mut Console,
 ) -> Result<(Summary, Judged), Answer> {
-    let network = arguments.network.settings();
+    let network = NetworkSettings {
+        can_be_cut: page.is_some_and(Page::may_command),
+        ..arguments.network.settings()
+    };
     let settings = LaboratorySettings {
         journal_limit_bytes: arguments.journal_limit,
         ..laboratory_settings(cluster, cluster_file, &arguments.overrides, network)?
     };
+    let served = page.map(|page| page.beside(directory.path(), console));
+    let (_served, commands) = served.transpose()?.unzip();
+    let commands = commands.flatten();
     let mut watch = |progress| console.show(&progress);
-    let run = run_laboratory(cluster, scenario, settings, directory, &mut watch)
+    let run = run_commanded(cluster, scenario, settings, directory, commands, &mut watch)
         .map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))?;
     let machine = machine().into_iter().chain(run.machine).collect();
     let circumstances = circumstances(cluster, World::Laboratory, None, machine, command_line());

@@ -45,6 +45,7 @@ mod simulate;
 mod supervisor_to_ladder;
 mod synth;
 mod verify;
+mod watch;
 
 use std::process::ExitCode;
 
@@ -76,8 +77,9 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Demo(demo::Arguments),
-    Lab(lab::Arguments),
+    Demo(Box<demo::Arguments>),
+    Lab(Box<lab::Arguments>),
+    Watch(Box<watch::Arguments>),
     Simulate(simulate::Arguments),
     Check(check::Arguments),
     Explain(explain::Arguments),
@@ -116,6 +118,7 @@ impl Command {
         match self {
             Self::Demo(_) => "demo",
             Self::Lab(_) => "lab",
+            Self::Watch(_) => "watch",
             Self::Simulate(_) => "simulate",
             Self::Check(_) => "check",
             Self::Explain(_) => "explain",
@@ -154,6 +157,7 @@ impl Command {
         match self {
             Self::Demo(arguments) => demo::run(&arguments, console),
             Self::Lab(arguments) => lab::run(&arguments, console),
+            Self::Watch(arguments) => watch::run(&arguments, console),
             Self::Simulate(arguments) => simulate::run(&arguments),
             Self::Check(arguments) => check::run(&arguments),
             Self::Explain(arguments) => explain::run(&arguments),

@@ -4,13 +4,14 @@ use insta::assert_snapshot;
 
 use crate::understudy;
 
-const COMMANDS: [&str; 27] = [
+const COMMANDS: [&str; 28] = [
     "allocate",
     "catalogue",
     "resources",
     "campaign",
     "demo",
     "lab",
+    "watch",
     "simulate",
     "check",
     "explain",

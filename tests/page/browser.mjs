@@ -1,0 +1,226 @@
+// Drives every view of a page with Chromium, takes pictures, and fails where something is not as it has to be.
+//
+//   node tests/page/browser.mjs http://127.0.0.1:7480/ PICTURES [AXE.min.js]
+//
+// The page may command a laboratory of the press cell. With the file of axe-core, each view is checked for accessibility too.
+
+import { spawn } from "node:child_process";
+import { mkdirSync, mkdtempSync, readFileSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+
+const [url, pictures, axe] = process.argv.slice(2);
+const DEADLINE = 60_000;
+mkdirSync(pictures, { recursive: true });
+
+const profile = mkdtempSync(join(tmpdir(), "understudy-browser-"));
+const chromium = spawn(
+  process.env.UNDERSTUDY_BROWSER || "chromium",
+  ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--remote-debugging-pipe", `--user-data-dir=${profile}`, "about:blank"],
+  { stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"] },
+);
+const [, , , toBrowser, fromBrowser] = chromium.stdio;
+const waiting = new Map();
+const problems = [];
+let session;
+let number = 0;
+let rest = "";
+
+fromBrowser.setEncoding("utf8");
+fromBrowser.on("data", (data) => {
+  const messages = (rest + data).split("\0");
+  rest = messages.pop();
+  for (const text of messages) {
+    const message = JSON.parse(text);
+    if (message.id) {
+      const { resolve, reject } = waiting.get(message.id);
+      waiting.delete(message.id);
+      message.error ? reject(new Error(message.error.message)) : resolve(message.result);
+    } else if (message.method === "Runtime.exceptionThrown") {
+      const { exceptionDetails: details } = message.params;
+      problems.push(details.exception?.description ?? details.text);
+    } else if (message.method === "Log.entryAdded" && message.params.entry.level === "error") {
+      problems.push(`${message.params.entry.text} ${message.params.entry.url ?? ""}`);
+    }
+  }
+});
+
+function call(method, params = {}) {
+  number += 1;
+  toBrowser.write(`${JSON.stringify({ id: number, method, params, sessionId: session })}\0`);
+  const id = number;
+  return new Promise((resolve, reject) => waiting.set(id, { resolve, reject }));
+}
+
+async function evaluate(expression) {
+  const { result, exceptionDetails } = await call("Runtime.evaluate", { expression, awaitPromise: true, returnByValue: true });
+  if (exceptionDetails) {
+    throw new Error(`${expression}: ${exceptionDetails.exception?.description ?? exceptionDetails.text}`);
+  }
+  return result.value;
+}
+
+async function until(what, expression) {
+  const started = Date.now();
+  while (!(await evaluate(expression))) {
+    if (Date.now() - started > DEADLINE) {
+      await picture("failed");
+      throw new Error(`${what} did not come: ${expression}`);
+    }
+    await new Promise((resolve) => setTimeout(resolve, 100));
+  }
+}
+
+async function picture(name) {
+  const { data } = await call("Page.captureScreenshot", { format: "png" });
+  writeFileSync(join(pictures, `${name}.png`), Buffer.from(data, "base64"));
+}
+
+async function size(width, height, mobile) {
+  await call("Emulation.setDeviceMetricsOverride", { width, height, deviceScaleFactor: mobile ? 2 : 1, mobile });
+}
+
+async function scheme(value) {
+  await evaluate("localStorage.removeItem('theme')");
+  await call("Emulation.setEmulatedMedia", { features: [{ name: "prefers-color-scheme", value }] });
+}
+
+const text = (selector) => `(document.querySelector(${JSON.stringify(selector)})?.textContent ?? "")`;
+const click = (selector) => evaluate(`(() => { const found = document.querySelector(${JSON.stringify(selector)}); if (!found) throw new Error("nothing is there"); found.dispatchEvent(new MouseEvent("click", { bubbles: true })); })()`);
+const party = (name) => `g.party[data-name="${name}"]`;
+const stateOf = (name) => `document.querySelector('${party(name)}')?.dataset.state`;
+const open = (view) => evaluate(`location.hash = ${JSON.stringify(view)}`);
+
+async function accessible(view) {
+  if (!axe) {
+    return;
+  }
+  await evaluate(`${readFileSync(axe, "utf8")}; 0`);
+  const found = await evaluate("axe.run().then(({ violations }) => violations.map(({ id, impact, nodes }) => `${id} (${impact}): ${nodes.slice(0, 3).map((node) => node.target.join(' ')).join(' | ')}`))");
+  console.log(`axe ${view}: ${found.length === 0 ? "nothing" : found.join("\n  ")}`);
+  if (found.length > 0) {
+    problems.push(...found.map((line) => `axe ${view}: ${line}`));
+  }
+}
+
+async function drive() {
+  const { targetId } = await call("Target.createTarget", { url: "about:blank" });
+  session = (await call("Target.attachToTarget", { targetId, flatten: true })).sessionId;
+  await Promise.all(["Page.enable", "Runtime.enable", "Log.enable"].map((method) => call(method)));
+  await size(1280, 900, false);
+  await call("Page.navigate", { url });
+  await until("everybody", `['robot', 'press', 'understudy'].every((name) => document.querySelector('g.party[data-name="' + name + '"]')?.dataset.state === 'speaking')`);
+  await scheme("light");
+  await until("a margin", `${text("#survival-words")}.includes("any one further failure")`);
+  await picture("cluster");
+  await accessible("cluster");
+
+  // A kill: the outputs move on, and the margin shrinks.
+  await click(party("robot"));
+  await until("the dialog", "document.getElementById('command').open");
+  await picture("command");
+  await accessible("command");
+  await click("[data-command=kill]");
+  await until("its end", `${stateOf("robot")} === "killed"`);
+  await until("a smaller margin", `${text("#survival-words")}.includes("1 of 2 failures")`);
+  await until("restored outputs", `document.querySelector(".flow[data-source=reconstructed]") !== null`);
+  await picture("killed");
+  await scheme("dark");
+  await until("the dark", "document.documentElement.dataset.theme === 'dark'");
+  await picture("killed-dark");
+  await accessible("killed, dark");
+  await scheme("light");
+
+  // Why is an output as it is?
+  await click(".signal[data-kind=output]");
+  await until("an answer", `!document.getElementById("why").hidden && ${text("#why")}.includes("Lineage")`);
+  await picture("why");
+  await accessible("why");
+  await click("#why > button");
+
+  // A button that cannot act says why.
+  await click(party("robot"));
+  await until("a reason", `document.querySelector("[data-command=kill]")?.disabled && ${text("#command .actions")}.includes("cannot: it is down")`);
+  await click("[data-command=restart]");
+  await until("its return", `${stateOf("robot")} === "speaking"`);
+
+  // Force an output, and take it back.
+  await click(party("robot-io"));
+  await evaluate("document.getElementById('force-signal').value = 'output 0'");
+  await click("[data-command=force]");
+  await until("a forced output", `${text(".signal-forced:not(:empty)")}.includes("forced by")`);
+  await picture("forced");
+  await click(party("robot-io"));
+  await until("what can be taken back", `document.querySelector("[data-command=unforce]") !== null`);
+  await click("[data-command=unforce]");
+  await until("a free output", `document.querySelector(".signal-forced:not(:empty)") === null`);
+
+  await open("ladder");
+  await until("a ladder with power", `document.querySelector("#ladder-picture svg .live") !== null && ${text("#ladder-stamp")}.includes("as evaluated")`);
+  await until("a cross-reference", `document.querySelectorAll("#ladder-cross tbody tr").length > 3`);
+  await picture("ladder");
+  await accessible("ladder");
+  await evaluate("(() => { const palette = document.getElementById('ladder-palette'); palette.value = 'tia'; palette.dispatchEvent(new Event('change')); })()");
+  await scheme("dark");
+  await picture("ladder-tia-dark");
+  await accessible("ladder, dark");
+  await scheme("light");
+  await evaluate("(() => { const choose = document.getElementById('ladder-program'); choose.value = [...choose.options].at(-1).value; choose.dispatchEvent(new Event('change')); })()");
+  await until("the sum", `${text("#ladder-stamp")}.includes("the sum of")`);
+  await picture("sum");
+  await accessible("sum");
+
+  await open("trends");
+  await until("trends", `document.querySelector("#trend-plot canvas") !== null`);
+  await picture("trends");
+  await accessible("trends");
+
+  await open("events");
+  await until("events", `${text("#event-table tbody")}.includes("killed")`);
+  await until("an alarm", `document.querySelectorAll("#alarm-list li").length > 0`);
+  await click("#alarm-list li[data-open=true] button");
+  await until("its acknowledgement", `${text("#alarm-list")}.includes("acknowledged by")`);
+  await picture("events");
+  await accessible("events");
+
+  await open("compare");
+  await until("a comparison", `${text("#view-compare")}.includes("Compare")`);
+  await picture("compare");
+  await accessible("compare");
+
+  // Replay: back to the cycle of the kill.
+  await open("events");
+  await evaluate(`[...document.querySelectorAll("#event-table tr")].find((row) => row.textContent.includes("killed")).querySelector("button").click()`);
+  await open("cluster");
+  await until("the replay", "document.getElementById('live').getAttribute('aria-pressed') === 'false'");
+  await click("#forth");
+  await click("#forth");
+  await click("#forth");
+  await until("the past", `${stateOf("robot")} === "killed"`);
+  await picture("replay");
+  await click("#live");
+
+  await size(390, 844, true);
+  await until("live again", `${stateOf("robot")} === "speaking"`);
+  for (const view of ["cluster", "ladder", "trends", "events"]) {
+    await open(view);
+    await until(view, `!document.getElementById("view-${view}").hidden`);
+    await new Promise((resolve) => setTimeout(resolve, 800));
+    await picture(`phone-${view}`);
+    const wide = await evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth");
+    if (wide > 1) {
+      problems.push(`phone ${view}: ${wide} pixels too wide`);
+    }
+  }
+  await accessible("phone");
+}
+
+drive()
+  .catch((error) => problems.push(error.stack))
+  .finally(() => {
+    chromium.kill();
+    for (const problem of problems) {
+      console.error(problem);
+    }
+    process.exitCode = problems.length > 0 ? 1 : 0;
+  });

@@ -1,0 +1,41 @@
+//! A real browser drives every view of a real laboratory, where `UNDERSTUDY_BROWSER` names a Chromium and Node is installed.
+
+use std::process::Command;
+
+use crate::{Page, empty_folder, one_at_a_time, party, understudy};
+
+fn is_there(program: &str) -> bool {
+    let output = Command::new(program).arg("--version").output();
+    output.is_ok_and(|output| output.status.success())
+}
+
+#[test]
+fn a_browser_sees_a_kill_and_asks_why() {
+    let browser = std::env::var("UNDERSTUDY_BROWSER").unwrap_or_default();
+    if browser.is_empty() || !is_there("node") || !is_there(&browser) {
+        eprintln!("skipped: UNDERSTUDY_BROWSER names no Chromium, or Node is not installed");
+        return;
+    }
+    let _turn = one_at_a_time();
+    let folder = empty_folder("browser");
+    let mut command = understudy(&["watch", "examples/press-cell/cluster.toml"]);
+    command
+        .args(["--address", "127.0.0.1:0", "--allow-commands"])
+        .args(["--link", "udp", "--period", "50ms"])
+        .arg("--out")
+        .arg(folder.join("runs"));
+    let page = Page::start(command);
+    page.wait_for("a cluster in step", |state| {
+        party(state, "robot")["state"] == "speaking"
+    });
+    let output = Command::new("node")
+        .arg("tests/page/browser.mjs")
+        .arg(format!("http://{}/", page.address))
+        .arg(folder.join("pictures"))
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output()
+        .expect("node runs");
+    let said = String::from_utf8_lossy(&output.stdout);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said:.4000}{errors:.4000}");
+}

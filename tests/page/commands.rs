@@ -1,0 +1,134 @@
+//! Commands of the page against a real laboratory: each is done or refused with a reason, and each is in the journal.
+
+use std::fs;
+
+use serde_json::{Value, json};
+
+use crate::{Page, empty_folder, one_at_a_time, party, understudy};
+
+const PERIOD: &str = "50ms";
+
+fn started(name: &str) -> (Page, std::path::PathBuf) {
+    let runs = empty_folder(name);
+    let mut command = understudy(&["watch", "examples/press-cell/cluster.toml"]);
+    command
+        .args(["--address", "127.0.0.1:0", "--allow-commands"])
+        .args(["--link", "udp", "--period", PERIOD])
+        .arg("--out")
+        .arg(&runs);
+    let page = Page::start(command);
+    page.wait_for("a cluster in step", |state| {
+        let speaking = |name| party(state, name)["state"] == "speaking";
+        ["robot", "press", "understudy"].into_iter().all(speaking)
+    });
+    (page, runs)
+}
+
+fn give(page: &Page, name: &str, command: &Value) -> (u16, String) {
+    let body = json!({ "party": name, "command": command, "owner": "anna", "reason": "a test" });
+    let answer = page.post("/api/command", &body.to_string());
+    let code = if answer.status == 200 {
+        String::new()
+    } else {
+        answer.code()
+    };
+    (answer.status, code)
+}
+
+#[test]
+fn every_command_is_done_or_refused_and_is_in_the_journal() {
+    let _turn = one_at_a_time();
+    let (page, runs) = started("commands");
+    let done = (200, String::new());
+    let refused = |code: &str| (409, code.to_owned());
+    let simple = |command: &str| json!({ "command": command });
+
+    assert_eq!(give(&page, "robot", &simple("kill")), done);
+    page.wait_for("its end", |state| {
+        party(state, "robot")["state"] == "killed"
+            && state["programs"][0]["source"] == "reconstructed"
+    });
+    assert_eq!(give(&page, "robot", &simple("kill")), refused("U0551"));
+    assert_eq!(give(&page, "robot", &simple("restart")), done);
+    assert_eq!(give(&page, "robot", &simple("restart")), refused("U0552"));
+    page.wait_for("its return", |state| {
+        party(state, "robot")["state"] == "speaking"
+    });
+
+    assert_eq!(give(&page, "press", &simple("continue")), refused("U0553"));
+    assert_eq!(give(&page, "press", &simple("stop")), done);
+    page.wait_for("its silence", |state| {
+        party(state, "press")["state"] == "stopped"
+    });
+    assert_eq!(give(&page, "press", &simple("continue")), done);
+    page.wait_for("its return", |state| {
+        party(state, "press")["state"] == "speaking"
+    });
+
+    assert_eq!(give(&page, "press", &simple("isolate")), done);
+    page.wait_for("a restored press", |state| {
+        state["programs"][1]["source"] == "reconstructed"
+    });
+    assert_eq!(give(&page, "press", &simple("rejoin")), done);
+    page.wait_for("its return", |state| {
+        party(state, "press")["state"] == "speaking"
+    });
+
+    assert_eq!(give(&page, "robot", &simple("release")), refused("U0554"));
+    assert_eq!(
+        give(&page, "nobody", &simple("kill")),
+        (404, "U0681".to_owned())
+    );
+    let force = |signal: Value, seconds: u32| json!({ "command": "force", "signal": signal, "value": true, "seconds": seconds });
+    assert_eq!(
+        give(&page, "robot-io", &force(json!({ "input": 900 }), 5)),
+        refused("U0556")
+    );
+    assert_eq!(
+        give(&page, "robot-io", &force(json!({ "output": 0 }), 0)),
+        refused("U0556")
+    );
+    assert_eq!(
+        give(&page, "robot-io", &force(json!({ "output": 0 }), 3600)),
+        done
+    );
+    page.wait_for("a forced output", |state| {
+        state["programs"][0]["forced"][0]["owner"] == "anna"
+    });
+    let unforce = json!({ "command": "unforce", "signal": { "output": 0 } });
+    assert_eq!(give(&page, "robot-io", &unforce), done);
+    page.wait_for("a free output", |state| {
+        state["programs"][0]["forced"]
+            .as_array()
+            .is_some_and(Vec::is_empty)
+    });
+
+    let run = fs::canonicalize(runs.join("latest")).expect("a run");
+    assert_eq!(page.end(), 0);
+    let journal = fs::read_to_string(run.join("journal.jsonl")).expect("a journal");
+    let records = journal
+        .lines()
+        .map(|line| serde_json::from_str::<Value>(line).expect("a record"));
+    let commanded: Vec<Value> = records
+        .map(|record| record["event"].clone())
+        .filter(|event| event["event"] == "commanded")
+        .collect();
+    assert_eq!(commanded.len(), 14, "{commanded:?}");
+    assert!(
+        commanded
+            .iter()
+            .all(|event| event["owner"] == "anna" && event["reason"] == "a test")
+    );
+    let refused = commanded
+        .iter()
+        .filter(|event| event["refused"].is_string());
+    assert_eq!(refused.count(), 6);
+    let summary = fs::read_to_string(run.join("summary.json")).expect("a summary");
+    let summary: Value = serde_json::from_str(&summary).expect("JSON");
+    let wrong = |remote_io: &Value| remote_io["counts"]["wrong"] == 0;
+    assert!(
+        summary["remote_ios"]
+            .as_array()
+            .is_some_and(|all| all.iter().all(wrong))
+    );
+}

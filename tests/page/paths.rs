@@ -1,0 +1,230 @@
+//! Every path of the page of a finished run, asked well and badly.
+
+use std::process::Stdio;
+
+use crate::{Page, empty_folder, party, simulated_run, understudy};
+
+#[test]
+fn a_finished_run_answers_every_question() {
+    let run = simulated_run(&empty_folder("paths"));
+    let page = Page::of_run(&run);
+
+    let facts = page.get("/api/run").json();
+    assert_eq!(facts["stations"].as_array().map(Vec::len), Some(3));
+    assert!(facts["commands"]["why"].is_string(), "it only looks");
+
+    // While the robot's station is down, its outputs are restored, and the understudy must not fail too.
+    let down = page.get("/api/state?cycle=100").json();
+    assert_eq!(party(&down, "robot")["state"], "killed");
+    assert_eq!(down["programs"][0]["source"], "reconstructed");
+    assert_eq!(down["programs"][0]["word_of"], "understudy");
+    assert_eq!(down["survival"]["level"], "some", "{}", down["survival"]);
+    let before = page.get("/api/state?cycle=20").json();
+    assert_eq!(party(&before, "robot")["state"], "speaking");
+    assert_eq!(before["programs"][0]["source"], "direct");
+    assert_eq!(before["survival"]["level"], "all", "{}", before["survival"]);
+    let after = page.get("/api/state?cycle=280").json();
+    assert_eq!(party(&after, "robot")["state"], "speaking");
+
+    let picture = page.get("/api/ladder/0?cycle=100").json();
+    let svg = picture["svg"].as_str().expect("a picture");
+    assert!(svg.starts_with("<svg") && svg.contains("class=\"live\""));
+    assert!(
+        picture["words"]
+            .as_str()
+            .expect("words")
+            .contains("cycle 100")
+    );
+    let addresses = page.get("/api/ladder/0?names=addresses&find=%25QX").json();
+    assert!(
+        addresses["svg"]
+            .as_str()
+            .expect("a picture")
+            .contains("%QX")
+    );
+    let nothing = page.get("/api/ladder/0?find=nothing-has-this-name").json();
+    assert!(nothing["words"].as_str().expect("words").contains("0 of"));
+
+    let cross = page.get("/api/cross-reference/1").json();
+    assert!(
+        cross["signals"]
+            .as_array()
+            .is_some_and(|lines| !lines.is_empty())
+    );
+
+    let why = page.get("/api/why/0/0?cycle=100").json();
+    assert_eq!(why["source"], "reconstructed");
+    assert_eq!(why["restored"]["proved"], true);
+
+    let trends = page
+        .get("/api/trends?signals=0.output.0,1.input.1&from=0&to=290")
+        .json();
+    assert_eq!(trends["signals"].as_array().map(Vec::len), Some(2));
+    let sources = trends["sources"][0]["runs"].as_array().expect("runs");
+    assert!(sources.iter().any(|run| run[2] == "reconstructed"));
+    assert!(
+        trends["faults"]
+            .as_array()
+            .is_some_and(|faults| faults.len() >= 2)
+    );
+
+    let events = page.get("/api/events?find=killed").json();
+    assert!(
+        events["events"]
+            .as_array()
+            .is_some_and(|events| !events.is_empty())
+    );
+
+    for path in [
+        "/",
+        "/page.js",
+        "/page.css",
+        "/vendor/uPlot.iife.min.js",
+        "/icon.svg",
+    ] {
+        let asset = page.get(path);
+        assert_eq!(asset.status, 200, "{path}");
+        assert!(asset.head.contains("content-security-policy"), "{path}");
+    }
+    assert_eq!(page.end(), 0);
+}
+
+#[test]
+fn bad_questions_get_clear_answers_and_stop_nothing() {
+    let run = simulated_run(&empty_folder("bad"));
+    let page = Page::of_run(&run);
+    let long = "a".repeat(3000);
+    let get = [
+        ("/nothing", 404, "U0681"),
+        ("/../../etc/passwd", 404, "U0681"),
+        ("/vendor/", 404, "U0681"),
+        ("/api/nothing", 404, "U0681"),
+        ("/api/state?cycle=9999999", 404, "U0683"),
+        ("/api/state?cycle=-5", 404, "U0683"),
+        ("/api/state?cycle=1e9", 400, "U0682"),
+        ("/api/state?cycle=", 400, "U0682"),
+        ("/api/state?cycle=99999999999999999999", 400, "U0682"),
+        ("/api/ladder/9", 404, "U0681"),
+        ("/api/ladder/x", 400, "U0682"),
+        ("/api/ladder/256", 400, "U0682"),
+        ("/api/ladder/0?names=nothing", 400, "U0682"),
+        ("/api/cross-reference/77", 404, "U0681"),
+        ("/api/why/0/99", 404, "U0681"),
+        ("/api/why/0/-1", 400, "U0682"),
+        ("/api/why/0", 404, "U0681"),
+        ("/api/trends", 400, "U0682"),
+        ("/api/trends?from=10&to=0", 400, "U0682"),
+        ("/api/trends?from=0&to=9000000000000000000", 400, "U0682"),
+        (
+            "/api/trends?from=-9223372036854775808&to=9223372036854775807",
+            400,
+            "U0682",
+        ),
+        ("/api/trends?signals=0.nothing.0&from=0&to=9", 404, "U0681"),
+        ("/api/trends?signals=0.output.99&from=0&to=9", 404, "U0681"),
+        ("/api/events?limit=-1", 400, "U0682"),
+        ("/api/compare", 400, "U0682"),
+        ("/api/compare?with=..%2F..", 404, "U0681"),
+        ("/api/compare?with=latest", 404, "U0681"),
+        ("/api/command", 405, "U0682"),
+    ];
+    for (path, status, code) in get {
+        let answer = page.get(path);
+        assert_eq!(
+            (answer.status, answer.code().as_str()),
+            (status, code),
+            "{path}: {}",
+            answer.body
+        );
+    }
+    let unread = page.get(&format!("/api/events?find={long}"));
+    assert_eq!(unread.status, 200);
+    let kill = r#"{"party":"robot","command":{"command":"kill"},"owner":"anna","reason":"a test"}"#;
+    let post = [
+        ("/api/command", kill, 403, "U0684"),
+        ("/api/command", "", 400, "U0682"),
+        ("/api/command", "{", 400, "U0682"),
+        ("/api/command", "[]", 400, "U0682"),
+        ("/api/command", r#"{"party":"robot"}"#, 400, "U0682"),
+        (
+            "/api/alarms/77/acknowledge",
+            r#"{"owner":"anna"}"#,
+            404,
+            "U0681",
+        ),
+        (
+            "/api/alarms/77/acknowledge",
+            r#"{"owner":"\n"}"#,
+            400,
+            "U0682",
+        ),
+        ("/api/login", r#"{"token":"x"}"#, 400, "U0682"),
+        ("/api/logout", "{}", 400, "U0682"),
+        ("/api/state", "{}", 405, "U0682"),
+        ("/api/command", long.as_str(), 400, "U0682"),
+    ];
+    for (path, body, status, code) in post {
+        let answer = page.post(path, body);
+        assert_eq!(
+            (answer.status, answer.code().as_str()),
+            (status, code),
+            "{path} {body:.80}: {}",
+            answer.body
+        );
+    }
+    let much = format!("\"{}\"", "a".repeat(10_000));
+    assert_eq!(page.post("/api/command", &much).code(), "U0682");
+    assert_eq!(page.get("/api/state").status, 200, "it still answers");
+}
+
+#[test]
+fn other_pages_cannot_ask() {
+    let run = simulated_run(&empty_folder("foreign"));
+    let page = Page::of_run(&run);
+    let of_host = |host: &str| {
+        let text = format!("GET /api/state HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n");
+        page.request(&text).status
+    };
+    assert_eq!(of_host(&page.address), 200);
+    assert_eq!(of_host("localhost:1"), 200);
+    assert_eq!(
+        of_host("evil.example"),
+        403,
+        "a name that now means this machine"
+    );
+    let body = r#"{"owner":"anna"}"#;
+    let post = |lines: &str| {
+        page.post_with("/api/alarms/77/acknowledge", lines, body)
+            .code()
+    };
+    assert_eq!(post("Origin: https://evil.example\r\n"), "U0685");
+    assert_eq!(post("Origin: null\r\n"), "U0685");
+    assert_eq!(post(""), "U0685");
+    assert_eq!(
+        post("X-Understudy: 1\r\n"),
+        "U0681",
+        "a program that means this"
+    );
+    let form = page.request(&format!(
+        "POST /api/command HTTP/1.1\r\nHost: {0}\r\nOrigin: http://{0}\r\nContent-Type: text/plain\r\nContent-Length: 2\r\nConnection: close\r\n\r\n{{}}",
+        page.address
+    ));
+    assert_eq!(form.code(), "U0682");
+}
+
+#[test]
+fn a_page_for_other_machines_asks_who_may_log_in() {
+    let run = simulated_run(&empty_folder("machines"));
+    let output = understudy(&["watch", "--address", "0.0.0.0:0"])
+        .arg(&run)
+        .stdin(Stdio::null())
+        .output()
+        .expect("the binary is built");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("U0674"), "{said}");
+    let nothing = understudy(&["watch", "nothing-lies-here"])
+        .output()
+        .expect("the binary is built");
+    assert_eq!(nothing.status.code(), Some(2));
+}

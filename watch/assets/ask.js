@@ -1,0 +1,53 @@
+// Questions to the server. Every answer is JSON; what cannot be answered comes as an Error with the server's own words.
+
+export async function ask(path) {
+  return answered(await fetch(path));
+}
+
+export async function tell(path, body) {
+  const answer = await fetch(path, {
+    method: "POST",
+    headers: { "content-type": "application/json" },
+    body: JSON.stringify(body),
+  });
+  return answered(answer);
+}
+
+async function answered(answer) {
+  const said = await answer.json().catch(() => null);
+  if (answer.ok) {
+    return said;
+  }
+  if (answer.status === 401) {
+    location.assign("/login.html");
+  }
+  const error = said?.error;
+  throw new Error(error ? `${error.message} (${error.code})` : `the page answered ${answer.status}`);
+}
+
+let hiding = 0;
+
+// A sentence that goes away by itself.
+export function toast(text) {
+  const place = document.getElementById("toast");
+  place.textContent = text;
+  place.hidden = false;
+  // Above a dialog that is open.
+  place.hidePopover?.();
+  place.showPopover?.();
+  clearTimeout(hiding);
+  hiding = setTimeout(() => {
+    place.hidePopover?.();
+    place.hidden = true;
+  }, 8000);
+}
+
+// Runs an action of somebody; what it throws is shown.
+export async function act(work) {
+  try {
+    return await work();
+  } catch (error) {
+    toast(error.message);
+    return undefined;
+  }
+}

@@ -1,0 +1,77 @@
+// Sources as bands below the trends and faults as upright lines through them. Each source has a pattern as well as a colour.
+
+const PATTERNS = { direct: "plain", reconstructed: "slanted", held: "dots", "fail-safe": "filled" };
+
+export function bandPlugin(answer, color) {
+  return {
+    hooks: {
+      drawClear: (plot) => {
+        const { ctx, bbox } = plot;
+        const x = (cycle) => Math.min(Math.max(plot.valToPos(cycle, "x", true), bbox.left), bbox.left + bbox.width);
+        ctx.save();
+        answer.sources.forEach((band, row) => {
+          const top = plot.valToPos(-0.35 - row * 0.7, "y", true);
+          const bottom = plot.valToPos(-0.35 - row * 0.7 - 0.5, "y", true);
+          for (const [from, to, source] of band.runs) {
+            stripe(ctx, x(from), top, x(to + 1), bottom, PATTERNS[source] ?? "none", color(`--source-${source}`) || color("--line"));
+          }
+          ctx.fillStyle = color("--ink");
+          ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
+          ctx.textAlign = "right";
+          ctx.fillText(band.name.slice(0, 18), bbox.left - 8 * devicePixelRatio, (top + bottom) / 2 + 4 * devicePixelRatio);
+        });
+        ctx.restore();
+      },
+      draw: (plot) => {
+        const { ctx, bbox } = plot;
+        ctx.save();
+        ctx.strokeStyle = color("--bad");
+        ctx.fillStyle = color("--bad");
+        ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
+        ctx.setLineDash([5, 4]);
+        answer.faults.forEach((fault, number) => {
+          const at = plot.valToPos(fault.cycle, "x", true);
+          if (at < bbox.left || at > bbox.left + bbox.width) {
+            return;
+          }
+          ctx.beginPath();
+          ctx.moveTo(at, bbox.top);
+          ctx.lineTo(at, bbox.top + bbox.height);
+          ctx.stroke();
+          const late = at > bbox.left + bbox.width * 0.8;
+          ctx.textAlign = late ? "right" : "left";
+          ctx.fillText(fault.words.length > 32 ? `${fault.words.slice(0, 31)}…` : fault.words, at + (late ? -4 : 4), bbox.top + (12 + (number % 3) * 13) * devicePixelRatio);
+        });
+        ctx.restore();
+      },
+    },
+  };
+}
+
+function stripe(ctx, left, top, right, bottom, pattern, color) {
+  const width = Math.max(right - left, 1);
+  ctx.save();
+  ctx.beginPath();
+  ctx.rect(left, top, width, bottom - top);
+  ctx.clip();
+  ctx.fillStyle = color;
+  ctx.strokeStyle = color;
+  ctx.globalAlpha = pattern === "filled" ? 1 : 0.25;
+  ctx.fillRect(left, top, width, bottom - top);
+  ctx.globalAlpha = 1;
+  const step = 7 * devicePixelRatio;
+  if (pattern === "slanted") {
+    ctx.lineWidth = 2 * devicePixelRatio;
+    for (let x = left - (bottom - top); x < right; x += step) {
+      ctx.beginPath();
+      ctx.moveTo(x, bottom);
+      ctx.lineTo(x + (bottom - top), top);
+      ctx.stroke();
+    }
+  } else if (pattern === "dots") {
+    for (let x = left + step / 2; x < right; x += step) {
+      ctx.fillRect(x, (top + bottom) / 2 - devicePixelRatio, 2 * devicePixelRatio, 2 * devicePixelRatio);
+    }
+  }
+  ctx.restore();
+}

@@ -1,0 +1,137 @@
+// The cluster: who works, from where each plant gets its outputs, and what could fail now.
+
+import { el, keyed, setText, setAttribute } from "/element.js";
+import { makePicture } from "/picture.js";
+import { openParty } from "/commands.js";
+import { openWhy } from "/why.js";
+
+let run = null;
+let place = null;
+let picture = null;
+
+export const SOURCES = {
+  direct: { sign: "→", words: "direct" },
+  reconstructed: { sign: "⊕", words: "restored" },
+  held: { sign: "‖", words: "held" },
+  "fail-safe": { sign: "⏻", words: "fail-safe" },
+  unknown: { sign: "?", words: "not known" },
+};
+
+export function prepare(facts) {
+  run = facts;
+  picture = makePicture(run, openParty);
+  const table = (id, heads) =>
+    el("table", { id }, el("thead", {}, el("tr", {}, heads.map((head) => el("th", { scope: "col" }, head)))), el("tbody"));
+  const card = (id, heading, ...content) =>
+    el("section", { id: `${id}-card`, class: "card", "aria-labelledby": `${id}-title` }, el("h2", { id: `${id}-title` }, heading), content);
+  place = document.getElementById("view-cluster");
+  place.append(
+    el("div", { class: "picture-frame", tabindex: "0", role: "region", "aria-label": "Picture of the cluster" }, picture.element),
+    el("div", { class: "cards" },
+      card("survival", "What could fail now", el("p", { id: "survival-words", class: "verdict" }), el("ul", { id: "survival-list", class: "plain" })),
+      card("timing", "Cycle", el("dl", { id: "timing-list" })),
+      card("counts", "Outputs so far", el("div", { class: "wide", tabindex: "0", role: "region", "aria-label": "Table of outputs so far" }, table("counts-table", ["program", "direct", "restored", "held", "fail-safe"]))),
+      card("signals", "Inputs and outputs", el("div", { id: "signals-list" })),
+    ),
+  );
+}
+
+export function show(state) {
+  picture.show(state);
+  survival(state.survival);
+  timing(state);
+  counts(state);
+  signals(state);
+}
+
+function survival(margin) {
+  const words = document.getElementById("survival-words");
+  setText(words, margin.words);
+  setAttribute(words, "data-level", margin.level);
+  const item = (failure) => (failure.masked ? `✓ ${failure.names.join(" and ")}: masked` : `✗ ${failure.names.join(" and ")}: ${failure.why}`);
+  keyed(
+    document.getElementById("survival-list"),
+    margin.failures,
+    (failure) => failure.names.join("+"),
+    () => el("li"),
+    (line, failure) => {
+      setText(line, item(failure));
+      setAttribute(line, "class", failure.masked ? "good" : "bad");
+    },
+  );
+}
+
+function timing(state) {
+  const micro = (value) => (value === null || value === undefined ? "not known" : value >= 1000 ? `${(value / 1000).toFixed(2)} ms` : `${value} µs`);
+  const { timing } = state;
+  const lines = [
+    ["period", micro(run.period_us)],
+    ["last cycle took", micro(timing.cycle_us)],
+    ["deadline", micro(run.deadline_us)],
+    ["last turn before it", micro(timing.margin_us)],
+    ["least so far", micro(timing.least_margin_us)],
+    ["starts the cycles", state.pacemaker ?? "nobody"],
+    ["host stood still", `${timing.stalls} times`],
+  ];
+  keyed(
+    document.getElementById("timing-list"),
+    lines,
+    ([name]) => name,
+    ([name]) => el("div", {}, el("dt", {}, name), el("dd")),
+    (line, [, value]) => setText(line.lastChild, value),
+  );
+}
+
+function counts(state) {
+  const body = document.querySelector("#counts-table tbody");
+  keyed(
+    body,
+    state.programs,
+    (program) => program.name,
+    (program) => el("tr", {}, el("th", { scope: "row" }, program.name), el("td"), el("td"), el("td"), el("td")),
+    (row, { counts }) => {
+      const numbers = [counts.direct, counts.reconstructed, counts.held, counts.fail_safe];
+      numbers.forEach((number, index) => setText(row.children[index + 1], String(number)));
+    },
+  );
+}
+
+function signals(state) {
+  keyed(
+    document.getElementById("signals-list"),
+    state.programs,
+    (program) => program.name,
+    (program) => {
+      const facts = run.programs[program.index];
+      const line = (signal, kind, index) =>
+        el("button", { type: "button", class: "signal", "data-kind": kind, "data-index": index, click: () => pick(program.index, kind, index) },
+          el("span", { class: "lamp", "aria-hidden": "true" }), el("span", { class: "signal-name" }, signal.name), el("span", { class: "signal-value" }), el("span", { class: "signal-forced" }));
+      return el("details", { open: true },
+        el("summary", {}, program.name, " ", el("span", { class: "source-words" })),
+        el("div", { class: "signal-columns" },
+          el("div", {}, el("h3", {}, "inputs"), facts.inputs.map((signal, index) => line(signal, "input", index))),
+          el("div", {}, el("h3", {}, "outputs"), facts.outputs.map((signal, index) => line(signal, "output", index)))));
+    },
+    (details, program) => {
+      const source = SOURCES[program.source] ?? SOURCES.unknown;
+      setText(details.querySelector(".source-words"), `${source.sign} ${source.words}${program.word_of ? ` by ${program.word_of}` : ""}`);
+      for (const button of details.querySelectorAll(".signal")) {
+        const { kind, index } = button.dataset;
+        const values = kind === "input" ? program.inputs : program.outputs;
+        const forced = program.forced.find((force) => force.kind === kind && String(force.index) === index);
+        const value = forced && kind === "output" ? String(Number(forced.value)) : (values?.[index] ?? "?");
+        setText(button.querySelector(".signal-value"), value);
+        setText(button.querySelector(".signal-forced"), forced ? `forced by ${forced.owner}` : "");
+        setAttribute(button, "data-value", value);
+      }
+    },
+  );
+}
+
+function pick(program, kind, index) {
+  if (kind === "output") {
+    openWhy(program, index);
+  } else {
+    openParty({ kind: "remote-io", program }, { kind, index });
+  }
+}

@@ -1,0 +1,122 @@
+// What somebody does to a party. A button that cannot act says why beside it.
+
+import { act, tell, toast } from "/ask.js";
+import { el } from "/element.js";
+import { isLive, state } from "/time.js";
+
+let run = null;
+
+export const owner = () => run?.person || localStorage.getItem("owner") || "somebody";
+
+export function prepare(facts) {
+  run = facts;
+  document.getElementById("command").addEventListener("click", (event) => {
+    if (event.target.id === "command") {
+      event.target.close();
+    }
+  });
+}
+
+// Why nothing at all can be commanded now; nothing where it can.
+function obstacle() {
+  if (run.commands.why) {
+    return run.commands.why;
+  }
+  if (!isLive()) {
+    return "this is a replay: go live to command";
+  }
+  return state()?.finished ? "the run has ended" : null;
+}
+
+const DOWN = "it is down";
+const UP = "it is running";
+
+// Each action with the reason why it cannot act now, if there is one.
+function actions(party) {
+  const { down } = party;
+  const still = party.state === "stopped";
+  const all = [
+    ["kill", "Kill", "as kill -9", down ? DOWN : null],
+    ["restart", "Start again", "", down ? null : UP],
+    ["stop", "Make stand still", "as SIGSTOP", down ? DOWN : still ? "it stands still already" : null],
+    ["continue", "Let go on", "as SIGCONT", down ? DOWN : still ? null : "it does not stand still"],
+  ];
+  if (party.kind !== "plant") {
+    const cut = party.cut;
+    all.push(["isolate", "Cut off", "from all other parties", cut ? "it is cut off already" : null]);
+    all.push(["rejoin", "Connect again", "", cut ? null : "it is not cut off"]);
+  }
+  if (party.kind === "remote-io") {
+    all.push(["release", "Release", "its outputs, and the stations that it excluded", down ? DOWN : null]);
+  }
+  return all;
+}
+
+function find(wanted) {
+  const parties = state()?.parties ?? [];
+  if (wanted.name) {
+    return parties.find((party) => party.name === wanted.name);
+  }
+  return parties.find((party) => party.kind === wanted.kind && party.program === wanted.program);
+}
+
+export function openParty(wanted, signal) {
+  const party = find(wanted);
+  if (!party) {
+    return;
+  }
+  const dialog = document.getElementById("command");
+  const because = obstacle();
+  const reason = el("input", { id: "command-reason", type: "text", maxlength: "120", value: "try it", required: true });
+  const who = el("input", { id: "command-owner", type: "text", maxlength: "40", value: owner(), required: true, disabled: Boolean(run.person) });
+  const give = async (command) => {
+    localStorage.setItem("owner", who.value);
+    const body = { party: party.name, command, owner: who.value, reason: reason.value };
+    const done = await act(() => tell("/api/command", body));
+    if (done) {
+      toast(`${party.name}: done`);
+      dialog.close();
+    }
+  };
+  const button = ([name, words, meaning, why]) => {
+    const reasonWhy = because ?? why;
+    return el("li", {},
+      el("button", { type: "button", disabled: Boolean(reasonWhy), "data-command": name, click: () => give({ command: name }) }, words),
+      " ", el("span", { class: "soft" }, reasonWhy ? `cannot: ${reasonWhy}` : meaning));
+  };
+  const content = [
+    el("h2", { id: "command-title" }, party.name),
+    el("p", {}, `${party.kind}: ${party.state}${party.note ? `, ${party.note}` : ""}`),
+    because ? el("p", { class: "obstacle" }, because) : null,
+    el("p", { class: "who" }, el("label", {}, "Who ", who), " ", el("label", {}, "Why ", reason)),
+    el("ul", { class: "plain actions" }, actions(party).map(button)),
+    party.kind === "remote-io" ? forcing(party, signal, because, give) : null,
+    el("form", { method: "dialog" }, el("button", { type: "submit", autofocus: true }, "Close")),
+  ];
+  dialog.replaceChildren(...content.filter(Boolean));
+  dialog.showModal();
+}
+
+function forcing(party, signal, because, give) {
+  const facts = run.programs[party.program];
+  const option = (kind) => (item, index) =>
+    el("option", { value: `${kind} ${index}`, selected: signal?.kind === kind && signal?.index === index }, `${kind} ${item.name}`);
+  const which = el("select", { id: "force-signal" }, facts.inputs.map(option("input")), facts.outputs.map(option("output")));
+  const value = el("select", { id: "force-value" }, el("option", { value: "1" }, "1"), el("option", { value: "0" }, "0"));
+  const seconds = el("input", { id: "force-seconds", type: "number", min: "1", max: "3600", value: "60" });
+  const chosen = () => {
+    const [kind, index] = which.value.split(" ");
+    return { [kind]: Number(index) };
+  };
+  const down = because ?? (party.down ? DOWN : null);
+  const forces = state().programs[party.program].forced;
+  const held = forces.map((force) =>
+    el("li", {}, `${force.kind} ${facts[`${force.kind}s`][force.index].name} = ${Number(force.value)}, by ${force.owner}: ${force.reason} `,
+      el("button", { type: "button", disabled: Boolean(down), "data-command": "unforce", click: () => give({ command: "unforce", signal: { [force.kind]: force.index } }) }, "Take back")));
+  return el("fieldset", {},
+    el("legend", {}, "Force a signal"),
+    el("label", {}, "Signal ", which), " ", el("label", {}, "Value ", value), " ", el("label", {}, "for seconds ", seconds), " ",
+    el("button", { type: "button", disabled: Boolean(down), "data-command": "force", click: () => give({ command: "force", signal: chosen(), value: value.value === "1", seconds: Number(seconds.value) }) }, "Force"),
+    down ? el("span", { class: "soft" }, ` cannot: ${down}`) : null,
+    el("ul", { class: "plain" }, held));
+}

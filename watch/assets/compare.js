@@ -1,0 +1,42 @@
+// This run beside another one: the first cycle in which they differ, and what differs.
+
+import { act, ask } from "/ask.js";
+import { el } from "/element.js";
+import { goTo } from "/time.js";
+
+export function prepare(run) {
+  const select = el("select", { id: "compare-with" }, run.others.map((name) => el("option", { value: name }, name)));
+  const button = el("button", { type: "button", id: "compare-go", disabled: run.others.length === 0, click: () => compare(select.value) }, "Compare");
+  document.getElementById("view-compare").append(
+    el("section", { class: "card", "aria-labelledby": "compare-title" },
+      el("h2", { id: "compare-title" }, "Compare with another run"),
+      run.others.length
+        ? el("p", {}, el("label", {}, "Run ", select), " ", button)
+        : el("p", {}, "cannot: there is no other run beside this one"),
+      el("div", { id: "compare-answer" })),
+  );
+}
+
+export function show() {}
+
+async function compare(name) {
+  const place = document.getElementById("compare-answer");
+  place.replaceChildren(el("p", { role: "status" }, "reading both runs"));
+  const answer = await act(() => ask(`/api/compare?with=${encodeURIComponent(name)}`));
+  if (!answer) {
+    place.replaceChildren();
+    return;
+  }
+  const rows = answer.differences.map((line) =>
+    el("tr", {},
+      el("td", {}, line.cycle === null ? "" : el("button", { class: "link", type: "button", click: () => goTo(line.cycle) }, String(line.cycle))),
+      el("td", {}, line.what), el("td", {}, line.here), el("td", {}, line.there)));
+  place.replaceChildren(
+    el("p", { class: "verdict" }, answer.words),
+    rows.length
+      ? el("div", { class: "wide", tabindex: "0", role: "region", "aria-label": "Differences" }, el("table", {},
+          el("thead", {}, el("tr", {}, ["cycle", "what", "here", "there"].map((head) => el("th", { scope: "col" }, head)))),
+          el("tbody", {}, rows)))
+      : el("p", {}, "nothing differs"),
+  );
+}

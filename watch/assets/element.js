@@ -1,0 +1,63 @@
+// Elements of the page. Text is always text: nothing that comes from a run is read as markup.
+
+const SVG = "http://www.w3.org/2000/svg";
+
+export const el = (name, attributes = {}, ...children) =>
+  fill(document.createElement(name), attributes, children);
+
+export const svg = (name, attributes = {}, ...children) =>
+  fill(document.createElementNS(SVG, name), attributes, children);
+
+function fill(element, attributes, children) {
+  for (const [name, value] of Object.entries(attributes)) {
+    if (value === undefined || value === null || value === false) {
+      continue;
+    }
+    if (typeof value === "function") {
+      element.addEventListener(name, value);
+    } else {
+      element.setAttribute(name, value === true ? "" : value);
+    }
+  }
+  element.append(...children.flat(Infinity).filter((child) => child !== null && child !== undefined));
+  return element;
+}
+
+// Sets only what differs, so that focus, selection and scrolling stay.
+export function setText(element, text) {
+  if (element.textContent !== text) {
+    element.textContent = text;
+  }
+}
+
+export function setAttribute(element, name, value) {
+  if (element.getAttribute(name) !== value) {
+    element.setAttribute(name, value);
+  }
+}
+
+// One element for each item by its key, made once and shown anew.
+export function keyed(parent, items, keyOf, make, show) {
+  const known = new Map([...parent.children].map((child) => [child.dataset.key, child]));
+  let before = null;
+  for (const item of items) {
+    const key = String(keyOf(item));
+    let child = known.get(key);
+    known.delete(key);
+    if (!child) {
+      child = make(item);
+      child.dataset.key = key;
+    }
+    const place = before ? before.nextSibling : parent.firstChild;
+    if (place !== child) {
+      parent.insertBefore(child, place);
+    }
+    show?.(child, item);
+    before = child;
+  }
+  for (const gone of known.values()) {
+    gone.remove();
+  }
+}
+
+export const bit = (on) => (on ? "1" : "0");

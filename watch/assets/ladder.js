@@ -1,0 +1,163 @@
+// A program as a ladder, with the power flow that the station evaluated in the cycle that is shown; and the understudy's word beside the
+// outputs that it is the sum of.
+
+import { act, ask } from "/ask.js";
+import { el, setText } from "/element.js";
+import { cycleParameter, isLive, state } from "/time.js";
+import { openWhy } from "/why.js";
+
+let run = null;
+let program = 0;
+let find = "";
+let names = "symbols";
+let asking = false;
+let wanted = false;
+let shown = "";
+let last = 0;
+
+// A page that shows a ladder asks for a new picture at most so often, in milliseconds.
+const PAUSE = 250;
+
+const id = (name) => document.getElementById(name);
+
+export function prepare(facts) {
+  run = facts;
+  const programs = run.programs.map((item, index) => el("option", { value: index }, item.name));
+  const understudies = run.stations.filter((station) => station.role === "understudy");
+  const sums = understudies.map((station) => el("option", { value: `sum ${station.name}` }, `${station.name} (sum)`));
+  id("view-ladder").append(
+    el("div", { class: "tools" },
+      el("label", {}, "Program ", el("select", { id: "ladder-program", change: choose }, programs, sums)),
+      el("label", {}, "Find ", el("input", { id: "ladder-find", type: "search", input: (event) => { find = event.target.value.trim(); refresh(true); } })),
+      el("label", {}, "Names ", el("select", { id: "ladder-names", change: (event) => { names = event.target.value; refresh(true); } },
+        el("option", { value: "symbols" }, "symbols"), el("option", { value: "addresses" }, "addresses"))),
+      el("label", {}, "Palette ", el("select", { id: "ladder-palette", change: (event) => palette(event.target.value) },
+        el("option", { value: "understudy" }, "Understudy"), el("option", { value: "codesys" }, "CODESYS"), el("option", { value: "tia" }, "TIA"))),
+    ),
+    el("p", { id: "ladder-stamp", class: "stamp", role: "status" }),
+    el("div", { class: "ladder-columns" },
+      el("div", { id: "ladder-picture", class: "wide", tabindex: "0", role: "region", "aria-label": "Ladder" }),
+      el("section", { id: "ladder-cross", class: "card", "aria-label": "Cross-reference" })),
+  );
+  palette(localStorage.getItem("palette") ?? "understudy");
+  id("ladder-palette").value = document.documentElement.dataset.palette;
+  id("ladder-picture").addEventListener("click", pick);
+}
+
+function palette(name) {
+  localStorage.setItem("palette", name);
+  document.documentElement.dataset.palette = name;
+}
+
+// `#ladder/PROGRAM/SIGNAL` opens a program, and finds a signal in it.
+export function enter([number, signal]) {
+  if (number !== undefined) {
+    program = Math.min(Number(number) || 0, run.programs.length - 1);
+    find = signal ?? "";
+    id("ladder-program").value = String(program);
+    id("ladder-find").value = find;
+  }
+  cross();
+  refresh(true);
+}
+
+function choose(event) {
+  const { value } = event.target;
+  program = value.startsWith("sum ") ? value.slice(4) : Number(value);
+  cross();
+  refresh(true);
+}
+
+export function show() {
+  refresh(false);
+}
+
+async function refresh(now) {
+  wanted = true;
+  if (asking || (!now && isLive() && performance.now() - last < PAUSE)) {
+    return;
+  }
+  asking = true;
+  while (wanted) {
+    wanted = false;
+    last = performance.now();
+    if (typeof program === "number") {
+      await picture();
+    } else {
+      sum();
+    }
+  }
+  asking = false;
+}
+
+async function picture() {
+  const question = `/api/ladder/${program}?names=${names}&find=${encodeURIComponent(find)}&${cycleParameter()}`;
+  const answer = await act(() => ask(question));
+  if (!answer || typeof program !== "number") {
+    return;
+  }
+  setText(id("ladder-stamp"), answer.words);
+  if (answer.svg !== shown) {
+    shown = answer.svg;
+    // The server draws it from the program, and escapes every name.
+    id("ladder-picture").innerHTML = answer.svg;
+  }
+}
+
+// A click on the name of an output asks why.
+function pick(event) {
+  const label = event.target.closest?.("text.name");
+  if (!label || typeof program !== "number") {
+    return;
+  }
+  const name = label.firstChild?.nodeName === "title" ? label.childNodes[1]?.textContent : label.firstChild?.textContent;
+  const { outputs } = run.programs[program];
+  const index = outputs.findIndex((output) => output.name === name || output.address === name);
+  if (index >= 0) {
+    openWhy(program, index);
+  }
+}
+
+async function cross() {
+  const place = id("ladder-cross");
+  if (typeof program !== "number") {
+    place.replaceChildren();
+    return;
+  }
+  const answer = await act(() => ask(`/api/cross-reference/${program}`));
+  if (!answer) {
+    return;
+  }
+  const rungs = (list) => list.map((rung) => rung + 1).join(", ");
+  const row = (signal) =>
+    el("tr", {},
+      el("th", { scope: "row" }, el("button", { class: "link", type: "button", click: () => { find = signal.name; id("ladder-find").value = find; refresh(true); } }, signal.name)),
+      el("td", {}, signal.address ?? ""), el("td", {}, rungs(signal.written)), el("td", {}, rungs(signal.read)), el("td", { class: "soft" }, signal.comment ?? ""));
+  const head = ["signal", "address", "written in rung", "read in rung", "meaning"];
+  place.replaceChildren(el("h2", {}, "Cross-reference"),
+    el("div", { class: "wide", tabindex: "0", role: "region", "aria-label": "Cross-reference table" },
+      el("table", {}, el("thead", {}, el("tr", {}, head.map((text) => el("th", { scope: "col" }, text)))), el("tbody", {}, answer.signals.map(row)))));
+}
+
+// y(N+1) is the sum of the outputs in each place: shown beside what it is the sum of.
+function sum() {
+  const now = state();
+  const members = run.programs;
+  const station = now.parties.find((party) => party.name === program);
+  const width = Math.max(...members.map((item) => item.outputs.length));
+  const word = station?.words?.[0];
+  const column = (item, place) => {
+    const output = item.outputs[place];
+    const value = now.programs[item.index].said?.[place];
+    return el("td", {}, output ? `${output.name} = ${value ?? "?"}` : "");
+  };
+  const rows = [...Array(width).keys()].map((place) =>
+    el("tr", {}, el("th", { scope: "row" }, `y${place + 1}`), members.map((item) => column(item, place)), el("td", { class: "sum" }, word?.sum?.[place] ?? "?")));
+  setText(id("ladder-stamp"), `cycle ${now.cycle}: ${program} says ${station?.words?.length ?? 0} words; the first is the sum of ${word?.members?.join(" ⊕ ") ?? "nothing"}`);
+  shown = "";
+  id("ladder-picture").replaceChildren(
+    el("table", {}, el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "place"), members.map((item) => el("th", { scope: "col" }, item.name)), el("th", { scope: "col" }, `${program} says`))), el("tbody", {}, rows)),
+    station?.words?.length > 1
+      ? el("ul", {}, station.words.slice(1).map((other) => el("li", {}, `for ${other.members.join(" ⊕ ")}: ${other.sum}`)))
+      : "");
+}

@@ -1,0 +1,20 @@
+// Shows a token, and goes to the page where it is accepted.
+
+const problem = document.getElementById("problem");
+
+document.getElementById("form").addEventListener("submit", async (event) => {
+  event.preventDefault();
+  problem.textContent = "";
+  const token = document.getElementById("token").value;
+  const answer = await fetch("/api/login", {
+    method: "POST",
+    headers: { "content-type": "application/json" },
+    body: JSON.stringify({ token }),
+  });
+  if (answer.ok) {
+    location.assign("/");
+    return;
+  }
+  const said = await answer.json().catch(() => null);
+  problem.textContent = said?.error?.message ?? `the page answered ${answer.status}`;
+});

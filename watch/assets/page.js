@@ -1,0 +1,86 @@
+// The page: its views, its head, and who is told of what.
+
+import { act, ask, tell, toast } from "/ask.js";
+import { setText } from "/element.js";
+import * as time from "/time.js";
+import * as cluster from "/cluster.js";
+import * as ladder from "/ladder.js";
+import * as trends from "/trends.js";
+import * as events from "/events.js";
+import * as compare from "/compare.js";
+import * as commands from "/commands.js";
+import * as why from "/why.js";
+
+const VIEWS = { cluster, ladder, trends, events, compare };
+
+function currentView() {
+  const name = location.hash.slice(1).split("/")[0];
+  return name in VIEWS ? name : "cluster";
+}
+
+function showView() {
+  const current = currentView();
+  for (const name of Object.keys(VIEWS)) {
+    document.getElementById(`view-${name}`).hidden = name !== current;
+    const tab = document.getElementById(`tab-${name}`);
+    if (name === current) {
+      tab.setAttribute("aria-current", "page");
+    } else {
+      tab.removeAttribute("aria-current");
+    }
+  }
+  VIEWS[current].enter?.(location.hash.split("/").slice(1).map(decodeURIComponent));
+  if (time.state()) {
+    VIEWS[current].show(time.state(), time.isLive());
+  }
+}
+
+function head(run, state, live) {
+  const when = live ? (state.finished ? "finished" : "live") : "replay";
+  setText(document.getElementById("status"), `${when} · cycle ${state.cycle} of ${state.newest}`);
+  document.body.dataset.when = when;
+  const open = state.alarms.filter((alarm) => !alarm.acknowledged).length;
+  const button = document.getElementById("alarm-count");
+  button.hidden = open === 0;
+  setText(button, open === 1 ? "⚠ 1 alarm" : `⚠ ${open} alarms`);
+}
+
+// What is run is known when its directory says it.
+async function facts() {
+  for (;;) {
+    try {
+      return await ask("/api/run");
+    } catch (error) {
+      setText(document.getElementById("status"), `waiting: ${error.message}`);
+      await new Promise((resolve) => setTimeout(resolve, 1000));
+    }
+  }
+}
+
+async function begin() {
+  const run = await facts();
+  setText(document.getElementById("title"), run.title || run.cluster);
+  document.title = `${run.cluster} · Understudy`;
+  const logOut = document.getElementById("log-out");
+  logOut.hidden = !run.person;
+  logOut.addEventListener("click", () =>
+    act(async () => {
+      await tell("/api/logout", {});
+      location.assign("/login.html");
+    }),
+  );
+  for (const part of [commands, why, ...Object.values(VIEWS)]) {
+    part.prepare(run);
+  }
+  document.getElementById("alarm-count").addEventListener("click", () => (location.hash = "events"));
+  time.onState((state, live) => {
+    head(run, state, live);
+    VIEWS[currentView()].show(state, live);
+  });
+  addEventListener("hashchange", showView);
+  showView();
+  time.start();
+}
+
+addEventListener("unhandledrejection", (event) => toast(String(event.reason?.message ?? event.reason)));
+begin();

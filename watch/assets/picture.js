@@ -1,0 +1,115 @@
+// The cluster as a picture: stations above, the network, remote I/Os and plants below, and a line for each source of outputs.
+//
+// What a shape means is said by its words and its sign as well as by its colour.
+
+import { setAttribute, setText, svg } from "/element.js";
+import { SOURCES } from "/cluster.js";
+
+export const STATES = {
+  speaking: { sign: "●", words: "speaking" },
+  silent: { sign: "○", words: "silent" },
+  flagged: { sign: "⚑", words: "flagged" },
+  joining: { sign: "↻", words: "joining" },
+  shadow: { sign: "◐", words: "in shadow" },
+  refused: { sign: "✗", words: "refused" },
+  excluded: { sign: "⊘", words: "excluded" },
+  stopped: { sign: "‖", words: "stands still" },
+  killed: { sign: "✕", words: "killed" },
+  ended: { sign: "✕", words: "has ended" },
+  "not-started": { sign: "…", words: "not started" },
+  "awaits-release": { sign: "✋", words: "awaits release" },
+  serving: { sign: "●", words: "serving" },
+  listening: { sign: "◌", words: "listening" },
+  moving: { sign: "●", words: "moving" },
+};
+
+const WIDTH = 168;
+const GAP = 22;
+const BOX = { width: WIDTH, height: 62 };
+const ROWS = { station: 14, bus: 112, remote: 152, plant: 262 };
+
+export function makePicture(run, pick) {
+  const columns = Math.max(run.stations.length, run.programs.length);
+  const width = columns * (WIDTH + GAP) + GAP;
+  const height = ROWS.plant + BOX.height + 14;
+  const left = (column) => GAP + column * (WIDTH + GAP);
+  const lines = svg("g", { class: "flows" });
+  const boxes = new Map();
+  const box = (name, kind, column, top, party) => {
+    const made = makeBox(name, kind, left(column), top, () => pick(party));
+    boxes.set(name, made);
+    return made.element;
+  };
+  const stations = run.stations.map((station) =>
+    box(station.name, station.role, station.rank, ROWS.station, { kind: "station", name: station.name, program: station.program }));
+  const remotes = run.programs.map((program, index) =>
+    box(program.remote_io, "remote I/O", index, ROWS.remote, { kind: "remote-io", name: program.remote_io, program: index }));
+  const plants = run.programs.flatMap((program, index) =>
+    program.plant ? [box(program.plant, "plant", index, ROWS.plant, { kind: "plant", name: program.plant, program: index })] : []);
+  const bus = svg("g", { class: "bus" },
+    svg("line", { x1: GAP / 2, x2: width - GAP / 2, y1: ROWS.bus, y2: ROWS.bus }),
+    svg("text", { x: width - GAP / 2, y: ROWS.bus - 7, "text-anchor": "end" }, "network"));
+  const drops = run.stations.map((station) => drop(left(station.rank) + WIDTH / 2, ROWS.station + BOX.height, ROWS.bus));
+  const element = svg("svg", { class: "picture", viewBox: `0 0 ${width} ${height}`, width, height, role: "group", "aria-label": "Stations, remote I/Os and plants" },
+    bus, drops, lines, stations, remotes, plants);
+  const flows = run.programs.map((program, index) => makeFlow(lines, left(index) + WIDTH / 2, Boolean(program.plant)));
+  return { element, show: (state) => showAll(run, boxes, flows, state) };
+}
+
+const drop = (x, from, to) => svg("line", { class: "drop", x1: x, x2: x, y1: from, y2: to });
+
+function makeBox(name, kind, x, y, pick) {
+  const state = svg("text", { class: "state", x: x + 12, y: y + 38 });
+  const note = svg("text", { class: "note", x: x + 12, y: y + 54 });
+  const element = svg("g", {
+    class: "party", tabindex: "0", role: "button", "data-name": name, click: pick,
+    keydown: (event) => {
+      if (event.key === "Enter" || event.key === " ") {
+        event.preventDefault();
+        pick();
+      }
+    },
+  },
+    svg("rect", { x, y, width: BOX.width, height: BOX.height, rx: kind === "plant" ? 22 : 5 }),
+    svg("text", { class: "name", x: x + 12, y: y + 20 }, name.length > 18 ? `${name.slice(0, 17)}…` : name),
+    state, note);
+  return { element, state, note, kind };
+}
+
+function makeFlow(parent, x, hasPlant) {
+  const down = svg("line", { class: "flow", x1: x, x2: x, y1: ROWS.bus, y2: ROWS.remote });
+  const words = svg("text", { class: "flow-words", x: x + 8, y: ROWS.bus + 24 });
+  const out = svg("line", { class: "flow", x1: x, x2: x, y1: ROWS.remote + BOX.height, y2: ROWS.plant });
+  const outWords = svg("text", { class: "flow-words", x: x + 8, y: ROWS.plant - 18 });
+  parent.append(down, words);
+  if (hasPlant) {
+    parent.append(out, outWords);
+  }
+  return { down, words, out, outWords };
+}
+
+function showAll(run, boxes, flows, state) {
+  for (const party of state.parties) {
+    const box = boxes.get(party.name);
+    if (box) {
+      showBox(box, party);
+    }
+  }
+  state.programs.forEach((program, index) => {
+    const { down, words, out, outWords } = flows[index];
+    const source = SOURCES[program.source] ?? SOURCES.unknown;
+    for (const line of [down, out]) {
+      setAttribute(line, "data-source", program.source);
+    }
+    const from = program.source === "reconstructed" ? `${source.words} by ${program.word_of}` : source.words;
+    setText(words, `${source.sign} ${from}`);
+    setText(outWords, program.forced.some((force) => force.kind === "output") ? "✋ forced" : "");
+  });
+}
+
+function showBox(box, party) {
+  const look = STATES[party.state] ?? { sign: "?", words: party.state };
+  setAttribute(box.element, "data-state", party.state);
+  setText(box.state, `${look.sign} ${look.words}${party.paces ? ", paces" : ""}`);
+  setText(box.note, party.note ? party.note : box.kind);
+}

@@ -1,0 +1,25 @@
+// Light and dark: as the system is, or as somebody chose. Runs before the page is painted, so that nothing flashes.
+
+(() => {
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  const root = document.documentElement;
+  const show = () => {
+    const chosen = localStorage.getItem("theme");
+    root.dataset.theme = chosen ?? (dark.matches ? "dark" : "light");
+    const button = document.getElementById("theme");
+    if (button) {
+      button.textContent = root.dataset.theme === "dark" ? "Light" : "Dark";
+      button.setAttribute("aria-label", `Change to ${button.textContent.toLowerCase()}`);
+    }
+  };
+  dark.addEventListener("change", show);
+  show();
+  addEventListener("DOMContentLoaded", () => {
+    show();
+    document.getElementById("theme").addEventListener("click", () => {
+      localStorage.setItem("theme", root.dataset.theme === "dark" ? "light" : "dark");
+      show();
+      dispatchEvent(new Event("theme"));
+    });
+  });
+})();

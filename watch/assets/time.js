@@ -1,0 +1,158 @@
+// What time the page shows: the newest cycle as it comes, or one of the run's cycles.
+//
+// Whoever wants to show a cycle listens with `onState`. There is one stream from the server, and it is followed only while the page is
+// live; a cycle of the past is asked for once, and answers that came too late are dropped.
+
+import { act, ask } from "/ask.js";
+
+const listeners = new Set();
+let live = true;
+let newest = null;
+let shown = null;
+let wanted = null;
+let asking = false;
+let playing = 0;
+let range = null;
+
+export const onState = (listener) => listeners.add(listener);
+export const state = () => shown;
+export const isLive = () => live;
+
+// A parameter for the server's questions.
+export const cycleParameter = () => (live || !shown ? "" : `cycle=${shown.cycle}`);
+
+function show(next) {
+  shown = next;
+  for (const listener of listeners) {
+    listener(shown, live);
+  }
+  const scrub = document.getElementById("scrub");
+  const [first, last] = range ?? [0, 0];
+  scrub.min = first;
+  scrub.max = last;
+  if (document.activeElement !== document.getElementById("cycle")) {
+    document.getElementById("cycle").value = shown.cycle;
+  }
+  scrub.value = shown.cycle;
+  scrub.setAttribute("aria-valuetext", `cycle ${shown.cycle}`);
+  const button = document.getElementById("live");
+  button.setAttribute("aria-pressed", String(live));
+  button.textContent = shown.finished ? "End" : "Live";
+}
+
+function take(next) {
+  if (!next) {
+    return;
+  }
+  newest = next;
+  // What the server does not remember it reads from the journal again.
+  range = [Math.min(0, next.oldest), next.newest];
+  const status = document.getElementById("status");
+  status.classList.remove("lost");
+  if (live) {
+    show(next);
+  } else {
+    document.getElementById("scrub").max = next.newest;
+  }
+}
+
+export function goLive() {
+  stop();
+  live = true;
+  wanted = null;
+  if (newest) {
+    show(newest);
+  }
+}
+
+export function goTo(cycle) {
+  const [first, last] = range ?? [0, 0];
+  const number = Math.min(Math.max(Math.round(Number(cycle)) || 0, first), last);
+  live = false;
+  wanted = number;
+  return fetchWanted();
+}
+
+async function fetchWanted() {
+  if (asking) {
+    return;
+  }
+  asking = true;
+  while (wanted !== null) {
+    const cycle = wanted;
+    const next = await act(() => ask(`/api/state?cycle=${cycle}`));
+    if (wanted === cycle) {
+      wanted = null;
+    }
+    if (next && !live) {
+      show(next);
+    }
+  }
+  asking = false;
+}
+
+function stop() {
+  clearInterval(playing);
+  playing = 0;
+  document.getElementById("play").textContent = "Play";
+}
+
+function play() {
+  if (playing) {
+    stop();
+    return;
+  }
+  document.getElementById("play").textContent = "Pause";
+  if (live || shown?.cycle >= range?.[1]) {
+    goTo(range?.[0] ?? 0);
+  }
+  playing = setInterval(() => {
+    if (shown && !asking) {
+      if (shown.cycle >= range[1]) {
+        stop();
+      } else {
+        goTo(shown.cycle + 1);
+      }
+    }
+  }, 120);
+}
+
+function step(by) {
+  stop();
+  goTo((wanted ?? shown?.cycle ?? 0) + by);
+}
+
+export function start() {
+  const on = (id, event, work) => document.getElementById(id).addEventListener(event, work);
+  on("live", "click", goLive);
+  on("back", "click", () => step(-1));
+  on("forth", "click", () => step(1));
+  on("play", "click", play);
+  on("scrub", "input", (event) => goTo(event.target.value));
+  on("cycle", "change", (event) => goTo(event.target.value));
+  addEventListener("keydown", (event) => {
+    if (event.target.closest?.("input, select, textarea, dialog") || event.altKey || event.ctrlKey) {
+      return;
+    }
+    if (event.key === "ArrowLeft") {
+      step(-1);
+    } else if (event.key === "ArrowRight") {
+      step(1);
+    }
+  });
+  follow();
+}
+
+function follow() {
+  const stream = new EventSource("/api/live");
+  stream.addEventListener("state", (event) => take(JSON.parse(event.data)));
+  // A browser calls again by itself, but not where it was answered by an error.
+  stream.addEventListener("error", () => {
+    const status = document.getElementById("status");
+    status.classList.add("lost");
+    status.textContent = shown?.finished ? "the page's server has ended" : "no connection to the server; trying again";
+    if (stream.readyState === EventSource.CLOSED) {
+      setTimeout(follow, 3000);
+    }
+  });
+}

@@ -1,0 +1,139 @@
+// Trends of chosen signals over the cycles, with sources and faults as bands behind them.
+
+import { act, ask } from "/ask.js";
+import { el, setText } from "/element.js";
+import { goTo, state } from "/time.js";
+import { bandPlugin } from "/bands.js";
+
+let run = null;
+let plot = null;
+let chosen = [];
+let span = 500;
+let asking = false;
+let drawn = "";
+
+const MAXIMUM_SIGNALS = 16;
+
+const id = (name) => document.getElementById(name);
+
+export function prepare(facts) {
+  run = facts;
+  const groups = run.programs.map((program) =>
+    el("fieldset", {}, el("legend", {}, program.name),
+      ["inputs", "outputs"].flatMap((kind) => program[kind].map((signal, index) => box(program, kind.slice(0, -1), signal, index)))));
+  chosen = run.programs.flatMap((program) => program.outputs.slice(0, 2).map((_, index) => `${program.index}.output.${index}`)).slice(0, 6);
+  id("view-trends").append(
+    el("div", { class: "tools" },
+      el("label", {}, "Cycles ", el("select", { id: "trend-span", change: (event) => { span = Number(event.target.value); refresh(); } },
+        [100, 500, 2000, 10000].map((count) => el("option", { value: count, selected: count === span }, String(count))))),
+      el("span", { id: "trend-words", class: "soft", role: "status" })),
+    el("div", { id: "trend-plot", class: "plot", role: "img", "aria-label": "Trends of the chosen signals" }),
+    el("p", { class: "legend-words" }, "Bands: one row for each remote I/O. Plain: direct. Slanted lines: restored. Dots: held. Filled: fail-safe. Upright lines: what was done to the cluster."),
+    el("details", { class: "chooser" }, el("summary", {}, "Signals"), groups));
+  for (const input of document.querySelectorAll("#view-trends input[type=checkbox]")) {
+    input.checked = chosen.includes(input.value);
+  }
+  addEventListener("resize", redraw);
+  addEventListener("theme", redraw);
+}
+
+function box(program, kind, signal, index) {
+  const change = (event) => {
+    chosen = chosen.filter((other) => other !== event.target.value);
+    if (event.target.checked && chosen.length < MAXIMUM_SIGNALS) {
+      chosen.push(event.target.value);
+    }
+    event.target.checked = chosen.includes(event.target.value);
+    refresh();
+  };
+  return el("label", { class: "choice" }, el("input", { type: "checkbox", value: `${program.index}.${kind}.${index}`, change }), " ", signal.name);
+}
+
+export function enter() {
+  drawn = "";
+}
+
+export function show() {
+  refresh();
+}
+
+function redraw() {
+  drawn = "";
+  if (state()) {
+    refresh();
+  }
+}
+
+async function refresh() {
+  const now = state();
+  const to = Math.max(now.cycle, now.oldest);
+  const from = Math.max(now.oldest, to - span + 1);
+  const question = `signals=${chosen.join(",")}&from=${from}&to=${to}`;
+  if (asking || question === drawn || id("view-trends").hidden) {
+    return;
+  }
+  asking = true;
+  drawn = question;
+  const answer = await act(() => ask(`/api/trends?${question}`));
+  asking = false;
+  if (answer) {
+    draw(answer);
+  }
+}
+
+// Each signal has a lane of its own; in it, it is at the bottom where it is 0 and above where it is 1.
+function draw(answer) {
+  const lanes = answer.signals.length;
+  const marks = new Set([answer.from, answer.to]);
+  for (const signal of answer.signals) {
+    for (const [cycle] of signal.runs) {
+      marks.add(cycle);
+    }
+  }
+  const cycles = [...marks].sort((a, b) => a - b);
+  const rows = answer.signals.map((signal, index) => sampled(signal.runs, cycles).map((value) => (value === null ? null : lanes - 1 - index + 0.7 * value)));
+  const place = id("trend-plot");
+  const dark = getComputedStyle(document.documentElement);
+  const color = (name) => dark.getPropertyValue(name).trim();
+  const series = answer.signals.map((signal, index) => ({
+    label: signal.name,
+    stroke: color(`--series-${index % 6}`),
+    width: 2,
+    paths: uPlot.paths.stepped({ align: 1 }),
+    points: { show: false },
+    value: (_, value) => (value === null ? "?" : value - (lanes - 1 - index) > 0.5 ? "1" : "0"),
+  }));
+  const bandRows = answer.sources.length;
+  const axis = { stroke: color("--ink"), grid: { stroke: color("--line"), width: 1 }, ticks: { stroke: color("--line") } };
+  const options = {
+    width: place.clientWidth,
+    height: Math.max(220, 26 * lanes + 18 * bandRows + 110),
+    scales: { x: { time: false }, y: { range: [-0.3 - bandRows * 0.7, Math.max(lanes, 1)] } },
+    axes: [
+      { ...axis, values: (_, values) => values.map((value) => (Number.isInteger(value) ? String(value) : "")) },
+      { ...axis, size: 130, splits: () => answer.signals.map((_, index) => lanes - 1 - index + 0.35), values: () => answer.signals.map((signal) => signal.name.slice(0, 18)), grid: { show: false } },
+    ],
+    series: [{ label: "cycle", value: (_, value) => (value === null ? "" : String(value)) }, ...series],
+    plugins: [bandPlugin(answer, color)],
+    cursor: { drag: { x: false, y: false }, bind: { dblclick: () => null } },
+  };
+  plot?.destroy();
+  plot = new uPlot(options, [cycles, ...rows], place);
+  plot.over.addEventListener("click", () => {
+    if (plot.cursor.left >= 0) {
+      goTo(plot.posToVal(plot.cursor.left, "x"));
+    }
+  });
+  setText(id("trend-words"), `cycles ${answer.from} to ${answer.to}; a click goes to the cycle`);
+}
+
+// The value of a run-length coded signal at each mark.
+function sampled(runs, cycles) {
+  let at = -1;
+  return cycles.map((cycle) => {
+    while (at + 1 < runs.length && runs[at + 1][0] <= cycle) {
+      at += 1;
+    }
+    return at < 0 ? null : runs[at][1];
+  });
+}

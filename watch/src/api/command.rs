@@ -1,0 +1,111 @@
+//! A command to a party of the laboratory.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::rejection::JsonRejection;
+use axum::extract::{Extension, State};
+use serde::Deserialize;
+use serde_json::{Value, json};
+use understudy_scenarios::Command;
+use understudy_wire::{Force, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH, SignalPlace};
+
+use super::Answered;
+use crate::app::{App, Commanding};
+use crate::error::Problem;
+use crate::login::Person;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Asked {
+    /// The party's name.
+    party: String,
+    command: AskedCommand,
+    owner: String,
+    reason: String,
+}
+
+/// As [`Command`], with the owner and the reason of a force said once for all.
+#[derive(Deserialize)]
+#[serde(tag = "command", rename_all = "kebab-case", deny_unknown_fields)]
+enum AskedCommand {
+    Kill,
+    Restart,
+    Stop,
+    Continue,
+    Release,
+    Isolate,
+    Rejoin,
+    Force {
+        signal: SignalPlace,
+        value: bool,
+        seconds: u32,
+    },
+    Unforce {
+        signal: SignalPlace,
+    },
+}
+
+pub(super) async fn command(
+    State(app): State<Arc<App>>,
+    Extension(person): Extension<Person>,
+    body: Result<Json<Asked>, JsonRejection>,
+) -> Answered<Json<Value>> {
+    let Json(asked) = body?;
+    if let Some(why) = app.why_not(&person) {
+        return Err(Problem::forbidden(why));
+    }
+    let Commanding::Allowed(commander) = &app.commanding else {
+        return Err(Problem::forbidden("this page may not command"));
+    };
+    let owner = named(&person, asked.owner)?;
+    let reason = readable(asked.reason, MAXIMUM_REASON_LENGTH, "the reason")?;
+    let party = app.model().party(&asked.party);
+    let party = party
+        .ok_or_else(|| Problem::unknown(format!("the cluster has no party {:.60}", asked.party)))?;
+    let command = match asked.command {
+        AskedCommand::Kill => Command::Kill,
+        AskedCommand::Restart => Command::Restart,
+        AskedCommand::Stop => Command::Stop,
+        AskedCommand::Continue => Command::Continue,
+        AskedCommand::Release => Command::Release,
+        AskedCommand::Isolate => Command::Isolate,
+        AskedCommand::Rejoin => Command::Rejoin,
+        AskedCommand::Unforce { signal } => Command::Unforce { signal },
+        AskedCommand::Force {
+            signal,
+            value,
+            seconds,
+        } => Command::Force(Force {
+            signal,
+            value,
+            seconds,
+            owner: owner.clone(),
+            reason: reason.clone(),
+        }),
+    };
+    let done = commander.give(party, command, owner, reason).await;
+    done.map_err(|refusal| Problem::refused(&refusal.to_string()))?;
+    Ok(Json(json!({})))
+}
+
+/// Who is logged in, or else who somebody says to be.
+pub(super) fn named(person: &Person, said: String) -> Answered<String> {
+    if person.name.is_empty() {
+        readable(said, MAXIMUM_OWNER_LENGTH, "the name of who commands")
+    } else {
+        Ok(person.name.clone())
+    }
+}
+
+fn readable(text: String, most: usize, what: &str) -> Answered<String> {
+    let length = text.chars().count();
+    let fits = (1..=most).contains(&length) && !text.trim().is_empty();
+    if fits && !text.chars().any(char::is_control) {
+        Ok(text)
+    } else {
+        Err(Problem::bad(format!(
+            "{what} is 1 to {most} readable characters"
+        )))
+    }
+}

@@ -1,0 +1,241 @@
+//! What is run, how it stands in a cycle, and what happened.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::rejection::QueryRejection;
+use axum::extract::{Extension, Query, State};
+use serde::{Deserialize, Serialize};
+use understudy_ladder::Signal;
+use understudy_view::Event;
+use understudy_wire::{Party, ProgramId};
+
+use super::Answered;
+use super::compare::others;
+use crate::app::App;
+use crate::error::Problem;
+use crate::login::Person;
+use crate::model::Known;
+use crate::shown;
+
+/// Events in one answer, at most.
+const MAXIMUM_EVENTS: usize = 1000;
+
+#[derive(Debug, Serialize)]
+pub(super) struct RunFacts {
+    title: String,
+    cluster: String,
+    period_us: u64,
+    deadline_us: u64,
+    stations: Vec<StationFacts>,
+    programs: Vec<ProgramFacts>,
+    commands: CommandFacts,
+    /// Who is logged in.
+    person: Option<String>,
+    /// Other runs beside this one.
+    others: Vec<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct StationFacts {
+    rank: usize,
+    name: String,
+    role: &'static str,
+    program: Option<usize>,
+}
+
+#[derive(Debug, Serialize)]
+struct ProgramFacts {
+    index: usize,
+    name: String,
+    remote_io: String,
+    plant: Option<String>,
+    inputs: Vec<SignalFacts>,
+    outputs: Vec<SignalFacts>,
+}
+
+#[derive(Debug, Serialize)]
+struct SignalFacts {
+    name: String,
+    address: Option<String>,
+    comment: Option<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct CommandFacts {
+    /// Why nothing can be commanded.
+    why: Option<String>,
+}
+
+pub(super) async fn run(
+    State(app): State<Arc<App>>,
+    Extension(person): Extension<Person>,
+) -> Answered<Json<RunFacts>> {
+    let model = app.model();
+    let known = known(&model)?;
+    let run = &known.run;
+    let cluster = run.cluster();
+    let schedule = &cluster.agreement().schedule;
+    let microseconds = |time: std::time::Duration| u64::try_from(time.as_micros()).unwrap_or(0);
+    let stations = known.stations().map(|station| StationFacts {
+        rank: station.index(),
+        name: shown::name(known, Party::Station(station)),
+        role: if schedule.is_understudy(station) {
+            "understudy"
+        } else {
+            "controller"
+        },
+        program: (!schedule.is_understudy(station)).then_some(station.index()),
+    });
+    let programs = known
+        .programs()
+        .map(|program| program_facts(known, program));
+    Ok(Json(RunFacts {
+        title: format!("{} · {}", cluster.name(), model.name()),
+        cluster: cluster.name().to_owned(),
+        period_us: microseconds(schedule.period()),
+        deadline_us: microseconds(schedule.deadline()),
+        stations: stations.collect(),
+        programs: programs.collect(),
+        commands: CommandFacts {
+            why: app.why_not(&person).map(str::to_owned),
+        },
+        person: Some(person.name).filter(|name| !name.is_empty()),
+        others: others(&app.run),
+    }))
+}
+
+fn program_facts(known: &Known, program: ProgramId) -> ProgramFacts {
+    let cluster = known.run.cluster();
+    let plant = Party::Plant(program);
+    let ladder = cluster.controllers().get(program.index());
+    let signals = |signals: &[Signal]| signals.iter().map(signal_facts).collect();
+    ProgramFacts {
+        index: program.index(),
+        name: shown::program_name(known, program),
+        remote_io: shown::name(known, Party::RemoteIo(program)),
+        plant: cluster.party_name(plant).map(str::to_owned),
+        inputs: ladder.map_or_else(Vec::new, |own| signals(&own.program.inputs)),
+        outputs: ladder.map_or_else(Vec::new, |own| signals(&own.program.outputs)),
+    }
+}
+
+fn signal_facts(signal: &Signal) -> SignalFacts {
+    SignalFacts {
+        name: signal.name.to_string(),
+        address: signal.address.as_ref().map(ToString::to_string),
+        comment: signal.description.clone(),
+    }
+}
+
+/// Which cycle is meant; the newest where none is said.
+#[derive(Debug, Deserialize)]
+pub(super) struct When {
+    pub(super) cycle: Option<i64>,
+}
+
+pub(super) async fn state(
+    State(app): State<Arc<App>>,
+    when: Result<Query<When>, QueryRejection>,
+) -> Answered<Json<shown::State>> {
+    let Query(when) = when?;
+    at_cycle(&app, when.cycle, |known, cycle| {
+        shown::state(known, cycle).ok_or_else(|| not_remembered(cycle))
+    })
+    .map(Json)
+}
+
+/// Answers from what is remembered of a cycle; of one that is older, from the journal.
+pub(super) fn at_cycle<T>(
+    app: &App,
+    cycle: Option<i64>,
+    answer: impl Fn(&Known, i64) -> Answered<T>,
+) -> Answered<T> {
+    let older = {
+        let model = app.model();
+        let known = known(&model)?;
+        let newest = known
+            .newest()
+            .ok_or_else(|| Problem::unrecorded("no cycle has been decided yet"))?;
+        let cycle = cycle.unwrap_or(newest);
+        if cycle > newest {
+            return Err(Problem::unrecorded(format!(
+                "cycle {cycle} is still to come: the newest is {newest}"
+            )));
+        }
+        if known.oldest().is_some_and(|oldest| oldest <= cycle) {
+            return answer(known, cycle);
+        }
+        cycle
+    };
+    let known = tokio::task::block_in_place(|| app.reread(older))?;
+    answer(&known, older)
+}
+
+pub(crate) fn not_remembered(cycle: i64) -> Problem {
+    Problem::unrecorded(format!("the journal does not reach back to cycle {cycle}"))
+}
+
+pub(super) fn known(model: &crate::model::Model) -> Answered<&Known> {
+    model
+        .known()
+        .ok_or_else(|| Problem::unrecorded(model.waits_for.clone()))
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Wanted {
+    limit: Option<usize>,
+    #[serde(default)]
+    find: String,
+    until: Option<i64>,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct Events {
+    /// The newest first.
+    events: Vec<ShownEvent>,
+}
+
+#[derive(Debug, Serialize)]
+struct ShownEvent {
+    id: u64,
+    cycle: i64,
+    who: String,
+    kind: &'static str,
+    level: &'static str,
+    what: String,
+    cause: Option<String>,
+}
+
+pub(super) async fn events(
+    State(app): State<Arc<App>>,
+    wanted: Result<Query<Wanted>, QueryRejection>,
+) -> Answered<Json<Events>> {
+    let Query(wanted) = wanted?;
+    let find = wanted.find.to_lowercase();
+    let model = app.model();
+    let known = known(&model)?;
+    let mentions = |event: &Event| {
+        let texts = [&event.name, &event.text];
+        let texts = texts.into_iter().chain(&event.cause);
+        let mut texts = texts.map(|text| text.to_lowercase());
+        texts.any(|text| text.contains(&find)) || event.event.contains(&find)
+    };
+    let events = known.run.events().rev();
+    let events = events
+        .filter(|event| wanted.until.is_none_or(|until| event.cycle <= until + 1))
+        .filter(|event| find.is_empty() || mentions(event))
+        .take(wanted.limit.unwrap_or(200).min(MAXIMUM_EVENTS))
+        .map(|event| ShownEvent {
+            id: event.number,
+            cycle: event.cycle,
+            who: event.name.clone(),
+            kind: event.event,
+            level: event.level.word(),
+            what: event.text.clone(),
+            cause: event.cause.clone(),
+        });
+    Ok(Json(Events {
+        events: events.collect(),
+    }))
+}

@@ -1,0 +1,208 @@
+//! A program as a picture with the power flow of one scan, and where its signals are written and read.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::rejection::{PathRejection, QueryRejection};
+use axum::extract::{Path, Query, State};
+use serde::{Deserialize, Serialize};
+use understudy_ladder::{Element, Program, Rung, draw_svg_rungs, visit};
+use understudy_wire::ProgramId;
+
+use super::Answered;
+use super::facts::{at_cycle, known};
+use crate::app::App;
+use crate::error::Problem;
+use crate::model::Known;
+use crate::renamed::by_address;
+use crate::shown;
+
+/// Rungs in one picture, at most: a reader of more looks for a signal.
+const MAXIMUM_RUNGS: usize = 60;
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Wanted {
+    cycle: Option<i64>,
+    #[serde(default)]
+    names: Names,
+    #[serde(default)]
+    find: String,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Names {
+    #[default]
+    Symbols,
+    Addresses,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct Picture {
+    cycle: i64,
+    /// Which cycle and lineage the picture is of, and how much of the program it shows.
+    words: String,
+    svg: String,
+}
+
+pub(super) async fn picture(
+    State(app): State<Arc<App>>,
+    program: Result<Path<u8>, PathRejection>,
+    wanted: Result<Query<Wanted>, QueryRejection>,
+) -> Answered<Json<Picture>> {
+    let Path(program) = program?;
+    let Query(wanted) = wanted?;
+    at_cycle(&app, wanted.cycle, |known, cycle| {
+        draw(known, ProgramId(program), cycle, &wanted)
+    })
+    .map(Json)
+}
+
+fn ladder_of(known: &Known, program: ProgramId) -> Answered<&Program> {
+    let controllers = known.run.cluster().controllers();
+    let controller = controllers.get(program.index());
+    let controller = controller.ok_or_else(|| {
+        Problem::unknown(format!(
+            "the cluster has {} programs, and no number {}",
+            controllers.len(),
+            program.0
+        ))
+    })?;
+    Ok(&controller.program)
+}
+
+fn draw(known: &Known, program: ProgramId, cycle: i64, wanted: &Wanted) -> Answered<Picture> {
+    let ladder = ladder_of(known, program)?;
+    let evaluation = known.run.evaluation(program, cycle);
+    let rungs: Vec<usize> = found(ladder, wanted.find.trim()).collect();
+    let shown = &rungs[..rungs.len().min(MAXIMUM_RUNGS)];
+    let flow = evaluation.as_ref().ok();
+    let svg = match wanted.names {
+        Names::Symbols => draw_svg_rungs(ladder, shown, flow),
+        Names::Addresses => draw_svg_rungs(&by_address(ladder), shown, flow),
+    };
+    let mut words = format!("{}, cycle {cycle}", shown::program_name(known, program));
+    let step = known.run.history(program).and_then(|steps| steps.at(cycle));
+    match (&evaluation, step.and_then(|step| step.sampled.as_ref())) {
+        (Ok(_), Some(sampled)) => {
+            let moment = step.map(|step| step.moment.to_string()).unwrap_or_default();
+            words += &format!(" ({moment}): as evaluated, lineage {}", sampled.before);
+        }
+        (Err(error), _) => words += &format!(": without power flow, for {error}"),
+        (Ok(_), None) => {}
+    }
+    if shown.len() < ladder.rungs.len() {
+        words += &format!("; {} of {} rungs", shown.len(), ladder.rungs.len());
+    }
+    Ok(Picture {
+        cycle,
+        words,
+        svg: without_style(&svg),
+    })
+}
+
+/// The page has the styles, so that its own theme and palette count.
+fn without_style(svg: &str) -> String {
+    match (svg.find("<style>"), svg.find("</style>")) {
+        (Some(from), Some(to)) if from < to => {
+            format!("{}{}", &svg[..from], &svg[to + "</style>".len()..])
+        }
+        _ => svg.to_owned(),
+    }
+}
+
+/// Rungs that have to do with a name, an address or a word of their title.
+fn found<'p>(program: &'p Program, find: &str) -> impl Iterator<Item = usize> + 'p {
+    let find = find.to_lowercase();
+    let signals = program.inputs.iter().chain(program.writable());
+    let named: Vec<String> = signals
+        .filter(|signal| {
+            let address = signal.address.as_ref().map(ToString::to_string);
+            address.is_some_and(|address| address.to_lowercase().contains(&find))
+        })
+        .map(|signal| signal.name.to_string())
+        .collect();
+    let rungs = program.rungs.iter().enumerate();
+    rungs
+        .filter(move |(_, rung)| {
+            let title = rung.title.as_deref().unwrap_or_default().to_lowercase();
+            let names = names_in(rung);
+            let mut names = names.read.iter().chain(&names.written);
+            title.contains(&find)
+                || names.any(|name| name.to_lowercase().contains(&find) || named.contains(name))
+        })
+        .map(|(place, _)| place)
+}
+
+#[derive(Default)]
+struct NamesIn {
+    read: Vec<String>,
+    written: Vec<String>,
+}
+
+fn names_in(rung: &Rung) -> NamesIn {
+    let mut names = NamesIn::default();
+    visit(&rung.network, &mut |element| match element {
+        Element::Contact(contact) => names.read.push(contact.operand.to_string()),
+        Element::Comparison(comparison) => names.read.push(comparison.counter.to_string()),
+        Element::Block(block) => names.written.push(block.name.to_string()),
+        Element::Branches(_) => {}
+    });
+    let targets = rung.coils.iter().map(|coil| coil.target.to_string());
+    names.written.extend(targets);
+    names
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct CrossReference {
+    signals: Vec<Line>,
+}
+
+#[derive(Debug, Serialize)]
+struct Line {
+    name: String,
+    address: Option<String>,
+    comment: Option<String>,
+    /// Rungs, counted from 0.
+    written: Vec<usize>,
+    read: Vec<usize>,
+}
+
+pub(super) async fn cross_reference(
+    State(app): State<Arc<App>>,
+    program: Result<Path<u8>, PathRejection>,
+) -> Answered<Json<CrossReference>> {
+    let Path(program) = program?;
+    let model = app.model();
+    let ladder = ladder_of(known(&model)?, ProgramId(program))?;
+    let (mut read, mut written) = (BTreeMap::new(), BTreeMap::new());
+    for (place, rung) in ladder.rungs.iter().enumerate() {
+        let names = names_in(rung);
+        note(&mut read, names.read, place);
+        note(&mut written, names.written, place);
+    }
+    let signals = ladder.inputs.iter().chain(ladder.writable());
+    let lines = signals.map(|signal| {
+        let name = signal.name.to_string();
+        Line {
+            address: signal.address.as_ref().map(ToString::to_string),
+            comment: signal.description.clone(),
+            written: written.get(&name).cloned().unwrap_or_default(),
+            read: read.get(&name).cloned().unwrap_or_default(),
+            name,
+        }
+    });
+    Ok(Json(CrossReference {
+        signals: lines.collect(),
+    }))
+}
+
+fn note(rungs: &mut BTreeMap<String, Vec<usize>>, names: Vec<String>, place: usize) {
+    for name in names {
+        let of_name = rungs.entry(name).or_default();
+        if of_name.last() != Some(&place) {
+            of_name.push(place);
+        }
+    }
+}

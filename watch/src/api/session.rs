@@ -1,0 +1,47 @@
+//! Logging in and out.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use axum::Json;
+use axum::extract::State;
+use axum::extract::rejection::JsonRejection;
+use axum::http::HeaderMap;
+use axum::http::header::SET_COOKIE;
+use axum::response::{IntoResponse, Response};
+use serde::Deserialize;
+use serde_json::json;
+
+use super::Answered;
+use crate::app::App;
+use crate::error::Problem;
+
+#[derive(Deserialize)]
+pub(super) struct Login {
+    token: String,
+}
+
+pub(super) async fn log_in(
+    State(app): State<Arc<App>>,
+    body: Result<Json<Login>, JsonRejection>,
+) -> Answered<Response> {
+    let Json(Login { token }) = body?;
+    let Some(logins) = &app.logins else {
+        return Err(Problem::bad("nobody logs in here"));
+    };
+    let person = logins.admit(&token).await;
+    let person = person.ok_or_else(|| Problem::log_in("nobody has this token"))?;
+    let name = person.name.clone();
+    let cookie = logins
+        .open(person, Instant::now())
+        .ok_or_else(|| Problem::too_many("the system gives no random numbers"))?;
+    Ok(([(SET_COOKIE, cookie)], Json(json!({ "person": name }))).into_response())
+}
+
+pub(super) async fn log_out(State(app): State<Arc<App>>, headers: HeaderMap) -> Answered<Response> {
+    let Some(logins) = &app.logins else {
+        return Err(Problem::bad("nobody logs in here"));
+    };
+    let cookie = logins.close(&headers);
+    Ok(([(SET_COOKIE, cookie)], Json(json!({}))).into_response())
+}

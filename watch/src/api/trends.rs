@@ -1,0 +1,169 @@
+//! Chosen signals over the cycles, with the source of each program's outputs and what was done to the cluster.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::rejection::QueryRejection;
+use axum::extract::{Query, State};
+use serde::{Deserialize, Serialize};
+use understudy_scenarios::source_word;
+use understudy_view::Timeline;
+use understudy_wire::{Image, ProgramId};
+
+use super::Answered;
+use super::facts::known;
+use crate::app::App;
+use crate::error::Problem;
+use crate::model::Known;
+use crate::shown;
+
+/// Signals in one answer, at most.
+const MAXIMUM_SIGNALS: usize = 32;
+
+/// Cycles in one answer, at most.
+const MAXIMUM_CYCLES: i64 = 100_000;
+
+/// Changes of one signal, at most; what is older is left out.
+const MAXIMUM_CHANGES: usize = 20_000;
+
+/// Faults in one answer, at most.
+const MAXIMUM_FAULTS: usize = 200;
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Wanted {
+    /// `PROGRAM.input.NUMBER` or `PROGRAM.output.NUMBER`, with commas between.
+    #[serde(default)]
+    signals: String,
+    from: i64,
+    /// The last cycle.
+    to: i64,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct Trends {
+    from: i64,
+    to: i64,
+    signals: Vec<Trend>,
+    sources: Vec<Band>,
+    faults: Vec<Fault>,
+}
+
+#[derive(Debug, Serialize)]
+struct Trend {
+    name: String,
+    /// From this cycle on it is this value, up to the next one; nothing where it is not known.
+    runs: Vec<(i64, Option<u8>)>,
+}
+
+#[derive(Debug, Serialize)]
+struct Band {
+    name: String,
+    /// First cycle, last cycle, source.
+    runs: Vec<(i64, i64, &'static str)>,
+}
+
+#[derive(Debug, Serialize)]
+struct Fault {
+    cycle: i64,
+    words: String,
+}
+
+pub(super) async fn trends(
+    State(app): State<Arc<App>>,
+    wanted: Result<Query<Wanted>, QueryRejection>,
+) -> Answered<Json<Trends>> {
+    let Query(Wanted { signals, from, to }) = wanted?;
+    let cycles = to.checked_sub(from).filter(|cycles| *cycles >= 0);
+    if cycles.is_none_or(|cycles| cycles >= MAXIMUM_CYCLES) {
+        return Err(Problem::bad(format!(
+            "from {from} to {to}: a trend has 1 to {MAXIMUM_CYCLES} cycles"
+        )));
+    }
+    let names: Vec<&str> = signals.split(',').filter(|name| !name.is_empty()).collect();
+    if names.len() > MAXIMUM_SIGNALS {
+        return Err(Problem::bad(format!(
+            "{} signals: at most {MAXIMUM_SIGNALS}",
+            names.len()
+        )));
+    }
+    let model = app.model();
+    let known = known(&model)?;
+    let signals = names.iter().map(|name| {
+        trend(known, name, from, to)
+            .ok_or_else(|| Problem::unknown(format!("the run has no signal {name:.60}")))
+    });
+    let sources = known
+        .programs()
+        .map(|program| band(known, program, from, to));
+    let faults = known.run.events().filter(|event| {
+        let done = matches!(event.event, "fault" | "ended" | "forced" | "unforced");
+        done && (from..=to).contains(&event.cycle)
+    });
+    Ok(Json(Trends {
+        from,
+        to,
+        signals: signals.collect::<Answered<_>>()?,
+        sources: sources.collect(),
+        faults: faults
+            .take(MAXIMUM_FAULTS)
+            .map(|event| Fault {
+                cycle: event.cycle,
+                words: event.text.clone(),
+            })
+            .collect(),
+    }))
+}
+
+fn trend(known: &Known, name: &str, from: i64, to: i64) -> Option<Trend> {
+    let mut parts = name.split('.');
+    let program = ProgramId(parts.next()?.parse().ok()?);
+    let kind = parts.next()?;
+    let index: usize = parts.next()?.parse().ok()?;
+    let controller = known.run.cluster().controllers().get(program.index())?;
+    let series = known.run.series();
+    let (signals, timeline) = match kind {
+        "input" => (&controller.program.inputs, series.inputs(program)?),
+        "output" => (&controller.program.outputs, series.outputs(program)?),
+        _ => return None,
+    };
+    let signal = signals.get(index)?;
+    Some(Trend {
+        name: format!("{}.{}", controller.name, signal.name),
+        runs: runs(timeline, index, from, to),
+    })
+}
+
+fn runs(timeline: &Timeline<Image>, index: usize, from: i64, to: i64) -> Vec<(i64, Option<u8>)> {
+    let mut runs: Vec<(i64, Option<u8>)> = Vec::new();
+    let mut push = |cycle: i64, value: Option<u8>| {
+        if runs.last().is_none_or(|(_, last)| *last != value) {
+            runs.push((cycle, value));
+        }
+    };
+    let mut known_up_to = from;
+    for span in timeline.spans(from, to + 1) {
+        if span.from > known_up_to {
+            push(known_up_to, None);
+        }
+        push(span.from, Some(u8::from(span.value.get(index))));
+        known_up_to = span.to;
+    }
+    if known_up_to <= to {
+        push(known_up_to, None);
+    }
+    let older = runs.len().saturating_sub(MAXIMUM_CHANGES);
+    runs.split_off(older)
+}
+
+fn band(known: &Known, program: ProgramId, from: i64, to: i64) -> Band {
+    let sources = known.run.series().sources(program);
+    let spans = sources
+        .into_iter()
+        .flat_map(|sources| sources.spans(from, to + 1));
+    Band {
+        name: shown::program_name(known, program),
+        runs: spans
+            .map(|span| (span.from, span.to - 1, source_word(*span.value)))
+            .collect(),
+    }
+}

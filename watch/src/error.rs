@@ -1,0 +1,131 @@
+//! Why the page is not served, and why a request is not answered.
+
+use std::io;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use axum::Json;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
+use serde_json::json;
+
+/// Why the page cannot be served. The codes are stable.
+#[derive(Debug, thiserror::Error)]
+pub enum WatchError {
+    /// The address cannot be listened at.
+    #[error("U0671: the page cannot be served at {address}: {source}")]
+    Listen {
+        /// The address.
+        address: SocketAddr,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The certificate or its key cannot be used.
+    #[error("U0672: the certificate of the page cannot be used: {0}")]
+    Certificate(String),
+    /// The file of those who may log in cannot be used.
+    #[error("U0673: {}: {reason}", path.display())]
+    Logins {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// The address can be reached from other machines, and nobody said who may log in.
+    #[error(
+        "U0674: {0} can be reached from other machines: say who may log in (--logins FILE), or serve the page at 127.0.0.1"
+    )]
+    NoLogins(SocketAddr),
+    /// The system refused something else.
+    #[error("U0675: {what}: {source}")]
+    System {
+        /// What was wanted.
+        what: &'static str,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+impl WatchError {
+    /// The code alone.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Listen { .. } => "U0671",
+            Self::Certificate(_) => "U0672",
+            Self::Logins { .. } => "U0673",
+            Self::NoLogins(_) => "U0674",
+            Self::System { .. } => "U0675",
+        }
+    }
+}
+
+/// The answer to a request that cannot be done: a status, a stable code, and a sentence for people.
+#[derive(Debug)]
+pub(crate) struct Problem {
+    status: StatusCode,
+    code: String,
+    message: String,
+}
+
+impl Problem {
+    fn new(status: StatusCode, code: &str, message: impl Into<String>) -> Self {
+        Self {
+            status,
+            code: code.to_owned(),
+            message: message.into(),
+        }
+    }
+
+    /// There is nothing of that name.
+    pub(crate) fn unknown(message: impl Into<String>) -> Self {
+        Self::new(StatusCode::NOT_FOUND, "U0681", message)
+    }
+
+    /// The request does not say what it has to, or says nonsense.
+    pub(crate) fn bad(message: impl Into<String>) -> Self {
+        Self::new(StatusCode::BAD_REQUEST, "U0682", message)
+    }
+
+    /// A question where a command is wanted, or the other way round.
+    pub(crate) fn wrong_method(message: impl Into<String>) -> Self {
+        Self::new(StatusCode::METHOD_NOT_ALLOWED, "U0682", message)
+    }
+
+    /// The run has no record of it, or not any more.
+    pub(crate) fn unrecorded(message: impl Into<String>) -> Self {
+        Self::new(StatusCode::NOT_FOUND, "U0683", message)
+    }
+
+    /// This page, or who asks, may not.
+    pub(crate) fn forbidden(message: impl Into<String>) -> Self {
+        Self::new(StatusCode::FORBIDDEN, "U0684", message)
+    }
+
+    /// The request comes from another page.
+    pub(crate) fn foreign(message: impl Into<String>) -> Self {
+        Self::new(StatusCode::FORBIDDEN, "U0685", message)
+    }
+
+    /// Nobody is logged in.
+    pub(crate) fn log_in(message: impl Into<String>) -> Self {
+        Self::new(StatusCode::UNAUTHORIZED, "U0686", message)
+    }
+
+    /// Too many at once.
+    pub(crate) fn too_many(message: impl Into<String>) -> Self {
+        Self::new(StatusCode::SERVICE_UNAVAILABLE, "U0687", message)
+    }
+
+    /// The laboratory refused a command; its words begin with their code.
+    pub(crate) fn refused(words: &str) -> Self {
+        let (code, message) = words.split_once(": ").unwrap_or(("U0682", words));
+        Self::new(StatusCode::CONFLICT, code, message)
+    }
+}
+
+impl IntoResponse for Problem {
+    fn into_response(self) -> Response {
+        let body = json!({ "error": { "code": self.code, "message": self.message } });
+        (self.status, Json(body)).into_response()
+    }
+}

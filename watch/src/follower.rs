@@ -1,0 +1,73 @@
+//! The thread that reads the journal while it is written, and says what is newest.
+
+use std::path::Path;
+use std::sync::{Arc, PoisonError, RwLock};
+use std::time::{Duration, Instant};
+
+use tokio::sync::watch;
+use understudy_view::Run;
+
+use crate::model::Model;
+use crate::shown::newest_state;
+
+/// Between two looks at a journal that says nothing new.
+const LOOK: Duration = Duration::from_millis(40);
+
+/// Between two words to the viewers.
+const SAY: Duration = Duration::from_millis(200);
+
+/// Between two looks for a run that has not begun.
+const WAIT: Duration = Duration::from_millis(200);
+
+pub(crate) fn follow(
+    path: &Path,
+    model: &RwLock<Model>,
+    newest: &watch::Sender<Arc<str>>,
+    ends: &watch::Receiver<bool>,
+) {
+    let (run, mut source) = loop {
+        if *ends.borrow() {
+            return;
+        }
+        match Run::open(path) {
+            Ok(run) => {
+                let source = lock(model, |model| model.begin(&run));
+                break (run, source);
+            }
+            Err(error) => lock(model, |model| model.waits_for = error.to_string()),
+        }
+        std::thread::sleep(WAIT);
+    };
+    let mut said = Instant::now() - SAY;
+    let mut unsaid = true;
+    let mut ended = false;
+    while !*ends.borrow() {
+        // Read first, so that nobody who asks waits for a disk.
+        let mut found = Vec::new();
+        let taken = source.poll(&mut |record| found.push(record));
+        lock(model, |model| {
+            found.into_iter().for_each(|found| model.note(found))
+        });
+        unsaid |= taken > 0;
+        // A simulated run has no last record; it has results when it is over.
+        if taken == 0 && !ended && run.is_finished() {
+            ended = true;
+            unsaid = true;
+            lock(model, Model::end);
+        }
+        if unsaid && said.elapsed() >= SAY {
+            let state = newest_state(&model.read().unwrap_or_else(PoisonError::into_inner));
+            // While a long journal is read for the first time this tells how far it is.
+            newest.send_replace(Arc::from(state));
+            said = Instant::now();
+            unsaid = false;
+        }
+        if taken == 0 {
+            std::thread::sleep(LOOK);
+        }
+    }
+}
+
+fn lock<T>(model: &RwLock<Model>, work: impl FnOnce(&mut Model) -> T) -> T {
+    work(&mut model.write().unwrap_or_else(PoisonError::into_inner))
+}

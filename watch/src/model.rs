@@ -1,0 +1,160 @@
+//! What the page knows of the run: the model of its journal, and what was done to its parties.
+
+use std::path::Path;
+
+use understudy_scenarios::Record;
+use understudy_view::{Bounds, Margin, Model as RunModel, Run, Source, Trouble};
+use understudy_wire::{Party, ProgramId, StationId, StationSet};
+
+use crate::changes::Changes;
+use crate::foreseen::Foresight;
+
+/// Cycles by which a remote I/O that is alive may be behind the newest deadline.
+const LAG_CYCLES: i64 = 3;
+
+/// What is known of the run.
+#[derive(Debug)]
+pub(crate) struct Model {
+    name: String,
+    known: Option<Known>,
+    /// Why nothing is known, while that is so.
+    pub(crate) waits_for: String,
+}
+
+/// A run whose programs are known.
+#[derive(Debug)]
+pub(crate) struct Known {
+    pub(crate) run: RunModel,
+    pub(crate) changes: Changes,
+    foresight: Foresight,
+    /// Nothing more will come, and all of it is read.
+    ended: bool,
+}
+
+impl Model {
+    pub(crate) fn new(run: &Path) -> Self {
+        let name = std::fs::canonicalize(run).ok();
+        let name = name.as_deref().unwrap_or(run).file_name();
+        Self {
+            name: name.map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
+            known: None,
+            waits_for: "the run has not begun".to_owned(),
+        }
+    }
+
+    /// The name of the run's directory.
+    pub(crate) fn name(&self) -> &str {
+        &self.name
+    }
+
+    pub(crate) fn known(&self) -> Option<&Known> {
+        self.known.as_ref()
+    }
+
+    /// The programs of the run are known from now on; its records are to be read.
+    pub(crate) fn begin(&mut self, run: &Run) -> Source {
+        self.known = Some(Known {
+            run: run.model(Bounds::default()),
+            changes: Changes::default(),
+            foresight: Foresight::default(),
+            ended: false,
+        });
+        run.follow()
+    }
+
+    pub(crate) fn note(&mut self, found: Result<Record, Trouble>) {
+        if let Some(known) = &mut self.known {
+            known.note(found);
+        }
+    }
+
+    /// Nothing more will come.
+    pub(crate) fn end(&mut self) {
+        if let Some(known) = &mut self.known {
+            known.ended = true;
+        }
+    }
+
+    /// False where the run has no such alarm.
+    pub(crate) fn acknowledge(&mut self, alarm: u64, by: &str) -> bool {
+        let known = self.known.as_mut();
+        known.is_some_and(|known| known.run.acknowledge(alarm, by))
+    }
+
+    pub(crate) fn party(&self, name: &str) -> Option<Party> {
+        self.known.as_ref()?.run.parties().find(name)
+    }
+}
+
+impl Known {
+    /// All that a journal holds up to a cycle.
+    pub(crate) fn of_journal(run: &Run, until: i64) -> Self {
+        let mut known = Self {
+            run: run.model(Bounds::default()),
+            changes: Changes::default(),
+            foresight: Foresight::default(),
+            ended: run.is_finished(),
+        };
+        let mut source = run.follow();
+        while source.poll(&mut |found| known.note(found)) > 0 {
+            let past = known.run.cycle().is_some_and(|newest| newest > until);
+            if past && known.run.has_origin() {
+                break;
+            }
+        }
+        known
+    }
+
+    fn note(&mut self, found: Result<Record, Trouble>) {
+        let record = match found {
+            Ok(record) => record,
+            Err(trouble) => {
+                self.run.trouble(&trouble);
+                return;
+            }
+        };
+        let had_origin = self.run.has_origin();
+        self.run.note(&record);
+        if self.run.has_origin() && !had_origin {
+            self.changes.begin_anew();
+        }
+        let felt = self.run.cycle().map_or(i64::MIN, |cycle| cycle + 1);
+        self.changes.note(&record, felt);
+    }
+
+    pub(crate) fn has_ended(&self) -> bool {
+        self.ended || self.run.is_finished()
+    }
+
+    pub(crate) fn programs(&self) -> impl Iterator<Item = ProgramId> + use<> {
+        (0..self.run.cluster().controllers().len()).map(|index| ProgramId(index as u8))
+    }
+
+    pub(crate) fn stations(&self) -> impl Iterator<Item = StationId> + use<> {
+        (0..self.run.cluster().agreement().schedule.stations()).map(|rank| StationId(rank as u8))
+    }
+
+    /// The newest cycle whose deadline every remote I/O that lives has told of.
+    pub(crate) fn newest(&self) -> Option<i64> {
+        let newest = self.run.cycle()?;
+        let told = self.programs().filter_map(|program| {
+            let steps = self.run.history(program)?.steps().iter().rev();
+            let mut driven = steps.filter(|step| step.driven.is_some());
+            driven.next().map(|step| step.cycle)
+        });
+        Some(told.min().unwrap_or(newest).max(newest - LAG_CYCLES))
+    }
+
+    /// The oldest cycle that is remembered; cycles before the origin are not shown.
+    pub(crate) fn oldest(&self) -> Option<i64> {
+        let oldest = self.programs().filter_map(|program| {
+            let steps = self.run.history(program)?.steps();
+            Some(steps.front()?.cycle)
+        });
+        Some(oldest.max()?.max(0))
+    }
+
+    pub(crate) fn margin(&self, cycle: i64, excluded: &[StationSet]) -> std::sync::Arc<Margin> {
+        self.foresight.margin(self, cycle, excluded)
+    }
+}

@@ -1,0 +1,480 @@
+//! What the page shows of one cycle, as JSON: who works, what is driven from which source, what could fail, what somebody has to look at.
+
+use serde::Serialize;
+use understudy_remote_io::Missing;
+use understudy_scenarios::source_word;
+use understudy_view::{Alarm, Margin, Outcome, StationState};
+use understudy_wire::{Party, ProgramId, ProgramSet, SignalPlace, Source, StationId};
+
+use crate::changes::{Process, Standing};
+use crate::model::{Known, Model};
+
+/// Failures that are listed, at most.
+const LISTED_FAILURES: usize = 40;
+
+/// One cycle.
+#[derive(Debug, Serialize)]
+pub(crate) struct State {
+    pub(crate) cycle: i64,
+    pub(crate) oldest: i64,
+    pub(crate) newest: i64,
+    finished: bool,
+    pacemaker: Option<String>,
+    parties: Vec<ShownParty>,
+    programs: Vec<ShownProgram>,
+    timing: Timing,
+    survival: Survival,
+    alarms: Vec<ShownAlarm>,
+    event_count: u64,
+}
+
+#[derive(Debug, Serialize)]
+struct ShownParty {
+    name: String,
+    kind: &'static str,
+    /// In one word.
+    state: &'static str,
+    /// It has no process.
+    down: bool,
+    paces: bool,
+    /// Something that it says does not arrive.
+    cut: bool,
+    note: String,
+    program: Option<u8>,
+    /// What it said in this cycle.
+    words: Vec<ShownWord>,
+}
+
+#[derive(Debug, Serialize)]
+struct ShownWord {
+    members: Vec<String>,
+    sum: String,
+}
+
+#[derive(Debug, Serialize)]
+struct ShownProgram {
+    index: usize,
+    name: String,
+    source: &'static str,
+    word_of: Option<String>,
+    /// Why nothing true was there.
+    missing: Option<String>,
+    inputs: Option<String>,
+    outputs: Option<String>,
+    /// What its own controller said.
+    said: Option<String>,
+    forced: Vec<ShownForce>,
+    counts: Counts,
+}
+
+#[derive(Debug, Serialize)]
+struct ShownForce {
+    kind: &'static str,
+    index: u16,
+    value: bool,
+    seconds: u32,
+    owner: String,
+    reason: String,
+}
+
+#[derive(Debug, Default, Serialize)]
+struct Counts {
+    direct: u64,
+    reconstructed: u64,
+    held: u64,
+    fail_safe: u64,
+}
+
+/// In microseconds.
+#[derive(Debug, Serialize)]
+struct Timing {
+    cycle_us: Option<u64>,
+    margin_us: Option<i64>,
+    least_margin_us: Option<i64>,
+    stalls: usize,
+}
+
+#[derive(Debug, Serialize)]
+struct Survival {
+    level: &'static str,
+    words: String,
+    failures: Vec<Failure>,
+}
+
+#[derive(Debug, Serialize)]
+struct Failure {
+    names: Vec<String>,
+    masked: bool,
+    why: String,
+}
+
+#[derive(Debug, Serialize)]
+struct ShownAlarm {
+    id: u64,
+    cycle: i64,
+    who: String,
+    what: String,
+    lasts: bool,
+    acknowledged: Option<String>,
+}
+
+/// The newest state as JSON; `null` where nothing is known yet.
+pub(crate) fn newest_state(model: &Model) -> String {
+    let state = model
+        .known()
+        .and_then(|known| state(known, known.newest()?));
+    serde_json::to_string(&state).unwrap_or_else(|_| "null".to_owned())
+}
+
+/// The state of a cycle; nothing where it is not remembered.
+pub(crate) fn state(known: &Known, cycle: i64) -> Option<State> {
+    let (oldest, newest) = (known.oldest()?, known.newest()?);
+    if !(oldest.min(newest)..=newest).contains(&cycle) {
+        return None;
+    }
+    let run = &known.run;
+    let standing = known.changes.at(cycle);
+    let excluded: Vec<_> = known
+        .programs()
+        .map(|program| standing.excluded(program))
+        .collect();
+    let margin = known.margin(cycle, &excluded);
+    let paces = standing.paces;
+    let stations = known
+        .stations()
+        .map(|station| shown_station(known, &standing, station, cycle));
+    let remote_ios = known
+        .programs()
+        .map(|program| shown_remote_io(known, &standing, program, cycle));
+    let plants = known
+        .programs()
+        .filter_map(|program| shown_plant(known, &standing, program));
+    Some(State {
+        cycle,
+        oldest,
+        newest,
+        finished: known.has_ended(),
+        pacemaker: paces.map(|station| name(known, Party::Station(station))),
+        parties: stations.chain(remote_ios).chain(plants).collect(),
+        programs: known
+            .programs()
+            .map(|program| shown_program(known, &standing, program, cycle))
+            .collect(),
+        timing: timing(known, cycle),
+        survival: survival(known, &margin),
+        alarms: run
+            .alarms()
+            .rev()
+            .filter(|alarm| alarm.cycle <= cycle)
+            .take(100)
+            .map(shown_alarm)
+            .collect(),
+        event_count: run.event_count(),
+    })
+}
+
+pub(crate) fn name(known: &Known, party: Party) -> String {
+    known.run.parties().name(party).to_owned()
+}
+
+/// A program has the name of its controller.
+pub(crate) fn program_name(known: &Known, program: ProgramId) -> String {
+    name(known, Party::Station(StationId(program.0)))
+}
+
+fn program_names(known: &Known, programs: ProgramSet) -> Vec<String> {
+    let names = programs.iter().map(|program| program_name(known, program));
+    names.collect()
+}
+
+fn shown_station(known: &Known, standing: &Standing, station: StationId, cycle: i64) -> ShownParty {
+    let run = &known.run;
+    let party = Party::Station(station);
+    let schedule = &run.cluster().agreement().schedule;
+    let understudy = schedule.is_understudy(station);
+    let recorded = run
+        .series()
+        .station(station)
+        .and_then(|series| series.at(cycle).copied());
+    let state = recorded
+        .or_else(|| run.station_state(station))
+        .unwrap_or(StationState::NotStarted);
+    let process = standing.process(party);
+    let excluded = known
+        .programs()
+        .filter(|&program| standing.excluded(program).contains(station));
+    let excluded = program_names(known, excluded.collect());
+    ShownParty {
+        name: name(known, party),
+        kind: if understudy {
+            "understudy"
+        } else {
+            "controller"
+        },
+        state: station_word(state, process),
+        down: matches!(process, Some(Process::Killed | Process::Ended)),
+        paces: standing.paces == Some(station),
+        cut: standing.is_cut(party),
+        note: note([
+            (!excluded.is_empty()).then(|| format!("excluded for {}", excluded.join(", "))),
+            standing.is_cut(party).then(|| "cut off".to_owned()),
+        ]),
+        program: (!understudy).then_some(station.0),
+        words: words_of(known, station, cycle),
+    }
+}
+
+fn station_word(state: StationState, process: Option<Process>) -> &'static str {
+    match (process, state) {
+        (Some(Process::Killed), _) => "killed",
+        (Some(Process::Ended), _) => "ended",
+        (Some(Process::StandsStill), _) => "stopped",
+        // The record of its end is older than that of its new beginning.
+        (_, StationState::Killed | StationState::Ended) => "joining",
+        (_, StationState::Stopped) => "silent",
+        (_, StationState::NotStarted) => "not-started",
+        (_, StationState::Speaking) => "speaking",
+        (_, StationState::Silent) => "silent",
+        (_, StationState::Flagged) => "flagged",
+        (_, StationState::Joining) => "joining",
+        (_, StationState::Shadow) => "shadow",
+        (_, StationState::Refused) => "refused",
+    }
+}
+
+fn note<const N: usize>(parts: [Option<String>; N]) -> String {
+    let parts: Vec<String> = parts.into_iter().flatten().collect();
+    parts.join(", ")
+}
+
+fn words_of(known: &Known, station: StationId, cycle: i64) -> Vec<ShownWord> {
+    let mut moments = known.programs().filter_map(|program| {
+        let step = known.run.history(program)?.at(cycle)?;
+        Some(step.moment)
+    });
+    let Some(moment) = moments.next() else {
+        return Vec::new();
+    };
+    let turns = known.run.spoken(moment).iter();
+    let words = turns
+        .filter(|turn| turn.station == station)
+        .flat_map(|turn| turn.words.iter());
+    words
+        .map(|word| ShownWord {
+            members: program_names(known, word.members),
+            sum: word.sum.to_string(),
+        })
+        .collect()
+}
+
+fn process_word(process: Option<Process>) -> Option<&'static str> {
+    match process? {
+        Process::Running => None,
+        Process::StandsStill => Some("stopped"),
+        Process::Killed => Some("killed"),
+        Process::Ended => Some("ended"),
+    }
+}
+
+fn shown_remote_io(
+    known: &Known,
+    standing: &Standing,
+    program: ProgramId,
+    cycle: i64,
+) -> ShownParty {
+    let party = Party::RemoteIo(program);
+    let step = known.run.history(program).and_then(|steps| steps.at(cycle));
+    let driven = step.and_then(|step| step.driven.as_ref());
+    let process = standing.process(party);
+    let missing = driven.and_then(|driven| driven.missing);
+    let alive = match (driven, missing) {
+        (None, _) | (_, Some(Missing::NoHistory)) => "listening",
+        (_, Some(Missing::NotReleased)) => "awaits-release",
+        _ => "serving",
+    };
+    let forced = standing.forced(program).count();
+    ShownParty {
+        name: name(known, party),
+        kind: "remote-io",
+        state: process_word(process).unwrap_or(alive),
+        down: matches!(process, Some(Process::Killed | Process::Ended)),
+        paces: false,
+        cut: standing.is_cut(party),
+        note: note([
+            (forced > 0).then(|| format!("{forced} forced")),
+            standing.is_cut(party).then(|| "cut off".to_owned()),
+        ]),
+        program: Some(program.0),
+        words: Vec::new(),
+    }
+}
+
+fn shown_plant(known: &Known, standing: &Standing, program: ProgramId) -> Option<ShownParty> {
+    let party = Party::Plant(program);
+    known.run.cluster().party_name(party)?;
+    let process = standing.process(party);
+    Some(ShownParty {
+        name: name(known, party),
+        kind: "plant",
+        state: process_word(process).unwrap_or("moving"),
+        down: matches!(process, Some(Process::Killed | Process::Ended)),
+        paces: false,
+        cut: false,
+        note: String::new(),
+        program: Some(program.0),
+        words: Vec::new(),
+    })
+}
+
+fn shown_program(
+    known: &Known,
+    standing: &Standing,
+    program: ProgramId,
+    cycle: i64,
+) -> ShownProgram {
+    let run = &known.run;
+    let step = run.history(program).and_then(|steps| steps.at(cycle));
+    let driven = step.and_then(|step| step.driven.as_ref());
+    let sampled = step.and_then(|step| step.sampled.as_ref());
+    let own = words_of(known, StationId(program.0), cycle);
+    ShownProgram {
+        index: program.index(),
+        name: program_name(known, program),
+        source: driven.map_or("unknown", |driven| source_word(driven.source)),
+        word_of: driven
+            .and_then(|driven| driven.word_of)
+            .map(|station| name(known, Party::Station(station))),
+        missing: driven.and_then(|driven| driven.missing).map(missing_words),
+        inputs: sampled.map(|sampled| sampled.inputs.to_string()),
+        outputs: driven.map(|driven| driven.outputs.to_string()),
+        said: own.into_iter().next().map(|word| word.sum),
+        forced: standing
+            .forced(program)
+            .map(|force| {
+                let (kind, index) = match force.signal {
+                    SignalPlace::Input(index) => ("input", index),
+                    SignalPlace::Output(index) => ("output", index),
+                };
+                ShownForce {
+                    kind,
+                    index,
+                    value: force.value,
+                    seconds: force.seconds,
+                    owner: force.owner.clone(),
+                    reason: force.reason.clone(),
+                }
+            })
+            .collect(),
+        counts: counts(known, program, cycle),
+    }
+}
+
+/// As the journal says it, for people.
+pub(crate) fn missing_words(missing: Missing) -> String {
+    let word = serde_json::to_value(missing).ok();
+    let word = word.as_ref().and_then(|word| word.as_str());
+    word.unwrap_or_default().replace('-', " ")
+}
+
+fn counts(known: &Known, program: ProgramId, cycle: i64) -> Counts {
+    let mut counts = Counts::default();
+    let Some(sources) = known.run.series().sources(program) else {
+        return counts;
+    };
+    for span in sources.spans(i64::MIN, cycle + 1) {
+        let cycles = u64::try_from(span.to - span.from).unwrap_or(0);
+        match span.value {
+            Source::Direct => counts.direct += cycles,
+            Source::Reconstructed => counts.reconstructed += cycles,
+            Source::Held => counts.held += cycles,
+            Source::FailSafe => counts.fail_safe += cycles,
+        }
+    }
+    counts
+}
+
+fn timing(known: &Known, cycle: i64) -> Timing {
+    let until = || known.run.timings().filter(|timing| timing.cycle <= cycle);
+    let least = until().map(|timing| timing.margin_ns).min();
+    // The newest cycles are not closed yet.
+    let own = until().next_back();
+    let stalls = known.run.events();
+    Timing {
+        cycle_us: own
+            .and_then(|timing| timing.cycle_ns)
+            .map(|cycle_ns| cycle_ns / 1000),
+        margin_us: own.map(|timing| timing.margin_ns / 1000),
+        least_margin_us: least.map(|least| least / 1000),
+        stalls: stalls
+            .filter(|event| event.event == "stalled" && event.cycle <= cycle)
+            .count(),
+    }
+}
+
+fn survival(known: &Known, margin: &Margin) -> Survival {
+    let of_stations = |outcome: &&Outcome| {
+        let mut failed = outcome.failed.iter();
+        failed.all(|party| matches!(party, Party::Station(_)))
+    };
+    let singles: Vec<&Outcome> = margin.singles.iter().filter(of_stations).collect();
+    let masked = singles.iter().filter(|outcome| outcome.is_masked()).count();
+    let (level, words) = match (margin.survives, masked) {
+        _ if margin.served.is_empty() => ("none", "no program has true outputs now".to_owned()),
+        (0, 0) => (
+            "none",
+            "no further failure of a station would be masked".to_owned(),
+        ),
+        (0, _) => (
+            "some",
+            format!(
+                "{masked} of {} failures of a single station would be masked",
+                singles.len()
+            ),
+        ),
+        (1, _) => (
+            "all",
+            "any one further failure of a station would be masked".to_owned(),
+        ),
+        _ => (
+            "all",
+            "any two further failures of stations would be masked".to_owned(),
+        ),
+    };
+    let unmasked_pairs = margin.pairs.iter().filter(|pair| !pair.is_masked());
+    let failures = singles.into_iter().chain(unmasked_pairs);
+    Survival {
+        level,
+        words,
+        failures: failures
+            .take(LISTED_FAILURES)
+            .map(|outcome| failure(known, outcome))
+            .collect(),
+    }
+}
+
+fn failure(known: &Known, outcome: &Outcome) -> Failure {
+    let lost = outcome.lost.iter().map(|loss| {
+        let program = program_name(known, loss.program);
+        match loss.missing {
+            Some(missing) => format!("{program} loses its outputs ({})", missing_words(missing)),
+            None => format!("{program} loses its outputs"),
+        }
+    });
+    let failed = outcome.failed.iter();
+    Failure {
+        names: failed.map(|&party| name(known, party)).collect(),
+        masked: outcome.is_masked(),
+        why: lost.collect::<Vec<_>>().join("; "),
+    }
+}
+
+fn shown_alarm(alarm: &Alarm) -> ShownAlarm {
+    ShownAlarm {
+        id: alarm.number,
+        cycle: alarm.cycle,
+        who: alarm.name.clone(),
+        what: alarm.text.clone(),
+        lasts: alarm.over.is_none(),
+        acknowledged: alarm.acknowledged_by.clone(),
+    }
+}

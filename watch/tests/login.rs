@@ -1,0 +1,178 @@
+//! The page for other machines: over TLS only, and only to those who show a token.
+
+use std::fs;
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpStream};
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use rustls::pki_types::ServerName;
+use rustls::{ClientConfig, ClientConnection, RootCertStore, StreamOwned};
+use understudy_watch::{Certificate, Commanding, Logins, Served, Settings, WatchError, serve};
+
+const OPERATOR: &str = "0123456789abcdef0123456789abcdef";
+const VIEWER: &str = "fedcba9876543210fedcba9876543210";
+
+fn empty_folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("login")
+        .join(name);
+    if folder.exists() {
+        fs::remove_dir_all(&folder).expect("an old run's folder goes");
+    }
+    fs::create_dir_all(&folder).expect("a folder");
+    folder
+}
+
+fn logins_file(folder: &Path, rights: u32) -> PathBuf {
+    let path = folder.join("logins.txt");
+    let text = format!("operator anna {OPERATOR}\nviewer bert {VIEWER}\n");
+    fs::write(&path, text).expect("written");
+    fs::set_permissions(&path, fs::Permissions::from_mode(rights)).expect("rights");
+    path
+}
+
+/// A page, and what a browser that trusts its certificate is.
+struct Page {
+    _served: Served,
+    address: SocketAddr,
+    client: Arc<ClientConfig>,
+}
+
+impl Page {
+    fn start(folder: &Path) -> Self {
+        let made = rcgen::generate_simple_self_signed(vec!["127.0.0.1".to_owned()]);
+        let made = made.expect("a certificate");
+        let (chain, key) = (folder.join("page.pem"), folder.join("page.key"));
+        fs::write(&chain, made.cert.pem()).expect("written");
+        fs::write(&key, made.signing_key.serialize_pem()).expect("written");
+        let served = serve(Settings {
+            run: folder.join("nothing"),
+            address: "127.0.0.1:0".parse().expect("an address"),
+            commanding: Commanding::Forbidden("a test looks only"),
+            logins: Some(Logins::of_file(&logins_file(folder, 0o600)).expect("logins")),
+            certificate: Some(Certificate { chain, key }),
+            names: Vec::new(),
+        });
+        let served = served.expect("served");
+        let url = served.url();
+        let address = url.trim_start_matches("https://").trim_end_matches('/');
+        let mut roots = RootCertStore::empty();
+        roots.add(made.cert.der().clone()).expect("a certificate");
+        let provider = Arc::new(rustls::crypto::ring::default_provider());
+        let client = ClientConfig::builder_with_provider(provider)
+            .with_safe_default_protocol_versions()
+            .expect("versions")
+            .with_root_certificates(roots)
+            .with_no_client_auth();
+        Self {
+            address: address.parse().expect("an address"),
+            client: Arc::new(client),
+            _served: served,
+        }
+    }
+
+    fn ask(&self, method: &str, path: &str, lines: &str, body: &str) -> String {
+        let name = ServerName::try_from("127.0.0.1").expect("a name");
+        let connection = ClientConnection::new(Arc::clone(&self.client), name).expect("a client");
+        let stream = TcpStream::connect(self.address).expect("it listens");
+        let patience = Some(Duration::from_secs(60));
+        stream.set_read_timeout(patience).expect("a timeout");
+        let mut stream = StreamOwned::new(connection, stream);
+        let (host, length) = (self.address, body.len());
+        let request = format!(
+            "{method} {path} HTTP/1.1\r\nHost: {host}\r\nOrigin: https://{host}\r\n{lines}Content-Type: application/json\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n{body}"
+        );
+        stream.write_all(request.as_bytes()).expect("sent");
+        let mut answer = Vec::new();
+        // Whoever closes first may leave the goodbye of TLS away.
+        let _ = stream.read_to_end(&mut answer);
+        String::from_utf8(answer).expect("text")
+    }
+
+    fn log_in(&self, token: &str) -> String {
+        let body = format!("{{\"token\":\"{token}\"}}");
+        self.ask("POST", "/api/login", "", &body)
+    }
+}
+
+/// The line with which a browser shows its session.
+fn cookie(answer: &str) -> String {
+    let line = answer
+        .lines()
+        .find(|line| line.to_lowercase().starts_with("set-cookie: "))
+        .expect("a cookie");
+    for word in ["HttpOnly", "Secure", "SameSite=Strict"] {
+        assert!(line.contains(word), "{line}");
+    }
+    let pair = line.split([' ', ';']).nth(1).expect("a name and a value");
+    format!("Cookie: {pair}\r\n")
+}
+
+#[test]
+fn only_who_shows_a_token_sees_the_page() {
+    let page = Page::start(&empty_folder("token"));
+    let status = |answer: &str| answer.split(' ').nth(1).map(str::to_owned);
+    let is = |answer: &str, expected: &str| {
+        assert_eq!(status(answer).as_deref(), Some(expected), "{answer}");
+    };
+    is(&page.ask("GET", "/api/run", "", ""), "401");
+    is(&page.ask("GET", "/", "", ""), "303");
+    is(&page.ask("GET", "/page.js", "", ""), "401");
+    is(&page.ask("GET", "/login.html", "", ""), "200");
+    is(&page.log_in("a guess"), "401");
+    let answer = page.log_in(VIEWER);
+    is(&answer, "200");
+    let session = cookie(&answer);
+    is(&page.ask("GET", "/", &session, ""), "200");
+    // Logged in, and the run has not begun.
+    let run = page.ask("GET", "/api/run", &session, "");
+    is(&run, "404");
+    assert!(run.contains("U0683"), "{run}");
+    is(&page.ask("POST", "/api/logout", &session, "{}"), "200");
+    is(&page.ask("GET", "/api/run", &session, ""), "401");
+}
+
+#[test]
+fn nothing_is_said_in_the_clear() {
+    let page = Page::start(&empty_folder("clear"));
+    let mut stream = TcpStream::connect(page.address).expect("it listens");
+    let patience = Some(Duration::from_secs(60));
+    stream.set_read_timeout(patience).expect("a timeout");
+    let request = format!("GET / HTTP/1.1\r\nHost: {}\r\n\r\n", page.address);
+    stream.write_all(request.as_bytes()).expect("sent");
+    let mut answer = Vec::new();
+    let _ = stream.read_to_end(&mut answer);
+    assert!(!answer.starts_with(b"HTTP"), "{answer:?}");
+}
+
+#[test]
+fn other_machines_need_logins_that_are_secret() {
+    let folder = empty_folder("rights");
+    let settings = |logins| Settings {
+        run: folder.join("nothing"),
+        address: "0.0.0.0:0".parse().expect("an address"),
+        commanding: Commanding::Forbidden("a test looks only"),
+        logins,
+        certificate: None,
+        names: Vec::new(),
+    };
+    assert!(matches!(
+        serve(settings(None)),
+        Err(WatchError::NoLogins(_))
+    ));
+    let readable = Logins::of_file(&logins_file(&folder, 0o644));
+    assert!(matches!(readable, Err(WatchError::Logins { .. })));
+    let made = folder.join("made.txt");
+    assert!(Logins::of_file(&made).is_ok());
+    let rights = fs::metadata(&made)
+        .expect("it was made")
+        .permissions()
+        .mode();
+    assert_eq!(rights & 0o777, 0o600);
+    let served = serve(settings(Some(Logins::of_file(&made).expect("logins"))));
+    let served = served.expect("with logins");
+    assert!(served.url().starts_with("https://") && served.fingerprint().is_some());
+}
