@@ -142,6 +142,24 @@ fn groups_may_share_boxes_with_each_other() {
     assert!(plan.is_complete());
 }
 
+/// Three plants of three programs beside each other: their stations share boxes across the plants, four boxes for twelve stations.
+#[test]
+fn three_groups_share_as_few_boxes_as_the_largest_of_them_wants() {
+    let mut items = Vec::new();
+    for group in 0..3 {
+        for number in 0..3 {
+            let name = format!("p{group}{number}");
+            items.push(program(&name, Some(group), Role::Controller));
+            items.push(program(&format!("{name}-io"), Some(group), Role::RemoteIo));
+        }
+        let name = format!("understudy{group}");
+        items.push(program(&name, Some(group), Role::Understudy));
+    }
+    let plan = planned(&items, &Options::default());
+    assert!(plan.is_complete());
+    assert_eq!(plan.boxes.len(), 4 + 9, "{:?}", boxes(&plan));
+}
+
 #[test]
 fn what_is_preferred_comes_first() {
     let first = |preference| {
