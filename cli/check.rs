@@ -8,6 +8,7 @@ use clap::Args;
 use serde::Serialize;
 use understudy_cluster::Overrides;
 use understudy_diagnostic::{Diagnostic, Report, Severity};
+use understudy_interchange::parse_program;
 use understudy_reconfiguration::project::looks_like_a_project;
 use understudy_scenarios::{Parties, looks_like_a_scenario, read};
 use understudy_supervisor::ladder::read_map;
@@ -75,7 +76,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         } else if let Some(kind) = kind {
             found.add_kind(kind, path, text);
         } else if !is_toml {
-            let diagnostics = understudy_ladder::parse(&text).diagnostics;
+            let diagnostics = parse_program(&path.display().to_string(), &text).diagnostics;
             found.add_file("ladder", path, text, diagnostics);
         } else if looks_like_a_scenario(&text) {
             scenarios.push((path, text));

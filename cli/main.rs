@@ -13,6 +13,7 @@ mod campaign;
 mod catalogue;
 mod check;
 mod console;
+mod convert;
 mod demo;
 mod des;
 mod doctor;
@@ -86,6 +87,7 @@ enum Command {
     Parity(parity::Arguments),
     Verify(verify::Arguments),
     Draw(draw::Arguments),
+    Convert(convert::Arguments),
     Des(des::Arguments),
     Synth(synth::Arguments),
     SupervisorToLadder(supervisor_to_ladder::Arguments),
@@ -125,6 +127,7 @@ impl Command {
             Self::Parity(_) => "parity",
             Self::Verify(_) => "verify",
             Self::Draw(_) => "draw",
+            Self::Convert(_) => "convert",
             Self::Des(_) => "des",
             Self::Synth(_) => "synth",
             Self::SupervisorToLadder(_) => "supervisor-to-ladder",
@@ -164,6 +167,7 @@ impl Command {
             Self::Parity(arguments) => parity::run(&arguments),
             Self::Verify(arguments) => verify::run(&arguments, console),
             Self::Draw(arguments) => draw::run(&arguments),
+            Self::Convert(arguments) => convert::run(&arguments),
             Self::Des(arguments) => des::run(&arguments),
             Self::Synth(arguments) => synth::run(&arguments),
             Self::SupervisorToLadder(arguments) => supervisor_to_ladder::run(&arguments),

@@ -9,7 +9,8 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 use understudy_cluster::{Cluster, Overrides};
 use understudy_diagnostic::{Report, has_errors};
-use understudy_ladder::{Program, parse, parse_time};
+use understudy_interchange::parse_program;
+use understudy_ladder::{Program, parse_time};
 use understudy_logic::Circuit;
 use understudy_verification::induction::{Induction, invariant, prove_always};
 use understudy_verification::program::{Answer as Proof, Bounds, Subject};
@@ -91,7 +92,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
         Ok(source) => source,
         Err(answer) => return answer,
     };
-    let parsed = parse(&source);
+    let parsed = parse_program(&arguments.file.display().to_string(), &source);
     let program = parsed.program;
     let report = Report {
         name: arguments.file.display().to_string(),

@@ -18,6 +18,7 @@ mod units;
 mod write;
 pub(crate) mod xml;
 
+use std::ops::Range;
 use std::time::Duration;
 
 use understudy_diagnostic::{Diagnostic, has_errors};
@@ -82,11 +83,33 @@ pub fn read(text: &str, unit: Option<&str>) -> Reading {
     if let Some(pou) = chosen(&project, unit, &mut reading.diagnostics) {
         translate(&project, pou, &mut reading);
     }
+    for found in &mut reading.diagnostics {
+        within(text, &mut found.span);
+        found
+            .related
+            .iter_mut()
+            .for_each(|related| within(text, &mut related.span));
+    }
+    for note in &mut reading.fidelity.notes {
+        within(text, &mut note.span);
+    }
     reading.diagnostics.sort_by_key(|found| found.span.start);
     if has_errors(&reading.diagnostics) {
         reading.program = None;
     }
     reading
+}
+
+/// Places that were reckoned through texts with entities in them may be off: they are brought to letters of the file.
+fn within(text: &str, span: &mut Range<usize>) {
+    let letter = |place: usize| {
+        let mut place = place.min(text.len());
+        while !text.is_char_boundary(place) {
+            place -= 1;
+        }
+        place
+    };
+    *span = letter(span.start)..letter(span.end.max(span.start));
 }
 
 /// The unit that is asked for, that a task runs, or the only program.

@@ -5,6 +5,7 @@ mod bench;
 mod book;
 mod campaign;
 mod check;
+mod convert;
 mod des;
 mod examples;
 mod explain;

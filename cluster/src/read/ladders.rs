@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use understudy_diagnostic::{Diagnostic, Report, has_errors};
-use understudy_ladder::{Parsed, Program, parse};
+use understudy_interchange::parse_program;
+use understudy_ladder::{Parsed, Program};
 use understudy_logic::Circuit;
 
 use crate::fields::Placed;
@@ -74,7 +75,7 @@ impl<'a> Ladders<'a> {
             return place.clone();
         }
         let place = (self.open)(file).map(|text| {
-            let parsed = parse(&text);
+            let parsed = parse_program(file, &text);
             self.read.push((file.to_owned(), text, parsed));
             self.read.len() - 1
         });

@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use understudy_ladder::{Element, Program, visit};
 
-use super::document::{Body, Ignored, Kind, Pou, Project};
+use super::document::{ActionContent, Body, Condition, Ignored, Kind, Pou, Project};
+use super::units::used;
 
 /// What was kept, and what was not.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -52,10 +53,18 @@ impl Fidelity {
     }
 
     pub(super) fn count(&mut self, project: &Project, pou: &Pou, program: &Program) {
-        let objects: Vec<&Kind> = match &pou.body {
-            Some(Body::Graph(graph)) => graph.objects.iter().map(|object| &object.kind).collect(),
-            _ => Vec::new(),
-        };
+        let parts = pou.actions.iter().chain(&pou.transitions);
+        let mut bodies: Vec<&Body> = parts.filter_map(|part| part.body.as_ref()).collect();
+        bodies.extend(&pou.body);
+        let mut objects: Vec<&Kind> = Vec::new();
+        while let Some(body) = bodies.pop() {
+            if let Body::Graph(graph) = body {
+                for object in &graph.objects {
+                    bodies.extend(inner(&object.kind));
+                    objects.push(&object.kind);
+                }
+            }
+        }
         let in_file = |is: &dyn Fn(&Kind) -> bool| objects.iter().filter(|kind| is(kind)).count();
         let coils = program.rungs.iter().map(|rung| rung.coils.len()).sum();
         let signals = program.inputs.len() + program.outputs.len() + program.memory.len();
@@ -105,8 +114,9 @@ impl Fidelity {
                 comments,
             ),
         ];
+        let used = used(project, pou);
         for other in &project.pous {
-            if other.name != pou.name {
+            if !used.iter().any(|known| known.name == other.name) {
                 let message = format!("the unit `{}` is not used by `{}`", other.name, pou.name);
                 self.notes.push(Note {
                     message,
@@ -116,5 +126,23 @@ impl Fidelity {
         }
         self.notes.sort_by_key(|note| note.span.start);
         self.notes.dedup();
+    }
+}
+
+/// Bodies that stand in an object.
+fn inner(kind: &Kind) -> Vec<&Body> {
+    match kind {
+        Kind::Transition(transition) => match &transition.condition {
+            Condition::Inline(body) => vec![body],
+            _ => Vec::new(),
+        },
+        Kind::Actions(actions) => actions
+            .iter()
+            .filter_map(|action| match &action.content {
+                ActionContent::Inline(body) => Some(body),
+                _ => None,
+            })
+            .collect(),
+        _ => Vec::new(),
     }
 }

@@ -7,7 +7,7 @@ mod calls;
 mod scope;
 mod series;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::time::Duration;
 
@@ -21,6 +21,9 @@ use self::scope::{Binding, Scope};
 use super::document::{Edge, Ignored, Modifier, Pou, Storage, Variable};
 use super::plan::{Action, Plan};
 use super::power::Power;
+
+/// Misspelt names for which the nearest known one is searched.
+const MAXIMUM_SUGGESTIONS: usize = 50;
 
 /// A program, and what was found on the way to it.
 pub(crate) struct Drawn {
@@ -45,6 +48,8 @@ pub(crate) fn draw(pou: &Pou, globals: &[Variable], plan: &Plan, period: Duratio
             ..Program::default()
         },
         kept: HashMap::new(),
+        drawn: HashSet::new(),
+        suggestions: 0,
         pending: Vec::new(),
         diagnostics: Vec::new(),
         ignored: Vec::new(),
@@ -94,6 +99,10 @@ struct Drawing<'a> {
     program: Program,
     /// The bits of objects whose power is kept.
     kept: HashMap<usize, Name>,
+    /// Blocks that have been drawn.
+    drawn: HashSet<String>,
+    /// Suggestions that have been made for misspelt names.
+    suggestions: usize,
     /// Blocks that will stand in the wire of what comes next.
     pending: Vec<Pending>,
     diagnostics: Vec<Diagnostic>,
@@ -234,7 +243,10 @@ impl Drawing<'_> {
         if name.is_empty() {
             return;
         }
-        if let Some(near) = self.scope.nearest(name) {
+        self.suggestions += 1;
+        if self.suggestions <= MAXIMUM_SUGGESTIONS
+            && let Some(near) = self.scope.nearest(name)
+        {
             error = error.with_help(format!("did you mean `{near}`?"));
         }
         self.diagnostics.push(error);

@@ -19,6 +19,9 @@ use self::walk::{Trace, Walk};
 use super::document::{Graph, Kind, Language, Modifier};
 use super::power::Power;
 
+/// Distances between comments and rungs that are measured; with more, comments stand at the end.
+const MAXIMUM_DISTANCES: usize = 10_000_000;
+
 /// What a graph does in one scan.
 #[derive(Debug, Default)]
 pub(crate) struct Plan {
@@ -210,6 +213,7 @@ fn comments(graph: &Graph, plan: &mut Plan) {
         .iter()
         .map(|object| (object.span.start, object.position))
         .collect();
+    let by_distance = comments.len().saturating_mul(plan.steps.len()) <= MAXIMUM_DISTANCES;
     for ((y, x), text) in comments {
         let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
         let lines = lines.map(str::to_owned);
@@ -226,7 +230,7 @@ fn comments(graph: &Graph, plan: &mut Plan) {
         let below = plan
             .steps
             .iter_mut()
-            .filter(|step| distance(step).is_some());
+            .filter(|step| by_distance && distance(step).is_some());
         let below = below.min_by_key(|step| distance(step));
         match below {
             Some(step) => step.comments.extend(lines),

@@ -15,6 +15,9 @@ use super::standard::StandardBlock;
 use super::statements::{Statements, Text};
 use crate::structured_text::{self, Callable, Class, lower_body};
 
+/// The most units that one program uses.
+const MAXIMUM_UNITS: usize = 200;
+
 /// A program, and what was found on the way to it.
 #[derive(Default)]
 pub(crate) struct Lowered {
@@ -36,6 +39,12 @@ pub(crate) fn lower(project: &Project, pou: &Pou) -> Lowered {
     let mut lowered = Lowered::default();
     let used = used(project, pou);
     let mut units: Vec<Unit<'_>> = Vec::new();
+    if used.len() > MAXIMUM_UNITS {
+        let message = format!("`{}` uses more than {MAXIMUM_UNITS} units", pou.name);
+        let error = Diagnostic::error("U1001", message, pou.name.span());
+        lowered.diagnostics.push(error);
+        return lowered;
+    }
     for pou in &used {
         units.extend(unit(project, pou, &mut lowered));
     }
@@ -92,7 +101,7 @@ fn placed<'a>(
 }
 
 /// The unit and all units that it uses, itself first.
-fn used<'a>(project: &'a Project, pou: &'a Pou) -> Vec<&'a Pou> {
+pub(crate) fn used<'a>(project: &'a Project, pou: &'a Pou) -> Vec<&'a Pou> {
     let mut used = vec![pou];
     let mut next = 0;
     while let Some(pou) = used.get(next).copied() {

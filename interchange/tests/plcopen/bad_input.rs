@@ -151,3 +151,55 @@ fn cut_and_changed_files_never_panic() {
         let _ = errors(&changed);
     }
 }
+
+#[test]
+fn changed_examples_are_read_or_refused_and_what_is_read_can_be_written() {
+    let tries = std::env::var("FUZZ_TRIES")
+        .ok()
+        .and_then(|tries| tries.parse().ok());
+    let mut dice = Dice::new(9);
+    for name in ["pump", "probes"] {
+        let path = format!(
+            "{}/../examples/plcopen/{name}.xml",
+            env!("CARGO_MANIFEST_DIR")
+        );
+        let text = std::fs::read_to_string(path).expect("an example");
+        let quotes: Vec<usize> = text.match_indices('"').map(|(place, _)| place).collect();
+        let words: Vec<&str> = text.split(['<', '>']).skip(1).collect();
+        for _ in 0..tries.unwrap_or(60) {
+            let mut changed = text.clone();
+            if dice.rarely(2) {
+                let pair = dice.below(quotes.len() / 2) * 2;
+                let other = dice.below(quotes.len() / 2) * 2;
+                let value = &text[quotes[other]..quotes[other + 1]];
+                changed.replace_range(quotes[pair]..quotes[pair + 1], value);
+            } else {
+                // One element's tag or text in place of another's.
+                let (from, to) = (dice.pick(&words), dice.pick(&words));
+                changed = changed.replacen(&format!(">{from}<"), &format!(">{to}<"), 1);
+            }
+            let reading = read(&changed, None);
+            let Some(program) = reading.program else {
+                assert!(
+                    !reading.diagnostics.is_empty(),
+                    "no program and no reason\n{changed}"
+                );
+                continue;
+            };
+            assert!(program.lower(PERIOD).is_ok(), "{changed}");
+            let again = read(&write(&program, PERIOD), None);
+            assert!(
+                again.program.is_some(),
+                "{:?}\n{changed}",
+                again.diagnostics
+            );
+        }
+    }
+}
+
+#[test]
+fn too_many_wires_are_refused() {
+    let many: Vec<u64> = vec![1; 1001];
+    let found = objects(&coil(2, "y", 20, &many));
+    assert!(found[0].contains("U1001"), "{found:?}");
+}

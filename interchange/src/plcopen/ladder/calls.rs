@@ -90,12 +90,7 @@ impl Drawing<'_> {
             }
         }
         let name = self.scope.declare_instance(&call.instance);
-        if self
-            .program
-            .blocks()
-            .iter()
-            .any(|block| block.name.as_str() == name)
-        {
+        if !self.drawn.insert(name.clone()) {
             self.general(
                 format!("`{}` is called twice", call.instance),
                 call.instance.span(),

@@ -1,6 +1,7 @@
 //! Who is connected to whom: references resolved, coils and connectors looked through, current from left to right.
 
-use std::collections::HashMap;
+use std::cell::Cell;
+use std::collections::{HashMap, HashSet};
 
 use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Name;
@@ -8,6 +9,12 @@ use understudy_ladder::Name;
 use super::is_ladder;
 use crate::plcopen::document::{CONDITION, Graph, Kind, Object, Pin, Wire};
 use crate::plcopen::standard::StandardBlock;
+
+/// The most connections of one input.
+const MAXIMUM_WIRES: usize = 1000;
+
+/// What is looked through for all inputs of a graph together.
+const MAXIMUM_LOOKS: usize = 5_000_000;
 
 /// Where power comes from.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -32,6 +39,7 @@ struct Resolver<'a> {
     places: HashMap<u64, usize>,
     connectors: HashMap<&'a str, usize>,
     is_block: &'a [bool],
+    looks: Cell<usize>,
 }
 
 impl Links {
@@ -61,12 +69,20 @@ impl Links {
             places,
             connectors,
             is_block: &blocks,
+            looks: Cell::new(0),
         };
         let mut sources = Vec::with_capacity(graph.objects.len());
         let mut fan_out = vec![0; graph.objects.len()];
         for object in &graph.objects {
             let mut inputs = Vec::new();
             for pin in &object.inputs {
+                if pin.wires.len() > MAXIMUM_WIRES {
+                    let message = format!("an input has more than {MAXIMUM_WIRES} connections");
+                    let span = object.span.clone();
+                    diagnostics.push(Diagnostic::error("U1001", message, span));
+                    inputs.push(Vec::new());
+                    continue;
+                }
                 resolver.check(object, pin, diagnostics);
                 // The ways of a sequence carry no power.
                 let found = if is_sequence(object) && pin.name.as_str() != CONDITION {
@@ -92,6 +108,14 @@ impl Links {
                 let message = format!("no connector is called `{name}`");
                 diagnostics.push(Diagnostic::error("U1005", message, object.span.clone()));
             }
+        }
+        if resolver.looks.get() > MAXIMUM_LOOKS {
+            let message = "the connections of a body are too many to be followed";
+            let span = graph
+                .objects
+                .first()
+                .map_or(0..0, |object| object.span.clone());
+            diagnostics.push(Diagnostic::error("U1001", message, span));
         }
         Self {
             sources,
@@ -124,9 +148,14 @@ impl Resolver<'_> {
     /// The sources of an input behind coils and connectors, each once.
     fn sources(&self, pin: &Pin) -> Vec<Source> {
         let mut found = Vec::new();
-        let mut seen = Vec::new();
+        let mut seen = HashSet::new();
         let mut waiting: Vec<&Wire> = pin.wires.iter().rev().collect();
         while let Some(wire) = waiting.pop() {
+            self.looks.set(self.looks.get() + 1 + found.len() / 8);
+            if self.looks.get() > MAXIMUM_LOOKS || found.len() > MAXIMUM_WIRES {
+                self.looks.set(MAXIMUM_LOOKS + 1);
+                break;
+            }
             let Some(&place) = self.places.get(&wire.from) else {
                 continue;
             };
@@ -137,8 +166,7 @@ impl Resolver<'_> {
                 _ => None,
             };
             if let Some(through) = through {
-                if !seen.contains(&through) {
-                    seen.push(through);
+                if seen.insert(through) {
                     let inputs = &self.graph.objects[through].inputs;
                     waiting.extend(inputs.iter().flat_map(|pin| &pin.wires).rev());
                 }

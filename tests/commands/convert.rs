@@ -1,0 +1,54 @@
+//! `understudy convert`: ladders of other tools in and out.
+
+use std::fs;
+
+use crate::{empty_folder, understudy, understudy_in};
+
+#[test]
+fn an_editor_s_ladder_becomes_text_with_all_that_is_not_kept() {
+    let answer = understudy(&["convert", "examples/plcopen/pump.xml", "--fidelity"]);
+    insta::assert_snapshot!(answer.shown());
+}
+
+#[test]
+fn what_is_written_is_read_again_by_every_command() {
+    let folder = empty_folder("convert");
+    let root = env!("CARGO_MANIFEST_DIR");
+    let example = |name: &str| format!("{root}/examples/{name}");
+    for (from, to) in [
+        (example("plcopen/pump.xml"), "pump.ladder"),
+        ("pump.ladder".to_owned(), "pump.xml"),
+        ("pump.xml".to_owned(), "pump.st"),
+        ("pump.st".to_owned(), "again.xml"),
+        (example("plcopen/probes.xml"), "probes.xml"),
+    ] {
+        let answer = understudy_in(&folder, &["convert", &from, to, "--json"]);
+        assert_eq!(answer.status, 0, "{from}: {}", answer.shown());
+        assert_eq!(answer.json()["result"]["file"], to);
+    }
+    for file in ["pump.xml", "again.xml", "probes.xml", "pump.st"] {
+        assert_eq!(understudy_in(&folder, &["check", file]).status, 0, "{file}");
+        let drawn = understudy_in(&folder, &["draw", file]);
+        assert!(drawn.output.contains("( )"), "{file}: {}", drawn.shown());
+    }
+    let proved = understudy_in(&folder, &["verify", "again.xml", "--json"]);
+    assert_ne!(proved.status, 2, "{}", proved.shown());
+}
+
+#[test]
+fn a_file_with_errors_is_not_converted() {
+    let folder = empty_folder("convert_wrong");
+    let pump = fs::read_to_string(format!(
+        "{}/examples/plcopen/pump.xml",
+        env!("CARGO_MANIFEST_DIR")
+    ))
+    .expect("an example");
+    let wrong = pump
+        .replace("<variable>empty</variable>", "<variable>emty</variable>")
+        .replacen("refLocalId=\"15\"", "refLocalId=\"150\"", 1);
+    fs::write(folder.join("pump.xml"), wrong).expect("written");
+    let answer = understudy_in(&folder, &["convert", "pump.xml", "pump.ladder"]);
+    assert_eq!(answer.status, 2);
+    assert!(!folder.join("pump.ladder").exists());
+    insta::assert_snapshot!(answer.shown());
+}
