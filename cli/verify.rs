@@ -2,7 +2,7 @@
 
 mod answer;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
@@ -13,10 +13,10 @@ use understudy_interchange::parse_program;
 use understudy_ladder::{Program, parse_time};
 use understudy_logic::Circuit;
 use understudy_verification::induction::{Induction, invariant, prove_always};
-use understudy_verification::program::{Answer as Proof, Bounds, Subject};
+use understudy_verification::program::{Answer as Proof, Bounds, Remarks, Subject};
 use understudy_verification::property::{Properties, Property, not_of_one_scan, read, read_one};
 use understudy_verification::symbolic::Resolved;
-use understudy_verification::{prove_parity, smv};
+use understudy_verification::{draw_runs, prove_parity, smv};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
@@ -30,11 +30,13 @@ Example:
   understudy verify examples/press-cell/press.ladder
   understudy verify press.ladder --property \"never ram_down and ram_up\" --property \"AG EF ram_down\"
   understudy verify press.ladder --properties press.properties --period 20ms
+  understudy verify press.ladder --property \"never ram_down and ram_up\" --draw runs.html
   understudy verify press.ladder --smv scan --output press.smv
   understudy verify examples/press-cell/cluster.toml
 
-Without a property it asks what is asked of every ladder: can each output be switched on and off, again and again? Of a cluster also
-whether the understudy equals the sum of its members. docs/properties.md describes formulas, sentences and files of them.
+Without a property it asks what is asked of every ladder: can each output be switched on and off, again and again? It also remarks on rungs
+without effect, on coils that want different values in one scan, and on steps that are run through in one. Of a cluster also whether the
+understudy equals the sum of its members. docs/properties.md describes formulas, sentences and files of them.
 
 Exit status: 0 when everything was proved, 1 when something does not hold or is undecided, 2 for bad input.")]
 pub(crate) struct Arguments {
@@ -59,6 +61,9 @@ pub(crate) struct Arguments {
     /// For what stays undecided: induction over at most so many scans
     #[arg(long, value_name = "SCANS", default_value_t = 20)]
     induction: u32,
+    /// A page in HTML with every run that shows something, drawn into the ladder scan by scan
+    #[arg(long, value_name = "FILE.html", conflicts_with = "smv")]
+    draw: Option<PathBuf>,
     /// Write the program and its properties for NuSMV, and prove nothing
     #[arg(long, value_enum)]
     smv: Option<Smv>,
@@ -94,7 +99,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
     };
     let parsed = parse_program(&arguments.file.display().to_string(), &source);
     let program = parsed.program;
-    let report = Report {
+    let mut report = Report {
         name: arguments.file.display().to_string(),
         text: source,
         diagnostics: parsed.diagnostics,
@@ -115,9 +120,28 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
     };
     let answer = match arguments.smv {
         Some(form) => text_for_nusmv(arguments, form, &program, &subject, &asked),
-        None => proved(arguments, &subject, &asked, console),
+        None => {
+            let remarks = match subject.remarks(&program, arguments.period, bounds(arguments)) {
+                Ok(remarks) => remarks,
+                Err(error) => {
+                    return Answer::failed(Status::BadInput, "U0436", error.to_string());
+                }
+            };
+            let found = remarks.found.iter();
+            report
+                .diagnostics
+                .extend(found.map(|remark| remark.diagnostic.clone()));
+            proved(arguments, &program, &subject, &remarks, &asked, console)
+        }
     };
     answer.with_reports(vec![report])
+}
+
+fn bounds(arguments: &Arguments) -> Bounds {
+    Bounds {
+        nodes: arguments.nodes,
+        ..Bounds::default()
+    }
 }
 
 /// Properties and conditions that were asked for, over the program's signals.
@@ -212,14 +236,14 @@ fn text_for_nusmv(
 
 fn proved(
     arguments: &Arguments,
+    ladder: &Program,
     subject: &Subject,
+    remarks: &Remarks,
     asked: &Asked,
     console: &mut Console,
 ) -> Answer {
-    let bounds = Bounds {
-        nodes: arguments.nodes,
-    };
-    let mut program = ProgramAnswer::of(subject, bounds);
+    let bounds = bounds(arguments);
+    let mut program = ProgramAnswer::of(subject, bounds, remarks);
     let formulas: Vec<Resolved> = asked
         .properties
         .iter()
@@ -251,23 +275,45 @@ fn proved(
             .properties
             .push(Finding::new(subject.circuit(), property, formula, proof));
     }
-    answer::of_programs(vec![program], None)
+    let page = match &arguments.draw {
+        None => None,
+        Some(path) => match draw(path, arguments.period, ladder, subject, &program) {
+            Ok(name) => Some(name),
+            Err(answer) => return answer,
+        },
+    };
+    answer::of_programs(vec![program], None, page)
+}
+
+/// Writes the page of runs; answers with its name.
+fn draw(
+    path: &Path,
+    period: Duration,
+    ladder: &Program,
+    subject: &Subject,
+    proved: &ProgramAnswer,
+) -> Result<String, Answer> {
+    let page = draw_runs(ladder, period, subject.circuit(), &proved.runs());
+    let page = page.map_err(|error| Answer::failed(Status::BadInput, "U0436", error.to_string()))?;
+    files::write(path, &page)?;
+    Ok(path.display().to_string())
 }
 
 /// Every program of a cluster against what is asked of all, and the understudy against its members.
 fn cluster(arguments: &Arguments) -> Answer {
-    if !(arguments.property.is_empty() && arguments.properties.is_none() && arguments.smv.is_none())
-    {
-        let message = "properties and --smv are of one ladder; name the ladder of the cluster's program instead of the cluster";
+    let of_a_ladder = !arguments.property.is_empty()
+        || arguments.properties.is_some()
+        || arguments.smv.is_some()
+        || arguments.draw.is_some();
+    if of_a_ladder {
+        let message = "properties, --draw and --smv are of one ladder; name the ladder of the cluster's program instead of the cluster";
         return Answer::failed(Status::BadInput, "U0437", message);
     }
     let (cluster, reports) = match files::cluster(&arguments.file, Overrides::default()) {
         Ok(read) => read,
         Err(answer) => return answer,
     };
-    let bounds = Bounds {
-        nodes: arguments.nodes,
-    };
+    let bounds = bounds(arguments);
     let mut programs = Vec::new();
     for controller in cluster.controllers() {
         let period = cluster.agreement().schedule.period();
@@ -275,9 +321,13 @@ fn cluster(arguments: &Arguments) -> Answer {
             Ok(subject) => subject,
             Err(error) => return Answer::failed(Status::BadInput, "U0436", error.to_string()),
         };
-        programs.push(ProgramAnswer::of(&subject, bounds));
+        let remarks = match subject.remarks(&controller.program, period, bounds) {
+            Ok(remarks) => remarks,
+            Err(error) => return Answer::failed(Status::BadInput, "U0436", error.to_string()),
+        };
+        programs.push(ProgramAnswer::of(&subject, bounds, &remarks));
     }
-    answer::of_programs(programs, Some(parity(&cluster))).with_reports(reports)
+    answer::of_programs(programs, Some(parity(&cluster)), None).with_reports(reports)
 }
 
 /// What the proof of the understudy says.

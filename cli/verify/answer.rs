@@ -6,9 +6,11 @@ use std::fmt::Write as _;
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_logic::Circuit;
-use understudy_verification::program::{Answer as Proof, Bounds, Lamp, OutputFinding, Subject};
+use understudy_verification::program::{
+    Answer as Proof, Bounds, Lamp, OutputFinding, Remarks, Subject,
+};
 use understudy_verification::property::Property;
-use understudy_verification::scan_table;
+use understudy_verification::{Shown, scan_table};
 use understudy_verification::symbolic::{Resolved, Signal, Trace};
 
 use crate::answer::{Answer, Status};
@@ -22,6 +24,8 @@ pub(crate) struct Verification {
     understudy: Option<String>,
     /// Whether everything was proved.
     proved: bool,
+    /// The page of runs that was written.
+    page: Option<String>,
 }
 
 /// One ladder.
@@ -32,8 +36,23 @@ pub(crate) struct ProgramAnswer {
     registers: usize,
     /// For each output whether it can be switched on and off for ever.
     switches: Vec<Switch>,
+    /// What is suspicious about the order and the effect of its rungs; nobody asked, and nothing fails by it.
+    remarks: Vec<RemarkAnswer>,
+    /// Questions for remarks that were not decided within the bounds.
+    undecided_remarks: usize,
     /// In the order in which they were asked.
     pub(super) properties: Vec<Finding>,
+}
+
+/// Something suspicious.
+#[derive(Debug, Serialize, JsonSchema)]
+pub(crate) struct RemarkAnswer {
+    /// Stable code, such as `U0445`.
+    code: &'static str,
+    /// What an engineer reads.
+    message: String,
+    /// A run at whose end it happens.
+    scans: Option<Scans>,
 }
 
 /// One output.
@@ -74,6 +93,8 @@ pub(crate) struct Scans {
     again_from: Option<usize>,
     #[serde(skip)]
     table: String,
+    #[serde(skip)]
+    trace: Trace,
 }
 
 impl Scans {
@@ -87,23 +108,60 @@ impl Scans {
             signals: signals.collect(),
             again_from: trace.again_from,
             table: scan_table(circuit, trace),
+            trace: trace.clone(),
         }
     }
 }
 
 impl ProgramAnswer {
     /// With what is asked of every ladder, and no property yet.
-    pub(super) fn of(subject: &Subject, bounds: Bounds) -> Self {
+    pub(super) fn of(subject: &Subject, bounds: Bounds, remarks: &Remarks) -> Self {
         let circuit = subject.circuit();
         let switches = subject.switches(bounds).into_iter();
+        let remarked = remarks.found.iter().map(|remark| RemarkAnswer {
+            code: remark.diagnostic.code,
+            message: remark.diagnostic.message.clone(),
+            scans: remark
+                .trace
+                .as_ref()
+                .map(|trace| Scans::of(circuit, trace)),
+        });
         Self {
             name: circuit.name().to_owned(),
             registers: circuit.registers().len(),
             switches: switches
                 .map(|(signal, finding)| switch(circuit, signal, &finding))
                 .collect(),
+            remarks: remarked.collect(),
+            undecided_remarks: remarks.undecided,
             properties: Vec::new(),
         }
+    }
+
+    /// Every run that shows something, with what it shows.
+    pub(super) fn runs(&self) -> Vec<Shown<'_>> {
+        let switches = self
+            .switches
+            .iter()
+            .map(|switch| (&switch.message, switch.verdict, &switch.scans));
+        let properties = self
+            .properties
+            .iter()
+            .map(|finding| (&finding.property, finding.verdict, &finding.scans));
+        let remarks = self
+            .remarks
+            .iter()
+            .map(|remark| (&remark.message, "remark", &remark.scans));
+        let shown = switches.chain(remarks).chain(properties);
+        let shown = shown.filter_map(|(title, verdict, scans)| {
+            let trace = &scans.as_ref()?.trace;
+            Some(Shown {
+                title,
+                verdict: word(verdict),
+                trace,
+            })
+        });
+        shown.collect()
     }
 
     fn proved(&self) -> bool {
@@ -119,6 +177,17 @@ impl ProgramAnswer {
         for switch in &self.switches {
             let _ = writeln!(text, "  {:<9} {}", word(switch.verdict), switch.message);
             push_table(&mut text, switch.scans.as_ref());
+        }
+        for remark in &self.remarks {
+            let _ = writeln!(text, "  {:<9} {} {}", word("remark"), remark.code, remark.message);
+            push_table(&mut text, remark.scans.as_ref());
+        }
+        if self.undecided_remarks > 0 {
+            let _ = writeln!(
+                text,
+                "  {:<9} {} questions about the order and the effect of rungs",
+                "undecided", self.undecided_remarks
+            );
         }
         for finding in &self.properties {
             let name = finding.name.as_ref().map(|name| format!("{name}: "));
@@ -146,6 +215,7 @@ fn word(verdict: &str) -> &str {
     match verdict {
         "holds" | "free" => "proved",
         "undecided" => "undecided",
+        "remark" => "remark",
         _ => "FAILS",
     }
 }
@@ -219,6 +289,7 @@ fn switch(circuit: &Circuit, signal: Signal, finding: &OutputFinding) -> Switch 
 pub(super) fn of_programs(
     programs: Vec<ProgramAnswer>,
     understudy: Option<Result<String, String>>,
+    page: Option<String>,
 ) -> Answer {
     let right =
         programs.iter().all(ProgramAnswer::proved) && understudy.as_ref().is_none_or(Result::is_ok);
@@ -231,11 +302,15 @@ pub(super) fn of_programs(
         };
         let _ = writeln!(text, "\n{word}: {message}");
     }
+    if let Some(page) = &page {
+        let _ = writeln!(text, "\nruns are drawn in {page}");
+    }
     let status = if right { Status::Done } else { Status::Failed };
     let result = Verification {
         programs,
         understudy: understudy.map(|proof| proof.unwrap_or_else(|message| message)),
         proved: right,
+        page,
     };
     Answer::done(text.trim_end().to_owned(), result).with_status(status)
 }

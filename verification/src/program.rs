@@ -11,23 +11,30 @@ use understudy_ladder::{LowerError, Program};
 use understudy_logic::Circuit;
 use understudy_logic::bdd::{BddError, Diagrams};
 
+use crate::explicit::Explicit;
 use crate::property::{Named, Property};
-use crate::symbolic::{Checker, Resolved, Signal, Trace, Verdict, resolve};
+use crate::symbolic::{Checker, Cone, Resolved, Signal, Trace, Verdict, resolve, rows};
 
 pub use remarks::{Remark, Remarks};
 pub use unasked::{Lamp, OutputFinding};
+
+/// Nodes with which most properties of ladders are decided, in a second or two.
+const FEW_NODES: usize = 400_000;
 
 /// Bounds of a proof.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Bounds {
     /// Nodes of decision diagrams alive at once.
     pub nodes: usize,
+    /// States, each with inputs, that are listed where diagrams grow large; four bytes each.
+    pub states: usize,
 }
 
 impl Default for Bounds {
     fn default() -> Self {
         Self {
             nodes: Diagrams::DEFAULT_LIMIT,
+            states: 1 << 26,
         }
     }
 }
@@ -103,6 +110,9 @@ impl Subject {
     }
 
     /// Decides `properties` one after the other; `fair` restricts the runs that are looked at. Each answer is told as it comes.
+    ///
+    /// Diagrams of few nodes come first. Once they are not enough, the states that can be reached are listed, where they are not too many; what is left is
+    /// tried with as many nodes as allowed.
     pub fn check(
         &self,
         properties: &[Resolved],
@@ -110,17 +120,55 @@ impl Subject {
         bounds: Bounds,
         answered: &mut dyn FnMut(usize, &Answer),
     ) -> Vec<Answer> {
-        let mut checker = Checker::new(&self.circuit, fair, bounds.nodes);
+        let few = bounds.nodes.min(FEW_NODES);
+        let lists = fair.is_empty() && bounds.nodes > few;
+        let first = if lists { few } else { bounds.nodes };
         let mut answers = Vec::with_capacity(properties.len());
-        for (place, property) in properties.iter().enumerate() {
-            let answer = match checker.check(property) {
-                Ok(Verdict::Holds(trace)) => Answer::Holds(trace),
-                Ok(Verdict::Fails(trace)) => Answer::Fails(trace),
-                Err(error) => Answer::Undecided(error),
-            };
-            answered(place, &answer);
+        let mut tell = |answer: Answer| {
+            answered(answers.len(), &answer);
             answers.push(answer);
+            answers.len()
+        };
+        let mut checker = Checker::new(&self.circuit, fair.clone(), first);
+        let mut place = 0;
+        for property in properties {
+            let answer = decided(checker.check(property));
+            if lists && matches!(answer, Answer::Undecided(_)) {
+                break;
+            }
+            place = tell(answer);
+        }
+        let left = &properties[place..];
+        if left.is_empty() {
+            return answers;
+        }
+        drop(checker);
+        if let Ok(listed) = Explicit::new(&self.circuit, bounds.states) {
+            for (property, (holds, run)) in left.iter().zip(listed.check(left)) {
+                let trace = run.map(|run| {
+                    let cone = Cone::of(&self.circuit, [property]);
+                    rows(&self.circuit, &cone, run)
+                });
+                tell(if holds {
+                    Answer::Holds(trace)
+                } else {
+                    Answer::Fails(trace)
+                });
+            }
+            return answers;
+        }
+        let mut checker = Checker::new(&self.circuit, fair, bounds.nodes);
+        for property in left {
+            tell(decided(checker.check(property)));
         }
         answers
+    }
+}
+
+fn decided(verdict: Result<Verdict, BddError>) -> Answer {
+    match verdict {
+        Ok(Verdict::Holds(trace)) => Answer::Holds(trace),
+        Ok(Verdict::Fails(trace)) => Answer::Fails(trace),
+        Err(error) => Answer::Undecided(error),
     }
 }

@@ -20,6 +20,7 @@ use understudy_logic::bdd::BddError;
 
 use crate::property::{Formula, Named};
 
+pub(crate) use self::core::Core;
 pub(crate) use model::Cone;
 pub(crate) use trace::rows;
 pub use trace::{ScanRow, Trace, replays};
@@ -79,6 +80,8 @@ pub struct Checker<'c> {
     fair: Vec<Resolved>,
     nodes: usize,
     models: Vec<model::Model<'c>>,
+    /// The part of the circuit that was too large, and why: it is not tried again.
+    too_large: Option<(Cone, BddError)>,
 }
 
 impl Signal {
@@ -99,6 +102,7 @@ impl<'c> Checker<'c> {
             fair,
             nodes,
             models: Vec::new(),
+            too_large: None,
         }
     }
 
@@ -108,14 +112,23 @@ impl<'c> Checker<'c> {
     /// The diagrams need more nodes than allowed.
     pub fn check(&mut self, property: &Resolved) -> Result<Verdict, BddError> {
         let cone = model::Cone::of(self.circuit, self.fair.iter().chain([property]));
+        if let Some((_, error)) = self.too_large.as_ref().filter(|(large, _)| {
+            // More signals make it no smaller.
+            large.variables.is_subset(&cone.variables)
+        }) {
+            return Err(*error);
+        }
         let known = self.models.iter().position(|model| model.cone == cone);
         let model = match known {
             Some(place) => &mut self.models[place],
             None => {
                 // What other properties need is dropped: the bound is on what is alive at once.
                 self.models.clear();
-                let model = model::Model::new(self.circuit, cone, &self.fair, self.nodes)?;
-                self.models.push(model);
+                let model = model::Model::new(self.circuit, cone.clone(), &self.fair, self.nodes);
+                if let Err(error) = &model {
+                    self.too_large = Some((cone, *error));
+                }
+                self.models.push(model?);
                 &mut self.models[0]
             }
         };

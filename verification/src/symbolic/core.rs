@@ -5,7 +5,7 @@ use crate::property::{Formula, Path};
 
 /// A formula of CTL in existential form.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(super) enum Core {
+pub(crate) enum Core {
     Constant(bool),
     Signal(Signal),
     Not(Box<Core>),
@@ -51,7 +51,7 @@ impl Core {
         Self::Always(Box::new(self))
     }
 
-    pub(super) fn of(formula: &Resolved) -> Self {
+    pub(crate) fn of(formula: &Resolved) -> Self {
         let of = |formula: &Resolved| Self::of(formula);
         match formula {
             Formula::Constant(value) => Self::Constant(*value),

@@ -149,3 +149,53 @@ fn an_unknown_signal_is_named() {
     let names: Vec<&str> = unknown.iter().map(|named| named.name.as_str()).collect();
     assert_eq!(names, ["lmap", "oops"]);
 }
+
+/// More inputs than 64 lanes tell apart, and more registers than a word: a shift register, tapped at its end.
+#[test]
+fn listed_states_of_many_inputs_and_registers() {
+    use std::fmt::Write as _;
+    use understudy_verification::explicit::{Explicit, ExplicitError};
+
+    let mut text = String::from("program shift\n");
+    for input in 0..8 {
+        let _ = writeln!(text, "input i{input}");
+    }
+    text.push_str("output y\n");
+    for place in 0..70 {
+        let _ = writeln!(text, "memory m{place} = 0");
+    }
+    text.push_str("rung\n    m69 ( y )\n");
+    for place in (1..70).rev() {
+        let _ = writeln!(text, "rung\n    m{} ( m{place} )", place - 1);
+    }
+    // One bit at most is on its way: the next one begins when it has left.
+    let waiting: Vec<String> = (1..70).map(|place| format!("/m{place}")).collect();
+    let _ = writeln!(text, "rung\n    i0 i7 /m0 {} ( m0 )", waiting.join(" "));
+    let (program, _) = parse(&text).into_result().expect("a right program");
+    let circuit = program
+        .lower_observed(Duration::from_millis(10))
+        .expect("a right program");
+    let listed = Explicit::new(&circuit, 100_000).expect("few states");
+    assert_eq!(listed.count(), 71);
+    let formulas = ["AG !y", "AG EF y", "never i0 and y", "EF (y & m3)"].map(|text| {
+        let property = read_one(text).expect("right");
+        resolve(&property.formula, &circuit).expect("known signals")
+    });
+    let found = listed.check(&formulas);
+    let found = found.iter();
+    let found: Vec<(bool, Option<usize>)> = found
+        .map(|(holds, run)| (*holds, run.as_ref().map(Vec::len)))
+        .collect();
+    assert_eq!(
+        found,
+        [
+            (false, Some(71)),
+            (true, None),
+            (false, Some(71)),
+            (false, None)
+        ]
+    );
+    let bound = 70 * 256;
+    let refused = Explicit::new(&circuit, bound).err();
+    assert_eq!(refused, Some(ExplicitError::States { bound }));
+}

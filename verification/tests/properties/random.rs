@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 use understudy_logic::bdd::Diagrams;
 use understudy_logic::{Circuit, CircuitBuilder, Expression};
+use understudy_verification::explicit::Explicit;
 use understudy_verification::induction::{Induction, prove_always};
 use understudy_verification::property::{Formula, Path};
 use understudy_verification::symbolic::{Checker, Resolved, Signal, Verdict, replays};
@@ -107,6 +108,27 @@ proptest! {
         prop_assert_eq!(holds, naive.holds(&property), "{:?}", readable.map(|f| f.to_string()));
         if let Some(trace) = trace {
             prop_assert!(replays(&circuit, &trace));
+        }
+    }
+
+    /// The list of reachable states and the lists of all states agree, and runs are as short as those from the diagrams.
+    #[test]
+    fn listed_states_agree_with_the_reference(
+        recipe in prop::collection::vec(any::<(u8, u8, u8)>(), 6..16),
+        initial in any::<u8>(),
+        property in formula(),
+    ) {
+        let circuit = circuit(&recipe, initial);
+        let naive = Naive::new(&circuit, &[]);
+        let listed = Explicit::new(&circuit, 1 << (REGISTERS + INPUTS)).expect("no more states than there are");
+        let (holds, _) = listed.check(std::slice::from_ref(&property)).remove(0);
+        prop_assert_eq!(holds, naive.holds(&property));
+        let kept = property.clone().always();
+        let (holds, run) = listed.check(std::slice::from_ref(&kept)).remove(0);
+        prop_assert_eq!(holds, naive.holds(&kept));
+        let mut checker = Checker::new(&circuit, Vec::new(), Diagrams::DEFAULT_LIMIT);
+        if let (Verdict::Fails(Some(trace)), Some(run)) = (checker.check(&kept).expect("small"), run) && property.is_of_one_scan() {
+            prop_assert_eq!(trace.scans.len(), run.len());
         }
     }
 
