@@ -27,6 +27,8 @@ mod program;
 mod resolve;
 mod syntax;
 
+use std::collections::HashSet;
+use std::rc::Rc;
 use std::time::Duration;
 
 use understudy_diagnostic::{Diagnostic, Severity, has_errors};
@@ -35,6 +37,11 @@ use understudy_ladder::{Name, Program};
 pub(crate) use self::parser::is_keyword;
 pub use self::syntax::Class;
 use self::syntax::{Declaration, File, Unit, UnitKind};
+
+/// The most programs of a text.
+const MAXIMUM_PROGRAMS: usize = 16;
+/// The most function blocks and functions of a text.
+const MAXIMUM_CALLABLE: usize = 1_000;
 
 /// What was read.
 #[derive(Debug, Clone, Default)]
@@ -52,29 +59,47 @@ pub fn read(text: &str) -> Reading {
     let (file, mut diagnostics) = parser::parse(text);
     let mut programs = Vec::new();
     let is_sound = !has_errors(&diagnostics);
-    let library = |but: &Unit| -> Vec<Unit> {
-        let others = file
-            .units
-            .iter()
-            .filter(|unit| unit.kind != UnitKind::Program && unit.name.span() != but.name.span());
-        others.cloned().collect()
-    };
-    for unit in file
-        .units
-        .iter()
-        .filter(|unit| unit.kind == UnitKind::Program)
-    {
-        let (program, found) = lowered(unit, "", &library(unit), &file, is_sound);
+    let units: Vec<Rc<Unit>> = file.units.iter().cloned().map(Rc::new).collect();
+    let (units, others): (Vec<_>, Vec<_>) = units
+        .into_iter()
+        .partition(|unit| unit.kind == UnitKind::Program);
+    if units.len() > MAXIMUM_PROGRAMS || others.len() > MAXIMUM_CALLABLE {
+        let message = format!(
+            "there are more than {MAXIMUM_PROGRAMS} programs, or {MAXIMUM_CALLABLE} blocks and functions"
+        );
+        diagnostics.push(Diagnostic::error("U1048", message, 0..0));
+        return Reading {
+            diagnostics,
+            ..Reading::default()
+        };
+    }
+    let mut budget = resolve::MAXIMUM_STEPS;
+    for unit in &units {
+        let (program, found) = lowered(unit, "", &others, &file, is_sound, &mut budget);
         diagnostics.extend(found);
         programs.extend(program);
+    }
+    // What no program calls is looked at as well.
+    for unit in &others {
+        if budget == 0 {
+            break;
+        }
+        let found = resolve::resolve(unit, "", &others, &file.types, &file.globals, &mut budget);
+        // That all of it is too much is not said of a program that is not.
+        let found = found.diagnostics.into_iter();
+        diagnostics.extend(found.filter(|found| budget > 0 || found.code != "U1048"));
+    }
+    if has_errors(&diagnostics) {
+        programs.clear();
     }
     if programs.is_empty() && !has_errors(&diagnostics) {
         let help = "a text needs a PROGRAM … END_PROGRAM";
         diagnostics
             .push(Diagnostic::error("U1051", "there is no program here", 0..0).with_help(help));
     }
+    let mut seen = HashSet::new();
+    diagnostics.retain(|found| seen.insert((found.code, found.span.clone())));
     diagnostics.sort_by_key(|found| found.span.start);
-    diagnostics.dedup();
     diagnostics.truncate(parser::MAXIMUM_FINDINGS);
     Reading {
         programs,
@@ -127,11 +152,11 @@ pub fn lower_body(
     others: &[Callable],
 ) -> (Option<Program>, Vec<Diagnostic>) {
     let mut diagnostics = Vec::new();
-    let own = unit_of(unit, false, &mut diagnostics);
+    let own = Rc::new(unit_of(unit, false, &mut diagnostics));
     let mut callable = Vec::new();
     for other in others {
         let mut found = Vec::new();
-        callable.push(unit_of(other, true, &mut found));
+        callable.push(Rc::new(unit_of(other, true, &mut found)));
         let errors = found
             .into_iter()
             .filter(|found| found.severity == Severity::Error);
@@ -144,7 +169,15 @@ pub fn lower_body(
         }));
     }
     let is_sound = !has_errors(&diagnostics);
-    let (program, found) = lowered(&own, instance, &callable, &File::default(), is_sound);
+    let mut budget = resolve::MAXIMUM_STEPS;
+    let (program, found) = lowered(
+        &own,
+        instance,
+        &callable,
+        &File::default(),
+        is_sound,
+        &mut budget,
+    );
     diagnostics.extend(found);
     diagnostics.sort_by_key(|found| found.span.start);
     diagnostics.truncate(parser::MAXIMUM_FINDINGS);
@@ -153,13 +186,14 @@ pub fn lower_body(
 
 /// Resolves, bounds and lowers a unit; no program where there are errors.
 fn lowered(
-    unit: &Unit,
+    unit: &Rc<Unit>,
     instance: &str,
-    others: &[Unit],
+    others: &[Rc<Unit>],
     file: &File,
     is_sound: bool,
+    budget: &mut usize,
 ) -> (Option<Program>, Vec<Diagnostic>) {
-    let resolving = resolve::resolve(unit, instance, others, &file.types, &file.globals);
+    let resolving = resolve::resolve(unit, instance, others, &file.types, &file.globals, budget);
     let mut diagnostics = resolving.diagnostics;
     if !is_sound || has_errors(&diagnostics) {
         return (None, diagnostics);

@@ -21,7 +21,7 @@ fn is_sound(program: &Program) {
 fn structured_text() {
     let seeds = [
         "interchange/tests/structured_text/texts/blocks.st",
-        "interchange/tests/structured_text/texts/press.st",
+        "examples/other-tools/press.st",
         "interchange/tests/structured_text/texts/full-of-errors.st",
     ];
     attack("structured_text", &seeds, |bytes| {
@@ -33,7 +33,7 @@ fn structured_text() {
 #[test]
 fn digraph() {
     let seeds = [
-        "interchange/tests/digraph/vents.xml",
+        "examples/other-tools/vents.xml",
         "interchange/tests/digraph/bridge.xml",
         "interchange/tests/digraph/full-of-errors.xml",
     ];
@@ -54,7 +54,7 @@ fn digraph() {
 #[test]
 fn ldmicro() {
     let seeds = [
-        "interchange/tests/ldmicro/light.ld",
+        "examples/other-tools/light.ld",
         "interchange/tests/ldmicro/full-of-errors.ld",
     ];
     attack("ldmicro", &seeds, |bytes| {

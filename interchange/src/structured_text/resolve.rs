@@ -27,8 +27,8 @@ use super::syntax::{Declaration, Unit};
 
 /// The most cells of a program, bits of numbers not counted.
 const MAXIMUM_CELLS: usize = 50_000;
-/// The most steps of a program, those of all instances together.
-const MAXIMUM_STEPS: usize = 100_000;
+/// The most steps of a text, those of all programs and instances together.
+pub(super) const MAXIMUM_STEPS: usize = 100_000;
 /// The most instances of blocks and calls of functions.
 const MAXIMUM_INSTANCES: usize = 20_000;
 
@@ -71,20 +71,24 @@ pub(super) struct Resolving {
     pub(super) diagnostics: Vec<Diagnostic>,
 }
 
-/// The program `unit`, with `others` to be called and `globals` behind its VAR_EXTERNAL.
+/// The program `unit`, with `others` to be called and `globals` behind its VAR_EXTERNAL; it takes its steps from `budget`.
 pub(super) fn resolve(
-    unit: &Unit,
+    unit: &Rc<Unit>,
     prefix: &str,
-    others: &[Unit],
+    others: &[Rc<Unit>],
     types: &[super::syntax::TypeDefinition],
     globals: &[Declaration],
+    budget: &mut usize,
 ) -> Resolving {
     let (library, _) = parse(include_str!("library.st"));
-    let mut units = vec![unit.clone()];
+    let mut units = vec![Rc::clone(unit)];
     units.extend(others.iter().cloned());
-    units.extend(library.units.into_iter().map(|unit| Unit {
-        foreign: true,
-        ..unit
+    let library = library.units.into_iter();
+    units.extend(library.map(|unit| {
+        Rc::new(Unit {
+            foreign: true,
+            ..unit
+        })
     }));
     let mut by_name = HashMap::new();
     for (place, unit) in units.iter().enumerate().skip(1) {
@@ -94,7 +98,7 @@ pub(super) fn resolve(
     }
     let mut resolver = Resolver {
         first_of_library: 1 + others.len(),
-        units: units.into_iter().map(Rc::new).collect(),
+        units,
         by_name,
         types: Types::default(),
         globals: globals.to_vec(),
@@ -103,7 +107,7 @@ pub(super) fn resolve(
         stack: Vec::new(),
         program: Resolved::default(),
         steps: Vec::new(),
-        step_count: 0,
+        steps_left: *budget,
         conditional: 0,
         names: HashSet::new(),
         namesakes: HashMap::new(),
@@ -116,6 +120,7 @@ pub(super) fn resolve(
     let main = resolver.instantiate(0, prefix.to_owned(), true);
     resolver.execute(main);
     resolver.program.steps = std::mem::take(&mut resolver.steps);
+    *budget = resolver.steps_left;
     Resolving {
         program: resolver.program,
         diagnostics: resolver.diagnostics,
@@ -136,7 +141,8 @@ struct Resolver {
     program: Resolved,
     /// Of the list that is being made.
     steps: Vec<Step>,
-    step_count: usize,
+    /// Of those that the whole text may have.
+    steps_left: usize,
     /// How many choices are around.
     conditional: usize,
     /// Names of cells and blocks.
@@ -223,12 +229,14 @@ impl Resolver {
 
     /// False past the bound, where the program is given up. A call counts too, so that empty blocks end as well.
     fn count_step(&mut self, span: &Range<usize>) -> bool {
-        self.step_count += 1;
-        if self.step_count > MAXIMUM_STEPS {
-            self.give_up(
-                format!("the program has more than {MAXIMUM_STEPS} steps, its blocks in place"),
-                span.clone(),
-            );
+        match self.steps_left.checked_sub(1) {
+            Some(left) => self.steps_left = left,
+            None => {
+                let message = format!(
+                    "the programs have more than {MAXIMUM_STEPS} steps, their blocks in place"
+                );
+                self.give_up(message, span.clone());
+            }
         }
         !self.is_full
     }

@@ -27,7 +27,7 @@ fn ladder(text: &str) -> Program {
 
 #[test]
 fn the_vents_of_the_paper() {
-    let xml = include_str!("vents.xml");
+    let xml = include_str!("../../../examples/other-tools/vents.xml");
     let reading = read(xml);
     let ladder = print(&program(xml));
     insta::assert_snapshot!(format!("{ladder}\n{}", findings(xml, reading.diagnostics)));

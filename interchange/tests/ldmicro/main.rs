@@ -14,7 +14,7 @@ use support::findings;
 
 #[test]
 fn a_program_as_a_ladder() {
-    let text = include_str!("light.ld");
+    let text = include_str!("../../../examples/other-tools/light.ld");
     let reading = read("light", text);
     assert_eq!(reading.period, Some(Duration::from_millis(10)));
     let ladder = print(&reading.program.expect("a program without errors"));
@@ -64,7 +64,7 @@ fn hostile_files_end() {
         "CONTACTS Xa 0\n".repeat(5_000)
     );
     assert!(read("long", &long).program.is_some());
-    let text = include_str!("light.ld");
+    let text = include_str!("../../../examples/other-tools/light.ld");
     for (end, _) in text.char_indices() {
         read("beginning", &text[..end]);
         read("end", &text[end..]);

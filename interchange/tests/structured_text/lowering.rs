@@ -6,5 +6,7 @@ use crate::support::program;
 
 #[test]
 fn a_text_as_a_ladder() {
-    insta::assert_snapshot!(print(&program(include_str!("texts/press.st"))));
+    insta::assert_snapshot!(print(&program(include_str!(
+        "../../../examples/other-tools/press.st"
+    ))));
 }

@@ -127,6 +127,9 @@ impl<'a> Rungs<'a> {
             };
             wanted.push((name, root, kind));
         }
+        if wanted.is_empty() {
+            return;
+        }
         let roots: Vec<Expression> = wanted.iter().map(|(_, root, _)| *root).collect();
         let networks = self.networks(graph, leaves, &roots);
         let mut pending = Vec::new();

@@ -17,6 +17,7 @@ impl Resolver {
     pub(super) fn instantiate(&mut self, unit: usize, path: String, exclusive: bool) -> usize {
         let number = self.instances.len();
         let content = self.units[unit].clone();
+        self.count_step(&content.name.span());
         if number >= MAXIMUM_INSTANCES {
             self.give_up(
                 format!("the program has more than {MAXIMUM_INSTANCES} instances"),
