@@ -471,3 +471,29 @@ fn units_of_the_file_stand_in_place_of_their_calls() {
         );
     }
 }
+
+#[test]
+fn a_number_that_comes_from_outside_is_no_preset() {
+    let mut declared = variables(&BITS);
+    declared += &variables(&[
+        ("input", "n", "<INT/>"),
+        ("local", "C", "<derived name=\"CTU\"/>"),
+    ]);
+    let objects = [
+        RAIL.to_owned(),
+        contact(1, "a", &[0]),
+        value(2, "n"),
+        block(3, "CTU", "C", &[("CU", 1), ("PV", 2)]),
+        coil(4, "y", &[3]),
+    ];
+    // It is counted to all the same, but as a number of the plant: Structured Text has statements for it.
+    let text = file(&declared, &objects.concat());
+    let reading = read(&text, None);
+    let program = reading.program.as_ref();
+    let inputs = program.map(|program| program.inputs.len());
+    assert!(
+        inputs.is_none_or(|inputs| inputs > 2),
+        "{:?}",
+        findings(&text, &reading)
+    );
+}

@@ -83,6 +83,21 @@ impl Run {
         }
     }
 
+    /// How many inputs there are.
+    pub(crate) fn width(&self) -> usize {
+        self.scan.input_count()
+    }
+
+    /// The registers, packed.
+    pub(crate) fn state(&self) -> &[u64] {
+        &self.registers
+    }
+
+    /// Goes on from another state.
+    pub(crate) fn go_to(&mut self, state: &[u64]) {
+        self.registers.copy_from_slice(state);
+    }
+
     pub(crate) fn step(&mut self, inputs: &[bool]) -> Vec<bool> {
         let mut words = vec![0_u64; inputs.len().div_ceil(64)];
         for (place, _) in inputs.iter().enumerate().filter(|(_, on)| **on) {

@@ -91,6 +91,7 @@ impl<'a> Scope<'a> {
                 }
                 Binding::Bit(name)
             }
+            VariableType::Elementary(kind) if is_given(variable) => Binding::Other(kind.clone()),
             VariableType::Elementary(kind) if kind == "TIME" => {
                 match time(initial.unwrap_or("T#0s")) {
                     Some(time) => Binding::Time(time),
@@ -289,6 +290,13 @@ impl<'a> Scope<'a> {
         }
         (inputs, outputs, memory)
     }
+}
+
+/// Whether its value comes from outside, so that it is no constant.
+fn is_given(variable: &Variable) -> bool {
+    let located = variable.address.as_ref();
+    matches!(variable.section, Section::Input | Section::InOut)
+        || located.is_some_and(|address| address.to_ascii_uppercase().starts_with("%I"))
 }
 
 /// `%IX0.3`, in any case.
