@@ -72,6 +72,7 @@ async function until(what, expression) {
 }
 
 async function picture(name) {
+  await evaluate("(() => { document.getElementById('toast')?.hidePopover?.(); })()");
   const { data } = await call("Page.captureScreenshot", { format: "png" });
   writeFileSync(join(pictures, `${name}.png`), Buffer.from(data, "base64"));
 }

@@ -29,7 +29,9 @@ export function bandPlugin(answer, color) {
         ctx.fillStyle = color("--bad");
         ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
         ctx.setLineDash([5, 4]);
-        answer.faults.forEach((fault, number) => {
+        // Words stand in the first row that is free; where none is, the line stands alone.
+        const free = [0, 0, 0];
+        answer.faults.forEach((fault) => {
           const at = plot.valToPos(fault.cycle, "x", true);
           if (at < bbox.left || at > bbox.left + bbox.width) {
             return;
@@ -38,9 +40,14 @@ export function bandPlugin(answer, color) {
           ctx.moveTo(at, bbox.top);
           ctx.lineTo(at, bbox.top + bbox.height);
           ctx.stroke();
-          const late = at > bbox.left + bbox.width * 0.8;
-          ctx.textAlign = late ? "right" : "left";
-          ctx.fillText(fault.words.length > 32 ? `${fault.words.slice(0, 31)}…` : fault.words, at + (late ? -4 : 4), bbox.top + (12 + (number % 3) * 13) * devicePixelRatio);
+          const words = fault.words.length > 32 ? `${fault.words.slice(0, 31)}…` : fault.words;
+          const width = ctx.measureText(words).width + 8 * devicePixelRatio;
+          const left = Math.min(at + 4, bbox.left + bbox.width - width);
+          const row = free.findIndex((end) => end <= left);
+          if (row >= 0) {
+            free[row] = left + width;
+            ctx.fillText(words, left, bbox.top + (12 + row * 13) * devicePixelRatio);
+          }
         });
         ctx.restore();
       },

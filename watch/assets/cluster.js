@@ -13,7 +13,7 @@ export const SOURCES = {
   direct: { sign: "→", words: "direct" },
   reconstructed: { sign: "⊕", words: "restored" },
   held: { sign: "‖", words: "held" },
-  "fail-safe": { sign: "⏻", words: "fail-safe" },
+  "fail-safe": { sign: "■", words: "fail-safe" },
   unknown: { sign: "?", words: "not known" },
 };
 

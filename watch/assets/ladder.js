@@ -122,8 +122,10 @@ async function cross() {
   const place = id("ladder-cross");
   if (typeof program !== "number") {
     place.replaceChildren();
+    place.hidden = true;
     return;
   }
+  place.hidden = false;
   const answer = await act(() => ask(`/api/cross-reference/${program}`));
   if (!answer) {
     return;
@@ -139,6 +141,8 @@ async function cross() {
       el("table", {}, el("thead", {}, el("tr", {}, head.map((text) => el("th", { scope: "col" }, text)))), el("tbody", {}, answer.signals.map(row)))));
 }
 
+const count = (words) => (words === 1 ? "one word:" : `${words} words; the first is`);
+
 // y(N+1) is the sum of the outputs in each place: shown beside what it is the sum of.
 function sum() {
   const now = state();
@@ -153,7 +157,7 @@ function sum() {
   };
   const rows = [...Array(width).keys()].map((place) =>
     el("tr", {}, el("th", { scope: "row" }, `y${place + 1}`), members.map((item) => column(item, place)), el("td", { class: "sum" }, word?.sum?.[place] ?? "?")));
-  setText(id("ladder-stamp"), `cycle ${now.cycle}: ${program} says ${station?.words?.length ?? 0} words; the first is the sum of ${word?.members?.join(" ⊕ ") ?? "nothing"}`);
+  setText(id("ladder-stamp"), `cycle ${now.cycle}: ${program} says ${count(station?.words?.length ?? 0)} the sum of ${word?.members?.join(" ⊕ ") ?? "nothing"}`);
   shown = "";
   id("ladder-picture").replaceChildren(
     el("table", {}, el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "place"), members.map((item) => el("th", { scope: "col" }, item.name)), el("th", { scope: "col" }, `${program} says`))), el("tbody", {}, rows)),

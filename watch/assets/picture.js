@@ -17,7 +17,7 @@ export const STATES = {
   killed: { sign: "✕", words: "killed" },
   ended: { sign: "✕", words: "has ended" },
   "not-started": { sign: "…", words: "not started" },
-  "awaits-release": { sign: "✋", words: "awaits release" },
+  "awaits-release": { sign: "⚠", words: "awaits release" },
   serving: { sign: "●", words: "serving" },
   listening: { sign: "◌", words: "listening" },
   moving: { sign: "●", words: "moving" },
@@ -103,7 +103,7 @@ function showAll(run, boxes, flows, state) {
     }
     const from = program.source === "reconstructed" ? `${source.words} by ${program.word_of}` : source.words;
     setText(words, `${source.sign} ${from}`);
-    setText(outWords, program.forced.some((force) => force.kind === "output") ? "✋ forced" : "");
+    setText(outWords, program.forced.some((force) => force.kind === "output") ? "⚠ forced" : "");
   });
 }
 

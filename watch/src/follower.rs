@@ -30,6 +30,8 @@ pub(crate) fn follow(
             return;
         }
         match Run::open(path) {
+            // What it runs is written down before its journal begins.
+            Ok(_) if !has_journal(path) => {}
             Ok(run) => {
                 let source = lock(model, |model| model.begin(&run));
                 break (run, source);
@@ -66,6 +68,13 @@ pub(crate) fn follow(
             std::thread::sleep(LOOK);
         }
     }
+}
+
+/// Whether a segment of the journal is there.
+fn has_journal(run: &Path) -> bool {
+    let files = std::fs::read_dir(run).into_iter().flatten().flatten();
+    let mut names = files.map(|file| file.file_name().to_string_lossy().into_owned());
+    names.any(|name| name.starts_with("journal") && name.ends_with(".jsonl"))
 }
 
 fn lock<T>(model: &RwLock<Model>, work: impl FnOnce(&mut Model) -> T) -> T {

@@ -1,6 +1,5 @@
 //! Connections, in the clear or over TLS, and never more than a bound of them.
 
-use std::future::Future;
 use std::io;
 use std::net::SocketAddr;
 use std::pin::Pin;
@@ -96,12 +95,10 @@ impl Listener for Doors {
     type Io = Connection;
     type Addr = SocketAddr;
 
-    fn accept(&mut self) -> impl Future<Output = (Connection, SocketAddr)> + Send {
-        async {
-            match self.accepted.recv().await {
-                Some(accepted) => accepted,
-                None => std::future::pending().await,
-            }
+    async fn accept(&mut self) -> (Connection, SocketAddr) {
+        match self.accepted.recv().await {
+            Some(accepted) => accepted,
+            None => std::future::pending().await,
         }
     }
 
