@@ -50,12 +50,12 @@ fn succeeds(arguments: &[&str]) -> Answer {
     answer
 }
 
-/// Models, maps, nets, automata, ladders, clusters, scenarios and projects of reconfiguration.
+/// Models, maps, nets, automata, ladders of every form, clusters, scenarios and projects of reconfiguration.
 #[test]
 fn every_file_is_right() {
     let is_read = |path: &PathBuf| {
         let extension = path.extension().unwrap_or_default();
-        ["ladder", "toml", "ADS"]
+        ["ladder", "toml", "ADS", "xml", "st", "ld"]
             .iter()
             .any(|read| extension == *read)
     };

@@ -61,6 +61,41 @@ fn a_ladder_is_drawn() {
     assert!(drawn.output.contains("ram_up"), "{}", drawn.output);
     let svg = understudy(&["draw", "examples/press-cell/press.ladder", "--as", "svg"]);
     assert!(svg.output.starts_with("<svg"), "{}", svg.output);
+    let digraph = understudy(&[
+        "draw",
+        "examples/press-cell/press.ladder",
+        "--as",
+        "digraph",
+    ]);
+    assert!(
+        digraph.output.contains("class=\"digraph\""),
+        "{}",
+        digraph.output
+    );
+}
+
+#[test]
+fn programs_of_other_tools_are_ladders() {
+    for file in ["press.st", "light.ld", "vents.xml"] {
+        let file = format!("examples/other-tools/{file}");
+        let converted = understudy(&["convert", &file]);
+        assert_eq!(converted.status, 0, "{}", converted.errors);
+        assert!(converted.output.contains("\nrung"), "{}", converted.output);
+        assert_eq!(understudy(&["check", &file]).status, 0);
+        let drawn = understudy(&["draw", &file, "--as", "digraph"]);
+        assert!(drawn.output.starts_with("<svg"), "{}", drawn.output);
+    }
+    let written = understudy(&[
+        "convert",
+        "examples/press-cell/press.ladder",
+        "--to",
+        "digraph",
+    ]);
+    assert!(
+        written.output.contains("<LadderDiagram name=\"press\""),
+        "{}",
+        written.output
+    );
 }
 
 #[test]
