@@ -13,13 +13,15 @@
 //! slowly or so fast that the ladder's timers leave S is outside of the model, and is counted.
 
 mod judge;
+mod lanes;
 
 use std::time::Duration;
 
 use rustc_hash::FxHashMap;
 use understudy_ladder::{LowerError, Name, Program};
-use understudy_logic::{Circuit, Scan, Scratch};
+use understudy_logic::{Scan, Scratch};
 
+use self::lanes::{LANES, Lanes, Run};
 use crate::controller::Controller;
 use crate::module_two::Correspondence;
 use crate::relation::Relation;
@@ -115,9 +117,21 @@ struct World {
     is_single: bool,
 }
 
+/// What may happen before a scan: where the world was, where it is then, and which channels are failed.
+#[derive(Clone, Copy)]
+struct Happening {
+    /// [`ORIGIN`] before the first scan.
+    parent: u32,
+    state: u32,
+    failed: u64,
+}
+
+/// The parent of the first scan.
+const ORIGIN: u32 = u32::MAX;
+
 struct Prover<'a> {
     claim: &'a Claim<'a>,
-    combined: Scan,
+    combined: Lanes,
     alone: Scan,
     /// Bits of the circuit: outputs that were added to see them.
     lost: usize,
@@ -127,6 +141,8 @@ struct Prover<'a> {
     scratch: Scratch,
     known: FxHashMap<World, u32>,
     nodes: Vec<(World, u32)>,
+    /// Before the first scan.
+    origin: World,
     proof: Proof,
     used: Vec<bool>,
 }
@@ -172,7 +188,16 @@ pub fn prove(claim: &Claim<'_>) -> Result<Proof, NotProved> {
     let at = at.map(|(number, (_, state))| (first_at + number, *state as u32));
     let mut prover = Prover {
         claim,
-        combined: Scan::new(&circuit),
+        origin: World {
+            registers: Scan::new(&circuit).initial().into(),
+            alone: Some(Scan::new(&alone).initial().into()),
+            state: 0,
+            failed: 0,
+            shown: claim.controller.states()[0].inputs.0.clone().into(),
+            outputs: Bits(vec![false; width]),
+            is_single: true,
+        },
+        combined: Lanes::new(Scan::new(&circuit)),
         alone: Scan::new(&alone),
         lost: width,
         at: at.collect(),
@@ -184,42 +209,50 @@ pub fn prove(claim: &Claim<'_>) -> Result<Proof, NotProved> {
         nodes: Vec::new(),
         proof: Proof::default(),
     };
-    prover.run(&circuit, &alone)
+    prover.run()
 }
 
 impl Prover<'_> {
-    fn run(&mut self, combined: &Circuit, alone: &Circuit) -> Result<Proof, NotProved> {
-        let pack = |circuit: &Circuit| -> Box<[u64]> { Scan::new(circuit).initial().into() };
-        let world = World {
-            registers: pack(combined),
-            alone: Some(pack(alone)),
+    fn run(&mut self) -> Result<Proof, NotProved> {
+        // Before the first scan nothing has happened.
+        let mut pending = vec![Happening {
+            parent: ORIGIN,
             state: 0,
             failed: 0,
-            shown: self.claim.controller.states()[0].inputs.0.clone().into(),
-            outputs: Bits(vec![false; self.width]),
-            is_single: true,
-        };
-        // Before the first scan nothing has happened.
-        self.scan(&world, u32::MAX, 0, 0)?;
+        }];
         let mut next = 0;
-        while next < self.nodes.len() {
-            let (world, _) = self.nodes[next].clone();
-            for (state, failed) in self.happenings(&world) {
-                self.scan(&world, next as u32, state, failed)?;
-            }
+        while !pending.is_empty() {
+            let batch = pending.len().min(LANES);
+            self.scan(&pending[..batch])?;
+            pending.drain(..batch);
             if self.nodes.len() > self.claim.maximum_states {
                 return Err(NotProved::TooLarge(self.claim.maximum_states));
             }
-            next += 1;
+            while pending.len() < LANES && next < self.nodes.len() {
+                self.happenings(next as u32, &mut pending);
+                next += 1;
+            }
         }
         self.proof.states = self.nodes.len();
         self.proof.latched = self.used.iter().filter(|used| **used).count();
         Ok(self.proof)
     }
 
-    /// What may happen before the next scan: where the world is then, and which channels are failed.
-    fn happenings(&self, world: &World) -> Vec<(u32, u64)> {
-        let claim = self.claim;
+    fn world(&self, place: u32) -> &World {
+        match self.nodes.get(place as usize) {
+            Some((world, _)) => world,
+            None => &self.origin,
+        }
+    }
+
+    /// What may happen before the scan that follows a node.
+    fn happenings(&self, parent: u32, found: &mut Vec<Happening>) {
+        let (claim, world) = (self.claim, self.world(parent));
+        let happening = |state, failed| Happening {
+            parent,
+            state,
+            failed,
+        };
         let mut statuses = vec![world.failed];
         for bit in 0..claim.channels.len() {
             let other = world.failed ^ (1 << bit);
@@ -227,9 +260,8 @@ impl Prover<'_> {
                 statuses.push(other);
             }
         }
-        let mut found = Vec::new();
         for failed in statuses {
-            found.push((world.state, failed));
+            found.push(happening(world.state, failed));
             let newly = failed & !world.failed;
             for step in claim.controller.moves(world.state as usize) {
                 let is_missed = |event: &Event| {
@@ -244,39 +276,69 @@ impl Prover<'_> {
                 let state = world.state as usize;
                 let is_let = |&event: &Event| claim.relation.allows(state, event, &world.outputs);
                 if step.events.iter().all(is_let) {
-                    found.push((step.target as u32, failed));
+                    found.push(happening(step.target as u32, failed));
                 }
             }
         }
-        found
     }
 
-    fn scan(
-        &mut self,
-        before: &World,
-        parent: u32,
-        state: u32,
-        failed: u64,
-    ) -> Result<(), NotProved> {
-        self.proof.scans += 1;
+    /// What the ladder sees: a failed channel keeps the value that it had.
+    fn shown(&self, happening: Happening) -> Box<[bool]> {
         let claim = self.claim;
-        let actual = &claim.controller.states()[state as usize].inputs.0;
-        let mut shown = before.shown.clone();
+        let actual = &claim.controller.states()[happening.state as usize].inputs.0;
+        let mut shown = self.world(happening.parent).shown.clone();
         for (input, shown) in shown.iter_mut().enumerate() {
             let bit = claim.channels.iter().position(|&known| known == input);
-            if bit.is_none_or(|bit| failed >> bit & 1 == 0) {
+            if bit.is_none_or(|bit| happening.failed >> bit & 1 == 0) {
                 *shown = actual[input];
             }
         }
-        let mut inputs = vec![0; self.combined.input_count().div_ceil(64)];
-        let statuses = (0..claim.channels.len()).map(|bit| failed >> bit & 1 == 1);
-        for (place, value) in shown.iter().copied().chain(statuses).enumerate() {
-            inputs[place / 64] |= u64::from(value) << (place % 64);
+        shown
+    }
+
+    /// The scans that follow, at most [`LANES`] of them.
+    fn scan(&mut self, happenings: &[Happening]) -> Result<(), NotProved> {
+        let words = self.combined.scan().input_count().div_ceil(64);
+        let mut shown = Vec::with_capacity(happenings.len());
+        let mut runs = Vec::with_capacity(happenings.len());
+        for &happening in happenings {
+            let seen = self.shown(happening);
+            let mut inputs = vec![0; words];
+            let bits = 0..self.claim.channels.len();
+            let statuses = bits.map(|bit| happening.failed >> bit & 1 == 1);
+            for (place, value) in seen.iter().copied().chain(statuses).enumerate() {
+                inputs[place / 64] |= u64::from(value) << (place % 64);
+            }
+            runs.push(Run {
+                state: self.world(happening.parent).registers.to_vec(),
+                signals: inputs,
+            });
+            shown.push(seen);
         }
-        let mut registers = before.registers.clone();
-        let mut seen = vec![0; self.combined.output_count().div_ceil(64)];
-        self.combined
-            .step(&mut self.scratch, &mut registers, &inputs, &mut seen);
+        self.combined.step(&mut runs);
+        for ((&happening, shown), run) in happenings.iter().zip(shown).zip(runs) {
+            self.follow(happening, shown, run)?;
+        }
+        Ok(())
+    }
+
+    /// One scan that was made: what has to hold after it, and where it has led.
+    fn follow(
+        &mut self,
+        happening: Happening,
+        shown: Box<[bool]>,
+        run: Run,
+    ) -> Result<(), NotProved> {
+        self.proof.scans += 1;
+        let Happening {
+            parent,
+            state,
+            failed,
+        } = happening;
+        let seen = run.signals;
+        let registers: Box<[u64]> = run.state.into();
+        let before = self.world(parent);
+        let (was_single, was_alone) = (before.is_single, before.alone.clone());
         let is_on = |place: usize| seen[place / 64] >> (place % 64) & 1 == 1;
         let outputs = Bits((0..self.width).map(is_on).collect());
         let mut world = World {
@@ -286,12 +348,11 @@ impl Prover<'_> {
             failed,
             shown,
             outputs,
-            is_single: before.is_single,
+            is_single: was_single,
         };
         if failed == 0
-            && let Some(registers) = &before.alone
+            && let Some(mut registers) = was_alone
         {
-            let mut registers = registers.clone();
             let mut own = vec![0; self.alone.output_count().div_ceil(64)];
             let mut inputs = vec![0; self.alone.input_count().div_ceil(64)];
             for (place, &value) in world.shown.iter().enumerate() {
