@@ -60,18 +60,16 @@ fn the_example_runs_what_is_generated() {
     }
 }
 
-/// Sensors that flicker and stick, nobody who says so, and a controller that is killed meanwhile.
+/// Sensors that flicker and stick, nobody who says so, and a controller or the remote I/O that is killed meanwhile.
 #[test]
 fn the_diagnosed_line_needs_nobody() {
-    let answer = understudy(&[
-        "simulate",
-        "examples/filling-line/diagnosed.toml",
-        "--scenario",
-        "examples/filling-line/silent-sensors-and-kills.toml",
-        "--seed",
-        "1",
-    ]);
-    assert_eq!(answer.status, 0, "{}", answer.shown());
+    for scenario in ["silent-sensors-and-kills", "restart-while-a-sensor-sticks"] {
+        let scenario = format!("examples/filling-line/{scenario}.toml");
+        let cluster = "examples/filling-line/diagnosed.toml";
+        let arguments = ["simulate", cluster, "--scenario", &scenario, "--seed", "1"];
+        let answer = understudy(&arguments);
+        assert_eq!(answer.status, 0, "{scenario}: {}", answer.shown());
+    }
 }
 
 #[test]
