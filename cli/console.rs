@@ -33,6 +33,11 @@ impl Console {
         }
     }
 
+    /// Whether machines are answered.
+    pub(crate) fn is_json(&self) -> bool {
+        self.json
+    }
+
     /// Prints the answer and gives the exit status.
     pub(crate) fn finish(self, command: &str, answer: &Answer) -> ExitCode {
         // A reader that is gone needs no answer.

@@ -16,6 +16,7 @@ mod console;
 mod convert;
 mod demo;
 mod des;
+mod diff;
 mod doctor;
 mod draw;
 mod endurance;
@@ -24,6 +25,7 @@ mod failover;
 mod field;
 mod files;
 mod init;
+mod journal;
 mod keys;
 mod lab;
 mod measure;
@@ -45,8 +47,11 @@ mod shell;
 mod simulate;
 mod supervisor_to_ladder;
 mod synth;
+mod top;
 mod verify;
+mod view;
 mod watch;
+mod why;
 
 use std::process::ExitCode;
 
@@ -100,6 +105,10 @@ enum Command {
     Measure(measure::Arguments),
     Outlook(outlook::Arguments),
     Campaign(campaign::Arguments),
+    Top(top::Arguments),
+    Why(why::Arguments),
+    Journal(journal::Arguments),
+    Diff(diff::Arguments),
     ModelCheck(model_check::Arguments),
     Init(init::Arguments),
     Keys(keys::Arguments),
@@ -140,6 +149,10 @@ impl Command {
             Self::Measure(_) => "measure",
             Self::Outlook(_) => "outlook",
             Self::Campaign(_) => "campaign",
+            Self::Top(_) => "top",
+            Self::Why(_) => "why",
+            Self::Journal(_) => "journal",
+            Self::Diff(_) => "diff",
             Self::ModelCheck(_) => "model-check",
             Self::Init(_) => "init",
             Self::Keys(_) => "keys",
@@ -181,6 +194,10 @@ impl Command {
             Self::Outlook(arguments) => outlook::run(&arguments),
             Self::ModelCheck(arguments) => model_check::run(&arguments),
             Self::Campaign(arguments) => campaign::run(&arguments, console),
+            Self::Top(arguments) => top::run(&arguments, console.is_json()),
+            Self::Why(arguments) => why::run(&arguments),
+            Self::Journal(arguments) => journal::run(&arguments, console.is_json()),
+            Self::Diff(arguments) => diff::run(&arguments),
             Self::Init(arguments) => init::run(&arguments),
             Self::Keys(arguments) => keys::run(&arguments),
             Self::Operate(arguments) => operate::run(&arguments),

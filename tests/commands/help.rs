@@ -4,7 +4,7 @@ use insta::assert_snapshot;
 
 use crate::understudy;
 
-const COMMANDS: [&str; 28] = [
+const COMMANDS: [&str; 32] = [
     "allocate",
     "catalogue",
     "resources",
@@ -21,6 +21,10 @@ const COMMANDS: [&str; 28] = [
     "reconfigure",
     "reliability",
     "measure",
+    "top",
+    "why",
+    "journal",
+    "diff",
     "init",
     "keys",
     "operate",

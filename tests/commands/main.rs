@@ -16,6 +16,7 @@ mod petri;
 mod reconfigure;
 mod reliability;
 mod verify;
+mod view;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

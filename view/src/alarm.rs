@@ -90,8 +90,8 @@ impl Alarms {
 
     pub(crate) fn shift(&mut self, by: i64) {
         for alarm in self.alarms.values_mut() {
-            alarm.cycle += by;
-            alarm.over = alarm.over.map(|over| over + by);
+            alarm.cycle = alarm.cycle.saturating_add(by);
+            alarm.over = alarm.over.map(|over| over.saturating_add(by));
         }
     }
 

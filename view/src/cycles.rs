@@ -46,8 +46,9 @@ impl Cycles {
     pub(crate) fn origin_is(&mut self, moment: Moment, cycle: i64) {
         match self.numbering.of(moment) {
             Some(number) => {
-                let origin = number - cycle;
-                self.shift += self.origin.unwrap_or(0) - origin;
+                let origin = number.saturating_sub(cycle);
+                let by = self.origin.unwrap_or(0).saturating_sub(origin);
+                self.shift = self.shift.saturating_add(by);
                 self.origin = Some(origin);
                 self.awaited = None;
             }
@@ -60,11 +61,19 @@ impl Cycles {
         Some(std::mem::take(&mut self.shift)).filter(|shift| *shift != 0)
     }
 
+    /// From the first record on again, with the origin that is known now.
+    pub(crate) fn again(&self) -> Self {
+        Self {
+            origin: self.origin,
+            ..Self::default()
+        }
+    }
+
     pub(crate) fn has_origin(&self) -> bool {
         self.origin.is_some()
     }
 
     fn counted(&self, number: i64) -> i64 {
-        number - self.origin.unwrap_or(0)
+        number.saturating_sub(self.origin.unwrap_or(0))
     }
 }

@@ -52,6 +52,47 @@ pub struct RunDiff {
     pub differences: Vec<Difference>,
 }
 
+impl RunDiff {
+    /// For a terminal.
+    pub fn to_text(&self) -> String {
+        let mut text = String::new();
+        if !self.same_configuration {
+            text += "They ran different configurations: what has the same name is compared.\n";
+        }
+        let last = self
+            .cycles
+            .map(|cycle| cycle.map_or("none".to_owned(), |cycle| cycle.to_string()));
+        text += &format!(
+            "{} cycles compared (the runs end at {} and {})\n",
+            self.compared, last[0], last[1]
+        );
+        match self.differences.first() {
+            None => text += "No difference in inputs, outputs, sources and events.\n",
+            Some(first) => {
+                text += &format!("They part in cycle {}.\n\n", first.cycle);
+                for found in &self.differences {
+                    let what = match found.what {
+                        Differing::Inputs => "inputs",
+                        Differing::Outputs => "outputs",
+                        Differing::Source => "source",
+                        Differing::Events => "events",
+                    };
+                    let unit = if found.what == Differing::Events {
+                        "events"
+                    } else {
+                        "cycles"
+                    };
+                    text += &format!(
+                        "{:>8}  {:14} {what:8} {} | {}  ({} {unit})\n",
+                        found.cycle, found.name, found.left, found.right, found.count
+                    );
+                }
+            }
+        }
+        text
+    }
+}
+
 /// Compares two runs from their origins on.
 pub fn diff(left: &Model, right: &Model) -> RunDiff {
     let configuration = |model: &Model| model.cluster().agreement().configuration;
@@ -60,7 +101,7 @@ pub fn diff(left: &Model, right: &Model) -> RunDiff {
         .iter()
         .flatten()
         .min()
-        .map_or(0, |last| last + 1)
+        .map_or(0, |last| last.saturating_add(1))
         .max(0);
     let mut differences = Vec::new();
     for (place, controller) in left.cluster().controllers().iter().enumerate() {

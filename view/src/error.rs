@@ -8,7 +8,7 @@ use understudy_scenarios::KeptError;
 #[derive(Debug, thiserror::Error)]
 pub enum ViewError {
     /// There is no run in this place.
-    #[error("{} is no run: it has no journal.jsonl{hint}", path.display())]
+    #[error("no run in {}{hint}", path.display())]
     NoRun {
         /// The place.
         path: PathBuf,
@@ -63,7 +63,7 @@ pub enum ViewError {
         reason: String,
     },
     /// No party or program has this name.
-    #[error("the cluster has no {kind} `{name}`; {hint}")]
+    #[error("no {kind} is called `{name}`; {hint}")]
     NoName {
         /// What was looked for.
         kind: &'static str,
@@ -80,29 +80,12 @@ impl ViewError {
         match self {
             Self::NoRun { .. } => "U0570",
             Self::Kept(KeptError::NotKept { .. }) => "U0571",
-            Self::Kept(_) => "U0572",
-            Self::Journal { .. } => "U0573",
-            Self::NoOutput { .. } | Self::SeveralOutputs { .. } => "U0574",
+            Self::Kept(_) | Self::Journal { .. } => "U0572",
+            Self::NoOutput { .. } => "U0573",
+            Self::SeveralOutputs { .. } => "U0574",
             Self::NoCycle { .. } => "U0575",
             Self::NoState { .. } => "U0576",
             Self::NoName { .. } => "U0577",
-        }
-    }
-}
-
-/// The known name that is nearest to a misspelt one, or all of them where none is near.
-pub(crate) fn suggest<'n>(name: &str, known: impl Iterator<Item = &'n str> + Clone) -> String {
-    let nearest = known
-        .clone()
-        .map(|known| (strsim::levenshtein(name, known), known))
-        .min();
-    match nearest {
-        Some((distance, nearest)) if distance <= (name.chars().count() / 3).max(1) => {
-            format!("did you mean `{nearest}`?")
-        }
-        _ => {
-            let known: Vec<&str> = known.take(40).collect();
-            format!("known are: {}", known.join(", "))
         }
     }
 }

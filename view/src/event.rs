@@ -80,7 +80,9 @@ impl Events {
     }
 
     pub(crate) fn shift(&mut self, by: i64) {
-        self.kept.iter_mut().for_each(|event| event.cycle += by);
+        self.kept
+            .iter_mut()
+            .for_each(|event| event.cycle = event.cycle.saturating_add(by));
     }
 
     pub(crate) fn count(&self) -> u64 {

@@ -220,7 +220,9 @@ impl History {
     }
 
     pub(crate) fn shift(&mut self, by: i64) {
-        self.steps.iter_mut().for_each(|step| step.cycle += by);
+        self.steps
+            .iter_mut()
+            .for_each(|step| step.cycle = step.cycle.saturating_add(by));
     }
 }
 

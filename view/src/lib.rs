@@ -17,6 +17,7 @@ mod diff;
 mod error;
 mod event;
 mod history;
+mod listing;
 mod margin;
 mod model;
 mod run;
@@ -24,6 +25,7 @@ mod series;
 mod snapshot;
 mod source;
 mod station;
+mod terminal;
 mod timeline;
 mod timing;
 mod why;
@@ -34,9 +36,10 @@ pub use diff::{Difference, Differing, RunDiff, diff};
 pub use error::ViewError;
 pub use event::{Event, Level};
 pub use history::{Driven, History, Sampled, Step};
+pub use listing::{Filter, JournalLine, Listing};
 pub use margin::{Holders, Loss, Margin, Outcome};
 pub use model::{Bounds, Model, Spoken};
-pub use run::{Run, find_run};
+pub use run::{Run, find_run, find_run_of};
 pub use series::Series;
 pub use snapshot::{
     MarginSnapshot, OutcomeSnapshot, ProgramSnapshot, RunState, Snapshot, StationSnapshot,
@@ -44,6 +47,7 @@ pub use snapshot::{
 };
 pub use source::{Feed, Source, Trouble};
 pub use station::StationState;
+pub use terminal::{Key, Screen};
 pub use timeline::{Span, Timeline};
 pub use timing::CycleTiming;
 pub use why::{Addend, Reason, Restored, Why};

@@ -149,6 +149,11 @@ impl Model {
         self.events.push(event);
     }
 
+    /// Nothing more will come: the results of the run are there.
+    pub fn end(&mut self) {
+        self.finished = true;
+    }
+
     /// `moment` is cycle `cycle` of the run.
     pub fn origin_is(&mut self, moment: Moment, cycle: i64) {
         self.cycles.origin_is(moment, cycle);
@@ -159,7 +164,9 @@ impl Model {
 
     fn shift(&mut self, by: i64) {
         self.stations.iter_mut().for_each(|track| track.shift(by));
-        self.programs.iter_mut().for_each(|track| track.since += by);
+        self.programs
+            .iter_mut()
+            .for_each(|track| track.since = track.since.saturating_add(by));
         self.histories
             .iter_mut()
             .for_each(|history| history.shift(by));
@@ -167,7 +174,7 @@ impl Model {
         self.events.shift(by);
         self.alarms.shift(by);
         self.timings.shift(by);
-        self.closed = self.closed.map(|closed| closed + by);
+        self.closed = self.closed.map(|closed| closed.saturating_add(by));
     }
 
     // ── what the parties say ────────────────────────────────────────────────────────────────────────────────────────
@@ -263,7 +270,10 @@ impl Model {
         let cycle = match event {
             RunEvent::Origin { moment, .. } => self.cycles.of(Some(*moment)),
             RunEvent::Finished => self.cycles.of(None),
-            _ => self.cycles.of(None) + i64::from(self.cycles.latest().is_some()),
+            _ => self
+                .cycles
+                .of(None)
+                .saturating_add(i64::from(self.cycles.latest().is_some())),
         };
         if let Some(latest) = self.cycles.latest() {
             self.close_up_to(latest);

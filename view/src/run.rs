@@ -10,6 +10,7 @@ use understudy_scenarios::kept_cluster;
 use understudy_wire::{Cycle, Epoch, Moment};
 
 use crate::error::ViewError;
+use crate::listing::{Filter, Listing};
 use crate::model::{Bounds, Model};
 use crate::source::{Source, Trouble};
 
@@ -49,17 +50,49 @@ pub fn find_run(path: &Path) -> Result<PathBuf, ViewError> {
     }
     let replica = path.join("replica-1");
     let hint = if replica.is_dir() {
-        format!("; each replica is one, such as {}", replica.display())
+        format!(": each replica is one, such as {}", replica.display())
     } else if !path.exists() {
-        "; nothing lies there".to_owned()
+        ": there is nothing".to_owned()
     } else {
-        String::new()
+        ": it has no journal.jsonl".to_owned()
     };
     Err(ViewError::NoRun {
         path: path.to_owned(),
         hint,
     })
 }
+
+/// The newest run of a cluster below a directory of runs: of one with the same configuration, or at least the same name.
+///
+/// # Errors
+/// [`ViewError::NoRun`] where none of the newest [`LOOKED_AT`] is.
+pub fn find_run_of(runs: &Path, cluster: &Cluster) -> Result<Run, ViewError> {
+    let mut folders: Vec<PathBuf> = std::fs::read_dir(runs)
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| path.is_dir() && !path.is_symlink())
+        .collect();
+    // Their names are times.
+    folders.sort();
+    let newest = folders.iter().rev().take(LOOKED_AT);
+    let opened: Vec<Run> = newest.filter_map(|folder| Run::open(folder).ok()).collect();
+    let configuration = |cluster: &Cluster| cluster.agreement().configuration;
+    let same = |run: &&Run| configuration(&run.cluster) == configuration(cluster);
+    let namesake = |run: &&Run| run.cluster.name() == cluster.name();
+    let found = opened
+        .iter()
+        .find(same)
+        .or_else(|| opened.iter().find(namesake));
+    found.cloned().ok_or_else(|| ViewError::NoRun {
+        path: runs.to_owned(),
+        hint: format!(": none of the newest there is one of `{}`", cluster.name()),
+    })
+}
+
+/// Runs that are opened to find one of a cluster.
+const LOOKED_AT: usize = 50;
 
 impl Run {
     /// A run in a directory, finished or not.
@@ -118,6 +151,7 @@ impl Run {
         let mut source = self.follow();
         let mut model = self.model(bounds);
         let mut any = false;
+        let is_finished = self.is_finished();
         loop {
             let taken = source.poll(&mut |found| match found {
                 Ok(record) => model.note(&record),
@@ -128,6 +162,9 @@ impl Run {
                 && model
                     .cycle()
                     .is_some_and(|newest| newest > cycle.saturating_add(BEHIND));
+            if taken == 0 && is_finished {
+                model.end();
+            }
             if taken == 0 || past {
                 break;
             }
@@ -138,6 +175,29 @@ impl Run {
             }
             _ => Ok(model),
         }
+    }
+
+    /// Its journal as a list, which counts cycles from the origin also before that was told.
+    ///
+    /// # Errors
+    /// Every name and word of the filter that does not exist.
+    pub fn listing(&self, filter: Filter) -> Result<Listing, Vec<ViewError>> {
+        let mut listing = Listing::new(&self.cluster, filter)?;
+        if let Some(moment) = self.origin_of_summary() {
+            listing.origin_is(moment);
+        }
+        let mut source = self.follow();
+        while !listing.has_origin() {
+            let taken = source.poll(&mut |found| {
+                if let Ok(record) = found {
+                    listing.take(&record);
+                }
+            });
+            if taken == 0 {
+                break;
+            }
+        }
+        Ok(listing.again())
     }
 
     /// As the summary says it, for journals whose own record of it is gone.

@@ -173,9 +173,9 @@ impl StationTrack {
     }
 
     pub(crate) fn shift(&mut self, by: i64) {
-        self.heard = self.heard.map(|heard| heard + by);
+        self.heard = self.heard.map(|heard| heard.saturating_add(by));
         if let Some((_, cycle)) = &mut self.done {
-            *cycle += by;
+            *cycle = cycle.saturating_add(by);
         }
     }
 
@@ -217,7 +217,7 @@ impl StationTrack {
             return StationState::Refused;
         }
         if let (Some(heard), Some(latest)) = (self.heard, latest)
-            && heard + slack >= latest
+            && heard.saturating_add(slack) >= latest
         {
             return StationState::Speaking;
         }

@@ -40,7 +40,7 @@ impl<T: Clone + PartialEq> Timeline<T> {
                 return;
             }
             if at == last.to && last.value == *value {
-                last.to = at + 1;
+                last.to = at.saturating_add(1);
                 return;
             }
         }
@@ -50,7 +50,7 @@ impl<T: Clone + PartialEq> Timeline<T> {
         }
         self.spans.push_back(Span {
             from: at,
-            to: at + 1,
+            to: at.saturating_add(1),
             value: value.clone(),
         });
     }
@@ -58,8 +58,8 @@ impl<T: Clone + PartialEq> Timeline<T> {
     /// Cycles are counted from somewhere else from now on.
     pub(crate) fn shift(&mut self, by: i64) {
         for span in &mut self.spans {
-            span.from += by;
-            span.to += by;
+            span.from = span.from.saturating_add(by);
+            span.to = span.to.saturating_add(by);
         }
     }
 

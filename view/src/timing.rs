@@ -99,14 +99,18 @@ impl Timings {
         let (Some(cycle), Some(start)) = (open.cycle, open.first_sample) else {
             return;
         };
-        let before = self.started.filter(|(last, _)| last + 1 == cycle);
+        let before = self
+            .started
+            .filter(|(last, _)| last.checked_add(1) == Some(cycle));
         self.started = Some((cycle, start));
         let Some(turn) = open.last_turn else {
             return;
         };
         let token_ns = turn.saturating_sub(start);
         // Clocks of other hosts say nothing here.
-        if token_ns > self.period_ns.saturating_mul(2) || start > turn + self.period_ns {
+        if token_ns > self.period_ns.saturating_mul(2)
+            || start > turn.saturating_add(self.period_ns)
+        {
             return;
         }
         let signed = |ns: u64| i64::try_from(ns).unwrap_or(i64::MAX);
@@ -123,10 +127,14 @@ impl Timings {
 
     pub(crate) fn shift(&mut self, by: i64) {
         for open in &mut self.open {
-            open.cycle = open.cycle.map(|cycle| cycle + by);
+            open.cycle = open.cycle.map(|cycle| cycle.saturating_add(by));
         }
-        self.closed.iter_mut().for_each(|closed| closed.cycle += by);
-        self.started = self.started.map(|(cycle, at)| (cycle + by, at));
+        self.closed
+            .iter_mut()
+            .for_each(|closed| closed.cycle = closed.cycle.saturating_add(by));
+        self.started = self
+            .started
+            .map(|(cycle, at)| (cycle.saturating_add(by), at));
     }
 
     pub(crate) fn iter(&self) -> impl DoubleEndedIterator<Item = &CycleTiming> {

@@ -7,11 +7,12 @@ mod text;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use understudy_diagnostic::spelling::suggestion;
 use understudy_scenarios::source_word;
 use understudy_wire::{Party, ProgramId, Source, StationId};
 
 use crate::describe::missing_text;
-use crate::error::{ViewError, suggest};
+use crate::error::ViewError;
 use crate::history::{Driven, History, Step};
 use crate::model::Model;
 use explain::Explainer;
@@ -188,7 +189,7 @@ impl Model {
         match found.as_slice() {
             [] => Err(ViewError::NoOutput {
                 name: asked.to_owned(),
-                hint: suggest(asked, known.iter().map(String::as_str)),
+                hint: suggestion(asked, known.iter().map(String::as_str)),
             }),
             [(program, name, _)] => Ok((*program, name.clone())),
             several => Err(ViewError::SeveralOutputs {

@@ -35,7 +35,7 @@ impl Numbering {
             && last.moment == moment
         {
             last.idle += 1;
-            return last.number + last.idle;
+            return last.number.saturating_add(last.idle);
         }
         let number = self.start(remote_io, moment);
         let last = Last {
@@ -50,14 +50,14 @@ impl Numbering {
     /// The number of a moment that others speak of; none for an epoch that no remote I/O has seen.
     pub fn of(&self, moment: Moment) -> Option<i64> {
         let offset = self.offsets.get(&moment.epoch)?;
-        Some(cycle(moment) + offset)
+        Some(cycle(moment).saturating_add(*offset))
     }
 
     /// The last number that was given.
     pub fn latest(&self) -> Option<i64> {
         self.remote_ios
             .values()
-            .map(|last| last.number + last.idle)
+            .map(|last| last.number.saturating_add(last.idle))
             .max()
     }
 
@@ -71,17 +71,20 @@ impl Numbering {
             if moment > newest {
                 let idle = self.idle_of_all(newest_number);
                 let skipped = cycle(moment) - cycle(newest) - 1;
-                *self.offsets.entry(moment.epoch).or_default() += (idle - skipped).max(0);
+                let offset = self.offsets.entry(moment.epoch).or_default();
+                *offset = offset.saturating_add((idle - skipped).max(0));
             }
         } else {
-            let next = newest_number + self.idle_of_all(newest_number) + 1;
+            let next = newest_number
+                .saturating_add(self.idle_of_all(newest_number))
+                .saturating_add(1);
             let offset = self
                 .offsets
                 .entry(moment.epoch)
                 .or_insert(next - cycle(moment));
             // One that comes back to an epoch goes on counting from where it was.
             let own = self.remote_ios.get(&remote_io).map(|last| last.number);
-            if own.is_some_and(|own| cycle(moment) + *offset <= own) {
+            if own.is_some_and(|own| cycle(moment).saturating_add(*offset) <= own) {
                 *offset = next - cycle(moment);
             }
         }
@@ -103,8 +106,11 @@ impl Numbering {
     }
 }
 
+/// No cluster lives for so long; what says so is a journal that somebody has changed.
+const MAXIMUM: i64 = i64::MAX / 4;
+
 fn cycle(moment: Moment) -> i64 {
-    i64::try_from(moment.cycle.0).unwrap_or(i64::MAX / 2)
+    i64::try_from(moment.cycle.0).map_or(MAXIMUM, |cycle| cycle.min(MAXIMUM))
 }
 
 #[cfg(test)]

@@ -55,7 +55,8 @@ impl ProgramTrack {
 impl Model {
     pub(super) fn remote_io(&mut self, record: &Record, program: ProgramId, event: &RemoteIoEvent) {
         let place = program.index();
-        if place >= self.programs.len() {
+        if place >= self.programs.len() || !self.fits(place, event) {
+            self.left_out += 1;
             return;
         }
         let cycle = match event {
@@ -70,7 +71,7 @@ impl Model {
                 // The deadline of the cycle before has passed.
                 self.cycles
                     .of_known(*moment)
-                    .unwrap_or_else(|| self.cycles.of(None) + 1)
+                    .unwrap_or_else(|| self.cycles.of(None).saturating_add(1))
             }
             _ => self.cycles.of(moment(&record.event)),
         };
@@ -94,6 +95,21 @@ impl Model {
             _ => None,
         };
         self.happened(record, cycle, cause);
+    }
+
+    /// Whether the images of a report are as wide as those of the program: a journal of other programs is none of this cluster's.
+    fn fits(&self, place: usize, event: &RemoteIoEvent) -> bool {
+        let circuit = &self.cluster.controllers()[place].circuit;
+        let inputs = |image: &Image| image.width() == circuit.inputs().len();
+        match event {
+            RemoteIoEvent::Sampled {
+                inputs: sampled, ..
+            } => inputs(sampled),
+            RemoteIoEvent::Applied {
+                sampled, outputs, ..
+            } => sampled.as_ref().is_none_or(inputs) && outputs.width() == circuit.outputs().len(),
+            _ => true,
+        }
     }
 
     /// What changes a program's standing.
@@ -180,7 +196,7 @@ impl Model {
                 track.heard(cycle);
             }
         }
-        self.close_up_to(cycle - 1);
+        self.close_up_to(cycle.saturating_sub(1));
         let track = &mut self.programs[program.index()];
         track.counts[*source as usize] += 1;
         track.heard = [*heard, track.heard[0]];

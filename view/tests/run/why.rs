@@ -55,7 +55,7 @@ fn what_is_not_there_is_said() {
     check(
         "move_don",
         None,
-        "U0574",
+        "U0573",
         "no program has an output `move_don`; did you mean `move_down`?",
     );
     check(

@@ -1,0 +1,236 @@
+//! The journal as a list of lines that a person chose.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use understudy_cluster::Cluster;
+use understudy_diagnostic::spelling::suggestion;
+use understudy_remote_io::{Event as RemoteIoEvent, Missing};
+use understudy_scenarios::{Happening, Parties, Record, RunEvent, moment};
+use understudy_wire::{Moment, Party, ProgramId, Source};
+
+use crate::cycles::Cycles;
+use crate::describe::{EVENTS, describe};
+use crate::error::ViewError;
+use crate::event::Level;
+
+/// Which records are wanted; an empty list is all.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Filter {
+    /// Names of parties, or `laboratory`.
+    pub parties: Vec<String>,
+    /// Words such as `flagged`.
+    pub events: Vec<String>,
+    /// Names of controllers: what they, their remote I/Os and their plants say.
+    pub programs: Vec<String>,
+    /// The first cycle, from the origin.
+    pub from: Option<i64>,
+    /// The last cycle.
+    pub to: Option<i64>,
+    /// Also what every party says in every cycle. What is named in `events` is wanted anyhow.
+    pub ordinary: bool,
+}
+
+/// One record in words.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct JournalLine {
+    /// From the origin of the run; nothing while that is not known.
+    pub cycle: Option<i64>,
+    /// As the record says it.
+    pub at_ns: u64,
+    /// Who.
+    pub name: String,
+    /// What, in one word.
+    pub event: &'static str,
+    /// How much a person should care.
+    pub level: Level,
+    /// What happened.
+    pub text: String,
+}
+
+/// Goes through the records of a run, and gives those that are wanted.
+#[derive(Debug, Clone)]
+pub struct Listing {
+    filter: Filter,
+    parties: Parties,
+    wanted: Vec<Party>,
+    cycles: Cycles,
+    sources: BTreeMap<ProgramId, Source>,
+}
+
+impl Listing {
+    /// For a run of this cluster, from its first record on.
+    ///
+    /// # Errors
+    /// Every name and word of the filter that does not exist.
+    pub fn new(cluster: &Cluster, filter: Filter) -> Result<Self, Vec<ViewError>> {
+        let parties = Parties::of(cluster);
+        let names: Vec<&str> = parties
+            .iter()
+            .map(|(_, name)| name)
+            .chain(["laboratory"])
+            .collect();
+        let programs: Vec<&str> = cluster
+            .controllers()
+            .iter()
+            .map(|found| found.name.as_str())
+            .collect();
+        let mut errors = Vec::new();
+        let mut check = |kind, asked: &[String], known: &[&str]| {
+            for name in asked.iter().filter(|name| !known.contains(&name.as_str())) {
+                errors.push(ViewError::NoName {
+                    kind,
+                    name: name.clone(),
+                    hint: suggestion(name, known.iter().copied()),
+                });
+            }
+        };
+        check("party", &filter.parties, &names);
+        check("program", &filter.programs, &programs);
+        check("event", &filter.events, &EVENTS);
+        if !errors.is_empty() {
+            return Err(errors);
+        }
+        let of_program = |party: &Party| match party {
+            Party::Station(station) => Some(station.index()),
+            Party::RemoteIo(program) | Party::Plant(program) => Some(program.index()),
+        };
+        let wanted = parties.iter().filter(|(party, _)| {
+            let program = of_program(party).and_then(|place| programs.get(place));
+            program.is_some_and(|name| filter.programs.iter().any(|wanted| wanted == name))
+        });
+        Ok(Self {
+            wanted: wanted.map(|(party, _)| party).collect(),
+            filter,
+            parties,
+            cycles: Cycles::default(),
+            sources: BTreeMap::new(),
+        })
+    }
+
+    pub(crate) fn origin_is(&mut self, moment: Moment) {
+        self.cycles.origin_is(moment, 0);
+    }
+
+    pub(crate) fn has_origin(&self) -> bool {
+        self.cycles.has_origin()
+    }
+
+    /// The same from the first record on again, with what has been learnt of the origin.
+    #[must_use]
+    pub(crate) fn again(&self) -> Self {
+        Self {
+            cycles: self.cycles.again(),
+            sources: BTreeMap::new(),
+            ..self.clone()
+        }
+    }
+
+    /// Takes the next record; answers with it in words if it is wanted.
+    pub fn take(&mut self, record: &Record) -> Option<JournalLine> {
+        let cycle = self.cycle_of(record);
+        let _ = self.cycles.take_shift();
+        let cycle = self.cycles.has_origin().then_some(cycle);
+        let changed = self.source_changed(record);
+        if !self.is_wanted(record, cycle) {
+            return None;
+        }
+        let mut description = describe(record, &self.parties);
+        let wants_source = self.filter.events.is_empty() || self.wants("source");
+        if changed && wants_source && !self.filter.ordinary && !self.wants("applied") {
+            description.event = "source";
+            description.is_ordinary = false;
+        }
+        let named = self.wants(description.event);
+        let wanted = named
+            || self.filter.events.is_empty() && (self.filter.ordinary || !description.is_ordinary);
+        wanted.then(|| JournalLine {
+            cycle,
+            at_ns: record.at_ns,
+            name: record.name.clone(),
+            event: description.event,
+            level: description.level,
+            text: description.text,
+        })
+    }
+
+    fn wants(&self, event: &str) -> bool {
+        self.filter.events.iter().any(|wanted| wanted == event)
+    }
+
+    /// Whether the outputs of a program come from elsewhere than at the deadline before.
+    fn source_changed(&mut self, record: &Record) -> bool {
+        let (
+            Some(Party::RemoteIo(program)),
+            Happening::RemoteIo(RemoteIoEvent::Applied { source, .. }),
+        ) = (record.party, &record.event)
+        else {
+            return false;
+        };
+        self.sources.insert(program, *source) != Some(*source)
+    }
+
+    fn cycle_of(&mut self, record: &Record) -> i64 {
+        match (&record.event, record.party) {
+            (
+                Happening::RemoteIo(RemoteIoEvent::Applied {
+                    moment, missing, ..
+                }),
+                Some(Party::RemoteIo(program)),
+            ) => {
+                let idle = *missing == Some(Missing::NoCycle);
+                self.cycles.deadline(program, *moment, idle)
+            }
+            (Happening::Run(RunEvent::Origin { moment, cycle }), _) => {
+                let cycle = i64::try_from(*cycle).unwrap_or(i64::MAX / 2);
+                self.cycles.origin_is(*moment, cycle);
+                cycle
+            }
+            (Happening::Run(RunEvent::Finished), _) => self.cycles.of(None),
+            // What is done is felt in the next cycle.
+            (Happening::Run(_), _) if self.cycles.latest().is_some() => {
+                self.cycles.of(None).saturating_add(1)
+            }
+            _ => self.cycles.of(moment(&record.event)),
+        }
+    }
+
+    fn is_wanted(&self, record: &Record, cycle: Option<i64>) -> bool {
+        let Filter {
+            parties,
+            from,
+            to,
+            programs,
+            ..
+        } = &self.filter;
+        let by_name = parties.is_empty() || parties.contains(&record.name);
+        let by_program = programs.is_empty()
+            || record
+                .party
+                .is_some_and(|party| self.wanted.contains(&party));
+        let after = from.is_none_or(|from| cycle.is_some_and(|cycle| cycle >= from));
+        let before = to.is_none_or(|to| cycle.is_none_or(|cycle| cycle <= to));
+        by_name && by_program && after && before
+    }
+
+    /// Whether records that are still to come are all behind the last wanted cycle.
+    pub fn is_past(&self) -> bool {
+        let latest = self.cycles.latest().filter(|_| self.cycles.has_origin());
+        // Lines of different parties may be a few cycles apart.
+        self.filter
+            .to
+            .is_some_and(|to| latest.is_some_and(|latest| latest > to.saturating_add(64)))
+    }
+}
+
+impl JournalLine {
+    /// In columns.
+    pub fn to_text(&self) -> String {
+        let cycle = self.cycle.map_or("-".to_owned(), |cycle| cycle.to_string());
+        format!(
+            "{cycle:>8}  {:14} {:14} {}",
+            self.name, self.event, self.text
+        )
+    }
+}

@@ -1,0 +1,234 @@
+//! A run on a terminal: a table that lives. It is drawn into any buffer of letters, and knows no terminal itself.
+//!
+//! ```text
+//!   press-cell  full  10ms                         running  cycle 1234
+//!   station      state      speaks for             last done
+//!   program      outputs from   since  direct  restored  held  safe  last cycles
+//!   survives     any one further failure; not: robot + understudy
+//!   margin       ▅▅▆▅▅▅▄▅▅▅                        3.6 ms before the deadline
+//!   events       cycle, who, what, why
+//! ```
+//!
+//! Nothing is said by colour alone.
+
+mod lists;
+mod tables;
+
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::style::{Modifier, Style};
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Paragraph, Sparkline};
+
+use crate::margin::{Holders, Margin};
+use crate::model::Model;
+use crate::snapshot::{RunState, Snapshot};
+
+/// What a person pressed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Key {
+    /// Up in the list at the bottom.
+    Up,
+    /// Down.
+    Down,
+    /// A screen up.
+    PageUp,
+    /// A screen down.
+    PageDown,
+    /// The tables of stations and programs up.
+    Left,
+    /// The tables down.
+    Right,
+    /// Events, alarms, failures: the next of them.
+    Next,
+    /// All alarms have been seen.
+    Acknowledge,
+    /// Stand still, or go on.
+    Pause,
+    /// What the keys do.
+    Help,
+}
+
+/// What stands at the bottom.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum Bottom {
+    #[default]
+    Events,
+    Alarms,
+    Failures,
+}
+
+/// What a person looks at.
+#[derive(Debug, Clone, Default)]
+pub struct Screen {
+    bottom: Bottom,
+    /// Lines from the newest.
+    back: usize,
+    /// Rows of the tables that are above them.
+    above: usize,
+    paused: bool,
+    help: bool,
+    /// Calculated when somebody has come or gone.
+    margin: Option<(Holders, Margin)>,
+}
+
+const PAGE: usize = 10;
+
+impl Screen {
+    /// Whether it stands still: then no record is to be noted.
+    pub fn is_paused(&self) -> bool {
+        self.paused
+    }
+
+    /// Does what a key asks for.
+    pub fn press(&mut self, key: Key, model: &mut Model) {
+        match key {
+            Key::Up => self.back += 1,
+            Key::Down => self.back = self.back.saturating_sub(1),
+            Key::PageUp => self.back += PAGE,
+            Key::PageDown => self.back = self.back.saturating_sub(PAGE),
+            Key::Left => self.above = self.above.saturating_sub(1),
+            Key::Right => self.above += 1,
+            Key::Next => {
+                self.back = 0;
+                self.bottom = match self.bottom {
+                    Bottom::Events => Bottom::Alarms,
+                    Bottom::Alarms => Bottom::Failures,
+                    Bottom::Failures => Bottom::Events,
+                };
+            }
+            Key::Acknowledge => {
+                let numbers: Vec<u64> = model.alarms().map(|alarm| alarm.number).collect();
+                for number in numbers {
+                    model.acknowledge(number, "terminal");
+                }
+            }
+            Key::Pause => self.paused = !self.paused,
+            Key::Help => self.help = !self.help,
+        }
+    }
+
+    /// The case now, with the margin of survival.
+    pub fn snapshot(&mut self, model: &Model) -> Snapshot {
+        let holders = model.holders();
+        let margin = match self.margin.take() {
+            Some((known, margin)) if known == holders => margin,
+            _ => holders.margin(),
+        };
+        let snapshot = model.snapshot_with(&margin);
+        self.margin = Some((holders, margin));
+        snapshot
+    }
+
+    /// Draws it all.
+    pub fn draw(&mut self, frame: &mut Frame<'_>, model: &Model) {
+        let snapshot = self.snapshot(model);
+        let area = frame.area();
+        let stations = rows(snapshot.stations.len(), area.height);
+        let programs = rows(snapshot.programs.len(), area.height);
+        let [head, station_area, program_area, survives, timing, bottom] = Layout::vertical([
+            Constraint::Length(1),
+            Constraint::Length(stations),
+            Constraint::Length(programs),
+            Constraint::Length(2),
+            Constraint::Length(2),
+            Constraint::Min(3),
+        ])
+        .areas(area);
+        frame.render_widget(self.head(&snapshot, head.width), head);
+        frame.render_widget(tables::stations(&snapshot, self.above), station_area);
+        frame.render_widget(tables::programs(&snapshot, model, self.above), program_area);
+        frame.render_widget(tables::survives(&snapshot), survives);
+        draw_timing(frame, timing, model, &snapshot);
+        if self.help {
+            frame.render_widget(help(), bottom);
+        } else {
+            lists::draw(frame, bottom, model, &snapshot, self.bottom, &mut self.back);
+        }
+    }
+
+    fn head(&self, snapshot: &Snapshot, width: u16) -> Line<'static> {
+        let run = match (self.paused, snapshot.run) {
+            (true, _) => "paused",
+            (_, RunState::Starting) => "starting",
+            (_, RunState::Running) => "running",
+            (_, RunState::Finished) => "finished",
+            (_, RunState::Interrupted) => "interrupted",
+        };
+        let period = std::time::Duration::from_micros(snapshot.period_us);
+        let left = format!(" {}  {}  {period:?}", snapshot.cluster, snapshot.mode);
+        let cycle = snapshot
+            .cycle
+            .map_or("-".to_owned(), |cycle| cycle.to_string());
+        let left_out = match snapshot.left_out {
+            0 => String::new(),
+            left_out => format!("  {left_out} records left out"),
+        };
+        let right = format!("{run}  cycle {cycle}{left_out}  h help  q quit ");
+        let gap = usize::from(width).saturating_sub(left.chars().count() + right.chars().count());
+        let text = format!("{left}{}{right}", " ".repeat(gap.max(1)));
+        Line::styled(text, Style::new().add_modifier(Modifier::REVERSED))
+    }
+}
+
+/// A table's head and its rows; of a large cluster a part.
+fn rows(count: usize, height: u16) -> u16 {
+    let most = (height / 4).max(3);
+    u16::try_from(count + 1).unwrap_or(most).min(most)
+}
+
+/// A word before a line.
+pub(crate) fn label(text: &str) -> Span<'static> {
+    Span::styled(
+        format!(" {text:10} "),
+        Style::new().add_modifier(Modifier::BOLD),
+    )
+}
+
+fn draw_timing(frame: &mut Frame<'_>, area: Rect, model: &Model, snapshot: &Snapshot) {
+    let [left, middle, right] = Layout::horizontal([
+        Constraint::Length(12),
+        Constraint::Min(10),
+        Constraint::Length(34),
+    ])
+    .areas(area);
+    frame.render_widget(Line::from(label("margin")), left);
+    let width = usize::from(middle.width);
+    let mut margins: Vec<u64> = model
+        .timings()
+        .rev()
+        .take(width)
+        .map(|timing| u64::try_from(timing.margin_ns).unwrap_or(0))
+        .collect();
+    margins.reverse();
+    let period_ns = snapshot.period_us.saturating_mul(1000);
+    frame.render_widget(
+        Sparkline::default().data(margins).max(period_ns * 65 / 100),
+        middle,
+    );
+    let text = snapshot.timing.map_or_else(
+        || " no times yet".to_owned(),
+        |timing| {
+            let cycle = timing.cycle_us.map_or(String::new(), |cycle| {
+                format!(", cycle {}", milliseconds(cycle))
+            });
+            format!(
+                " {} before the deadline\n token {}{cycle}",
+                milliseconds(timing.margin_us),
+                milliseconds(timing.token_us)
+            )
+        },
+    );
+    frame.render_widget(Paragraph::new(text), right);
+}
+
+fn milliseconds(us: f64) -> String {
+    format!("{:.2} ms", us / 1000.0)
+}
+
+fn help() -> Paragraph<'static> {
+    Paragraph::new(
+        " q quit            space  stand still, go on\n tab  events, alarms, failures to come\n a    all alarms have been seen\n \
+         up, down, page up, page down   scroll the list\n left, right                    scroll the tables\n h    back",
+    )
+}

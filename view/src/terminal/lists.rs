@@ -1,0 +1,104 @@
+//! What stands at the bottom: events, alarms, or the failures that could come.
+
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::style::{Color, Modifier, Style};
+use ratatui::text::{Line, Text};
+
+use super::Bottom;
+use crate::alarm::Alarm;
+use crate::event::{Event, Level};
+use crate::model::Model;
+use crate::snapshot::Snapshot;
+
+pub(super) fn draw(
+    frame: &mut Frame<'_>,
+    area: Rect,
+    model: &Model,
+    snapshot: &Snapshot,
+    bottom: Bottom,
+    back: &mut usize,
+) {
+    let [head, list] = Layout::vertical([Constraint::Length(1), Constraint::Min(1)]).areas(area);
+    let open = snapshot.alarms.len();
+    let tabs = [
+        (Bottom::Events, format!("events {}", snapshot.events)),
+        (Bottom::Alarms, format!("alarms {open}")),
+        (Bottom::Failures, "failures to come".to_owned()),
+    ];
+    let spans = tabs.into_iter().flat_map(|(tab, text)| {
+        let style = if tab == bottom {
+            Style::new().add_modifier(Modifier::BOLD | Modifier::UNDERLINED)
+        } else {
+            Style::new()
+        };
+        [
+            " ".into(),
+            ratatui::text::Span::styled(text, style),
+            "  ".into(),
+        ]
+    });
+    frame.render_widget(Line::from(spans.collect::<Vec<_>>()), head);
+    let lines: Vec<Line<'static>> = match bottom {
+        Bottom::Events => model.events().map(event).collect(),
+        Bottom::Alarms => model.alarms().map(alarm).collect(),
+        Bottom::Failures => failures(snapshot),
+    };
+    // The newest at the bottom, and never past the oldest.
+    let height = usize::from(list.height);
+    *back = (*back).min(lines.len().saturating_sub(height));
+    let end = lines.len() - *back;
+    let start = end.saturating_sub(height);
+    frame.render_widget(Text::from(lines[start..end].to_vec()), list);
+}
+
+fn colour(level: Level) -> Style {
+    match level {
+        Level::Info | Level::Notice => Style::new(),
+        Level::Warning => Style::new().fg(Color::Yellow),
+        Level::Alarm => Style::new().fg(Color::Red).add_modifier(Modifier::BOLD),
+    }
+}
+
+fn event(event: &Event) -> Line<'static> {
+    let cause = event
+        .cause
+        .as_ref()
+        .map_or(String::new(), |cause| format!(" <- {cause}"));
+    let text = format!("{:>7} {:12} {}{cause}", event.cycle, event.name, event.text);
+    Line::styled(text, colour(event.level))
+}
+
+fn alarm(alarm: &Alarm) -> Line<'static> {
+    let state = match (&alarm.over, &alarm.acknowledged_by) {
+        (None, None) => "lasts, not seen".to_owned(),
+        (None, Some(by)) => format!("lasts, seen by {by}"),
+        (Some(over), None) => format!("over in {over}, not seen"),
+        (Some(over), Some(by)) => format!("over in {over}, seen by {by}"),
+    };
+    let text = format!(
+        "{:>7} {:12} {:12} {} ({state})",
+        alarm.cycle, alarm.name, alarm.alarm, alarm.text
+    );
+    let style = if alarm.is_open() {
+        colour(Level::Alarm)
+    } else {
+        Style::new()
+    };
+    Line::styled(text, style)
+}
+
+fn failures(snapshot: &Snapshot) -> Vec<Line<'static>> {
+    let margin = &snapshot.margin;
+    let outcomes = margin.singles.iter().chain(&margin.pairs);
+    let lines = outcomes.map(|outcome| {
+        let failed = outcome.failed.join(" + ");
+        if outcome.masked {
+            Line::from(format!(" {failed:28} masked"))
+        } else {
+            let text = format!(" {failed:28} takes {}", outcome.lost.join(", "));
+            Line::styled(text, colour(Level::Warning))
+        }
+    });
+    lines.collect()
+}

@@ -1,0 +1,175 @@
+//! The tables of stations and programs, and the margin of survival.
+
+use ratatui::layout::Constraint;
+use ratatui::style::{Color, Modifier, Style};
+use ratatui::text::Line;
+use ratatui::widgets::{Cell, Paragraph, Row, Table, Wrap};
+use understudy_wire::{ProgramId, Source};
+
+use super::label;
+use crate::model::Model;
+use crate::snapshot::{MarginSnapshot, Snapshot};
+use crate::station::StationState;
+
+const GOOD: Color = Color::Green;
+const MIDDLING: Color = Color::Yellow;
+const BAD: Color = Color::Red;
+
+/// Cycles that the row of a program shows.
+const LAST: i64 = 20;
+
+fn head(words: &[&'static str]) -> Row<'static> {
+    let cells = words.iter().map(|word| Cell::from(*word));
+    Row::new(cells.collect::<Vec<_>>()).style(Style::new().add_modifier(Modifier::BOLD))
+}
+
+pub(super) fn stations(snapshot: &Snapshot, above: usize) -> Table<'static> {
+    let rows = snapshot
+        .stations
+        .iter()
+        .skip(clamped(above, snapshot.stations.len()));
+    let rows = rows.map(|station| {
+        let colour = match station.state {
+            StationState::Speaking => GOOD,
+            StationState::Joining | StationState::Shadow | StationState::NotStarted => MIDDLING,
+            _ => BAD,
+        };
+        let mut state = station.state.word().to_owned();
+        if station.flagged && station.state != StationState::Flagged {
+            state += ", flagged";
+        }
+        if !station.excluded_from.is_empty() {
+            state += ", excluded";
+        }
+        Row::new([
+            Cell::from(format!(" {}", station.name)),
+            Cell::from(state).style(Style::new().fg(colour)),
+            Cell::from(station.speaks_for.join(" ")),
+            Cell::from(station.done.clone().unwrap_or_default()),
+        ])
+    });
+    let widths = [
+        Constraint::Length(14),
+        Constraint::Length(16),
+        Constraint::Length(14),
+        Constraint::Min(10),
+    ];
+    Table::new(rows.collect::<Vec<_>>(), widths).header(head(&[
+        " station",
+        "state",
+        "speaks for",
+        "last done",
+    ]))
+}
+
+pub(super) fn programs(snapshot: &Snapshot, model: &Model, above: usize) -> Table<'static> {
+    let programs = (0..).map(ProgramId).zip(&snapshot.programs);
+    let rows = programs.skip(clamped(above, snapshot.programs.len()));
+    let rows = rows.map(|(program, found)| {
+        let colour = match found.source {
+            Some("direct") => GOOD,
+            Some("reconstructed") | None => MIDDLING,
+            _ => BAD,
+        };
+        let source = found.source.unwrap_or("nothing yet");
+        Row::new([
+            Cell::from(format!(" {}", found.program)),
+            Cell::from(source).style(Style::new().fg(colour)),
+            Cell::from(found.since.to_string()),
+            Cell::from(found.direct.to_string()),
+            Cell::from(found.reconstructed.to_string()),
+            Cell::from(found.held.to_string()),
+            Cell::from(found.fail_safe.to_string()),
+            Cell::from(last_sources(model, program, snapshot.cycle)),
+        ])
+    });
+    let widths = [
+        Constraint::Length(14),
+        Constraint::Length(14),
+        Constraint::Length(7),
+        Constraint::Length(7),
+        Constraint::Length(8),
+        Constraint::Length(5),
+        Constraint::Length(5),
+        Constraint::Min(10),
+    ];
+    Table::new(rows.collect::<Vec<_>>(), widths).header(head(&[
+        " program",
+        "outputs",
+        "since",
+        "direct",
+        "restored",
+        "held",
+        "safe",
+        "last cycles",
+    ]))
+}
+
+fn clamped(above: usize, count: usize) -> usize {
+    above.min(count.saturating_sub(1))
+}
+
+/// A letter for each of the last cycles: | direct, + reconstructed, _ held, ! fail-safe, a gap for nothing.
+fn last_sources(model: &Model, program: ProgramId, cycle: Option<i64>) -> String {
+    let (Some(sources), Some(last)) = (model.series().sources(program), cycle) else {
+        return String::new();
+    };
+    let letter = |cycle: i64| match sources.at(cycle) {
+        Some(Source::Direct) => '|',
+        Some(Source::Reconstructed) => '+',
+        Some(Source::Held) => '_',
+        Some(Source::FailSafe) => '!',
+        None => ' ',
+    };
+    (last.saturating_sub(LAST - 1)..=last).map(letter).collect()
+}
+
+/// The margin of survival in a sentence.
+pub(super) fn survives(snapshot: &Snapshot) -> Paragraph<'static> {
+    let line = Line::from(vec![label("survives"), sentence(&snapshot.margin).into()]);
+    Paragraph::new(line).wrap(Wrap { trim: false })
+}
+
+fn sentence(margin: &MarginSnapshot) -> String {
+    if margin.served.is_empty() {
+        return "nothing true is driven now".to_owned();
+    }
+    let stations = |outcomes: &[crate::snapshot::OutcomeSnapshot], count: usize| -> Vec<String> {
+        let fatal = outcomes
+            .iter()
+            .filter(|outcome| !outcome.masked && outcome.failed.len() == count);
+        fatal.map(|outcome| outcome.failed.join("+")).collect()
+    };
+    let most = |mut fatal: Vec<String>| {
+        let more = fatal.len().saturating_sub(6);
+        fatal.truncate(6);
+        let more = if more > 0 {
+            format!(" and {more} more")
+        } else {
+            String::new()
+        };
+        format!("{}{more}", fatal.join(", "))
+    };
+    match margin.survives {
+        0 => {
+            let singles = margin.singles.iter().filter(|single| {
+                // A remote I/O has no second: that goes without saying.
+                !single.masked && !is_remote_io(single, margin)
+            });
+            let fatal = singles.map(|single| single.failed.join("+")).collect();
+            format!("NOT the failure of {}", most(fatal))
+        }
+        1 => format!("any one station; not {}", most(stations(&margin.pairs, 2))),
+        _ => "any two stations".to_owned(),
+    }
+}
+
+/// The remote I/Os of served programs come behind the stations.
+fn is_remote_io(single: &crate::snapshot::OutcomeSnapshot, margin: &MarginSnapshot) -> bool {
+    let stations = margin.singles.len() - margin.served.len();
+    let place = margin
+        .singles
+        .iter()
+        .position(|other| other.failed == single.failed);
+    place.is_some_and(|place| place >= stations)
+}

@@ -1,0 +1,96 @@
+//! A run in its directory, while it is written and afterwards.
+
+use std::fs;
+use std::path::PathBuf;
+
+use understudy_cluster::press_cell;
+use understudy_scenarios::{Journal, keep_cluster};
+use understudy_view::{Bounds, Filter, Run, find_run_of};
+
+use crate::support::{KILL_EACH, cell, model, records, scenario};
+
+fn folder(name: &str) -> PathBuf {
+    let folder = std::env::temp_dir().join(format!("understudy-{name}-{}", std::process::id()));
+    // It is there only where a run before was killed.
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).expect("a folder");
+    folder
+}
+
+/// Who follows a journal of a few segments knows at the end what one knows who reads it then, or who was handed its records.
+#[test]
+fn a_run_is_followed_while_it_is_written() {
+    let cell = cell();
+    let folder = folder("view-run");
+    let source = folder.join("source");
+    fs::create_dir_all(&source).expect("a folder");
+    for file in press_cell() {
+        fs::write(source.join(file.name), file.text).expect("written");
+    }
+    let path = folder.join("runs/2026-01-01T00-00-00Z");
+    fs::create_dir_all(&path).expect("a folder");
+    assert_eq!(Run::open(&path).expect_err("no run").code(), "U0570");
+    keep_cluster(&path, &source.join("cluster.toml"), &cell).expect("kept");
+
+    let run = Run::open(&path).expect("a run that begins");
+    let mut follower = run.follow();
+    let mut followed = run.model(Bounds::default());
+    let scenario = scenario(&cell, KILL_EACH);
+    let mut journal = Journal::create(&path.join("journal.jsonl"), 4 << 20).expect("created");
+    for (number, record) in records(&cell, &scenario, 1).iter().enumerate() {
+        journal.write(record);
+        if number % 700 == 0 {
+            journal.flush();
+            follower.poll(&mut |record| followed.note(&record.expect("a record")));
+        }
+    }
+    assert_eq!(journal.finish().lost, 0);
+    while follower.poll(&mut |record| followed.note(&record.expect("a record"))) > 0 {}
+    let segments = fs::read_dir(&path).expect("readable").count();
+    assert!(segments > 3, "{segments}");
+
+    let read = run.read(Bounds::default()).expect("readable");
+    let handed = model(&cell, &scenario, 1);
+    assert_eq!(followed.snapshot(), read.snapshot());
+    assert_eq!(handed.snapshot(), read.snapshot());
+    let events = |model: &understudy_view::Model| model.events().cloned().collect::<Vec<_>>();
+    assert_eq!(events(&followed), events(&read));
+    assert_eq!(events(&handed), events(&read));
+
+    // What is asked of one cycle needs no more than the cycles before it.
+    let few = Bounds {
+        cycles: 200,
+        ..Bounds::default()
+    };
+    let part = run.read_until(few, 140).expect("readable");
+    let why = part.why("press.move_down", Some(140)).expect("known");
+    assert_eq!(why, read.why("press.move_down", Some(140)).expect("known"));
+    let late = run.read(few).expect("readable");
+    assert_eq!(
+        late.why("press.move_down", Some(20))
+            .expect_err("forgotten")
+            .code(),
+        "U0575"
+    );
+
+    // A list counts cycles from the origin also before it was told.
+    let first = run
+        .listing(Filter::default())
+        .map(|mut listing| {
+            let mut first = None;
+            run.follow().poll(&mut |record| {
+                let line = listing.take(&record.expect("a record"));
+                first = first.take().or(line);
+            });
+            first
+        })
+        .expect("no filter");
+    assert!(
+        first
+            .and_then(|line| line.cycle)
+            .is_some_and(|cycle| cycle < 0)
+    );
+    let found = find_run_of(&folder.join("runs"), &cell).expect("the newest");
+    assert_eq!(found.path(), path);
+    fs::remove_dir_all(folder).expect("it goes");
+}

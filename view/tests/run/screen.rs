@@ -1,0 +1,69 @@
+//! What a terminal shows, as letters.
+
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+use understudy_view::{Key, Screen};
+
+use crate::support::{KILL_EACH, cell, line, model, scenario};
+
+fn shown(screen: &mut Screen, model: &understudy_view::Model, width: u16, height: u16) -> String {
+    let mut terminal = Terminal::new(TestBackend::new(width, height)).expect("a terminal");
+    terminal
+        .draw(|frame| screen.draw(frame, model))
+        .expect("drawn");
+    terminal.backend().to_string()
+}
+
+#[test]
+fn a_run_fits_a_terminal_of_eighty_columns() {
+    let cell = cell();
+    let mut model = model(&cell, &scenario(&cell, KILL_EACH).shortened(Some(140)), 1);
+    let mut screen = Screen::default();
+    insta::assert_snapshot!("events", shown(&mut screen, &model, 80, 24));
+    screen.press(Key::Next, &mut model);
+    screen.press(Key::Next, &mut model);
+    insta::assert_snapshot!("failures", shown(&mut screen, &model, 80, 24));
+    screen.press(Key::Help, &mut model);
+    screen.press(Key::Pause, &mut model);
+    assert!(screen.is_paused());
+    let help = shown(&mut screen, &model, 80, 24);
+    assert!(
+        help.contains("paused") && help.contains("all alarms have been seen"),
+        "{help}"
+    );
+}
+
+/// Any size, any key, nothing panics; also before the first record and with many stations.
+#[test]
+fn no_size_is_too_small() {
+    let large = line(12, 3, understudy_wire::Mode::Full);
+    let quiet = understudy_scenarios::Scenario {
+        title: "quiet".into(),
+        cycles: 20,
+        ..Default::default()
+    };
+    let mut large = model(&large, &quiet, 1);
+    let mut empty = understudy_view::Model::new(std::sync::Arc::new(cell()), Default::default());
+    let keys = [
+        Key::Up,
+        Key::PageUp,
+        Key::Right,
+        Key::Next,
+        Key::PageUp,
+        Key::Next,
+        Key::PageDown,
+        Key::Left,
+        Key::Acknowledge,
+        Key::Down,
+        Key::Help,
+    ];
+    for (width, height) in [(1, 1), (10, 3), (40, 8), (80, 24), (200, 60)] {
+        for model in [&mut large, &mut empty] {
+            let mut screen = Screen::default();
+            for key in keys {
+                screen.press(key, model);
+                shown(&mut screen, model, width, height);
+            }
+        }
+    }
+}
