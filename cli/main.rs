@@ -24,6 +24,7 @@ mod explain;
 mod failover;
 mod field;
 mod files;
+mod gateway;
 mod init;
 mod journal;
 mod keys;
@@ -114,6 +115,7 @@ enum Command {
     Keys(keys::Arguments),
     Operate(operate::Arguments),
     Doctor(doctor::Arguments),
+    Gateway(gateway::Arguments),
     Node(party::Arguments),
     RemoteIo(party::RemoteIoArguments),
     Plant(party::PlantArguments),
@@ -158,6 +160,7 @@ impl Command {
             Self::Keys(_) => "keys",
             Self::Operate(_) => "operate",
             Self::Doctor(_) => "doctor",
+            Self::Gateway(_) => "gateway",
             Self::Node(_) => "node",
             Self::RemoteIo(_) => "remote-io",
             Self::Plant(_) => "plant",
@@ -202,6 +205,7 @@ impl Command {
             Self::Keys(arguments) => keys::run(&arguments),
             Self::Operate(arguments) => operate::run(&arguments),
             Self::Doctor(arguments) => doctor::run(&arguments),
+            Self::Gateway(arguments) => gateway::run(&arguments, console),
             Self::Node(arguments) => party::run_station(&arguments),
             Self::RemoteIo(arguments) => party::run_remote_io(&arguments.common),
             Self::Plant(arguments) => party::run_plant(&arguments.common),

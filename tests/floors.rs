@@ -47,7 +47,7 @@ const FLOORS: &[&[&str]] = &[
         "understudy-scenarios",
     ],
     &["understudy-view"],
-    &["understudy-watch"],
+    &["understudy-gateway", "understudy-watch"],
     &["understudy", "understudy-fuzz"],
 ];
 

@@ -4,6 +4,7 @@
 //! a link to its peers ([`LinkKind`]: Zenoh or plain UDP) and a journal, and runs it ([`Host`], or [`run_party`] for a process
 //! of its own). Nothing here decides anything about the cycle.
 
+mod announcer;
 mod channel;
 mod clock;
 mod control;
@@ -29,6 +30,7 @@ mod udp;
 mod watchdog;
 mod zenoh_link;
 
+pub use announcer::Announcer;
 pub use channel::{Admitted, ChannelSettings, TlsKeys};
 pub use clock::Clock;
 pub use control::{Commands, hold_back_signals};

@@ -4,7 +4,7 @@ use insta::assert_snapshot;
 
 use crate::understudy;
 
-const COMMANDS: [&str; 32] = [
+const COMMANDS: [&str; 33] = [
     "allocate",
     "catalogue",
     "resources",
@@ -29,6 +29,7 @@ const COMMANDS: [&str; 32] = [
     "keys",
     "operate",
     "doctor",
+    "gateway",
     "node",
     "remote-io",
     "plant",

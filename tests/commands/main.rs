@@ -9,6 +9,7 @@ mod convert;
 mod des;
 mod examples;
 mod explain;
+mod gateway;
 mod help;
 mod model_check;
 mod others;

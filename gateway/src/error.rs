@@ -1,0 +1,55 @@
+//! What can be wrong about a gateway.
+
+use std::io;
+use std::net::SocketAddr;
+
+use understudy_bus::BusError;
+use understudy_view::Trouble;
+
+/// Why a gateway does not run.
+#[derive(Debug, thiserror::Error)]
+pub enum GatewayError {
+    /// It cannot listen.
+    #[error("U0590: the gateway cannot listen on {address}: {source}")]
+    Listen {
+        /// Where.
+        address: SocketAddr,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The system refused something that it needs.
+    #[error("U0591: {what}: {source}")]
+    System {
+        /// What was asked of it.
+        what: &'static str,
+        /// What it said.
+        source: io::Error,
+    },
+    /// More signals than a Modbus address can name.
+    #[error("U0592: the process image has {bits} bits, and a register map holds {most}")]
+    TooManyBits {
+        /// Of all programs.
+        bits: usize,
+        /// At most.
+        most: usize,
+    },
+    /// The journal cannot be read.
+    #[error("U0593: {0}")]
+    Journal(Trouble),
+    /// Zenoh did not start.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+}
+
+impl GatewayError {
+    /// The stable code.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Listen { .. } => "U0590",
+            Self::System { .. } => "U0591",
+            Self::TooManyBits { .. } => "U0592",
+            Self::Journal(_) => "U0593",
+            Self::Bus(error) => error.code(),
+        }
+    }
+}

@@ -1,0 +1,31 @@
+//! The labels of metrics: names of the cluster, and words.
+
+use prometheus_client::encoding::EncodeLabelSet;
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+pub(crate) struct OfProgram {
+    pub(crate) program: String,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+pub(crate) struct OfSource {
+    pub(crate) program: String,
+    pub(crate) source: &'static str,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+pub(crate) struct OfTurn {
+    pub(crate) station: String,
+    pub(crate) remote_io: String,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+pub(crate) struct OfParty {
+    pub(crate) party: String,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+pub(crate) struct OfState {
+    pub(crate) station: String,
+    pub(crate) state: &'static str,
+}

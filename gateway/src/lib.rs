@@ -1,0 +1,99 @@
+//! What a run is, for other systems, read-only.
+//!
+//! ```text
+//!   journal ──► Followed ──┬─► Metrics          ──► Prometheus scrapes them over HTTP
+//!   (files that grow)      ├─► Snapshot ──► RegisterMap ──► Modbus TCP: bits and registers
+//!                          └─► Snapshot and events ──► JSON under keys of Zenoh, at a limited rate
+//! ```
+//!
+//! A reader of the journal only: no party knows that somebody looks, and nothing here can be written.
+
+#![allow(
+    clippy::disallowed_methods,
+    reason = "it looks at a journal again and again, by the clock"
+)]
+
+mod error;
+mod followed;
+mod http;
+mod labels;
+mod metrics;
+mod mirror;
+mod modbus;
+mod register_map;
+
+pub use error::GatewayError;
+pub use followed::Followed;
+pub use http::serve_metrics;
+pub use metrics::{Metrics, exposition_of};
+pub use mirror::{Rate, mirror};
+pub use modbus::serve_modbus;
+pub use register_map::{Area, Place, RegisterMap};
+
+/// What is looked at.
+pub use understudy_view::Run;
+
+use std::future::Future;
+use std::net::SocketAddr;
+
+use tokio::net::TcpListener;
+use tokio::runtime::{Builder, Runtime};
+
+/// One thread serves all who ask: they look, and the cluster must not notice.
+fn runtime() -> Result<Runtime, GatewayError> {
+    Builder::new_multi_thread()
+        .worker_threads(1)
+        .enable_all()
+        .build()
+        .map_err(|source| GatewayError::System {
+            what: "a thread to serve with",
+            source,
+        })
+}
+
+async fn listen(address: SocketAddr) -> Result<TcpListener, GatewayError> {
+    TcpListener::bind(address)
+        .await
+        .map_err(|source| GatewayError::Listen { address, source })
+}
+
+/// Ends with SIGINT or with SIGTERM.
+async fn asked_to_end() {
+    use tokio::signal::unix::{SignalKind, signal};
+    let of = |kind| async move {
+        match signal(kind) {
+            Ok(mut signal) => {
+                signal.recv().await;
+            }
+            // Without the right to listen to signals their default ends the process.
+            Err(_) => std::future::pending().await,
+        }
+    };
+    tokio::select! {
+        () = of(SignalKind::interrupt()) => {}
+        () = of(SignalKind::terminate()) => {}
+    }
+}
+
+/// Runs `serve` on a listener at `address` until a signal; `ready` is told where it listens.
+fn serve_until_asked<F>(
+    address: SocketAddr,
+    ready: impl FnOnce(SocketAddr),
+    serve: impl FnOnce(TcpListener) -> F,
+) -> Result<(), GatewayError>
+where
+    F: Future<Output = std::io::Result<()>>,
+{
+    runtime()?.block_on(async {
+        let listener = listen(address).await?;
+        let system = |source| GatewayError::System {
+            what: "serving",
+            source,
+        };
+        ready(listener.local_addr().map_err(system)?);
+        tokio::select! {
+            ended = serve(listener) => ended.map_err(system),
+            () = asked_to_end() => Ok(()),
+        }
+    })
+}

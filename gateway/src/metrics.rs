@@ -1,0 +1,398 @@
+//! What Prometheus scrapes, in the OpenMetrics text format. Names and labels are listed in `docs/monitoring.md`.
+//!
+//! Counters count records, so they begin at the first record of the journal that is still there, and never go back.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicI64, Ordering};
+
+use prometheus_client::encoding::text::encode;
+use prometheus_client::metrics::counter::Counter;
+use prometheus_client::metrics::family::Family;
+use prometheus_client::metrics::gauge::Gauge;
+use prometheus_client::metrics::histogram::Histogram;
+use prometheus_client::registry::{Registry, Unit};
+use understudy_bus::HostEvent;
+use understudy_cluster::Cluster;
+use understudy_node::Event as StationEvent;
+use understudy_remote_io::Event as RemoteIoEvent;
+use understudy_scenarios::{Happening, Parties, Record, source_word};
+use understudy_view::{Model, Run, Snapshot, StationState};
+use understudy_wire::{Party, ProgramId, StationId};
+
+use crate::error::GatewayError;
+use crate::followed::BOUNDS;
+use crate::labels::{OfParty, OfProgram, OfSource, OfState, OfTurn};
+
+/// Shares of a period that bound the buckets of times.
+const SHARES: [f64; 12] = [
+    0.0, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 1.0,
+];
+
+const STATES: [(StationState, &str); 10] = [
+    (StationState::NotStarted, "not-started"),
+    (StationState::Speaking, "speaking"),
+    (StationState::Silent, "silent"),
+    (StationState::Flagged, "flagged"),
+    (StationState::Joining, "joining"),
+    (StationState::Shadow, "shadow"),
+    (StationState::Refused, "refused"),
+    (StationState::Stopped, "stopped"),
+    (StationState::Killed, "killed"),
+    (StationState::Ended, "ended"),
+];
+
+/// All metrics of one run.
+#[derive(Debug)]
+pub struct Metrics {
+    registry: Mutex<Registry>,
+    parties: Parties,
+    stations: u8,
+    /// The newest cycle whose times were observed.
+    timed: AtomicI64,
+    deadlines: Family<OfSource, Counter>,
+    silent_turns: Family<OfTurn, Counter>,
+    voided_samples: Family<OfProgram, Counter>,
+    substituted_inputs: Family<OfProgram, Counter>,
+    digest_differences: Family<OfParty, Counter>,
+    value_faults: Family<OfProgram, Counter>,
+    flagged: Family<OfParty, Counter>,
+    refused_frames: Family<OfParty, Counter>,
+    stalls: Family<OfParty, Counter>,
+    stall_seconds: Family<OfParty, Counter<f64, std::sync::atomic::AtomicU64>>,
+    records_lost: Family<OfParty, Counter>,
+    margin: Histogram,
+    late_turns: Counter,
+    token: Histogram,
+    cycle_times: Histogram,
+    cycle: Gauge,
+    survives: Gauge,
+    open_alarms: Gauge,
+    station_states: Family<OfState, Gauge>,
+    awaits_release: Family<OfProgram, Gauge>,
+    forced: Family<OfProgram, Gauge>,
+    finished: Family<OfProgram, Gauge>,
+    mishaps: Family<OfProgram, Gauge>,
+    records: Gauge,
+    left_out: Gauge,
+}
+
+impl Metrics {
+    /// Of a run of `cluster`, with everything at 0.
+    pub fn new(cluster: &Cluster) -> Self {
+        let schedule = &cluster.agreement().schedule;
+        let period = schedule.period().as_secs_f64();
+        let buckets = || Histogram::new(SHARES.map(|share| share * period));
+        let mut metrics = Self {
+            registry: Mutex::new(Registry::default()),
+            parties: Parties::of(cluster),
+            stations: u8::try_from(schedule.stations()).unwrap_or(u8::MAX),
+            timed: AtomicI64::new(i64::MIN),
+            deadlines: Family::default(),
+            silent_turns: Family::default(),
+            voided_samples: Family::default(),
+            substituted_inputs: Family::default(),
+            digest_differences: Family::default(),
+            value_faults: Family::default(),
+            flagged: Family::default(),
+            refused_frames: Family::default(),
+            stalls: Family::default(),
+            stall_seconds: Family::default(),
+            records_lost: Family::default(),
+            margin: buckets(),
+            late_turns: Counter::default(),
+            token: buckets(),
+            cycle_times: Histogram::new(
+                [0.5, 0.9, 0.95, 0.99, 1.01, 1.05, 1.1, 1.5, 2.0, 5.0, 10.0]
+                    .map(|share| share * period),
+            ),
+            cycle: Gauge::default(),
+            survives: Gauge::default(),
+            open_alarms: Gauge::default(),
+            station_states: Family::default(),
+            awaits_release: Family::default(),
+            forced: Family::default(),
+            finished: Family::default(),
+            mishaps: Family::default(),
+            records: Gauge::default(),
+            left_out: Gauge::default(),
+        };
+        metrics.register(cluster.name());
+        metrics.begin(cluster);
+        metrics
+    }
+
+    /// Whoever watches a counter has to see it at 0 before it counts.
+    fn begin(&self, cluster: &Cluster) {
+        for (party, name) in self.parties.iter() {
+            let of_party = OfParty {
+                party: name.to_owned(),
+            };
+            for family in [&self.refused_frames, &self.stalls, &self.records_lost] {
+                let _ = family.get_or_create(&of_party);
+            }
+            let _ = self.stall_seconds.get_or_create(&of_party);
+            if !matches!(party, Party::Plant(_)) {
+                let _ = self.digest_differences.get_or_create(&of_party);
+                let _ = self.flagged.get_or_create(&of_party);
+            }
+        }
+        for controller in cluster.controllers() {
+            let of_program = OfProgram {
+                program: controller.name.clone(),
+            };
+            for family in [
+                &self.voided_samples,
+                &self.substituted_inputs,
+                &self.value_faults,
+            ] {
+                let _ = family.get_or_create(&of_program);
+            }
+            for source in ["direct", "reconstructed", "held", "fail-safe"] {
+                let of_source = OfSource {
+                    program: controller.name.clone(),
+                    source,
+                };
+                let _ = self.deadlines.get_or_create(&of_source);
+            }
+        }
+    }
+
+    fn register(&mut self, cluster: &str) {
+        let labels = [("cluster".into(), cluster.to_owned().into())];
+        let mut all = Registry::with_prefix_and_labels("understudy", labels.into_iter());
+        macro_rules! register {
+            ($($name:literal $field:ident $help:literal;)*) => {
+                $(all.register($name, $help, self.$field.clone());)*
+            };
+        }
+        register! {
+            "deadlines" deadlines "Deadlines of each program by the source of what was driven";
+            "silent_turns" silent_turns "Turns of a station that a remote I/O did not hear";
+            "voided_samples" voided_samples "Samples that nobody heard, and that are void";
+            "substituted_inputs" substituted_inputs "Changes of the channels that a remote I/O finds failed, whose last good value is used";
+            "digest_differences" digest_differences "Equal histories with unequal states, as the party says";
+            "value_faults" value_faults "Outputs that differ in one history, or whose sum is not 0";
+            "flagged" flagged "Stations that were silent for too long, as the party says";
+            "refused_frames" refused_frames "Datagrams that are no frames of this cluster";
+            "host_stalls" stalls "Wake-ups of the party that came too late";
+            "journal_records_lost" records_lost "Records that the party could not write";
+            "late_turns" late_turns "Cycles whose last turn came after the deadline";
+            "cycle" cycle "The newest cycle, from the origin of the run";
+            "survivable_failures" survives "Further failures of stations that are masked whichever they are";
+            "open_alarms" open_alarms "Alarms that last, or that nobody has acknowledged";
+            "station_state" station_states "1 for what a station is";
+            "awaits_release" awaits_release "1 where an operator has to release the outputs";
+            "forced_signals" forced "Signals that are forced";
+            "plant_finished" finished "Parts that the simulated plant has finished";
+            "plant_mishaps" mishaps "Things that must not happen to the simulated plant and did";
+            "journal_records" records "Records that were read";
+            "journal_left_out" left_out "Records that were gone or could not be read, at least";
+        }
+        macro_rules! in_seconds {
+            ($($name:literal $field:ident $help:literal;)*) => {
+                $(all.register_with_unit($name, $help, Unit::Seconds, self.$field.clone());)*
+            };
+        }
+        in_seconds! {
+            "host_stall" stall_seconds "By how much the wake-ups of the party came too late, in all";
+            "cycle_margin" margin "From the last turn of a cycle to its deadline; 0 where it came later";
+            "token" token "From the first sample of a cycle to its last turn";
+            "cycle_time" cycle_times "From the start of a cycle to that of the next";
+        }
+        self.registry = Mutex::new(all);
+    }
+
+    /// Counts a record.
+    pub fn note(&self, record: &Record) {
+        match (&record.event, record.party) {
+            (Happening::RemoteIo(event), Some(Party::RemoteIo(program))) => {
+                self.remote_io(record, program, event);
+            }
+            (Happening::Station(event), Some(_)) => match event {
+                StationEvent::DigestDiffers { .. } => {
+                    self.digest_differences.get_or_create(&of(record)).inc();
+                }
+                StationEvent::Flagged { .. } => {
+                    self.flagged.get_or_create(&of(record)).inc();
+                }
+                StationEvent::Stalled { late, .. } => self.stalled(record, *late),
+                _ => {}
+            },
+            (Happening::Host(event), Some(_)) => match event {
+                HostEvent::RefusedBytes { datagrams, .. }
+                | HostEvent::RefusedFrames { datagrams, .. } => {
+                    self.refused_frames
+                        .get_or_create(&of(record))
+                        .inc_by(*datagrams);
+                }
+                HostEvent::JournalLost { records } => {
+                    self.records_lost
+                        .get_or_create(&of(record))
+                        .inc_by(*records);
+                }
+                _ => {}
+            },
+            _ => {}
+        }
+    }
+
+    fn remote_io(&self, record: &Record, program: ProgramId, event: &RemoteIoEvent) {
+        let of_program = || OfProgram {
+            program: self.program(program),
+        };
+        match event {
+            RemoteIoEvent::Applied { source, heard, .. } => {
+                let of_source = OfSource {
+                    program: self.program(program),
+                    source: source_word(*source),
+                };
+                self.deadlines.get_or_create(&of_source).inc();
+                for station in (0..self.stations).map(StationId) {
+                    if !heard.contains(station) {
+                        let turn = OfTurn {
+                            station: self.parties.name(Party::Station(station)).to_owned(),
+                            remote_io: record.name.clone(),
+                        };
+                        self.silent_turns.get_or_create(&turn).inc();
+                    }
+                }
+            }
+            RemoteIoEvent::Voided { samples, .. } => {
+                self.voided_samples
+                    .get_or_create(&of_program())
+                    .inc_by(*samples as u64);
+            }
+            RemoteIoEvent::Diagnosed { .. } => {
+                self.substituted_inputs.get_or_create(&of_program()).inc();
+            }
+            RemoteIoEvent::ValueFault { .. } | RemoteIoEvent::Syndrome { .. } => {
+                self.value_faults.get_or_create(&of_program()).inc();
+            }
+            RemoteIoEvent::DigestDiffers { .. } => {
+                self.digest_differences.get_or_create(&of(record)).inc();
+            }
+            RemoteIoEvent::Flagged { .. } => {
+                self.flagged.get_or_create(&of(record)).inc();
+            }
+            RemoteIoEvent::Stalled { late, .. } => self.stalled(record, *late),
+            _ => {}
+        }
+    }
+
+    fn stalled(&self, record: &Record, late: std::time::Duration) {
+        self.stalls.get_or_create(&of(record)).inc();
+        self.stall_seconds
+            .get_or_create(&of(record))
+            .inc_by(late.as_secs_f64());
+    }
+
+    fn program(&self, program: ProgramId) -> String {
+        self.parties
+            .name(Party::Station(StationId(program.0)))
+            .to_owned()
+    }
+
+    /// Observes the times of cycles that are new.
+    pub fn times(&self, model: &Model) {
+        let last = self.timed.load(Ordering::Relaxed);
+        let fresh = model.timings().filter(|timing| timing.cycle > last);
+        for timing in fresh {
+            self.margin.observe(timing.margin_ns.max(0) as f64 / 1e9);
+            if timing.margin_ns < 0 {
+                self.late_turns.inc();
+            }
+            self.token.observe(timing.token_ns as f64 / 1e9);
+            if let Some(cycle) = timing.cycle_ns {
+                self.cycle_times.observe(cycle as f64 / 1e9);
+            }
+            self.timed.store(timing.cycle, Ordering::Relaxed);
+        }
+    }
+
+    /// Sets what is the case.
+    pub fn state(&self, snapshot: &Snapshot) {
+        let whole = |count: u64| i64::try_from(count).unwrap_or(i64::MAX);
+        self.cycle.set(snapshot.cycle.unwrap_or_default());
+        self.survives.set(i64::from(snapshot.margin.survives));
+        self.open_alarms.set(whole(snapshot.alarms.len() as u64));
+        self.records.set(whole(snapshot.records));
+        self.left_out.set(whole(snapshot.left_out));
+        for station in &snapshot.stations {
+            for (state, word) in STATES {
+                let of_state = OfState {
+                    station: station.name.clone(),
+                    state: word,
+                };
+                self.station_states
+                    .get_or_create(&of_state)
+                    .set(i64::from(state == station.state));
+            }
+        }
+        for program in &snapshot.programs {
+            let of_program = OfProgram {
+                program: program.program.clone(),
+            };
+            self.awaits_release
+                .get_or_create(&of_program)
+                .set(i64::from(program.awaits_release));
+            self.forced
+                .get_or_create(&of_program)
+                .set(whole(program.forced.len() as u64));
+            if let Some(finished) = program.finished {
+                self.finished
+                    .get_or_create(&of_program)
+                    .set(whole(finished));
+            }
+            if let Some(mishaps) = program.mishaps {
+                self.mishaps.get_or_create(&of_program).set(whole(mishaps));
+            }
+        }
+    }
+
+    /// All of them in the OpenMetrics text format.
+    pub fn exposition(&self) -> String {
+        let registry = self
+            .registry
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut text = String::new();
+        // A text takes whatever is written to it.
+        let _ = encode(&mut text, &registry);
+        text
+    }
+}
+
+fn of(record: &Record) -> OfParty {
+    OfParty {
+        party: record.name.clone(),
+    }
+}
+
+/// The metrics of all that is in the journal of `run` now.
+///
+/// # Errors
+/// The journal cannot be read.
+pub fn exposition_of(run: &Run) -> Result<String, GatewayError> {
+    let metrics = Metrics::new(run.cluster());
+    let (mut source, mut model) = (run.follow(), run.model(BOUNDS));
+    let mut read = 0;
+    loop {
+        let taken = source.poll(&mut |found| match found {
+            Ok(record) => {
+                metrics.note(&record);
+                model.note(&record);
+            }
+            Err(trouble) => model.trouble(&trouble),
+        });
+        metrics.times(&model);
+        read += taken;
+        if taken == 0 {
+            break;
+        }
+    }
+    if let (0, Some(trouble)) = (read, source.failure()) {
+        return Err(GatewayError::Journal(trouble));
+    }
+    metrics.state(&model.snapshot());
+    Ok(metrics.exposition())
+}

@@ -1,0 +1,150 @@
+//! The run as JSON under keys of Zenoh, at a limited rate. The keys are listed in `docs/zenoh-keys.md`.
+
+use std::collections::BTreeMap;
+use std::net::SocketAddr;
+use std::str::FromStr;
+use std::time::Duration;
+
+use serde_json::{Map, Value, json};
+use understudy_bus::Announcer;
+use understudy_cluster::Cluster;
+use understudy_view::{ProgramSnapshot, Snapshot};
+
+use crate::error::GatewayError;
+use crate::followed::Followed;
+use crate::{asked_to_end, runtime};
+
+/// How often each document may be said, at most.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Rate(Duration);
+
+impl FromStr for Rate {
+    type Err = String;
+
+    /// `5/s`: 1 to 50 times a second.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let times = text.strip_suffix("/s").and_then(|times| times.parse().ok());
+        match times {
+            Some(times @ 1..=50) => Ok(Self(Duration::from_secs(1) / times)),
+            _ => Err("a rate is 1/s to 50/s".to_owned()),
+        }
+    }
+}
+
+/// Says what is new of `run` under `understudy/mirror/CLUSTER/...` until SIGINT or SIGTERM, to whoever calls `address`; `ready` is told
+/// when it listens. Who comes late asks for the newest.
+///
+/// # Errors
+/// Zenoh does not start there.
+pub fn mirror(
+    run: &Followed,
+    address: SocketAddr,
+    rate: Rate,
+    ready: impl FnOnce(SocketAddr),
+) -> Result<(), GatewayError> {
+    let runtime = runtime()?;
+    let root = format!("understudy/mirror/{}", run.cluster().name());
+    let announcer = Announcer::open(address, &root)?;
+    ready(address);
+    let mut said: BTreeMap<String, String> = BTreeMap::new();
+    runtime.block_on(async {
+        let end = asked_to_end();
+        tokio::pin!(end);
+        loop {
+            for (key, document) in documents(run.cluster(), &run.snapshot()) {
+                let text = document.to_string();
+                if said.get(&key) != Some(&text) {
+                    announcer.say(&key, &text);
+                    said.insert(key, text);
+                }
+            }
+            for event in run.take_events() {
+                announcer.say_once("events", &json!(event).to_string());
+            }
+            tokio::select! {
+                () = tokio::time::sleep(rate.0) => {}
+                () = &mut end => return,
+            }
+        }
+    });
+    Ok(())
+}
+
+/// Each document with the end of its key.
+fn documents(cluster: &Cluster, snapshot: &Snapshot) -> Vec<(String, Value)> {
+    let mut documents = vec![
+        (
+            "run".to_owned(),
+            json!({
+                "cluster": snapshot.cluster,
+                "run": snapshot.run,
+                "cycle": snapshot.cycle,
+                "period_us": snapshot.period_us,
+                "mode": snapshot.mode,
+                "timing": snapshot.timing,
+            }),
+        ),
+        ("stations".to_owned(), json!(snapshot.stations)),
+        ("margin".to_owned(), json!(snapshot.margin)),
+        ("alarms".to_owned(), json!(snapshot.alarms)),
+    ];
+    for (controller, program) in cluster.controllers().iter().zip(&snapshot.programs) {
+        let outputs = controller.circuit.outputs().iter();
+        let outputs: Vec<&str> = outputs.map(|output| output.name.as_str()).collect();
+        let inputs = controller.circuit.inputs().iter().map(String::as_str);
+        let inputs: Vec<&str> = inputs.collect();
+        let document = values(program, &inputs, &outputs);
+        documents.push((format!("programs/{}", controller.name), document));
+    }
+    documents
+}
+
+fn values(program: &ProgramSnapshot, inputs: &[&str], outputs: &[&str]) -> Value {
+    json!({
+        "source": program.source,
+        "inputs": named(inputs, program.inputs.as_deref()),
+        "outputs": named(outputs, program.outputs.as_deref()),
+        "word_of": program.word_of,
+        "missing": program.missing,
+        "awaits_release": program.awaits_release,
+        "forced": program.forced,
+        "deadlines": {
+            "direct": program.direct,
+            "reconstructed": program.reconstructed,
+            "held": program.held,
+            "fail_safe": program.fail_safe,
+        },
+    })
+}
+
+/// Signals by name; nothing where no image is known.
+fn named(names: &[&str], bits: Option<&str>) -> Option<Map<String, Value>> {
+    let bits = bits?.bytes().map(|byte| byte == b'1');
+    let signals = names.iter().zip(bits);
+    Some(
+        signals
+            .map(|(name, bit)| ((*name).to_owned(), Value::Bool(bit)))
+            .collect(),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rate_is_between_one_and_fifty_a_second() {
+        assert_eq!("5/s".parse(), Ok(Rate(Duration::from_millis(200))));
+        assert_eq!("50/s".parse(), Ok(Rate(Duration::from_millis(20))));
+        for wrong in ["0/s", "51/s", "5", "/s", "-1/s", "5/min", "99999999999/s"] {
+            assert!(wrong.parse::<Rate>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn signals_stand_by_their_names() {
+        let found = named(&["a", "b"], Some("10")).map(Value::Object);
+        assert_eq!(found, Some(json!({ "a": true, "b": false })));
+        assert_eq!(named(&["a"], None), None);
+    }
+}

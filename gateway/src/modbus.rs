@@ -1,0 +1,168 @@
+//! The process image over Modbus TCP, read-only: whoever writes is told that there is no such function.
+
+use std::future::{Ready, ready};
+use std::net::SocketAddr;
+use std::sync::Arc;
+
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio_modbus::server::Service;
+use tokio_modbus::server::tcp::Server;
+use tokio_modbus::{ExceptionCode, Request, Response};
+
+use crate::error::GatewayError;
+use crate::followed::Followed;
+use crate::register_map::{ProcessImage, RegisterMap};
+use crate::serve_until_asked;
+
+/// Who calls when so many are connected is sent away.
+const MOST_CLIENTS: usize = 64;
+
+/// By the standard, in one answer.
+const MOST_BITS: u16 = 2000;
+
+/// Likewise.
+const MOST_REGISTERS: u16 = 125;
+
+/// Serves the process image of `run` until SIGINT or SIGTERM; `ready` is told where.
+///
+/// # Errors
+/// It cannot listen there, or the cluster has more signals than there are addresses.
+pub fn serve_modbus(
+    run: Followed,
+    address: SocketAddr,
+    ready: impl FnOnce(SocketAddr),
+) -> Result<(), GatewayError> {
+    let map = Arc::new(RegisterMap::new(run.cluster())?);
+    let run = Arc::new(run);
+    serve_until_asked(address, ready, |listener| serve(listener, run, map))
+}
+
+async fn serve(
+    listener: TcpListener,
+    run: Arc<Followed>,
+    map: Arc<RegisterMap>,
+) -> std::io::Result<()> {
+    let places = Arc::new(Semaphore::new(MOST_CLIENTS));
+    let connected = move |stream: TcpStream, _: SocketAddr| {
+        let (run, map) = (Arc::clone(&run), Arc::clone(&map));
+        let place = Arc::clone(&places).try_acquire_owned().ok();
+        async move {
+            let client = place.map(|place| Client {
+                run,
+                map,
+                _place: place,
+            });
+            Ok(client.map(|client| (client, stream)))
+        }
+    };
+    // A client that breaks its connection off, or says what is no request, is gone; the others stay.
+    Server::new(listener).serve(&connected, |_| {}).await
+}
+
+struct Client {
+    run: Arc<Followed>,
+    map: Arc<RegisterMap>,
+    _place: OwnedSemaphorePermit,
+}
+
+impl Service for Client {
+    type Request = Request<'static>;
+    type Response = Response;
+    type Exception = ExceptionCode;
+    type Future = Ready<Result<Response, ExceptionCode>>;
+
+    fn call(&self, request: Self::Request) -> Self::Future {
+        ready(answer(&self.map.image(&self.run.snapshot()), &request))
+    }
+}
+
+fn answer(image: &ProcessImage, request: &Request<'_>) -> Result<Response, ExceptionCode> {
+    match *request {
+        Request::ReadCoils(address, count) => {
+            part(&image.coils, address, count, MOST_BITS).map(Response::ReadCoils)
+        }
+        Request::ReadDiscreteInputs(address, count) => {
+            part(&image.inputs, address, count, MOST_BITS).map(Response::ReadDiscreteInputs)
+        }
+        Request::ReadInputRegisters(address, count) => {
+            part(&image.registers, address, count, MOST_REGISTERS).map(Response::ReadInputRegisters)
+        }
+        Request::ReadHoldingRegisters(address, count) => {
+            part(&image.registers, address, count, MOST_REGISTERS)
+                .map(Response::ReadHoldingRegisters)
+        }
+        _ => Err(ExceptionCode::IllegalFunction),
+    }
+}
+
+fn part<T: Copy>(
+    table: &[T],
+    address: u16,
+    count: u16,
+    most: u16,
+) -> Result<Vec<T>, ExceptionCode> {
+    if count == 0 || count > most {
+        return Err(ExceptionCode::IllegalDataValue);
+    }
+    let start = usize::from(address);
+    let found = table.get(start..start + usize::from(count));
+    found
+        .map(<[T]>::to_vec)
+        .ok_or(ExceptionCode::IllegalDataAddress)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(request: &Request<'_>, expected: Result<Response, ExceptionCode>) {
+        let image = ProcessImage {
+            inputs: vec![true, false, true],
+            coils: vec![false, true],
+            registers: vec![1, 2, 3],
+        };
+        assert_eq!(answer(&image, request), expected, "{request:?}");
+    }
+
+    #[test]
+    fn what_is_there_can_be_read_and_nothing_can_be_written() {
+        check(
+            &Request::ReadDiscreteInputs(0, 3),
+            Ok(Response::ReadDiscreteInputs(vec![true, false, true])),
+        );
+        check(
+            &Request::ReadCoils(1, 1),
+            Ok(Response::ReadCoils(vec![true])),
+        );
+        check(
+            &Request::ReadInputRegisters(1, 2),
+            Ok(Response::ReadInputRegisters(vec![2, 3])),
+        );
+        check(
+            &Request::ReadHoldingRegisters(2, 1),
+            Ok(Response::ReadHoldingRegisters(vec![3])),
+        );
+        for (address, count) in [(3, 1), (2, 2), (u16::MAX, 1)] {
+            check(
+                &Request::ReadInputRegisters(address, count),
+                Err(ExceptionCode::IllegalDataAddress),
+            );
+        }
+        for count in [0, 126, u16::MAX] {
+            check(
+                &Request::ReadInputRegisters(0, count),
+                Err(ExceptionCode::IllegalDataValue),
+            );
+        }
+        for request in [
+            Request::WriteSingleCoil(0, true),
+            Request::WriteSingleRegister(0, 7),
+            Request::WriteMultipleCoils(0, vec![true].into()),
+            Request::WriteMultipleRegisters(0, vec![1].into()),
+            Request::MaskWriteRegister(0, 0, 0),
+        ] {
+            check(&request, Err(ExceptionCode::IllegalFunction));
+        }
+    }
+}

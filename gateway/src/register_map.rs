@@ -1,0 +1,286 @@
+//! Which bit and which register of Modbus says what.
+//!
+//! ```text
+//!   discrete inputs   u(1), u(2), ... one after the other, element 1 first
+//!   coils             y(1), y(2), ... as they are driven; they can be read only
+//!   registers         0..16 the run, 16.. the stations, 96.. the programs; read as input or as holding registers
+//! ```
+//!
+//! Numbers of 32 bits take two registers, the upper half first. Addresses are those on the wire, from 0.
+
+use understudy_cluster::Cluster;
+use understudy_logic::Circuit;
+use understudy_view::{RunState, Snapshot, StationState};
+
+use crate::error::GatewayError;
+
+/// Of the map, in register 0; it changes when a place does.
+const VERSION: u16 = 1;
+
+/// Where the stations begin, a register each.
+const STATIONS: usize = 16;
+
+/// Where the programs begin.
+const PROGRAMS: usize = 96;
+
+/// Registers of a program.
+const OF_PROGRAM: usize = 16;
+
+/// What an address of 16 bits can name.
+const MOST_BITS: usize = 1 << 16;
+
+/// One of the tables of Modbus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Area {
+    /// Read by function 2.
+    DiscreteInput,
+    /// Read by function 1.
+    Coil,
+    /// Read by functions 3 and 4.
+    Register,
+}
+
+/// One line of the map.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Place {
+    /// In which table.
+    pub area: Area,
+    /// From 0.
+    pub address: u16,
+    /// 1, or 2 for a number of 32 bits.
+    pub width: u16,
+    /// A signal as `program.signal`, or what the register is called.
+    pub name: String,
+    /// What its values mean.
+    pub meaning: &'static str,
+}
+
+/// The map of one cluster.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RegisterMap {
+    places: Vec<Place>,
+    /// Widths of u(i) and y(i).
+    widths: Vec<(usize, usize)>,
+    stations: usize,
+}
+
+/// What is read at one moment.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(crate) struct ProcessImage {
+    pub(crate) inputs: Vec<bool>,
+    pub(crate) coils: Vec<bool>,
+    pub(crate) registers: Vec<u16>,
+}
+
+const STATION_STATES: &str = "0 not-started, 1 speaking, 2 silent, 3 flagged, 4 joining, 5 shadow, 6 refused, 7 stopped, 8 killed, 9 ended";
+
+const SOURCES: &str = "0 nothing yet, 1 direct, 2 reconstructed, 3 held, 4 fail-safe";
+
+/// Of the run, with address, width and meaning.
+const OF_RUN: [(u16, u16, &str, &str); 8] = [
+    (0, 1, "map.version", "1"),
+    (
+        1,
+        1,
+        "run.state",
+        "0 starting, 1 running, 2 finished, 3 interrupted",
+    ),
+    (2, 2, "run.cycle", "the newest cycle, from the origin"),
+    (4, 2, "run.period_us", "microseconds"),
+    (
+        6,
+        1,
+        "margin.survives",
+        "further failures of stations that are masked whichever they are",
+    ),
+    (
+        7,
+        1,
+        "alarms.open",
+        "alarms that last, or that nobody has acknowledged",
+    ),
+    (8, 1, "cluster.programs", "how many"),
+    (9, 1, "cluster.stations", "how many"),
+];
+
+/// Of a program, with its place behind the program's first register.
+const PROGRAM_REGISTERS: [(u16, u16, &str, &str); 9] = [
+    (0, 1, "source", SOURCES),
+    (1, 1, "awaits_release", "1 where an operator has to release"),
+    (2, 1, "forced", "signals that are forced"),
+    (4, 2, "direct", "deadlines"),
+    (6, 2, "reconstructed", "deadlines"),
+    (8, 2, "held", "deadlines"),
+    (10, 2, "fail_safe", "deadlines"),
+    (12, 2, "finished", "parts"),
+    (14, 2, "mishaps", "things that must not happen"),
+];
+
+impl RegisterMap {
+    /// Of a cluster.
+    ///
+    /// # Errors
+    /// More signals than addresses.
+    pub fn new(cluster: &Cluster) -> Result<Self, GatewayError> {
+        let programs = cluster.controllers();
+        let mut places = Vec::new();
+        let outputs = |circuit: &Circuit| -> Vec<String> {
+            let outputs = circuit.outputs().iter();
+            outputs.map(|output| output.name.clone()).collect()
+        };
+        for (area, meaning) in [
+            (Area::DiscreteInput, "an input, as last sampled"),
+            (Area::Coil, "an output, as it is driven"),
+        ] {
+            let names: Vec<String> = programs
+                .iter()
+                .flat_map(|program| {
+                    let signals = match area {
+                        Area::DiscreteInput => program.circuit.inputs().to_vec(),
+                        _ => outputs(&program.circuit),
+                    };
+                    let named = move |signal| format!("{}.{signal}", program.name);
+                    signals.into_iter().map(named)
+                })
+                .collect();
+            if names.len() > MOST_BITS {
+                return Err(GatewayError::TooManyBits {
+                    bits: names.len(),
+                    most: MOST_BITS,
+                });
+            }
+            places.extend(names.into_iter().enumerate().map(|(address, name)| Place {
+                area,
+                address: address as u16,
+                width: 1,
+                name,
+                meaning,
+            }));
+        }
+        let register = |address: usize, width, name, meaning| Place {
+            area: Area::Register,
+            address: address as u16,
+            width,
+            name,
+            meaning,
+        };
+        for (address, width, name, meaning) in OF_RUN {
+            places.push(register(address.into(), width, name.to_owned(), meaning));
+        }
+        let stations = programs
+            .iter()
+            .map(|controller| &controller.name)
+            .chain(cluster.understudies().iter().map(|station| &station.name));
+        let mut count = 0;
+        for (rank, name) in stations.enumerate() {
+            places.push(register(
+                STATIONS + rank,
+                1,
+                format!("{name}.state"),
+                STATION_STATES,
+            ));
+            count = rank + 1;
+        }
+        for (index, program) in programs.iter().enumerate() {
+            for (offset, width, name, meaning) in PROGRAM_REGISTERS {
+                let address = PROGRAMS + index * OF_PROGRAM + usize::from(offset);
+                let name = format!("{}.{name}", program.name);
+                places.push(register(address, width, name, meaning));
+            }
+        }
+        let widths = programs.iter().map(|program| {
+            let circuit = &program.circuit;
+            (circuit.inputs().len(), circuit.outputs().len())
+        });
+        Ok(Self {
+            places,
+            widths: widths.collect(),
+            stations: count,
+        })
+    }
+
+    /// Every line, by table and address.
+    pub fn places(&self) -> &[Place] {
+        &self.places
+    }
+
+    /// What is to be read now.
+    pub(crate) fn image(&self, snapshot: &Snapshot) -> ProcessImage {
+        let mut image = ProcessImage {
+            registers: vec![0; PROGRAMS + self.widths.len() * OF_PROGRAM],
+            ..ProcessImage::default()
+        };
+        let set = |registers: &mut Vec<u16>, address: usize, value: u64| {
+            let value = u32::try_from(value).unwrap_or(u32::MAX);
+            registers[address] = (value >> 16) as u16;
+            registers[address + 1] = value as u16;
+        };
+        let small = |value: usize| u16::try_from(value).unwrap_or(u16::MAX);
+        let registers = &mut image.registers;
+        registers[0] = VERSION;
+        registers[1] = match snapshot.run {
+            RunState::Starting => 0,
+            RunState::Running => 1,
+            RunState::Finished => 2,
+            RunState::Interrupted => 3,
+        };
+        set(
+            registers,
+            2,
+            snapshot.cycle.unwrap_or_default().max(0) as u64,
+        );
+        set(registers, 4, snapshot.period_us);
+        registers[6] = u16::from(snapshot.margin.survives);
+        registers[7] = small(snapshot.alarms.len());
+        registers[8] = small(self.widths.len());
+        registers[9] = small(self.stations);
+        for (rank, station) in snapshot.stations.iter().enumerate().take(self.stations) {
+            registers[STATIONS + rank] = state_number(station.state);
+        }
+        for (index, (width, program)) in self.widths.iter().zip(&snapshot.programs).enumerate() {
+            let base = PROGRAMS + index * OF_PROGRAM;
+            registers[base] = match program.source {
+                None => 0,
+                Some("direct") => 1,
+                Some("reconstructed") => 2,
+                Some("held") => 3,
+                Some(_) => 4,
+            };
+            registers[base + 1] = u16::from(program.awaits_release);
+            registers[base + 2] = small(program.forced.len());
+            set(registers, base + 4, program.direct);
+            set(registers, base + 6, program.reconstructed);
+            set(registers, base + 8, program.held);
+            set(registers, base + 10, program.fail_safe);
+            set(registers, base + 12, program.finished.unwrap_or_default());
+            set(registers, base + 14, program.mishaps.unwrap_or_default());
+            add_bits(&mut image.inputs, program.inputs.as_deref(), width.0);
+            add_bits(&mut image.coils, program.outputs.as_deref(), width.1);
+        }
+        image
+    }
+}
+
+/// `width` bits of a text such as `0110`; 0 where nothing is known.
+fn add_bits(bits: &mut Vec<bool>, text: Option<&str>, width: usize) {
+    let end = bits.len() + width;
+    let known = text.unwrap_or_default().bytes().take(width);
+    bits.extend(known.map(|byte| byte == b'1'));
+    bits.resize(end, false);
+}
+
+fn state_number(state: StationState) -> u16 {
+    match state {
+        StationState::NotStarted => 0,
+        StationState::Speaking => 1,
+        StationState::Silent => 2,
+        StationState::Flagged => 3,
+        StationState::Joining => 4,
+        StationState::Shadow => 5,
+        StationState::Refused => 6,
+        StationState::Stopped => 7,
+        StationState::Killed => 8,
+        StationState::Ended => 9,
+    }
+}
