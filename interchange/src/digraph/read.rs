@@ -60,14 +60,31 @@ impl Reader {
         }
     }
 
-    /// Says which children of `node` nobody reads.
-    fn only(&mut self, node: Node<'_, '_>, known: &[&str]) {
+    /// Says which children and attributes of `node` nobody reads.
+    fn only(&mut self, node: Node<'_, '_>, elements: &[&str], attributes: &[&str]) {
+        let mut found = Vec::new();
         for child in xml::elements(node) {
             let name = child.tag_name().name();
-            if !known.contains(&name) && self.diagnostics.len() < MAXIMUM_FINDINGS {
-                let message = format!("the element `{name}` is not read here");
+            if !elements.contains(&name) {
+                found.push((
+                    format!("the element `{name}` is not read here"),
+                    xml::start_tag(child),
+                ));
+            }
+        }
+        for attribute in node.attributes() {
+            let name = attribute.name();
+            if attribute.namespace().is_none() && !attributes.contains(&name) {
+                found.push((
+                    format!("the attribute `{name}` is not read here"),
+                    attribute.range(),
+                ));
+            }
+        }
+        for (message, span) in found {
+            if self.diagnostics.len() < MAXIMUM_FINDINGS {
                 self.diagnostics
-                    .push(Diagnostic::warning("U1066", message, xml::start_tag(child)));
+                    .push(Diagnostic::warning("U1066", message, span));
             }
         }
     }
@@ -81,7 +98,11 @@ impl Reader {
             self.error("U1060", message, xml::start_tag(root));
             return Program::default();
         }
-        self.only(root, &["Comment", "Signals", "Graph", "Footer"]);
+        self.only(
+            root,
+            &["Comment", "Signals", "Graph", "Footer"],
+            &["name", "description"],
+        );
         let name = xml::attribute(root, "name").unwrap_or_else(|| Name::from("ladder"));
         let mut program = Program {
             name: self.names.legal(&name, &mut self.diagnostics),
@@ -91,7 +112,7 @@ impl Reader {
             ..Program::default()
         };
         if let Some(declared) = xml::child(root, "Signals") {
-            self.only(declared, &["Signal"]);
+            self.only(declared, &["Signal"], &[]);
             for signal in xml::children(declared, "Signal") {
                 self.declaration(signal, &mut program);
             }
@@ -121,7 +142,8 @@ impl Reader {
     }
 
     fn declaration(&mut self, node: Node<'_, '_>, program: &mut Program) {
-        self.only(node, &["Comment"]);
+        let attributes = ["role", "name", "address", "initial", "description"];
+        self.only(node, &["Comment"], &attributes);
         let Some(name) = xml::attribute(node, "name") else {
             self.error("U1061", "a Signal needs a name", xml::start_tag(node));
             return;
@@ -169,18 +191,19 @@ impl Reader {
     }
 
     fn graph(&mut self, node: Node<'_, '_>, program: &mut Program, used: &mut Vec<Use>) {
-        self.only(node, &["Comment", "Vertices", "Edges"]);
+        let attributes = ["graphNumber", "block", "pin", "title"];
+        self.only(node, &["Comment", "Vertices", "Edges"], &attributes);
         let place = xml::start_tag(node);
         let number = program.rungs.len() + 1;
         let vertices: Option<Vec<usize>> = xml::child(node, "Vertices").map(|vertices| {
-            self.only(vertices, &["Vertex"]);
+            self.only(vertices, &["Vertex"], &[]);
             let vertices = xml::children(vertices, "Vertex");
             vertices.filter_map(|vertex| self.vertex(vertex)).collect()
         });
         let mut edges = Vec::new();
         let mut is_whole = true;
         if let Some(content) = xml::child(node, "Edges") {
-            self.only(content, &["Edge"]);
+            self.only(content, &["Edge"], &[]);
             for edge in xml::children(content, "Edge") {
                 match self.edge(edge, vertices.as_deref(), used) {
                     Some(edge) => edges.push(edge),

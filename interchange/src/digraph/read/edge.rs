@@ -32,6 +32,7 @@ impl Reader {
     }
 
     pub(super) fn vertex(&mut self, node: Node<'_, '_>) -> Option<usize> {
+        self.only(node, &["startX", "startY"], &["number"]);
         let number = xml::attribute(node, "number").unwrap_or_default();
         self.whole(node, &number, "the number of a vertex")
     }
@@ -42,12 +43,10 @@ impl Reader {
         vertices: Option<&[usize]>,
         used: &mut Vec<Use>,
     ) -> Option<RawEdge> {
-        self.only(
-            node,
-            &[
-                "from", "to", "address", "symbol", "relation", "value", "block", "preset",
-            ],
-        );
+        let elements = [
+            "from", "to", "address", "symbol", "relation", "value", "block", "preset",
+        ];
+        self.only(node, &elements, &["type"]);
         let end = |reader: &mut Self, name: &str| {
             let word = xml::child(node, name).map(xml::word).unwrap_or_default();
             let number = reader.whole(node, &word, "the end of an edge")?;

@@ -65,6 +65,11 @@ impl Parser {
             "PRIVATE",
         ]) {
             constant |= self.at_word("CONSTANT");
+            if self.at_any(&["RETAIN", "PERSISTENT"]) {
+                let message = "what is retained over a loss of power is not kept: the state of a circuit is kept by its copies";
+                self.diagnostics
+                    .push(Diagnostic::warning("U1055", message, self.span()));
+            }
             self.skip();
         }
         let ends = [
