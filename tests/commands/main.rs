@@ -16,6 +16,7 @@ mod others;
 mod petri;
 mod reconfigure;
 mod reliability;
+mod verdicts;
 mod verify;
 mod view;
 
