@@ -241,11 +241,10 @@ impl Parser {
                 Diagnostic::error("U0104", format!("no block is called `{word}`"), span)
                     .with_label("expected TON, TOF, TP, CTU, CTD, CTUD, SR, RS, R_TRIG or F_TRIG");
             let upper = word.to_uppercase();
-            self.diagnostics
-                .push(match nearest(&upper, BLOCK_WORDS.into_iter()) {
-                    Some(near) => diagnostic.with_help(format!("did you mean `{near}`?")),
-                    None => diagnostic,
-                });
+            self.diagnostics.push(match nearest(&upper, BLOCK_WORDS) {
+                Some(near) => diagnostic.with_help(format!("did you mean `{near}`?")),
+                None => diagnostic,
+            });
             return None;
         };
         self.advance();
