@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use understudy_cluster::{Cluster, Overrides};
 use understudy_diagnostic::Report;
-use understudy_ladder::{Program, parse, parse_time};
+use understudy_interchange::parse_program;
+use understudy_ladder::{Program, parse_time};
 use understudy_logic::Circuit;
 use understudy_parity::{ParityController, generate};
 
@@ -116,9 +117,10 @@ impl Programs {
 
 fn ladder(path: &Path, period: Duration) -> Result<(Member, Report), Answer> {
     let text = files::text(path)?;
-    let parsed = parse(&text);
+    let name = path.display().to_string();
+    let parsed = parse_program(&name, &text);
     let report = Report {
-        name: path.display().to_string(),
+        name,
         text,
         diagnostics: parsed.diagnostics,
     };
