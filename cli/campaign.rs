@@ -2,10 +2,12 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
+use understudy_bus::interruption;
 use understudy_scenarios::{
     Findings, InjectionPlan, Kind, MAXIMUM_RUN_CYCLES, MINIMUM_RUN_CYCLES, Property, Shard, inject,
     merge, picture,
@@ -29,7 +31,8 @@ Example:
   understudy campaign merge shard-* --out campaign
 
 The same seed and runs give the same findings on any number of processors and shards. DIR gets campaign.json, campaign.html and
-a scenario for each failure, which `understudy simulate` repeats. Exit status 1 when a run failed, or not all were made."
+a scenario for each failure, which `understudy simulate` repeats. Exit status 1 when a run failed, or not all were made; Ctrl-C
+keeps what was found so far."
 )]
 pub(crate) struct Arguments {
     #[command(subcommand)]
@@ -144,18 +147,27 @@ fn campaign(
         plan.shard.share(plan.runs),
         "run {pos} of {len}, {eta} left",
     );
+    let interrupted = interruption()
+        .map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))?;
     let start = Instant::now();
     let in_time = || {
         bar.inc(1);
-        arguments
+        let in_budget = arguments
             .budget
-            .is_none_or(|budget| start.elapsed() < budget)
+            .is_none_or(|budget| start.elapsed() < budget);
+        in_budget && !interrupted.load(Ordering::Relaxed)
     };
     let findings = inject(&cluster, &plan, threads, &in_time)
         .map_err(|error| Answer::failed(Status::Failed, "U0530", error.to_string()))?;
     let took = start.elapsed();
     bar.finish_and_clear();
     let mut answer = kept(&findings, arguments.out.as_deref())?.with_reports(reports);
+    if interrupted.load(Ordering::Relaxed) {
+        answer.text.push_str(&format!(
+            "interrupted: these are partial findings, of {} of {} runs\n",
+            findings.runs_made, findings.runs_asked
+        ));
+    }
     let seconds = took.as_secs_f64();
     let cycles = findings.runs_made * plan.cycles;
     answer.text.push_str(&format!(

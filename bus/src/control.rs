@@ -32,12 +32,12 @@ const LINE_BYTES: usize = 1024;
 /// # Errors
 /// [`BusError::System`].
 pub fn hold_back_signals() -> Result<(), BusError> {
-    ending()
+    ending_signal_set()
         .thread_block()
         .map_err(BusError::system("to hold back SIGINT and SIGTERM"))
 }
 
-fn ending() -> SigSet {
+pub(crate) fn ending_signal_set() -> SigSet {
     let mut signals = SigSet::empty();
     signals.add(Signal::SIGINT);
     signals.add(Signal::SIGTERM);
@@ -47,8 +47,11 @@ fn ending() -> SigSet {
 /// SIGINT and SIGTERM as a file descriptor.
 pub(crate) fn ending_signals() -> Result<SignalFd, BusError> {
     hold_back_signals()?;
-    SignalFd::with_flags(&ending(), SfdFlags::SFD_CLOEXEC | SfdFlags::SFD_NONBLOCK)
-        .map_err(BusError::system("a signalfd"))
+    SignalFd::with_flags(
+        &ending_signal_set(),
+        SfdFlags::SFD_CLOEXEC | SfdFlags::SFD_NONBLOCK,
+    )
+    .map_err(BusError::system("a signalfd"))
 }
 
 /// Passes commands and signals on until `finished` becomes readable. Lines that are no command go to `unknown`.

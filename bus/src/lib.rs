@@ -16,6 +16,7 @@ pub mod exchange;
 mod field;
 mod guard;
 mod host;
+mod interruption;
 mod journal;
 mod link;
 mod observer;
@@ -39,6 +40,7 @@ pub use error::BusError;
 pub use field::{FieldDriver, Look, NoField, SimulatedField};
 pub use guard::{Guard, Keys};
 pub use host::{Host, Summary};
+pub use interruption::interruption;
 pub use journal::{
     EventSink, HostEvent, JOURNAL_RECORDS, Journal, JournalSender, Noted, Record, RefusedAs,
 };

@@ -2,6 +2,11 @@
 
 use std::fs;
 use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
 
 use crate::{Answer, empty_folder, understudy};
 
@@ -72,6 +77,44 @@ fn merged_shards_are_the_whole_and_failures_fail_again() {
             again.output
         );
     }
+}
+
+/// Whether a process holds SIGINT back, as a campaign does once it can be interrupted.
+fn holds_back_sigint(pid: u32) -> bool {
+    let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigBlk:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> (Signal::SIGINT as u32 - 1) & 1 == 1)
+}
+
+#[test]
+fn what_was_found_is_kept_when_it_is_interrupted() {
+    let folder = empty_folder("campaign_interrupted");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_understudy"))
+        .args(["campaign", PRESS_CELL, "--seed", "5", "--cycles", "150"])
+        .args(["--runs", "1000000000", "--out"])
+        .arg(&folder)
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the binary is built");
+    let start = Instant::now();
+    while !holds_back_sigint(child.id()) {
+        let ended = child.try_wait().expect("a status");
+        assert!(ended.is_none(), "it has ended by itself: {ended:?}");
+        assert!(start.elapsed() < Duration::from_secs(60), "it never began");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    kill(Pid::from_raw(child.id() as i32), Signal::SIGINT).expect("it runs");
+    let answer = child.wait_with_output().expect("it ends");
+    let output = String::from_utf8(answer.stdout).expect("text");
+    assert_eq!(answer.status.code(), Some(1), "{output}");
+    assert!(output.contains("partial findings"), "{output}");
+    let kept = fs::read_to_string(folder.join("campaign.json")).expect("findings");
+    let kept: serde_json::Value = serde_json::from_str(&kept).expect("JSON");
+    assert_eq!(kept["runs_failed"], 0, "{output}");
+    assert!(kept["runs_made"].as_u64() < kept["runs_asked"].as_u64());
 }
 
 #[test]

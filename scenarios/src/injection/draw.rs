@@ -116,6 +116,15 @@ impl Draw<'_> {
                     })
                     .collect()
             }
+            Kind::ClockJump => {
+                // The simulated epochs are counted from 1; all clocks of one run lie around them.
+                let epoch = match self.random.random_range(0..3) {
+                    0 => 0,
+                    1 => self.random.random_range(1..10),
+                    _ => self.random.random_range(1..1 << 40),
+                };
+                lasting(Action::Crash, Action::RestartInEpoch { epoch })
+            }
             Kind::Misconfiguration => {
                 let middle = from.midpoint(to);
                 vec![

@@ -14,6 +14,8 @@ pub enum Kind {
     Crash,
     /// It crashes and restarts several times in a row.
     RestartStorm,
+    /// It is restarted on a host whose wall clock has jumped, so that it would found an epoch of long ago or of a far future.
+    ClockJump,
     /// It stands still, and goes on later.
     Stop,
     /// It and what it is told are late for a while.
@@ -52,9 +54,10 @@ pub enum Kind {
 
 impl Kind {
     /// In the order in which they are explained.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 20] = [
         Self::Crash,
         Self::RestartStorm,
+        Self::ClockJump,
         Self::Stop,
         Self::Slow,
         Self::Misconfiguration,
@@ -79,6 +82,7 @@ impl Kind {
         match self {
             Self::Crash => "crash",
             Self::RestartStorm => "restart-storm",
+            Self::ClockJump => "clock-jump",
             Self::Stop => "stop",
             Self::Slow => "slow",
             Self::Misconfiguration => "misconfiguration",
@@ -102,7 +106,9 @@ impl Kind {
     /// Whom it can strike.
     pub fn roles(self) -> &'static [Role] {
         match self {
-            Self::FlippedState | Self::FlippedWord => &[Role::Controller, Role::Understudy],
+            Self::FlippedState | Self::FlippedWord | Self::ClockJump => {
+                &[Role::Controller, Role::Understudy]
+            }
             Self::Loss | Self::Duplication | Self::Jitter | Self::Corruption => &[Role::Network],
             _ => &[Role::Controller, Role::Understudy, Role::RemoteIo],
         }
