@@ -26,10 +26,10 @@ impl Cycles {
 
     /// The cycle of a moment; the newest one where its epoch has not been seen.
     pub(crate) fn of(&self, moment: Option<Moment>) -> i64 {
-        moment
+        let number = moment
             .and_then(|moment| self.numbering.of(moment))
-            .or_else(|| self.numbering.latest())
-            .map_or(0, |number| self.counted(number))
+            .or_else(|| self.numbering.latest());
+        self.counted(number.unwrap_or(0))
     }
 
     /// The cycle of a moment, where its epoch has been seen.

@@ -184,10 +184,11 @@ impl<'m> Explainer<'m> {
             }
             since = before;
         }
-        let text = if since == place {
-            "input, new in this cycle".to_owned()
-        } else {
-            format!("input, since cycle {}", self.cycle(since))
+        let known = self.history.before(since).is_some() || !self.history.is_cut();
+        let text = match (since == place, known) {
+            (true, true) => "input, new in this cycle".to_owned(),
+            (false, true) => format!("input, since cycle {}", self.cycle(since)),
+            (_, false) => format!("input, since cycle {} or longer", self.cycle(since)),
         };
         self.leaf(name, value, place, text)
     }

@@ -36,7 +36,7 @@ fn a_run_is_followed_while_it_is_written() {
     let mut follower = run.follow();
     let mut followed = run.model(Bounds::default());
     let scenario = scenario(&cell, KILL_EACH);
-    let mut journal = Journal::create(&path.join("journal.jsonl"), 4 << 20).expect("created");
+    let mut journal = Journal::create(&path.join("journal.jsonl"), 1_500_000).expect("created");
     for (number, record) in records(&cell, &scenario, 1).iter().enumerate() {
         journal.write(record);
         if number % 700 == 0 {
