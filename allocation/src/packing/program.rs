@@ -11,7 +11,7 @@ use super::{BoxType, PackedBox, usable_items};
 use crate::fit::Dimension;
 
 /// Seconds after which the solver is stopped; what it has found until then is taken, and not said to be the best.
-const MAXIMUM_SECONDS: f64 = 10.0;
+const MAXIMUM_SECONDS: f64 = 60.0;
 
 /// A copy of a type and the unknowns of what is on it.
 struct Copy {
