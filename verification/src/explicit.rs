@@ -15,6 +15,9 @@ use crate::symbolic::{Core, Resolved, Signal};
 /// Inputs past which nothing is listed: every state has 2^|u| ways on.
 pub const MAXIMUM_INPUTS: usize = 12;
 
+/// Registers that are listed, whatever the bound: a few hundred bytes each.
+const MAXIMUM_COUNT: usize = 1 << 20;
+
 /// Why there is no list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ExplicitError {
@@ -27,7 +30,7 @@ pub enum ExplicitError {
     /// Too many states.
     #[error("more than {bound} states can be reached")]
     States {
-        /// The bound, in pairs of registers and inputs.
+        /// The bound that was given, in pairs of registers and inputs.
         bound: usize,
     },
 }
@@ -102,7 +105,7 @@ impl<'c> Explicit<'c> {
         let mut lanes = Lanes::default();
         let mut from = 0;
         while from < listed.origins.len() {
-            if (from + 1) * listed.ways > bound {
+            if (from + 1) * listed.ways > bound || listed.origins.len() > MAXIMUM_COUNT {
                 return Err(ExplicitError::States { bound });
             }
             for block in 0..listed.ways.div_ceil(64) {

@@ -19,7 +19,7 @@ pub use remarks::{Remark, Remarks};
 pub use unasked::{Lamp, OutputFinding};
 
 /// Nodes with which most properties of ladders are decided, in a second or two.
-const FEW_NODES: usize = 400_000;
+const FEW_NODES: usize = 1 << 20;
 
 /// Bounds of a proof.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
