@@ -65,3 +65,38 @@ fn a_bound_that_is_too_small_leaves_it_undecided_or_to_induction() {
         json!("undecided")
     );
 }
+
+/// A light whose button sets and resets it by the same edge, as a vendor's example does.
+const STAIRS: &str = "\
+program stairs
+input button
+output light
+rung
+    +button /light (S light)
+rung
+    +button light (R light)
+";
+
+#[test]
+fn an_edge_that_undoes_itself_is_remarked_on_and_drawn() {
+    let folder = empty_folder("verify_remarks");
+    let (ladder, page) = (folder.join("stairs.ladder"), folder.join("runs.html"));
+    fs::write(&ladder, STAIRS).expect("written");
+    let [ladder, page] = [ladder, page].map(|path| path.display().to_string());
+    let answer = understudy(&["verify", &ladder, "--draw", &page, "--json"]);
+    assert_eq!(answer.status, 1, "{}", answer.shown());
+    let result = &answer.json()["result"];
+    assert_eq!(
+        result["programs"][0]["remarks"][0]["code"],
+        json!("U0445"),
+        "{result}"
+    );
+    assert_eq!(
+        result["programs"][0]["switches"][0]["verdict"],
+        json!("never-on")
+    );
+    let drawn = fs::read_to_string(&page).expect("the page");
+    assert!(drawn.contains("light") && drawn.contains("class=\"live\""));
+    let both = understudy(&["verify", &ladder, "--draw", &page, "--smv", "scan"]);
+    assert_eq!(both.status, 2, "{}", both.output);
+}
