@@ -26,6 +26,7 @@ use crate::endurance;
 use crate::failover;
 use crate::lab::RunArguments;
 use crate::memory;
+use crate::scan;
 
 /// Measure speed on this machine
 #[derive(Debug, Args)]
@@ -34,6 +35,7 @@ Example:
   understudy bench exchange --cycles 2000
   understudy bench kills --count 100 --link udp
   understudy bench failover --figure failover.svg
+  understudy bench scan examples/press-cell/robot.ladder
   understudy bench join --trials 50 --loss 10%")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
@@ -83,6 +85,8 @@ enum What {
     Failover(Box<failover::Arguments>),
     /// Memory of a long simulated run with loss and failures
     Memory(memory::Arguments),
+    /// A scan of a program as machine code, beside the scan of a station
+    Scan(scan::Arguments),
     /// One process of the exchange
     #[command(hide = true)]
     Party {
@@ -122,6 +126,7 @@ pub(crate) fn run(arguments: Arguments, console: &mut Console) -> Answer {
         What::Join { trials, run } => endurance::join(trials, &run, console),
         What::Failover(arguments) => failover::run(&arguments, console),
         What::Memory(arguments) => memory::run(&arguments),
+        What::Scan(arguments) => scan::run(&arguments),
         What::Party { part } => party(&part),
     }
 }

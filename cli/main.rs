@@ -43,6 +43,7 @@ mod reconfigure;
 mod reliability;
 mod resources;
 mod run;
+mod scan;
 mod schema;
 mod shell;
 mod simulate;

@@ -39,3 +39,15 @@ fn a_long_run_needs_no_more_memory() {
     let answer = understudy(&["bench", "memory", "--cycles", "5000"]);
     assert_eq!(answer.status, 0, "{}{}", answer.output, answer.errors);
 }
+
+#[test]
+fn machine_code_does_what_the_scan_does() {
+    let robot = "examples/press-cell/robot.ladder";
+    for asked in [&[robot][..], &["--rungs", "40", "--seed", "7"]] {
+        let answer = understudy(&[&["bench", "scan", "--json"], asked].concat());
+        assert_eq!(answer.status, 0, "{}{}", answer.output, answer.errors);
+        assert_eq!(answer.json()["result"]["equal"], true);
+    }
+    let none = understudy(&["bench", "scan", "--rungs", "0"]);
+    assert_eq!(none.status, 2, "{}", none.output);
+}
