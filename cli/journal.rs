@@ -72,6 +72,9 @@ fn answered(arguments: &Arguments, json: bool) -> Result<Answer, Answer> {
     let mut lines = Vec::new();
     let troubles = read(&run, listing, &mut |line| lines.push(line));
     let mut text: String = lines.iter().map(|line| line.to_text() + "\n").collect();
+    if lines.is_empty() {
+        text += "Nothing else happened there than what every party says in every cycle, which --all shows.\n";
+    }
     for trouble in &troubles {
         text += &format!("       -  {trouble}\n");
     }
