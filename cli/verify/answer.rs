@@ -10,8 +10,8 @@ use understudy_verification::program::{
     Answer as Proof, Bounds, Lamp, OutputFinding, Remarks, Subject,
 };
 use understudy_verification::property::Property;
-use understudy_verification::{Shown, scan_table};
 use understudy_verification::symbolic::{Resolved, Signal, Trace};
+use understudy_verification::{Shown, scan_table};
 
 use crate::answer::{Answer, Status};
 
@@ -121,10 +121,7 @@ impl ProgramAnswer {
         let remarked = remarks.found.iter().map(|remark| RemarkAnswer {
             code: remark.diagnostic.code,
             message: remark.diagnostic.message.clone(),
-            scans: remark
-                .trace
-                .as_ref()
-                .map(|trace| Scans::of(circuit, trace)),
+            scans: remark.trace.as_ref().map(|trace| Scans::of(circuit, trace)),
         });
         Self {
             name: circuit.name().to_owned(),
@@ -179,7 +176,13 @@ impl ProgramAnswer {
             push_table(&mut text, switch.scans.as_ref());
         }
         for remark in &self.remarks {
-            let _ = writeln!(text, "  {:<9} {} {}", word("remark"), remark.code, remark.message);
+            let _ = writeln!(
+                text,
+                "  {:<9} {} {}",
+                word("remark"),
+                remark.code,
+                remark.message
+            );
             push_table(&mut text, remark.scans.as_ref());
         }
         if self.undecided_remarks > 0 {
