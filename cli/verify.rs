@@ -294,7 +294,8 @@ fn draw(
     proved: &ProgramAnswer,
 ) -> Result<String, Answer> {
     let page = draw_runs(ladder, period, subject.circuit(), &proved.runs());
-    let page = page.map_err(|error| Answer::failed(Status::BadInput, "U0436", error.to_string()))?;
+    let page =
+        page.map_err(|error| Answer::failed(Status::BadInput, "U0436", error.to_string()))?;
     files::write(path, &page)?;
     Ok(path.display().to_string())
 }

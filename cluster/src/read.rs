@@ -39,8 +39,8 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, Report};
 use understudy_diagnostic::spelling::suggestion;
+use understudy_diagnostic::{Diagnostic, Report};
 use understudy_ladder::Program as LadderProgram;
 use understudy_logic::{Circuit, Scan};
 use understudy_node::Program;

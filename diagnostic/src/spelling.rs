@@ -1,7 +1,7 @@
 //! What a misspelt name was meant to be: one rule for every reader of files.
 
 /// Names that a suggestion lists.
-const MAXIMUM_LISTED: usize = 12;
+const MAXIMUM_LISTED: usize = 20;
 
 /// The known name that `name` is probably a misspelling of: at most a third of its letters differ, or one; case alone is no
 /// difference.
@@ -61,13 +61,13 @@ mod tests {
 
     #[test]
     fn a_suggestion_lists_what_is_known_where_nothing_is_near() {
-        let many: Vec<String> = (0..14).map(|number| format!("signal{number}")).collect();
+        let many: Vec<String> = (0..22).map(|number| format!("signal{number}")).collect();
         let many = || many.iter().map(String::as_str);
         assert_eq!(suggestion("signl3", many()), "did you mean `signal3`?");
         assert_eq!(
             suggestion("x", many()),
             "known: signal0, signal1, signal2, signal3, signal4, signal5, signal6, signal7, signal8, signal9, signal10, \
-             signal11, and 2 more"
+             signal11, signal12, signal13, signal14, signal15, signal16, signal17, signal18, signal19, and 2 more"
         );
         assert_eq!(suggestion("x", ["one", "two"]), "known: one, two");
         assert_eq!(suggestion("x", []), "none is known here");

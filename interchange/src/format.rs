@@ -42,9 +42,10 @@ impl Format {
         let ending = name.rsplit_once('.').map_or("", |(_, ending)| ending);
         let start = text.trim_start_matches('\u{feff}').trim_start();
         let xml = || {
-            let root = start.split('<').map(str::trim_start).find(|tag| {
-                tag.starts_with(|letter: char| letter.is_alphabetic())
-            });
+            let root = start
+                .split('<')
+                .map(str::trim_start)
+                .find(|tag| tag.starts_with(|letter: char| letter.is_alphabetic()));
             match root {
                 Some(root) if root.starts_with("LadderDiagram") => Self::Digraph,
                 _ => Self::PlcOpen,

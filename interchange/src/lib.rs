@@ -1,8 +1,8 @@
 //! Programs in and out of other tools: PLCopen XML, Structured Text, the digraph XML of the paper, LDmicro.
 
 pub mod digraph;
-pub mod ldmicro;
 mod format;
+pub mod ldmicro;
 pub mod plcopen;
 pub mod structured_text;
 

@@ -18,8 +18,8 @@ mod steps;
 use std::ops::Range;
 
 use toml::de::DeTable;
-use understudy_diagnostic::{Diagnostic, Report, has_errors};
 use understudy_diagnostic::spelling::suggestion;
+use understudy_diagnostic::{Diagnostic, Report, has_errors};
 use understudy_simulator::{Disturbance, Network};
 use understudy_wire::{Party, ProgramId, Source};
 

@@ -1,5 +1,10 @@
 //! Campaigns from outside: shards that are merged are the whole, and each failure is a scenario that fails again.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "what is waited for has a deadline on the real clock"
+)]
+
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};

@@ -207,7 +207,10 @@ fn nesting_has_a_bound() {
 
 #[test]
 fn catalogue() {
-    let seeds = ["catalogue/data/controllers.csv", "catalogue/data/families.csv"];
+    let seeds = [
+        "catalogue/data/controllers.csv",
+        "catalogue/data/families.csv",
+    ];
     attack("catalogue", &seeds, |bytes| {
         let Some(catalogue) = file::read("fuzz", &text(bytes)).catalogue else {
             return;

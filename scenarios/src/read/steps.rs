@@ -86,7 +86,7 @@ impl Reader<'_> {
             let known = ACTIONS.into_iter().find(|known| *known == word);
             if known.is_none() {
                 let message = format!("there is no action `{word}`");
-                let help = suggestion(word, ACTIONS.into_iter());
+                let help = suggestion(word, ACTIONS);
                 found.push(Diagnostic::error("U0306", message, place).with_help(help));
             }
             known
