@@ -295,12 +295,13 @@ impl Search<'_> {
 
     fn proved(&self, question: &Resolved) -> Found {
         let mut checker = Checker::new(self.circuit, Vec::new(), self.nodes);
-        match checker.check(&question.clone().reachable()) {
-            Ok(Verdict::Holds(Some(trace))) => {
+        // `EF` asks it of every first scan, and one is enough here.
+        match checker.check(&question.clone().negated().always()) {
+            Ok(Verdict::Fails(Some(trace))) => {
                 Found::Yes(trace.scans.into_iter().map(|scan| scan.inputs).collect())
             }
-            Ok(Verdict::Fails(_)) => Found::Never,
-            Ok(Verdict::Holds(None)) | Err(_) => Found::Unknown,
+            Ok(Verdict::Holds(_)) => Found::Never,
+            Ok(Verdict::Fails(None)) | Err(_) => Found::Unknown,
         }
     }
 

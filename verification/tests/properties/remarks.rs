@@ -73,6 +73,12 @@ fn an_edge_that_resets_what_it_has_set() {
     );
 }
 
+/// It can happen in the first scan only, and not whatever that scan's inputs are.
+#[test]
+fn what_only_the_first_scan_can_show() {
+    check("rung\n    /y +a ( y ) (/ y )\n", &[("U0445", 1)]);
+}
+
 /// The automaton of figure 4 of Uzam, Gelen and Saleh: a second `a` is to lead on, and the first one does.
 #[test]
 fn an_avalanche() {
