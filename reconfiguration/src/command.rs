@@ -15,9 +15,12 @@
 
 use std::sync::Arc;
 
+#[cfg(feature = "highs")]
+use good_lp::highs as solver;
+#[cfg(not(feature = "highs"))]
+use good_lp::microlp as solver;
 use good_lp::{
-    Expression, ProblemVariables, ResolutionError, Solution, SolverModel, constraint, microlp,
-    variable,
+    Expression, ProblemVariables, ResolutionError, Solution, SolverModel, constraint, variable,
 };
 use rustc_hash::FxHashMap;
 
@@ -138,7 +141,7 @@ fn minimise(demands: &[Demand], weights: &[f64]) -> Result<Option<Bits>, Unsolve
             constraints.push(constraint!(on <= count * output)); // (3)
         }
     }
-    let mut model = variables.minimise(objective).using(microlp);
+    let mut model = variables.minimise(objective).using(solver);
     for one in constraints {
         model = model.with(one);
     }
