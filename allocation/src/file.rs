@@ -10,6 +10,7 @@ mod wide;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use understudy_diagnostic::spelling::suggestion;
 use understudy_diagnostic::{Diagnostic, Report, has_errors};
 
 use crate::controller::{Catalogue, Controller, Kind};
@@ -126,7 +127,7 @@ impl Columns {
         for (place, field) in header.iter().enumerate() {
             let Some(&name) = known.iter().find(|name| **name == field.text) else {
                 let message = format!("there is no column `{}`", field.text);
-                let help = nearest(&field.text, known);
+                let help = suggestion(&field.text, known.iter().copied());
                 wrong.push(Diagnostic::error("U1103", message, field.span.clone()).with_help(help));
                 continue;
             };
@@ -231,16 +232,5 @@ fn price_has_currency(controller: &Controller, span: Range<usize>, wrong: &mut V
     if has_price && !controller.texts.contains_key(&Statement::Currency) {
         let message = format!("the price of {controller} has no currency");
         wrong.push(Diagnostic::error("U1110", message, span));
-    }
-}
-
-/// What might have been meant.
-fn nearest(word: &str, known: &[&str]) -> String {
-    let distance = |name: &&&str| strsim::damerau_levenshtein(name, word);
-    match known.iter().min_by_key(distance) {
-        Some(name) if distance(&name) <= word.chars().count() / 3 + 1 => {
-            format!("did you mean `{name}`?")
-        }
-        _ => format!("known are: {}", known.join(", ")),
     }
 }

@@ -7,6 +7,7 @@ mod unasked;
 use std::time::Duration;
 
 use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::spelling::suggestion;
 use understudy_ladder::{LowerError, Program};
 use understudy_logic::Circuit;
 use understudy_logic::bdd::{BddError, Diagrams};
@@ -94,17 +95,8 @@ impl Subject {
 
     fn unknown(&self, named: &Named) -> Diagnostic {
         let outputs = self.circuit.outputs().iter().map(|output| &output.name);
-        let names = outputs.chain(self.circuit.inputs());
-        let distance = |name: &String| strsim::damerau_levenshtein(name, &named.name);
-        let nearest = names.clone().min_by_key(|name| distance(name));
-        let near = named.name.chars().count() / 3 + 1;
-        let help = match nearest {
-            Some(nearest) if distance(nearest) <= near => format!("did you mean `{nearest}`?"),
-            _ => {
-                let known: Vec<&str> = names.take(12).map(String::as_str).collect();
-                format!("signals are, among others: {}", known.join(", "))
-            }
-        };
+        let names = outputs.chain(self.circuit.inputs()).map(String::as_str);
+        let help = suggestion(&named.name, names);
         let message = format!("`{}` is no signal of `{}`", named.name, self.circuit.name());
         Diagnostic::error("U0435", message, named.span.clone()).with_help(help)
     }

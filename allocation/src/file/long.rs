@@ -4,8 +4,9 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::spelling::suggestion;
 
-use super::{Row, line, nearest, number, price_has_currency};
+use super::{Row, line, number, price_has_currency};
 use crate::controller::{Catalogue, Family};
 use crate::figures::{FamilyQuantity, Figure, Quantity, Statement};
 
@@ -72,7 +73,7 @@ fn family(row: &Row<'_>, catalogue: &mut Catalogue, wrong: &mut Vec<Diagnostic>)
     let Some(quantity) = quantity.into_iter().find(|known| known.name() == text) else {
         let message = format!("`{text}` is no figure of a family");
         let diagnostic = Diagnostic::error("U1111", message, row.span("figure"));
-        wrong.push(diagnostic.with_help(nearest(text, &known)));
+        wrong.push(diagnostic.with_help(suggestion(text, known)));
         return;
     };
     let value = row.text("value");
@@ -134,7 +135,7 @@ fn model(row: &Row<'_>, catalogue: &mut Catalogue, wrong: &mut Vec<Diagnostic>) 
             .collect();
         let message = format!("`{figure}` is no figure of a controller");
         let diagnostic = Diagnostic::error("U1111", message, row.span("figure"));
-        wrong.push(diagnostic.with_help(nearest(figure, &names)));
+        wrong.push(diagnostic.with_help(suggestion(figure, names)));
     }
     controller.notes = row.text("notes").to_owned();
     catalogue.put(controller);
