@@ -54,12 +54,14 @@ pub struct Terms {
     pub referees: Vec<Referee>,
     /// Of each program, for the figure.
     pub signals: Vec<Signals>,
+    /// Programs whose plant is simulated.
+    pub plants: ProgramSet,
 }
 
 /// Who says where the origin is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OriginRule {
-    /// The records: the first cycle in which everybody was in step.
+    /// The records: the first cycle in which everybody was in step, with every simulated plant there.
     Found,
     /// Whoever runs the scenario.
     Told,
@@ -107,6 +109,8 @@ pub struct Account {
     closed_up_to: Option<i64>,
     origin: Option<(Moment, i64)>,
     origin_rule: OriginRule,
+    /// Simulated plants that have not made a step yet: a process that still starts takes the processor from the cycles.
+    starting_plants: ProgramSet,
     presences: Presences,
     pub(crate) services: Vec<ServiceTrack>,
     stalls: Stalls,
@@ -135,6 +139,7 @@ impl Account {
             closed_up_to: None,
             origin: None,
             origin_rule,
+            starting_plants: terms.plants,
             presences: Presences::new(stations, terms.agreement.flag_after),
             services: vec![ServiceTrack::default(); programs],
             stalls: Stalls::default(),
@@ -170,7 +175,8 @@ impl Account {
         u64::try_from(self.numbering.latest()? - origin).ok()
     }
 
-    /// Remote I/Os that do not drive directly yet, and understudies that do not speak for all programs: why there is no origin.
+    /// Remote I/Os that do not drive directly yet, understudies that do not speak for all programs, and plants that have not begun:
+    /// why there is no origin.
     pub fn awaited(&self) -> Vec<Party> {
         let schedule = &self.terms.agreement.schedule;
         let newest = self.open.iter().next_back().map(|(_, cycle)| cycle);
@@ -194,7 +200,8 @@ impl Account {
                 !in_either(&test)
             })
             .map(Party::Station);
-        stations.chain(remote_ios).collect()
+        let plants = self.starting_plants.iter().map(Party::Plant);
+        stations.chain(remote_ios).chain(plants).collect()
     }
 
     /// The simulator knows better than the records where the origin is: `moment` is cycle `cycle` from it.
@@ -326,6 +333,7 @@ impl Account {
         let understudy_plant::Event::Stepped { moment, field, .. } = event else {
             return;
         };
+        self.starting_plants.remove(program);
         if let Some(referee) = self.terms.referees.get_mut(program.index()) {
             referee.saw(&field.sensors);
         }
@@ -413,7 +421,7 @@ impl Account {
             cycle.content == ProgramSet::first(schedule.controllers())
                 && cycle.covering == understudies
         });
-        if everybody {
+        if everybody && self.starting_plants.is_empty() {
             self.origin = Some((moment, number));
         }
     }

@@ -3,7 +3,7 @@
 use understudy_cluster::Cluster;
 use understudy_simulator::Referee;
 pub use understudy_simulator::parts;
-use understudy_wire::ProgramId;
+use understudy_wire::{ProgramId, ProgramSet};
 
 use crate::account::Terms;
 use crate::figure::Signals;
@@ -35,11 +35,18 @@ impl Terms {
                 .map(|output| output.name.clone())
                 .collect(),
         });
+        let mut plants = ProgramSet::default();
+        for (program, plant) in cluster.plants().iter().enumerate() {
+            if plant.is_some() {
+                plants.insert(ProgramId(program as u8));
+            }
+        }
         Self {
             parties: Parties::of(cluster),
             agreement: cluster.agreement().clone(),
             referees: referees.collect(),
             signals: signals.collect(),
+            plants,
         }
     }
 }
