@@ -5,6 +5,8 @@
 //! made, take exponential time. What is bounded is the number of nodes alive at once. Recursion is as deep as there are variables; past [`SHALLOW`] of them the work is done on the
 //! deep stack that the library keeps for it.
 
+mod reorder;
+
 use std::collections::{HashMap, HashSet};
 
 use oxidd::bdd::{BDDFunction, BDDManagerRef, new_manager};
@@ -15,6 +17,7 @@ use oxidd::{
 };
 
 use crate::expression::{Expression, Graph, Operation, Variable};
+use reorder::Need;
 
 /// So many variables are no danger to an ordinary stack.
 const SHALLOW: usize = 500;
@@ -45,12 +48,13 @@ impl BddError {
     }
 }
 
-/// Diagrams over one static order of variables.
+/// Diagrams over an order of variables, which stays as it is unless [`Diagrams::reordered_by_need`] was asked for.
 pub struct Diagrams {
     manager: BDDManagerRef,
     variables: Vec<Variable>,
     numbers: HashMap<Variable, VarNo>,
     limit: usize,
+    need: Option<Need>,
 }
 
 /// One function; equal to another of the same [`Diagrams`] exactly when the functions are equal.
@@ -82,7 +86,23 @@ impl Diagrams {
             variables,
             numbers,
             limit,
+            need: None,
         }
+    }
+
+    /// The same, but the order changes between operations when the diagrams have grown, and when there is no node left. Verdicts are the same with and
+    /// without; sizes, and which of several assignments is found, are not.
+    #[must_use]
+    pub fn reordered_by_need(self) -> Self {
+        Self {
+            need: Some(Need::new(self.limit)),
+            ..self
+        }
+    }
+
+    /// How often the order was changed.
+    pub fn reorderings(&self) -> usize {
+        self.need.as_ref().map_or(0, Need::changes)
     }
 
     /// Diagrams over the variables that `roots` depend on, in the order of [`depth_first_order`].
@@ -90,7 +110,7 @@ impl Diagrams {
         Self::new(depth_first_order(graph, roots), limit)
     }
 
-    /// The declared variables, the top one first.
+    /// The declared variables, as they were declared: the top one first, as long as nothing was reordered.
     pub fn variables(&self) -> &[Variable] {
         &self.variables
     }
@@ -137,30 +157,30 @@ impl Diagrams {
             .numbers
             .get(&variable)
             .ok_or(BddError::UnknownVariable(variable))?;
-        self.checked(
+        self.made(|| {
             self.manager
-                .with_manager_shared(|manager| BDDFunction::var(manager, number)),
-        )
+                .with_manager_shared(|manager| BDDFunction::var(manager, number))
+        })
     }
 
     /// Negation.
     pub fn not(&self, operand: &Diagram) -> Result<Diagram, BddError> {
-        self.checked(self.deep(|| operand.0.not()))
+        self.made(|| operand.0.not())
     }
 
     /// Logical product.
     pub fn and(&self, left: &Diagram, right: &Diagram) -> Result<Diagram, BddError> {
-        self.checked(self.deep(|| left.0.and(&right.0)))
+        self.made(|| left.0.and(&right.0))
     }
 
     /// Logical sum.
     pub fn or(&self, left: &Diagram, right: &Diagram) -> Result<Diagram, BddError> {
-        self.checked(self.deep(|| left.0.or(&right.0)))
+        self.made(|| left.0.or(&right.0))
     }
 
     /// Exclusive or.
     pub fn xor(&self, left: &Diagram, right: &Diagram) -> Result<Diagram, BddError> {
-        self.checked(self.deep(|| left.0.xor(&right.0)))
+        self.made(|| left.0.xor(&right.0))
     }
 
     /// `one` where `condition` holds, `zero` elsewhere.
@@ -173,7 +193,7 @@ impl Diagrams {
         one: &Diagram,
         zero: &Diagram,
     ) -> Result<Diagram, BddError> {
-        self.checked(self.deep(|| condition.0.ite(&one.0, &zero.0)))
+        self.made(|| condition.0.ite(&one.0, &zero.0))
     }
 
     /// Whether the function is 1 for some value of each variable of the product `variables`.
@@ -181,7 +201,7 @@ impl Diagrams {
     /// # Errors
     /// Too many nodes.
     pub fn exists(&self, diagram: &Diagram, variables: &Diagram) -> Result<Diagram, BddError> {
-        self.checked(self.deep(|| diagram.0.exists(&variables.0)))
+        self.made(|| diagram.0.exists(&variables.0))
     }
 
     /// The product of declared variables, for [`Self::exists`].
@@ -227,7 +247,7 @@ impl Diagrams {
     ) -> Result<Diagram, BddError> {
         match &substitution.0 {
             None => Ok(diagram.clone()),
-            Some(pairs) => self.checked(self.deep(|| diagram.0.substitute(pairs))),
+            Some(pairs) => self.made(|| diagram.0.substitute(pairs)),
         }
     }
 
@@ -274,12 +294,20 @@ impl Diagrams {
         Ok(self.satisfying(&self.xor(left, right)?))
     }
 
-    /// The place of the top variable among [`Self::variables`]; `None` for a constant.
+    /// The place of the top variable in the order; `None` for a constant.
     pub fn top(&self, diagram: &Diagram) -> Option<usize> {
         let level = diagram
             .0
             .with_manager_shared(|manager, edge| manager.get_node(edge).level());
         Some(level as usize).filter(|&level| level < self.variables.len())
+    }
+
+    /// The variable at a place of the order.
+    pub fn variable_at(&self, place: usize) -> Variable {
+        let number = self
+            .manager
+            .with_manager_shared(|manager| manager.level_to_var(place as VarNo));
+        self.variables[number as usize]
     }
 
     /// The functions where the variable at `place`, at or above the top one, is 0 and is 1.
@@ -299,7 +327,19 @@ impl Diagrams {
             .with_manager_shared(|manager| manager.workers().install(work))
     }
 
-    fn checked(&self, made: AllocResult<BDDFunction>) -> Result<Diagram, BddError> {
+    /// What `operation` makes; where it finds no free node and the order may change, once more in a better one.
+    fn made(
+        &self,
+        operation: impl Fn() -> AllocResult<BDDFunction> + Sync,
+    ) -> Result<Diagram, BddError> {
+        let mut made = self.deep(&operation);
+        if let Some(need) = &self.need {
+            if made.is_ok() {
+                need.look(&self.manager);
+            } else if need.make_room(&self.manager) {
+                made = self.deep(&operation);
+            }
+        }
         made.map(Diagram)
             .map_err(|_| BddError::TooManyNodes { limit: self.limit })
     }
@@ -340,7 +380,7 @@ impl Builder<'_> {
     /// Too many nodes even for this one alone, or a variable that is not declared.
     pub fn diagram(&mut self, root: Expression) -> Result<Diagram, BddError> {
         let diagrams = self.diagrams;
-        diagrams.deep(|| match self.make(root) {
+        let mut make = || match self.make(root) {
             Err(BddError::TooManyNodes { .. }) => {
                 // What is remembered for sharing may be what fills the memory.
                 self.made.clear();
@@ -348,7 +388,13 @@ impl Builder<'_> {
                 self.make(root)
             }
             result => result,
-        })
+        };
+        // A new order wants the diagrams for itself; with one, each operation goes to the deep stack by itself.
+        if diagrams.need.is_some() {
+            make()
+        } else {
+            diagrams.deep(make)
+        }
     }
 
     fn make(&mut self, root: Expression) -> Result<Diagram, BddError> {

@@ -126,7 +126,7 @@ impl Search<'_> {
             &without(&lower_one, &one_function)?,
         )?;
         let (both, both_function) = self.between(&rest, &diagrams.and(&upper_zero, &upper_one)?)?;
-        let variable = diagrams.variables()[top];
+        let variable = diagrams.variable_at(top);
         let literal = |negated| Literal { negated, variable };
         let mut products = both;
         for (found, negated) in [(one, false), (zero, true)] {

@@ -275,6 +275,69 @@ fn bounds_hold() {
     assert_eq!(error.code(), "U0413");
 }
 
+/// An order that is bad for a function is changed when the nodes grow many, and the functions are the same.
+#[test]
+fn a_bad_order_is_changed_by_need() {
+    let pairs = 18;
+    let mut graph = Graph::new();
+    let terms: Vec<Expression> = (0..pairs)
+        .map(|pair| {
+            let left = graph.variable(Variable::Input(2 * pair));
+            let right = graph.variable(Variable::Input(2 * pair + 1));
+            graph.and(left, right)
+        })
+        .collect();
+    let any = graph.any(terms.clone());
+    let sum = graph.sum(terms.clone());
+    let apart = (0..pairs)
+        .map(|pair| 2 * pair)
+        .chain((0..pairs).map(|pair| 2 * pair + 1));
+    let apart: Vec<Variable> = apart.map(Variable::Input).collect();
+    let fixed = Diagrams::new(apart.clone(), 40_000);
+    assert!(fixed.of(&graph, any).is_err(), "2^18 nodes");
+
+    let diagrams = Diagrams::new(apart.clone(), 40_000).reordered_by_need();
+    let found = diagrams.of(&graph, any).expect("2 nodes a pair");
+    assert!(diagrams.reorderings() > 0);
+    assert!(found.node_count() < 5_000, "{}", found.node_count());
+    let first = diagrams.of(&graph, terms[0]).expect("few nodes");
+    assert!(diagrams.and(&first, &found).expect("few nodes") == first);
+    // 4^18 assignments, and three of four values of each pair give no term.
+    assert_eq!(
+        diagrams.count(&found),
+        Some(4_u128.pow(pairs) - 3_u128.pow(pairs))
+    );
+    let summed = diagrams.of(&graph, sum).expect("linear");
+    // The same two functions in an order that was good from the start.
+    let good = Diagrams::for_roots(&graph, &[any, sum], 40_000);
+    for (function, root) in [(&found, any), (&summed, sum)] {
+        let same = good.of(&graph, root).expect("few nodes");
+        assert_eq!(diagrams.count(function), good.count(&same));
+        let chosen = diagrams.satisfying(function).expect("it is not 0");
+        let value = |variable| chosen.contains(&(variable, true));
+        assert!(diagrams.value(function, value) && good.value(&same, value));
+    }
+    // Quantification and substitution know where the variables went.
+    let right = diagrams
+        .product((0..pairs).map(|pair| Variable::Input(2 * pair + 1)))
+        .expect("few nodes");
+    let some = diagrams.exists(&found, &right).expect("few nodes");
+    let lefts: Vec<Expression> = (0..pairs)
+        .map(|pair| graph.variable(Variable::Input(2 * pair)))
+        .collect();
+    let any_left = graph.any(lefts);
+    assert!(some == diagrams.of(&graph, any_left).expect("few nodes"));
+    let twins = (0..pairs).map(|pair| {
+        let left = diagrams.variable(Variable::Input(2 * pair));
+        (
+            Variable::Input(2 * pair + 1),
+            left.expect("a variable that is there"),
+        )
+    });
+    let twins = diagrams.substitution(twins).expect("declared");
+    assert!(diagrams.substitute(&found, &twins).expect("few nodes") == some);
+}
+
 /// Recursion over 20,000 variables does not overrun the stack, and the sum over all of them takes linear time.
 #[test]
 fn deep_diagrams_need_no_deep_stack() {

@@ -94,7 +94,7 @@ impl<'c> Model<'c> {
                 Variable::Input(_) => None,
             })
             .collect();
-        let diagrams = Diagrams::new(order(circuit, &cone, &registers), nodes);
+        let diagrams = Diagrams::new(order(circuit, &cone, &registers), nodes).reordered_by_need();
         let inputs = cone.variables.iter().copied();
         let inputs = inputs.filter(|variable| matches!(variable, Variable::Input(_)));
         let inputs = diagrams.product(inputs)?;
