@@ -129,6 +129,7 @@ impl<M: Machine> Host<'_, M> {
                 self.drain(now, &mut round);
             } else if heard < INPUTS_IN_A_ROW {
                 let until = if now >= due { now + BREATH } else { due };
+                self.observer.rests(now, until);
                 self.sleep(now, until)?;
                 round.wakeups_in_a_row = 0;
             }

@@ -12,6 +12,9 @@ pub trait Observer: Send {
     /// The party was woken for one of its own times.
     fn woken(&mut self, _now: Time) {}
 
+    /// The party has nothing left to do, and sleeps until its own next time, `until`, or until something comes.
+    fn rests(&mut self, _now: Time, _until: Time) {}
+
     /// Whether it has seen all that it came for; the party stops then.
     fn satisfied(&self) -> bool {
         false

@@ -1,8 +1,10 @@
 //! Signs of life for systemd: `Type=notify` and `WatchdogSec=` of a unit.
 //!
-//! Invariant: a sign is given from the loop of the cycle itself, and only after the party was woken for one of its own times since the
-//! last sign. A loop that hangs, or that is kept from its times by a flood, is not alive, and systemd starts the party again.
-//! Whether other parties are there makes no difference: a remote I/O that holds its outputs alone is well.
+//! Invariant: a sign is given from the loop of the cycle itself, and only where the party keeps its own times: it was woken for one, or it
+//! rests and the next comes before systemd's patience ends. (A plant that is driven in every cycle is never woken: its time comes only
+//! where an actuation does not.) A loop that hangs, that is kept from its times by a flood, or that waits for nothing is not
+//! alive, and systemd starts the party again. Whether other parties are there makes no difference: a remote I/O that holds its outputs
+//! alone is well.
 
 use std::env;
 use std::io;
@@ -22,7 +24,7 @@ const SIGNS: u32 = 4;
 #[derive(Debug)]
 pub(crate) struct Watchdog {
     socket: UnixDatagram,
-    period: Option<Duration>,
+    timeout: Option<Duration>,
     last: Option<Time>,
 }
 
@@ -44,10 +46,9 @@ impl Watchdog {
         socket.connect_addr(&address)?;
         // A systemd that does not read must not stop a cycle.
         socket.set_nonblocking(true)?;
-        let period = timeout.filter(|timeout| !timeout.is_zero());
         Ok(Self {
             socket,
-            period: period.map(|timeout| timeout / SIGNS),
+            timeout: timeout.filter(|timeout| !timeout.is_zero()),
             last: None,
         })
     }
@@ -58,12 +59,24 @@ impl Watchdog {
     }
 
     fn woken(&mut self, now: Time) {
-        let Some(period) = self.period else {
+        let Some(timeout) = self.timeout else {
             return;
         };
-        if self.last.is_none_or(|last| now.since(last) >= period) {
+        if self
+            .last
+            .is_none_or(|last| now.since(last) >= timeout / SIGNS)
+        {
             self.last = Some(now);
             self.say("WATCHDOG=1");
+        }
+    }
+
+    fn rests(&mut self, now: Time, until: Time) {
+        if self
+            .timeout
+            .is_some_and(|timeout| until.since(now) < timeout)
+        {
+            self.woken(now);
         }
     }
 
@@ -93,6 +106,11 @@ impl Observer for Watched {
     fn woken(&mut self, now: Time) {
         self.watchdog.woken(now);
         self.inner.woken(now);
+    }
+
+    fn rests(&mut self, now: Time, until: Time) {
+        self.watchdog.rests(now, until);
+        self.inner.rests(now, until);
     }
 
     fn satisfied(&self) -> bool {
@@ -146,6 +164,26 @@ mod tests {
         let signs = all.iter().filter(|text| *text == "WATCHDOG=1").count();
         assert_eq!(signs, 10);
         assert_eq!(all.last().map(String::as_str), Some("STOPPING=1"));
+    }
+
+    /// A plant whose next time is put off in every cycle, and a party that has none any more.
+    #[test]
+    fn a_party_that_rests_lives_if_it_has_a_time_to_come() {
+        let (path, socket) = systemd("rests");
+        let timeout = Duration::from_millis(400);
+        let mut watchdog = Watchdog::at(&path, Some(timeout)).expect("somebody listens");
+        let mut signs = |next: Duration, times: std::ops::Range<u64>| {
+            let mut all = Vec::new();
+            for milliseconds in times {
+                let now = Time(0) + Duration::from_millis(milliseconds);
+                watchdog.rests(now, now + next);
+                all.extend(said(&socket));
+            }
+            all.len()
+        };
+        assert_eq!(signs(Duration::from_millis(15), 0..1000), 10);
+        assert_eq!(signs(timeout, 1000..2000), 0);
+        assert_eq!(signs(Duration::from_millis(399), 2000..2001), 1);
     }
 
     #[test]
