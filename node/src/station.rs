@@ -24,7 +24,7 @@ use understudy_logic::Scratch;
 use understudy_wire::{
     Admission, Arrival, Attendance, Body, Copies, CycleClock, Digest, Frame, Header, Holding,
     Image, Input, Lineage, Machine, Moment, Output, Party, ProgramId, ProgramSet, Recalled,
-    Reception, Sample, StationId, StationSet, Time,
+    Reception, Sample, StationId, StationSet, Time, Waking,
 };
 
 use crate::event::Event;
@@ -44,10 +44,7 @@ pub struct Station {
     outbox: VecDeque<Output<Event>>,
     cycle: CycleNotes,
     started: Time,
-    /// When it wants to be woken, as of its last input.
-    asked: Time,
-    /// What it had asked for when it last reported a stall.
-    stalled: Time,
+    waking: Waking,
     /// Whether this station starts the cycles.
     paces: bool,
     wanted: ProgramSet,
@@ -99,15 +96,14 @@ impl Station {
             outbox: VecDeque::new(),
             cycle: CycleNotes::default(),
             started: now,
-            asked: now,
-            stalled: now,
+            waking: Waking::default(),
             paces: false,
             wanted: ProgramSet::EMPTY,
             joining: StationSet::EMPTY,
             differed: SmallVec::new(),
             settings,
         };
-        station.asked = station.next_wakeup();
+        station.waking.ask(station.next_wakeup());
         station
     }
 
@@ -164,16 +160,13 @@ impl Station {
         }
         match self.reception.admit(&frame.header) {
             Admission::Admitted => {}
-            Admission::Foreign => return,
-            Admission::Refused { theirs, first } => {
-                if first {
-                    self.report(Event::Refused {
-                        party: frame.header.sender,
-                        theirs,
-                        ours: self.settings.agreement.configuration,
-                    });
-                }
-                return;
+            Admission::Dropped => return,
+            Admission::Refused { theirs } => {
+                return self.report(Event::Refused {
+                    party: frame.header.sender,
+                    theirs,
+                    ours: self.settings.agreement.configuration,
+                });
             }
         }
         match self
@@ -252,21 +245,9 @@ impl Station {
     }
 
     fn next_wakeup(&self) -> Time {
-        [self.copies.wakeup(), self.speaks_at(), self.asks_at()]
-            .into_iter()
-            .flatten()
-            .fold(self.paces_at(), Time::min)
-    }
-
-    /// Reports once that it was not woken at a time that it had asked for, whatever woke it.
-    fn notice_stall(&mut self, now: Time) {
-        let due = self.asked;
-        let late = now.since(due);
-        if late > self.settings.agreement.schedule.period() / 5 && due != self.stalled {
-            self.stalled = due;
-            let moment = self.clock.moment().unwrap_or_default();
-            self.report(Event::Stalled { moment, late });
-        }
+        let others = [self.copies.wakeup(), self.speaks_at(), self.asks_at()];
+        let earlier = |next: Time, other: Option<Time>| other.map_or(next, |at| at.min(next));
+        others.into_iter().fold(self.paces_at(), earlier)
     }
 
     fn wake(&mut self, now: Time) {
@@ -298,15 +279,14 @@ impl Hash for Station {
             outbox: _,
             cycle,
             started,
-            asked,
-            stalled,
+            waking,
             paces,
             wanted,
             joining,
             differed,
         } = self;
         (reception, clock, attendance, replicas, copies).hash(hasher);
-        (cycle, started, asked, stalled, paces, wanted).hash(hasher);
+        (cycle, started, waking, paces, wanted).hash(hasher);
         (joining, differed).hash(hasher);
     }
 }
@@ -315,7 +295,10 @@ impl Machine for Station {
     type Event = Event;
 
     fn handle_input(&mut self, now: Time, input: Input<'_>) {
-        self.notice_stall(now);
+        if let Some(late) = self.waking.stall(now, &self.settings.agreement.schedule) {
+            let moment = self.clock.moment().unwrap_or_default();
+            self.report(Event::Stalled { moment, late });
+        }
         match input {
             Input::Wakeup => self.wake(now),
             Input::Frame(frame) => self.receive(now, frame),
@@ -325,7 +308,7 @@ impl Machine for Station {
             | Input::Force(_)
             | Input::Unforce(_) => {}
         }
-        self.asked = self.next_wakeup();
+        self.waking.ask(self.next_wakeup());
     }
 
     fn poll_output(&mut self) -> Option<Output<Event>> {
@@ -333,6 +316,6 @@ impl Machine for Station {
     }
 
     fn wakeup(&self) -> Time {
-        self.asked
+        self.waking.asked()
     }
 }

@@ -134,10 +134,7 @@ impl PlantMachine {
         let header = &frame.header;
         match self.reception.admit(header) {
             Admission::Admitted => {}
-            Admission::Refused {
-                theirs,
-                first: true,
-            } => {
+            Admission::Refused { theirs } => {
                 self.said.push_back(Output::Report(Event::Refused {
                     party: header.sender,
                     theirs,
@@ -145,7 +142,7 @@ impl PlantMachine {
                 }));
                 return;
             }
-            Admission::Refused { .. } | Admission::Foreign => return,
+            Admission::Dropped => return,
         }
         match (&frame.body, header.sender) {
             (Body::Actuation(actuation), Party::RemoteIo(program))

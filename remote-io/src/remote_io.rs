@@ -25,7 +25,7 @@ use std::sync::Arc;
 use understudy_wire::{
     Admission, Applied, Arrival, Attendance, Body, Change, Copies, CycleClock, Frame, Header,
     Holding, Image, Input, Machine, Moment, Output, Party, ProgramId, Recalled, Reception,
-    StationId, StationSet, Time,
+    StationId, StationSet, Time, Waking,
 };
 
 use crate::diagnosis::Diagnosing;
@@ -71,10 +71,7 @@ pub struct RemoteIo {
     /// Deadlines in a row at which nothing true was there.
     missed: u32,
     applied: Option<Applied>,
-    /// When it wants to be woken, as of its last input.
-    asked: Time,
-    /// What it had asked for when it last reported a stall.
-    stalled: Time,
+    waking: Waking,
     last_true: Option<Image>,
     trust: Trust,
     /// Words and states that differed at the last deadline, with those who can be wrong.
@@ -139,8 +136,7 @@ impl RemoteIo {
             idle: 0,
             missed: 0,
             applied: None,
-            asked: now,
-            stalled: now,
+            waking: Waking::default(),
             last_true: None,
             trust: Trust::default(),
             differed: Vec::new(),
@@ -148,7 +144,7 @@ impl RemoteIo {
             outbox: VecDeque::new(),
             settings,
         };
-        remote_io.asked = remote_io.next_wakeup();
+        remote_io.waking.ask(remote_io.next_wakeup());
         remote_io
     }
 
@@ -166,16 +162,13 @@ impl RemoteIo {
         };
         match self.reception.admit(&frame.header) {
             Admission::Admitted => {}
-            Admission::Foreign => return,
-            Admission::Refused { theirs, first } => {
-                if first {
-                    self.report(Event::Refused {
-                        party: frame.header.sender,
-                        theirs,
-                        ours: self.settings.agreement.configuration,
-                    });
-                }
-                return;
+            Admission::Dropped => return,
+            Admission::Refused { theirs } => {
+                return self.report(Event::Refused {
+                    party: frame.header.sender,
+                    theirs,
+                    ours: self.settings.agreement.configuration,
+                });
             }
         }
         match self
@@ -261,17 +254,6 @@ impl RemoteIo {
         copy.map_or(decides_at, |copy| copy.min(decides_at))
     }
 
-    /// Reports once that it was not woken at a time that it had asked for, whatever woke it.
-    fn notice_stall(&mut self, now: Time) {
-        let due = self.asked;
-        let late = now.since(due);
-        if late > self.settings.agreement.schedule.period() / 5 && due != self.stalled {
-            self.stalled = due;
-            let moment = self.moment();
-            self.report(Event::Stalled { moment, late });
-        }
-    }
-
     fn wake(&mut self, now: Time) {
         while let Some(frame) = self.copies.take_due(now, &self.settings.agreement.schedule) {
             self.outbox.push_back(Output::Send(frame));
@@ -316,8 +298,7 @@ impl Hash for RemoteIo {
             idle,
             missed,
             applied,
-            asked,
-            stalled,
+            waking,
             last_true,
             trust,
             differed,
@@ -330,7 +311,7 @@ impl Hash for RemoteIo {
             .hash(hasher);
         (sensors, diagnosing, diagnosed, forgetful, pardons).hash(hasher);
         (released, turns, decided, idle, missed, applied).hash(hasher);
-        (asked, stalled, last_true, trust, differed, copies).hash(hasher);
+        (waking, last_true, trust, differed, copies).hash(hasher);
     }
 }
 
@@ -338,14 +319,17 @@ impl Machine for RemoteIo {
     type Event = Event;
 
     fn handle_input(&mut self, now: Time, input: Input<'_>) {
-        self.notice_stall(now);
+        if let Some(late) = self.waking.stall(now, &self.settings.agreement.schedule) {
+            let moment = self.moment();
+            self.report(Event::Stalled { moment, late });
+        }
         self.end_forces(now);
         match input {
             Input::Wakeup => self.wake(now),
             Input::Frame(frame) => self.receive(now, frame),
             Input::Field(sensors) => {
                 if sensors.width() == self.settings.inputs {
-                    self.sensors = sensors.clone();
+                    self.sensors.clone_from(sensors);
                     self.field_lost = false;
                 }
             }
@@ -369,7 +353,7 @@ impl Machine for RemoteIo {
                 }
             }
         }
-        self.asked = self.next_wakeup();
+        self.waking.ask(self.next_wakeup());
     }
 
     fn poll_output(&mut self) -> Option<Output<Event>> {
@@ -377,6 +361,6 @@ impl Machine for RemoteIo {
     }
 
     fn wakeup(&self) -> Time {
-        self.asked
+        self.waking.asked()
     }
 }

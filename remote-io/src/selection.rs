@@ -173,12 +173,12 @@ impl<'a> Heard<'a> {
     pub(crate) fn digest_differences(self) -> impl Iterator<Item = (ProgramId, StationSet)> {
         let programs = (0..self.controllers as u8).map(ProgramId);
         programs.flat_map(move |program| {
-            let holdings = (0..self.turns.len() as u8).filter_map(move |rank| {
+            let mut holdings = (0..self.turns.len() as u8).filter_map(move |rank| {
                 let holding = holding_of(self.turn_of(StationId(rank))?, program)?;
                 Some((StationId(rank), holding))
             });
-            let first = holdings.clone().next();
-            holdings.skip(1).filter_map(move |(station, holding)| {
+            let first = holdings.next();
+            holdings.filter_map(move |(station, holding)| {
                 let (first_station, first) = first?;
                 let differs = first.lineage == holding.lineage && first.digest != holding.digest;
                 differs.then(|| (program, [first_station, station].into_iter().collect()))

@@ -232,15 +232,11 @@ impl Links {
         self.carry(now, place, frame);
     }
 
-    /// What a station takes in where this frame comes to it.
-    pub(crate) fn take_in(&mut self, station: StationId, frame: &Arc<Frame>) -> Arc<Frame> {
+    /// What a station takes in where this frame comes to it, if that is another one.
+    pub(crate) fn take_in(&mut self, station: StationId, frame: &Frame) -> Option<Arc<Frame>> {
         let flips = &mut self.intakes[station.index()];
-        if flips.frames > 0
-            && let Body::Sample(_) = &frame.body
-        {
-            return flipped(frame, flips);
-        }
-        Arc::clone(frame)
+        let flips_it = flips.frames > 0 && matches!(frame.body, Body::Sample(_));
+        flips_it.then(|| flipped(frame, flips))
     }
 
     fn place(&self, party: Party) -> Option<usize> {
@@ -382,8 +378,8 @@ impl Hash for Links {
 }
 
 /// The newest sample, or the first word, with a bit flipped.
-fn flipped(frame: &Arc<Frame>, flips: &mut Flips) -> Arc<Frame> {
-    let mut changed = Frame::clone(frame);
+fn flipped(frame: &Frame, flips: &mut Flips) -> Arc<Frame> {
+    let mut changed = frame.clone();
     let image = match &mut changed.body {
         Body::Sample(sample) => sample.history.last_mut(),
         Body::Turn(turn) => turn.words.first_mut().map(|word| &mut word.sum),

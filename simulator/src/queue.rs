@@ -52,7 +52,10 @@ impl Queue {
     pub(crate) fn next_at(&self) -> Option<Time> {
         let even = self.even.front().map(|delivery| delivery.at);
         let uneven = self.uneven.peek().map(|delivery| delivery.at);
-        even.into_iter().chain(uneven).min()
+        match (even, uneven) {
+            (Some(even), Some(uneven)) => Some(even.min(uneven)),
+            (at, None) | (None, at) => at,
+        }
     }
 
     pub(crate) fn pop(&mut self) -> Option<Delivery> {

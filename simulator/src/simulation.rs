@@ -285,11 +285,8 @@ impl Simulation {
         let (wakeup, sleeper) = self.next_wakeup();
         let fault = self.next_fault_at();
         let overdue = self.pace.overdue_at();
-        let next = [arrival, Some(wakeup), fault, Some(overdue)]
-            .into_iter()
-            .flatten()
-            .min();
-        let next = next.unwrap_or(overdue);
+        let others = [arrival, fault].into_iter().flatten();
+        let next = others.fold(wakeup.min(overdue), Time::min);
         self.now = self.now.max(next);
         if arrival == Some(next) {
             if let Some(delivery) = self.links.pop() {
@@ -309,13 +306,13 @@ impl Simulation {
     fn next_wakeup(&self) -> (Time, Party) {
         let mut next = (Time(u64::MAX), Party::Station(StationId(0)));
         for (rank, slot) in self.stations.iter().enumerate() {
-            if let Some(at) = slot.wakeup().filter(|&at| at < next.0) {
-                next = (at, Party::Station(StationId(rank as u8)));
+            if slot.due() < next.0 {
+                next = (slot.due(), Party::Station(StationId(rank as u8)));
             }
         }
         for (program, slot) in self.remote_ios.iter().enumerate() {
-            if let Some(at) = slot.wakeup().filter(|&at| at < next.0) {
-                next = (at, Party::RemoteIo(ProgramId(program as u8)));
+            if slot.due() < next.0 {
+                next = (slot.due(), Party::RemoteIo(ProgramId(program as u8)));
             }
         }
         next
@@ -332,8 +329,9 @@ impl Simulation {
 
     fn deliver(&mut self, delivery: &Delivery, observe: &mut Observe<'_>) {
         for station in delivery.stations.iter() {
-            let frame = self.links.take_in(station, &delivery.frame);
-            self.give(Party::Station(station), Input::Frame(&frame), observe);
+            let changed = self.links.take_in(station, &delivery.frame);
+            let frame = changed.as_ref().unwrap_or(&delivery.frame);
+            self.give(Party::Station(station), Input::Frame(frame), observe);
         }
         for program in delivery.remote_ios.iter() {
             self.give(

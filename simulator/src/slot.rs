@@ -9,19 +9,21 @@ use understudy_wire::{Frame, Input, Machine, Time};
 /// Frames that wait for a stopped party, at most, as in a socket's buffer; later ones are lost.
 const WAITING_FRAMES: usize = 256;
 
+const NEVER: Time = Time(u64::MAX);
+
 #[derive(Debug, Clone, Hash)]
 pub(crate) struct Slot<M> {
     machine: Option<M>,
     stopped: bool,
     waiting: VecDeque<Arc<Frame>>,
-    wakeup: Time,
     slow: Duration,
+    due: Time,
 }
 
 impl<M: Machine> Slot<M> {
     pub(crate) fn new(machine: M) -> Self {
         Self {
-            wakeup: machine.wakeup(),
+            due: machine.wakeup(),
             machine: Some(machine),
             stopped: false,
             waiting: VecDeque::new(),
@@ -29,9 +31,9 @@ impl<M: Machine> Slot<M> {
         }
     }
 
-    /// When it wants to be woken; never while it is stopped or crashed.
-    pub(crate) fn wakeup(&self) -> Option<Time> {
-        (self.machine.is_some() && !self.stopped).then(|| self.wakeup + self.slow)
+    /// When it is woken, as it wanted when it was last settled; never while it is stopped or crashed.
+    pub(crate) fn due(&self) -> Time {
+        self.due
     }
 
     /// Gives an input to a running party. True if it took it.
@@ -57,36 +59,41 @@ impl<M: Machine> Slot<M> {
 
     /// Notes the time that it wants next, once its outputs are drained.
     pub(crate) fn settle(&mut self) {
-        if let Some(machine) = &self.machine {
-            self.wakeup = machine.wakeup();
-        }
+        self.due = match &self.machine {
+            Some(machine) if !self.stopped => machine.wakeup() + self.slow,
+            _ => NEVER,
+        };
     }
 
     pub(crate) fn crash(&mut self) {
         self.machine = None;
         self.stopped = false;
         self.waiting.clear();
+        self.settle();
     }
 
     /// Starts again; one on a slow host stays slow.
     pub(crate) fn restart(&mut self, machine: M) {
         let slow = self.slow;
         *self = Self::new(machine);
-        self.slow = slow;
+        self.slow_down(slow);
     }
 
     /// From now on it is woken so much later than it asks for.
     pub(crate) fn slow_down(&mut self, by: Duration) {
         self.slow = by;
+        self.settle();
     }
 
     pub(crate) fn stop(&mut self) {
         self.stopped = self.machine.is_some();
+        self.settle();
     }
 
     /// Goes on; answers with the frames that waited.
     pub(crate) fn go_on(&mut self) -> VecDeque<Arc<Frame>> {
         self.stopped = false;
+        self.settle();
         std::mem::take(&mut self.waiting)
     }
 }

@@ -12,7 +12,7 @@ use smallvec::SmallVec;
 pub const MAXIMUM_IMAGE_BITS: usize = 64 * 1024;
 
 /// Bit k of word k / 64 is element k + 1 of the vector.
-#[derive(Clone, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[derive(PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(try_from = "RawImage", into = "RawImage")]
 pub struct Image {
     width: u32,
@@ -160,6 +160,22 @@ impl Image {
     }
 }
 
+/// All words at once: every frame and every report has images in it, and a derived copy goes word by word.
+impl Clone for Image {
+    fn clone(&self) -> Self {
+        Self {
+            width: self.width,
+            words: SmallVec::from_slice(&self.words),
+        }
+    }
+
+    fn clone_from(&mut self, other: &Self) {
+        self.width = other.width;
+        self.words.clear();
+        self.words.extend_from_slice(&other.words);
+    }
+}
+
 impl TryFrom<RawImage> for Image {
     type Error = ImageError;
 
@@ -222,6 +238,19 @@ mod tests {
                 assert_eq!(sum, image(left_width.max(right_width), left ^ right));
                 let back = sum.narrowed(left_width);
                 assert_eq!(back.is_some(), (left ^ right) >> left_width == 0);
+            }
+        }
+    }
+
+    #[test]
+    fn a_copy_is_equal_whatever_it_replaces() {
+        let of_width = |width| Image::from_bits((0..width).map(|bit| bit % 3 == 0));
+        let widths = [0, 1, 64, 65, 128, 129, 500];
+        for image in widths.map(of_width) {
+            assert_eq!(image.clone(), image);
+            for mut other in widths.map(of_width) {
+                other.clone_from(&image);
+                assert_eq!(other, image);
             }
         }
     }

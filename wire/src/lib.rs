@@ -19,6 +19,7 @@ mod reception;
 mod schedule;
 mod set;
 mod time;
+mod waking;
 
 pub use agreement::{Agreement, Mode};
 pub use attendance::{Attendance, Change};
@@ -45,3 +46,4 @@ pub use reception::{Admission, Reception};
 pub use schedule::{Schedule, ScheduleError};
 pub use set::{Member, ProgramSet, Set, StationSet};
 pub use time::Time;
+pub use waking::Waking;

@@ -22,14 +22,12 @@ pub struct Reception {
 pub enum Admission {
     /// It counts.
     Admitted,
-    /// Of another cluster, of nobody in this one, or one's own: dropped without a word.
-    Foreign,
-    /// Of a party with another configuration: dropped.
+    /// Of another cluster, of nobody in this one, one's own, or of a party that was refused before: dropped without a word.
+    Dropped,
+    /// The first of a party with another configuration: dropped, and worth a word.
     Refused {
         /// The configuration that it runs.
         theirs: ConfigurationHash,
-        /// Whether it is the first that is refused from this party.
-        first: bool,
     },
 }
 
@@ -53,20 +51,22 @@ impl Reception {
             Party::RemoteIo(program) | Party::Plant(program) => program.index() < self.programs,
         };
         if header.cluster != self.cluster || header.sender == self.own {
-            return Admission::Foreign;
+            return Admission::Dropped;
         }
         if header.configuration != self.configuration {
             // A party that is in no cluster of this size is still worth a word, once for all of them.
             let party = if known { header.sender } else { self.own };
-            return Admission::Refused {
-                theirs: header.configuration,
-                first: self.refused.insert(party),
+            let theirs = header.configuration;
+            return if self.refused.insert(party) {
+                Admission::Refused { theirs }
+            } else {
+                Admission::Dropped
             };
         }
         if known {
             Admission::Admitted
         } else {
-            Admission::Foreign
+            Admission::Dropped
         }
     }
 }

@@ -28,6 +28,7 @@ pub struct Schedule {
     deadline: Duration,
     rest: Duration,
     guard: Duration,
+    stall: Duration,
 }
 
 /// Why there is no such schedule.
@@ -64,6 +65,7 @@ const TURNS_END_PER_MILLE: u32 = 550;
 const DEADLINE_PER_MILLE: u32 = 650;
 const REST_PER_MILLE: u32 = 700;
 const GUARD_PER_MILLE: u32 = 100;
+const STALL_PER_MILLE: u32 = 200;
 const COPIES_SPAN_PER_MILLE: u32 = 75;
 
 impl Schedule {
@@ -108,6 +110,7 @@ impl Schedule {
             deadline: share(DEADLINE_PER_MILLE),
             rest: share(REST_PER_MILLE),
             guard: share(GUARD_PER_MILLE),
+            stall: share(STALL_PER_MILLE),
         })
     }
 
@@ -172,6 +175,11 @@ impl Schedule {
     /// How long the next rank waits for a silent pacemaker.
     pub fn guard(&self) -> Duration {
         self.guard
+    }
+
+    /// How late a host may wake a party before it has to say so.
+    pub fn stall(&self) -> Duration {
+        self.stall
     }
 }
 
