@@ -31,8 +31,12 @@ fn files(folder: &Path) -> Vec<Vec<u8>> {
         .collect()
 }
 
-/// Replays, reads and changes; `seeds` are files of the project, relative to its root.
+/// Replays, reads and changes; `seeds` are files of the project, relative to its root. Where libFuzzer leads, it does all of that.
 pub(crate) fn attack(target: &str, seeds: &[&str], read: impl Fn(&[u8]) + RefUnwindSafe) {
+    if std::env::var_os("BOLERO_LIBFUZZER_ARGS").is_some() {
+        bolero::check!().for_each(|bytes: &[u8]| read(bytes));
+        return;
+    }
     for regression in files(&root().join("regressions").join(target)) {
         read(&regression);
     }

@@ -4,18 +4,33 @@
 
 mod attack;
 mod other_tools;
+mod parties;
+mod questions;
+mod runs;
 
 use std::time::Duration;
 
 use attack::attack;
 use understudy_allocation::file;
-use understudy_bus::{Endpoints, Peer};
+use understudy_cluster::Cluster;
 use understudy_ladder::{MAXIMUM_NESTING, check, parse, print};
 use understudy_reconfiguration::{Signals, project, record};
-use understudy_wire::{ClusterHash, MAXIMUM_FRAME_BYTES, decode, encode};
 
 fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// The cluster of the examples.
+pub(crate) fn press_cell() -> Cluster {
+    let text = include_str!("../../../examples/press-cell/cluster.toml");
+    let read = understudy_cluster::read("cluster.toml", text, &mut |name| {
+        Ok(match name {
+            "robot.ladder" => include_str!("../../../examples/press-cell/robot.ladder"),
+            _ => include_str!("../../../examples/press-cell/press.ladder"),
+        }
+        .to_owned())
+    });
+    read.cluster.expect("the example is right")
 }
 
 #[test]
@@ -64,6 +79,7 @@ fn cluster() {
     let seeds = [
         "examples/press-cell/cluster.toml",
         "examples/boiler/cluster.toml",
+        "examples/modbus-cell/cluster.toml",
     ];
     let ladder = include_str!("../../../examples/press-cell/press.ladder");
     attack("cluster", &seeds, |bytes| {
@@ -83,15 +99,6 @@ fn scenario() {
         let text = text(bytes);
         let _ = understudy_scenarios::looks_like_a_scenario(&text);
         let _ = understudy_scenarios::read("scenario.toml", &text, None);
-    });
-}
-
-#[test]
-fn journal() {
-    attack("journal", &[], |bytes| {
-        for record in understudy_scenarios::records(bytes) {
-            let _ = record;
-        }
     });
 }
 
@@ -153,43 +160,6 @@ fn record_of_scans() {
     };
     attack("record", &[], |bytes| {
         let _ = record::read("record.csv", &text(bytes), &signals);
-    });
-}
-
-#[test]
-fn endpoints() {
-    attack("endpoints", &[], |bytes| {
-        let Ok(peers) = serde_json::from_slice::<Vec<Peer>>(bytes) else {
-            return;
-        };
-        if let Some(own) = peers.first().map(|peer| peer.party) {
-            let _ = Endpoints::new(ClusterHash(1), own, peers, Vec::new());
-        }
-    });
-}
-
-#[test]
-fn register_of_keys() {
-    attack("keys", &[], |bytes| {
-        let _ = toml::from_str::<understudy_keys::Register>(&text(bytes));
-    });
-}
-
-#[test]
-fn frame() {
-    // Behind the prefix and before the checksum, where a reader has to understand something.
-    attack("frame", &[], |payload| {
-        let mut bytes = b"UNDR\x02".to_vec();
-        bytes.extend_from_slice(payload);
-        let checksum = crc32fast::hash(&bytes);
-        bytes.extend_from_slice(&checksum.to_le_bytes());
-        let _ = decode(payload);
-        // What is taken for a frame is one: it can be said again, and means the same.
-        let Ok(frame) = decode(&bytes) else { return };
-        let mut again = Vec::new();
-        encode(&frame, &mut again).expect("what was heard can be said");
-        assert!(again.len() <= MAXIMUM_FRAME_BYTES);
-        assert_eq!(decode(&again), Ok(frame));
     });
 }
 
