@@ -209,6 +209,15 @@ impl Resolver {
             .address
             .as_ref()
             .and_then(|address| self.address(address, kind));
+        // One bit may have several names.
+        if let Some(known) = address.as_ref().and_then(|address| self.cell_at(address)) {
+            let message = format!(
+                "`{name}` as a second name of `{}`, whose address it has, is not kept",
+                self.program.cells[known].name
+            );
+            self.say(Diagnostic::warning("U1055", message, name.span()));
+            return Entity::Cell(known);
+        }
         let located =
             declaration
                 .address
@@ -270,6 +279,11 @@ impl Resolver {
         None
     }
 
+    fn cell_at(&self, address: &Address) -> Option<usize> {
+        let mut cells = self.program.cells.iter();
+        cells.position(|cell| cell.address.as_ref() == Some(address))
+    }
+
     /// The cell behind an address in a body; it is made where no variable has it.
     pub(super) fn direct(&mut self, address: &Name) -> Option<usize> {
         let text = address.trim_start_matches('%');
@@ -278,8 +292,7 @@ impl Resolver {
             self.error("U1036", message, address.span());
             return None;
         };
-        let mut cells = self.program.cells.iter();
-        if let Some(known) = cells.position(|cell| cell.address.as_ref() == Some(&found)) {
+        if let Some(known) = self.cell_at(&found) {
             return Some(known);
         }
         let role = match found.area {
