@@ -26,6 +26,7 @@ mod parser;
 mod program;
 mod resolve;
 mod syntax;
+mod timers;
 
 use std::collections::HashSet;
 use std::rc::Rc;
@@ -193,14 +194,20 @@ fn lowered(
     is_sound: bool,
     budget: &mut usize,
 ) -> (Option<Program>, Vec<Diagnostic>) {
-    let resolving = resolve::resolve(unit, instance, others, &file.types, &file.globals, budget);
+    let mut resolving =
+        resolve::resolve(unit, instance, others, &file.types, &file.globals, budget);
     let mut diagnostics = resolving.diagnostics;
     if !is_sound || has_errors(&diagnostics) {
         return (None, diagnostics);
     }
-    let (intervals, suspicious) = bounds::bounds(&resolving.program);
+    let (mut intervals, suspicious) = bounds::bounds(&resolving.program);
     // What is suspicious in the library is a matter of the block's own text.
     diagnostics.extend(suspicious.into_iter().filter(|_| !unit.foreign));
+    let found = timers::place(&mut resolving.program, &mut intervals);
+    if has_errors(&found) {
+        diagnostics.extend(found);
+        return (None, diagnostics);
+    }
     let (mut program, found) = lower::lower(&unit.name, &resolving.program, &intervals);
     diagnostics.extend(found);
     program.comments.clone_from(&unit.comments);

@@ -208,7 +208,7 @@ impl<'a> Analysis<'a> {
                     .iter()
                     .for_each(|(truth, _)| constants_of_truth(truth, &mut named));
             }
-            Action::Block { .. } => {}
+            Action::Block { .. } | Action::Timer { .. } => {}
         });
         Self {
             program,
@@ -294,7 +294,7 @@ impl<'a> Analysis<'a> {
                     }
                     *present = rest;
                 }
-                Action::SetTruth(..) | Action::Block { .. } => {}
+                Action::SetTruth(..) | Action::Block { .. } | Action::Timer { .. } => {}
             }
         }
     }

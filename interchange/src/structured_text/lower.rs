@@ -48,7 +48,7 @@ pub(super) fn lower(
         places: HashMap::new(),
         known: HashMap::new(),
         overlays: vec![HashMap::new()],
-        rungs: Rungs::new(&resolved.cells, intervals),
+        rungs: Rungs::new(resolved, intervals),
         place: 0..0,
         operations: 0,
         trouble: None,
@@ -227,8 +227,8 @@ impl Lowering<'_> {
                 self.set(*cell, Value::Number(stored));
             }
             Action::If(branches, otherwise) => self.choice(branches, otherwise),
-            // Blocks are called where every execution passes, as resolving has seen to.
-            Action::Block { .. } => {}
+            // Blocks stand where every execution passes, as resolving and the placing of timers have seen to.
+            Action::Block { .. } | Action::Timer { .. } => {}
         }
     }
 

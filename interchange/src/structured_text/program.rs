@@ -5,6 +5,7 @@
 
 use std::collections::HashSet;
 use std::ops::Range;
+use std::time::Duration;
 
 use understudy_ladder::{Address, BlockKind, Relation};
 
@@ -16,6 +17,8 @@ pub(super) enum Role {
     Memory,
     /// An output of a block of the ladder, which its block alone writes.
     Pin,
+    /// A bit that stands for the output of a timer, which the calls of the timer alone write.
+    Held,
 }
 
 /// What a cell holds.
@@ -111,6 +114,26 @@ pub(super) enum Action {
         wire: Truth,
         feeds: Vec<(&'static str, Truth)>,
     },
+    /// A call of one of [`Resolved::timers`], anywhere; [`super::timers`] puts blocks and assignments in its place.
+    Timer {
+        timer: usize,
+        wire: Truth,
+        /// Its time, where the call gives one.
+        preset: Option<Duration>,
+    },
+}
+
+/// A timer that is called under a condition, or more than once in an execution.
+#[derive(Debug, Clone)]
+pub(super) struct Timer {
+    /// Unique among cells and blocks.
+    pub(super) name: String,
+    /// TON, TOF or TP.
+    pub(super) word: &'static str,
+    /// The cell of what its clock is fed with: IN at its last call.
+    pub(super) started: usize,
+    /// The cell of its output.
+    pub(super) output: usize,
 }
 
 /// One step with its place in the text.
@@ -126,6 +149,9 @@ pub(super) struct Step {
 pub(super) struct Resolved {
     pub(super) cells: Vec<Cell>,
     pub(super) steps: Vec<Step>,
+    pub(super) timers: Vec<Timer>,
+    /// Of cells and blocks.
+    pub(super) names: HashSet<String>,
 }
 
 impl Resolved {

@@ -7,6 +7,7 @@ mod call;
 mod declare;
 mod expression;
 mod function;
+mod leave;
 mod statement;
 mod types;
 mod uses;
@@ -19,6 +20,7 @@ use std::time::Duration;
 use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{KEYWORDS, MAXIMUM_NAME_LENGTH, Name};
 
+use self::leave::Left;
 use self::types::Types;
 use self::uses::UsesByName;
 use super::parser::{MAXIMUM_FINDINGS, parse};
@@ -55,6 +57,8 @@ struct Instance {
     unit: usize,
     /// The standard block that stands in a rung, in its place.
     native: Option<&'static str>,
+    /// The timer that it is, where not every execution calls it once.
+    timer: Option<usize>,
     /// Its name among all, with those around it.
     path: String,
     /// By name in capitals.
@@ -105,10 +109,10 @@ pub(super) fn resolve(
         global_cells: HashMap::new(),
         instances: Vec::new(),
         stack: Vec::new(),
+        left: Left::default(),
         program: Resolved::default(),
         steps: Vec::new(),
         steps_left: *budget,
-        conditional: 0,
         names: HashSet::new(),
         namesakes: HashMap::new(),
         blame: None,
@@ -120,6 +124,7 @@ pub(super) fn resolve(
     let main = resolver.instantiate(0, prefix.to_owned(), true);
     resolver.execute(main);
     resolver.program.steps = std::mem::take(&mut resolver.steps);
+    resolver.program.names = std::mem::take(&mut resolver.names);
     *budget = resolver.steps_left;
     Resolving {
         program: resolver.program,
@@ -138,13 +143,13 @@ struct Resolver {
     instances: Vec<Instance>,
     /// Units around, against a block in itself.
     stack: Vec<usize>,
+    /// Of the execution at hand.
+    left: Left,
     program: Resolved,
     /// Of the list that is being made.
     steps: Vec<Step>,
     /// Of those that the whole text may have.
     steps_left: usize,
-    /// How many choices are around.
-    conditional: usize,
     /// Names of cells and blocks.
     names: HashSet<String>,
     /// The last number behind each name that is wanted more than once.

@@ -115,10 +115,22 @@ pub(crate) enum StatementKind {
         Vec<Statement>,
     ),
     For(Box<Loop>),
+    Leave(Leave),
     /// Understood, and not taken: what it is.
     Refused(&'static str),
     /// Not understood and already diagnosed, or nothing but a semicolon.
     Nothing,
+}
+
+/// What is left before its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Leave {
+    /// `RETURN`: the unit.
+    Unit,
+    /// `EXIT`: the loop around.
+    Loop,
+    /// `CONTINUE`: this turn of the loop around.
+    Turn,
 }
 
 /// `FOR counter := from TO to BY by DO body END_FOR`

@@ -10,7 +10,7 @@ use understudy_ladder::{
 use understudy_logic::{CircuitBuilder, Expression, Graph, Operation, Variable};
 
 use super::super::bounds::{Interval, opposite};
-use super::super::program::{Cell, Role};
+use super::super::program::{Cell, Resolved, Role};
 use super::{Leaf, signals};
 
 /// One network with the coil that takes its power: a wire cannot be off, so a constant 0 is a wire to a negated coil.
@@ -35,19 +35,16 @@ pub(super) struct Rungs<'a> {
 }
 
 impl<'a> Rungs<'a> {
-    pub(super) fn new(cells: &'a [Cell], intervals: &'a [Interval]) -> Self {
-        let all = cells.iter().zip(intervals).flat_map(|(cell, interval)| {
-            let mut names = signals(cell, *interval);
-            names.push(cell.name.clone());
-            names
-        });
+    pub(super) fn new(resolved: &'a Resolved, intervals: &'a [Interval]) -> Self {
+        let cells = resolved.cells.iter().zip(intervals);
+        let bits = cells.flat_map(|(cell, interval)| signals(cell, *interval));
         Self {
-            cells,
+            cells: &resolved.cells,
             intervals,
             rungs: Vec::new(),
             comments: Vec::new(),
             helpers: Vec::new(),
-            taken: all.collect(),
+            taken: bits.chain(resolved.names.iter().cloned()).collect(),
             written: HashSet::new(),
             states: HashSet::new(),
         }
@@ -363,7 +360,7 @@ impl<'a> Rungs<'a> {
                 match cell.role {
                     Role::Input => program.inputs.push(signal),
                     Role::Output => program.outputs.push(signal),
-                    Role::Memory | Role::Pin => program.memory.push(signal),
+                    Role::Memory | Role::Pin | Role::Held => program.memory.push(signal),
                 }
             }
         }

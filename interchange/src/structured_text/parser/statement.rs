@@ -1,7 +1,7 @@
 //! Statements.
 
 use super::super::lexer::Lexeme;
-use super::super::syntax::{Label, Loop, Statement, StatementKind};
+use super::super::syntax::{Label, Leave, Loop, Statement, StatementKind};
 use super::{Parser, is_keyword};
 
 /// Words at which a list of statements ends.
@@ -81,11 +81,9 @@ impl Parser {
             "FOR" => Self::for_statement,
             "WHILE" => Self::while_statement,
             "REPEAT" => Self::repeat_statement,
-            "RETURN" | "EXIT" | "CONTINUE" => {
-                self.skip();
-                self.need_sign(";");
-                return StatementKind::Refused("RETURN, EXIT and CONTINUE are");
-            }
+            "RETURN" => return self.leave(Leave::Unit),
+            "EXIT" => return self.leave(Leave::Loop),
+            "CONTINUE" => return self.leave(Leave::Turn),
             _ => return self.simple(),
         };
         let statement = self.enter(|parser| {
@@ -97,6 +95,12 @@ impl Parser {
             self.recover(&ENDS);
             StatementKind::Nothing
         })
+    }
+
+    fn leave(&mut self, what: Leave) -> StatementKind {
+        self.skip();
+        self.need_sign(";");
+        StatementKind::Leave(what)
     }
 
     /// An assignment, a call, or a semicolon alone.

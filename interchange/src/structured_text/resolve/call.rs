@@ -8,7 +8,7 @@ use understudy_ladder::BlockKind;
 use super::super::program::{Action, Truth};
 use super::super::syntax::{Argument, Class, Expression, Path};
 use super::expression::Value;
-use super::types::{inputs, is_timer};
+use super::types::inputs;
 use super::{Entity, Resolver};
 
 impl Resolver {
@@ -207,22 +207,14 @@ impl Resolver {
         arguments: &[Argument],
         span: &Range<usize>,
     ) {
-        let path = self.instances[called].path.clone();
-        if is_timer(word)
-            && (self.conditional > 0
-                || self.instances[called].called
-                || !self.instances[called].exclusive)
-        {
-            let message = format!("the {word} `{path}` is not called once in every execution");
-            let finding = Diagnostic::error("U1050", message, span.clone());
-            self.say(finding.with_help(
-                "call it once, outside of IF, CASE and FOR, with the condition in its IN",
-            ));
-            return;
-        }
         self.instances[called].called = true;
+        let path = self.instances[called].path.clone();
         let names: Vec<String> = inputs(word).iter().map(|name| (*name).to_owned()).collect();
         let given = self.given(&names, arguments);
+        if let Some(timer) = self.instances[called].timer {
+            self.call_timer(instance, called, timer, &given, span);
+            return;
+        }
         let mut time = None;
         let mut preset = None;
         let mut values = Vec::new();
@@ -232,6 +224,8 @@ impl Resolver {
                 .find(|(name, _)| name == pin)
                 .map(|(_, value)| *value);
             match (pin, found) {
+                // What is never started needs no time.
+                ("PT", None) if matches!(values.first(), Some((_, Truth::Constant(false)))) => {}
                 ("PT", found) => time = self.preset_time(instance, found, word, span),
                 ("PV", Some(found)) => preset = self.constant(instance, found),
                 ("PV", None) => {}
@@ -270,6 +264,41 @@ impl Resolver {
             kind,
             wire,
             feeds: values,
+        };
+        self.push(action, span.clone(), Vec::new());
+    }
+
+    /// A timer that not every execution calls once.
+    fn call_timer(
+        &mut self,
+        instance: usize,
+        called: usize,
+        timer: usize,
+        given: &[(String, &Expression)],
+        span: &Range<usize>,
+    ) {
+        let value = |pin| given.iter().find(|(name, _)| name == pin);
+        let word = self.program.timers[timer].word;
+        let preset =
+            value("PT").and_then(|(_, found)| self.preset_time(instance, Some(*found), word, span));
+        let wire = match value("IN") {
+            Some((_, found)) => {
+                let wire = self.truth(instance, found);
+                match self.through(called, "IN", wire.clone(), span) {
+                    // That it is stopped is worth knowing.
+                    _ if matches!(wire, Truth::Constant(_)) => wire,
+                    kept => kept,
+                }
+            }
+            None => match self.entity(called, "IN") {
+                Some(Entity::Cell(cell)) => Truth::Cell(*cell),
+                _ => Truth::Constant(false),
+            },
+        };
+        let action = Action::Timer {
+            timer,
+            wire,
+            preset,
         };
         self.push(action, span.clone(), Vec::new());
     }

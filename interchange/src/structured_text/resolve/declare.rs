@@ -5,7 +5,7 @@ use std::ops::Range;
 use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{Address, Area, Name, parse_address};
 
-use super::super::program::{Cell, Kind, Number, Role, Truth};
+use super::super::program::{Cell, Kind, Number, Role, Timer, Truth};
 use super::super::syntax::{Class, Declaration, Expression, UnitKind};
 use super::expression::Value;
 use super::types::{STANDARD, Type, inputs, is_timer, outputs};
@@ -129,7 +129,7 @@ impl Resolver {
         self.define(instance, &declaration.name, entity);
     }
 
-    fn path_of(&self, instance: usize, name: &str) -> String {
+    pub(super) fn path_of(&self, instance: usize, name: &str) -> String {
         let around = &self.instances[instance].path;
         if around.is_empty() {
             name.to_owned()
@@ -368,8 +368,23 @@ impl Resolver {
             ..Instance::default()
         });
         let span = declaration.name.span();
-        for pin in outputs(word) {
-            self.add_pin(made, &path, pin, Role::Pin, &span);
+        if is_timer(word) && !exclusive {
+            let started = self.add_bit(format!("{path}.started"), Role::Memory, &span);
+            let output = self.add_bit(format!("{path}.Q"), Role::Held, &span);
+            self.instances[made].timer = Some(self.program.timers.len());
+            self.instances[made]
+                .entities
+                .insert("Q".into(), Entity::Cell(output));
+            self.program.timers.push(Timer {
+                name: path.clone(),
+                word,
+                started,
+                output,
+            });
+        } else {
+            for pin in outputs(word) {
+                self.add_pin(made, &path, pin, Role::Pin, &span);
+            }
         }
         for pin in inputs(word)
             .iter()
@@ -390,10 +405,22 @@ impl Resolver {
         // A contact reads an output by the names of the block and of the pin; an input is a bit of its own.
         let name = match role {
             Role::Pin => format!("{path}.{pin}"),
-            _ => self.unique(&format!("{path}_{pin}")),
+            _ => format!("{path}_{pin}"),
         };
+        let cell = self.add_bit(name, role, span);
+        self.instances[instance]
+            .entities
+            .insert(pin.to_owned(), Entity::Cell(cell));
+    }
+
+    /// A bit of a block, which begins with 0.
+    fn add_bit(&mut self, name: String, role: Role, span: &Range<usize>) -> usize {
         let cell = Cell {
-            name,
+            name: if role == Role::Pin {
+                name
+            } else {
+                self.unique(&name)
+            },
             kind: Kind::Truth,
             role,
             initial: 0,
@@ -401,9 +428,6 @@ impl Resolver {
             address: None,
             description: None,
         };
-        let cell = self.add_cell(cell, span.clone());
-        self.instances[instance]
-            .entities
-            .insert(pin.to_owned(), Entity::Cell(cell));
+        self.add_cell(cell, span.clone())
     }
 }

@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::super::program::{Action, Kind, Number, Role, Truth};
 use super::super::syntax::{Expression, Label, Loop, Path, Statement, StatementKind};
 use super::expression::Value;
+use super::leave::{Leaves, leaves, leaves_of};
 use super::{Entity, MAXIMUM_STEPS, Resolver};
 use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Relation;
@@ -19,7 +20,9 @@ impl Resolver {
             self.blame = None;
         }
         self.begin_temporaries(instance, &content);
+        let around = self.enter_unit(instance, &content);
         self.statements(instance, &content.body);
+        self.leave_unit(around);
         self.blame = blame;
     }
 
@@ -46,7 +49,26 @@ impl Resolver {
         }
     }
 
-    fn statements(&mut self, instance: usize, statements: &[Statement]) {
+    /// The steps of a list; what comes behind a statement that may leave it is done where it has not been left.
+    pub(super) fn statements(&mut self, instance: usize, statements: &[Statement]) {
+        let mut left = Leaves::default();
+        let mut rest = statements;
+        while !rest.is_empty() {
+            let place = rest.iter().position(|statement| leaves_of(statement).any());
+            let (now, later) = rest.split_at(place.map_or(rest.len(), |place| place + 1));
+            if left.any() {
+                let condition = self.still_here(left);
+                let span = now[0].span.start..now[now.len() - 1].span.end;
+                self.under(condition, &span, |own| own.all(instance, now));
+            } else {
+                self.all(instance, now);
+            }
+            left = left.and(leaves(now));
+            rest = later;
+        }
+    }
+
+    fn all(&mut self, instance: usize, statements: &[Statement]) {
         for statement in statements {
             if self.is_full {
                 return;
@@ -91,11 +113,12 @@ impl Resolver {
                 self.choice(instance, conditions, &bodies, otherwise, span);
             }
             StatementKind::For(content) => self.repeat(instance, content, &span),
+            StatementKind::Leave(what) => self.leave(*what, span),
             StatementKind::Refused(what) => {
                 let message = format!("{what} not taken");
                 let finding = Diagnostic::error("U1040", message, span);
                 self.say(finding.with_help(
-                    "a scan has a fixed number of steps; FOR with constant bounds is taken, and IF",
+                    "a scan has a fixed number of steps; FOR with constant bounds is taken, and EXIT in it",
                 ));
             }
             StatementKind::Nothing => {}
@@ -110,7 +133,6 @@ impl Resolver {
         otherwise: &[Statement],
         span: Range<usize>,
     ) {
-        self.conditional += 1;
         let around = std::mem::take(&mut self.steps);
         let mut branches = Vec::with_capacity(conditions.len());
         for (condition, body) in conditions.into_iter().zip(bodies) {
@@ -119,7 +141,6 @@ impl Resolver {
         }
         self.statements(instance, otherwise);
         let otherwise = std::mem::replace(&mut self.steps, around);
-        self.conditional -= 1;
         self.push(Action::If(branches, otherwise), span, Vec::new());
     }
 
@@ -198,29 +219,39 @@ impl Resolver {
             );
             return;
         }
+        let ends = Self::ends_loop(&content.body);
+        self.enter_loop(instance, &content.body, span);
         let mut turns = 0_usize;
-        while if by > 0 { value <= to } else { value >= to } {
+        loop {
+            let is_last = if by > 0 { value > to } else { value < to };
             turns += 1;
             if self.is_full || turns > MAXIMUM_STEPS {
                 self.give_up(
                     format!("a loop has more than {MAXIMUM_STEPS} turns"),
                     span.clone(),
                 );
-                return;
+                break;
             }
-            self.push(
-                Action::SetNumber(counter, Number::Constant(value)),
-                span.clone(),
-                Vec::new(),
-            );
-            self.statements(instance, &content.body);
+            let turn = |own: &mut Self| {
+                let count = Action::SetNumber(counter, Number::Constant(value));
+                own.push(count, span.clone(), Vec::new());
+                if !is_last {
+                    own.begin_turn(span);
+                    own.statements(instance, &content.body);
+                }
+            };
+            if ends.any() && turns > 1 {
+                let condition = self.still_here(ends);
+                self.under(condition, span, turn);
+            } else {
+                turn(self);
+            }
+            if is_last {
+                break;
+            }
             value = value.saturating_add(by);
         }
-        self.push(
-            Action::SetNumber(counter, Number::Constant(value)),
-            span.clone(),
-            Vec::new(),
-        );
+        self.leave_loop();
     }
 
     fn assign(&mut self, instance: usize, target: &Path, value: &Expression, span: Range<usize>) {
@@ -258,7 +289,7 @@ impl Resolver {
                 );
                 match role {
                     Role::Input => format!("`{name}` is an input, and cannot be assigned"),
-                    Role::Pin => {
+                    Role::Pin | Role::Held => {
                         format!("`{name}` is an output of a block, and cannot be assigned")
                     }
                     Role::Output | Role::Memory => {

@@ -6,6 +6,8 @@ use super::super::syntax::{
     Argument, Expression, ExpressionKind, Operator, Path, Statement, StatementKind,
 };
 
+use super::leave::leaves_of;
+
 /// What happens to one instance in a body.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Uses {
@@ -34,7 +36,7 @@ pub(super) fn uses(body: &[Statement]) -> UsesByName {
     found
 }
 
-fn statements(body: &[Statement], conditional: bool, found: &mut UsesByName) {
+fn statements(body: &[Statement], mut conditional: bool, found: &mut UsesByName) {
     for statement in body {
         match &statement.kind {
             StatementKind::Assign(target, value) => {
@@ -57,6 +59,15 @@ fn statements(body: &[Statement], conditional: bool, found: &mut UsesByName) {
                         _ => None,
                     });
                     uses.preset = preset.or(last);
+                    let is_fed = arguments.iter().any(|argument| match argument {
+                        Argument::Placed(_) => true,
+                        Argument::Given(pin, _) => pin.eq_ignore_ascii_case("IN"),
+                        Argument::Taken(..) => false,
+                    });
+                    if !is_fed {
+                        // What another call has given stays.
+                        uses.touched.insert("IN".to_owned());
+                    }
                 }
                 arguments_of(arguments, found);
             }
@@ -79,8 +90,10 @@ fn statements(body: &[Statement], conditional: bool, found: &mut UsesByName) {
                 expression(&content.to, found);
                 statements(&content.body, true, found);
             }
-            StatementKind::Refused(_) | StatementKind::Nothing => {}
+            StatementKind::Leave(_) | StatementKind::Refused(_) | StatementKind::Nothing => {}
         }
+        // What comes behind it may not be executed.
+        conditional |= leaves_of(statement).any();
     }
 }
 

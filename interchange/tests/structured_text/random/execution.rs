@@ -1,6 +1,7 @@
 //! The naive execution: a value for each name, and the blocks as the library of matiec writes them.
 
 use std::collections::HashMap;
+use std::ops::ControlFlow;
 
 use super::text::{Number, Statement, Text, Truth};
 
@@ -47,7 +48,7 @@ impl Execution {
             .rev()
             .fold(0, |sum, bit| sum * 2 + i128::from(*bit));
         self.numbers.insert("u".into(), u);
-        self.list(&text.body);
+        let _left = self.list(&text.body);
         self.now += 1;
     }
 
@@ -129,14 +130,21 @@ impl Execution {
         }
     }
 
-    fn list(&mut self, statements: &[Statement]) {
+    /// Breaks with the word that leaves the list.
+    fn list(&mut self, statements: &[Statement]) -> ControlFlow<&'static str> {
         for statement in statements {
-            self.statement(statement);
+            self.statement(statement)?;
         }
+        ControlFlow::Continue(())
     }
 
-    fn statement(&mut self, statement: &Statement) {
+    fn statement(&mut self, statement: &Statement) -> ControlFlow<&'static str> {
         match statement {
+            Statement::Leave(when, word) => {
+                if self.truth(when) {
+                    return ControlFlow::Break(*word);
+                }
+            }
             Statement::SetTruth(name, value) => {
                 let value = self.truth(value);
                 self.put(*name, value);
@@ -153,7 +161,7 @@ impl Execution {
             Statement::If(branches, otherwise) => {
                 let taken = branches.iter().find(|(condition, _)| self.truth(condition));
                 let taken = taken.map_or(otherwise, |(_, branch)| branch);
-                self.list(taken);
+                self.list(taken)?;
             }
             Statement::Case(name, branches, otherwise) => {
                 let value = self.value(name);
@@ -161,9 +169,17 @@ impl Execution {
                     i128::from(*first) <= value && value <= i128::from(*last)
                 };
                 let taken = branches.iter().find(|(first, last, _)| fits(first, last));
-                self.list(taken.map_or(otherwise, |(_, _, branch)| branch));
+                self.list(taken.map_or(otherwise, |(_, _, branch)| branch))?;
             }
-            Statement::For(from, to, body) => (*from..=*to).for_each(|_| self.list(body)),
+            Statement::For(from, to, body) => {
+                for _ in *from..=*to {
+                    match self.list(body) {
+                        ControlFlow::Break("EXIT") => break,
+                        ControlFlow::Break("RETURN") => return ControlFlow::Break("RETURN"),
+                        _ => {}
+                    }
+                }
+            }
             Statement::Trigger(name, clock) => {
                 let clock = self.truth(clock) == (*name == "rise");
                 let memory = format!("{name}.M");
@@ -202,6 +218,10 @@ impl Execution {
                 let output = self.timer(word, name, wire, u64::from(*scans));
                 self.put(format!("{name}.Q"), output);
             }
+            Statement::Stop => {
+                let output = self.timer("TON", "late", false, 0);
+                self.put("late.Q", output);
+            }
             Statement::Total(name, enable, value) => {
                 let (enable, value) = (self.truth(enable), short(self.number(value)));
                 let sum = self.value(&format!("{name}.sum"));
@@ -210,6 +230,7 @@ impl Execution {
                 self.put(format!("{name}.big"), 2 * sum > 20);
             }
         }
+        ControlFlow::Continue(())
     }
 
     /// State 0 waits, 1 runs, 2 is over.

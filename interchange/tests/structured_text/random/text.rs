@@ -37,6 +37,8 @@ pub(crate) enum Statement {
         Vec<Statement>,
     ),
     For(i64, i64, Vec<Statement>),
+    /// RETURN, or EXIT or CONTINUE in a loop.
+    Leave(Truth, &'static str),
     /// R_TRIG and F_TRIG.
     Trigger(&'static str, Truth),
     Latch(&'static str, Truth, Truth),
@@ -44,6 +46,8 @@ pub(crate) enum Statement {
     Count(&'static str, Truth, Truth, Number),
     /// Its preset in scans of 100 ms.
     Timer(&'static str, &'static str, Truth, u32),
+    /// `late` is stopped; this may happen anywhere.
+    Stop,
     /// A block of the text: two inputs, and what it has added up.
     Total(&'static str, Truth, Number),
 }
@@ -53,7 +57,7 @@ pub(crate) struct Text {
     pub(crate) body: Vec<Statement>,
 }
 
-const TRUTHS_READ: [&str; 17] = [
+const TRUTHS_READ: [&str; 20] = [
     "a0",
     "a1",
     "a2",
@@ -70,6 +74,9 @@ const TRUTHS_READ: [&str; 17] = [
     "on.Q",
     "off.Q",
     "pulse.Q",
+    "late.Q",
+    "linger.Q",
+    "flash.Q",
     "total.big",
 ];
 const TRUTHS_WRITTEN: [&str; 4] = ["y0", "y1", "b0", "b1"];
@@ -141,7 +148,7 @@ fn statements(dice: &mut Dice, count: usize, depth: usize) -> Vec<Statement> {
 
 fn statement(dice: &mut Dice, depth: usize) -> Statement {
     let deeper = depth.saturating_sub(1);
-    match dice.below(if depth == 0 { 12 } else { 17 }) {
+    match dice.below(if depth == 0 { 14 } else { 19 }) {
         0..=3 => Statement::SetTruth(pick(dice, &TRUTHS_WRITTEN), truth(dice, 3)),
         4..=7 => Statement::SetNumber(pick(dice, &NUMBERS_WRITTEN), number(dice, 2)),
         8 => Statement::Trigger(pick(dice, &["rise", "fall"]), truth(dice, 1)),
@@ -158,7 +165,10 @@ fn statement(dice: &mut Dice, depth: usize) -> Statement {
             }
         }
         11 => Statement::Total("total", truth(dice, 1), number(dice, 1)),
-        12..=14 => {
+        12 => Statement::Stop,
+        13 if dice.below(3) == 0 => Statement::Leave(truth(dice, 1), "RETURN"),
+        13 => Statement::SetTruth("b1", truth(dice, 1)),
+        14..=16 => {
             let branches = (0..1 + dice.below(3)).map(|_| {
                 let condition = truth(dice, 2);
                 let count = dice.below(3);
@@ -168,7 +178,7 @@ fn statement(dice: &mut Dice, depth: usize) -> Statement {
             let count = dice.below(3);
             Statement::If(branches, statements(dice, count, deeper))
         }
-        15 => {
+        17 => {
             let mut first = -3;
             let branches = (0..1 + dice.below(3)).map(|_| {
                 first += i64::try_from(dice.below(3)).expect("small");
@@ -190,9 +200,42 @@ fn statement(dice: &mut Dice, depth: usize) -> Statement {
             let from = small(dice);
             let to = from + i64::try_from(dice.below(4)).expect("small") - 1;
             let count = 1 + dice.below(2);
-            Statement::For(from, to, statements(dice, count, deeper))
+            let mut body = statements(dice, count, deeper);
+            if dice.below(2) == 0 {
+                let word = pick(dice, &["EXIT", "CONTINUE", "RETURN"]);
+                let leave = Statement::Leave(truth(dice, 1), word);
+                body.insert(dice.below(body.len() + 1), leave);
+            }
+            Statement::For(from, to, body)
         }
     }
+}
+
+/// Timers that conditions decide about, each called once on a way through the text at most.
+fn timed(dice: &mut Dice, depth: usize, timers: &[(&'static str, &'static str)]) -> Vec<Statement> {
+    let mut list = Vec::new();
+    for &(word, name) in timers {
+        let count = dice.below(2);
+        list.extend(statements(dice, count, 1));
+        match dice.below(if depth == 0 { 2 } else { 4 }) {
+            0 => {}
+            1 => {
+                let scans = match word {
+                    "TP" => 3,
+                    _ => pick(dice, &[0, 1, 3, 5]),
+                };
+                list.push(Statement::Timer(word, name, truth(dice, 2), scans));
+            }
+            _ => {
+                let branches = (0..1 + dice.below(2))
+                    .map(|_| (truth(dice, 1), timed(dice, depth - 1, &[(word, name)])));
+                let branches = branches.collect();
+                let otherwise = timed(dice, depth - 1, &[(word, name)]);
+                list.push(Statement::If(branches, otherwise));
+            }
+        }
+    }
+    list
 }
 
 impl Text {
@@ -205,6 +248,8 @@ impl Text {
             let scans = u32::try_from(dice.below(5)).expect("small");
             body.push(Statement::Timer(word, name, truth(dice, 2), scans));
         }
+        let timers = [("TON", "late"), ("TOF", "linger"), ("TP", "flash")];
+        body.extend(timed(dice, 3, &timers));
         let count = dice.below(4);
         body.extend(statements(dice, count, 2));
         Self { body }
@@ -270,6 +315,7 @@ impl fmt::Display for Statement {
             Self::For(from, to, body) => {
                 writeln!(out, "FOR k := {from} TO {to} DO\n{}END_FOR;", list(body))
             }
+            Self::Leave(when, word) => writeln!(out, "IF {when} THEN {word}; END_IF;"),
             Self::Trigger(name, clock) => writeln!(out, "{name}(CLK := {clock});"),
             Self::Latch("set_first", set, reset) => {
                 writeln!(out, "set_first(S1 := {set}, R := {reset});")
@@ -281,6 +327,7 @@ impl fmt::Display for Statement {
             Self::Timer(_, name, wire, scans) => {
                 writeln!(out, "{name}(IN := {wire}, PT := T#{}ms);", scans * 100)
             }
+            Self::Stop => writeln!(out, "late(IN := FALSE);"),
             Self::Total(name, enable, value) => {
                 writeln!(out, "{name}(enable := {enable}, value := {value});")
             }
@@ -306,7 +353,7 @@ PROGRAM random
   VAR
     b0, b1 : BOOL; n0 : USINT; n1 : INT (0..9); n2 : SINT := -7; k : INT;
     rise : R_TRIG; fall : F_TRIG; set_first : SR; reset_first : RS; up, many : CTU;
-    on : TON; off : TOF; pulse : TP; total : Total;
+    on, late : TON; off, linger : TOF; pulse, flash : TP; total : Total;
   END_VAR"
         )?;
         for statement in &self.body {
