@@ -11,6 +11,7 @@ mod expression;
 mod normal_form;
 pub mod notation;
 mod polynomial;
+mod running;
 mod scan;
 pub mod transform;
 
@@ -19,4 +20,5 @@ pub use cover::{Cover, Literal};
 pub use expression::{Expression, Graph, Operation, Variable};
 pub use normal_form::{Monomial, NormalForm, TooManyMonomials};
 pub use polynomial::Polynomial;
+pub use running::Running;
 pub use scan::{Scan, Scratch};

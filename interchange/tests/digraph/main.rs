@@ -8,7 +8,8 @@ use proptest::prelude::*;
 use understudy_interchange::digraph::{digraphs, draw_svg, read, write};
 use understudy_ladder::{Interpreter, Program, parse, print};
 
-use support::{Dice, PERIOD, Running, findings};
+use support::{Dice, PERIOD, findings};
+use understudy_logic::Running;
 
 /// The program of an XML without errors.
 fn program(xml: &str) -> Program {

@@ -7,7 +7,8 @@ use proptest::prelude::*;
 use understudy_interchange::ldmicro::read;
 use understudy_ladder::Interpreter;
 
-use crate::support::{Dice, Running};
+use crate::support::Dice;
+use understudy_logic::Running;
 
 enum Element {
     Contacts(&'static str, bool),

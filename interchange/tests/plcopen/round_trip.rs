@@ -8,7 +8,8 @@ use understudy_ladder::{Program, from_circuit, parse};
 use understudy_logic::Circuit;
 
 use crate::random::random_program;
-use crate::support::{PERIOD, Run, findings, outputs, program, xmllint};
+use crate::support::{PERIOD, findings, outputs, program, xmllint};
+use understudy_logic::Running;
 
 fn check(original: &Program, seed: u64) {
     let text = write(original, PERIOD);
@@ -112,8 +113,8 @@ output 1st_
 
 /// Every input in every state that the two reach together; `None` where there are more than `most`.
 fn equal_in_every_state(one: &Circuit, other: &Circuit, most: usize) -> Option<bool> {
-    let (mut one, mut other) = (Run::new(one), Run::new(other));
-    let width = one.width();
+    let (mut one, mut other) = (Running::new(one), Running::new(other));
+    let width = one.input_count();
     let start = (one.state().to_vec(), other.state().to_vec());
     let mut seen = HashSet::from([start.clone()]);
     let mut waiting = vec![start];

@@ -8,7 +8,7 @@ use std::time::Duration;
 use understudy_diagnostic::{Report, Severity};
 use understudy_interchange::plcopen::{Reading, read};
 use understudy_ladder::Program;
-use understudy_logic::{Circuit, Scan, Scratch};
+use understudy_logic::{Circuit, Running};
 
 use crate::random::Dice;
 
@@ -51,7 +51,7 @@ pub(crate) fn program(text: &str) -> Program {
 pub(crate) fn outputs(circuit: &Circuit, seed: u64, scans: usize) -> Vec<Vec<bool>> {
     let mut dice = Dice::new(seed);
     let mut inputs = vec![false; circuit.inputs().len()];
-    let mut run = Run::new(circuit);
+    let mut run = Running::new(circuit);
     let mut shown = Vec::new();
     for _ in 0..scans {
         for input in &mut inputs {
@@ -60,59 +60,6 @@ pub(crate) fn outputs(circuit: &Circuit, seed: u64, scans: usize) -> Vec<Vec<boo
         shown.push(run.step(&inputs));
     }
     shown
-}
-
-/// A running circuit.
-pub(crate) struct Run {
-    scan: Scan,
-    scratch: Scratch,
-    registers: Vec<u64>,
-    outputs: Vec<u64>,
-    width: usize,
-}
-
-impl Run {
-    pub(crate) fn new(circuit: &Circuit) -> Self {
-        let scan = Scan::new(circuit);
-        Self {
-            scratch: Scratch::default(),
-            registers: scan.initial().to_vec(),
-            outputs: vec![0; scan.output_count().div_ceil(64)],
-            width: scan.output_count(),
-            scan,
-        }
-    }
-
-    /// How many inputs there are.
-    pub(crate) fn width(&self) -> usize {
-        self.scan.input_count()
-    }
-
-    /// The registers, packed.
-    pub(crate) fn state(&self) -> &[u64] {
-        &self.registers
-    }
-
-    /// Goes on from another state.
-    pub(crate) fn go_to(&mut self, state: &[u64]) {
-        self.registers.copy_from_slice(state);
-    }
-
-    pub(crate) fn step(&mut self, inputs: &[bool]) -> Vec<bool> {
-        let mut words = vec![0_u64; inputs.len().div_ceil(64)];
-        for (place, _) in inputs.iter().enumerate().filter(|(_, on)| **on) {
-            words[place / 64] |= 1 << (place % 64);
-        }
-        self.scan.step(
-            &mut self.scratch,
-            &mut self.registers,
-            &words,
-            &mut self.outputs,
-        );
-        (0..self.width)
-            .map(|place| self.outputs[place / 64] >> (place % 64) & 1 == 1)
-            .collect()
-    }
 }
 
 /// What `xmllint` says about a text and the schema; `None` where one of them is not at hand.

@@ -8,7 +8,8 @@ use understudy_ladder::Interpreter;
 
 use self::execution::Execution;
 use self::text::Text;
-use crate::support::{Dice, PERIOD, Running, program};
+use crate::support::{Dice, PERIOD, program};
+use understudy_logic::Running;
 
 fn check(seed: u64) {
     let mut dice = Dice::new(seed);
@@ -39,7 +40,7 @@ fn check(seed: u64) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 150, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn a_ladder_scans_as_its_text_executes(seed: u64) {

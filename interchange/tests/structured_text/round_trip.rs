@@ -6,7 +6,8 @@ use proptest::prelude::*;
 use understudy_ladder::structured_text;
 use understudy_logic::{Circuit, CircuitBuilder};
 
-use crate::support::{Dice, PERIOD, Running, program};
+use crate::support::{Dice, PERIOD, program};
+use understudy_logic::Running;
 
 /// A circuit with all operations and registers that read each other.
 fn random_circuit(seed: u64) -> Circuit {

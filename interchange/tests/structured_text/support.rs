@@ -5,7 +5,6 @@ use std::time::Duration;
 use understudy_diagnostic::Diagnostic;
 use understudy_interchange::structured_text::read;
 use understudy_ladder::{Program, check};
-use understudy_logic::{Circuit, Scan, Scratch};
 
 pub(crate) const PERIOD: Duration = Duration::from_millis(100);
 
@@ -46,37 +45,6 @@ pub(crate) fn findings(text: &str, diagnostics: Vec<Diagnostic>) -> String {
         )
     });
     lines.collect()
-}
-
-/// A running circuit with bits for images.
-pub(crate) struct Running {
-    scan: Scan,
-    scratch: Scratch,
-    state: Vec<u64>,
-}
-
-impl Running {
-    pub(crate) fn new(circuit: &Circuit) -> Self {
-        let scan = Scan::new(circuit);
-        Self {
-            state: scan.initial().to_vec(),
-            scan,
-            scratch: Scratch::default(),
-        }
-    }
-
-    pub(crate) fn step(&mut self, inputs: &[bool]) -> Vec<bool> {
-        let mut packed = vec![0; inputs.len().div_ceil(64)];
-        for (index, &input) in inputs.iter().enumerate() {
-            packed[index / 64] |= u64::from(input) << (index % 64);
-        }
-        let mut outputs = vec![0; self.scan.output_count().div_ceil(64)];
-        self.scan
-            .step(&mut self.scratch, &mut self.state, &packed, &mut outputs);
-        (0..self.scan.output_count())
-            .map(|index| outputs[index / 64] >> (index % 64) & 1 == 1)
-            .collect()
-    }
 }
 
 /// Random numbers, the same for the same seed.

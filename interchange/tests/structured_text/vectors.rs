@@ -5,7 +5,8 @@ use std::time::Duration;
 use understudy_interchange::structured_text::read;
 use understudy_ladder::Interpreter;
 
-use crate::support::{Running, program};
+use crate::support::program;
+use understudy_logic::Running;
 
 fn bits(text: &str) -> Vec<bool> {
     text.bytes().map(|byte| byte == b'1').collect()

@@ -8,7 +8,8 @@ use understudy_logic::{Circuit, CircuitBuilder};
 
 use crate::random::{Dice, random_program};
 use crate::structured_text_reader::StructuredText;
-use crate::support::{PERIOD, Running, program};
+use crate::support::{PERIOD, program};
+use understudy_logic::Running;
 
 /// A circuit with all operations and registers that read each other.
 fn random_circuit(seed: u64) -> Circuit {

@@ -9,7 +9,8 @@ use understudy_ladder::{
 };
 
 use crate::random::{Dice, random_program};
-use crate::support::{PERIOD, Running, program};
+use crate::support::{PERIOD, program};
+use understudy_logic::Running;
 
 fn check(program: &Program, period: Duration, scans: impl Iterator<Item = Vec<bool>>) {
     let mut interpreter = Interpreter::new(program, period).expect("a sound program");

@@ -4,7 +4,8 @@ use std::fmt::Write;
 
 use understudy_ladder::Interpreter;
 
-use crate::support::{PERIOD, Running, program};
+use crate::support::{PERIOD, program};
+use understudy_logic::Running;
 
 /// A block of `vectors/semantics.txt`.
 struct Case {
