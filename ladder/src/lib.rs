@@ -38,6 +38,7 @@ pub use from_circuit::from_circuit;
 pub use interpreter::Interpreter;
 pub use lexer::{MAXIMUM_NAME_LENGTH, MAXIMUM_PRESET_TIME, parse_address, parse_time};
 pub use lower::{LowerError, Observer, PERIODS, Write};
+pub use names::{Language, Namer};
 pub use parser::{
     KEYWORDS, MAXIMUM_NESTING, MAXIMUM_PRESET_VALUE, MAXIMUM_RUNGS, MAXIMUM_TEXT_BYTES, Parsed,
     parse,

@@ -10,28 +10,32 @@ const MAXIMUM_WANTED_LENGTH: usize = MAXIMUM_NAME_LENGTH - 12;
 
 /// The language that the names are for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Language {
+pub enum Language {
+    /// That of this crate.
     Ladder,
     /// IEC 61131-3: ASCII, no dots, no two underscores beside each other or one at the end, case does not matter.
     StructuredText,
 }
 
 /// Gives names that it has not given before.
-pub(crate) struct Namer {
+#[derive(Debug, Clone)]
+pub struct Namer {
     language: Language,
     /// As compared, in capitals for Structured Text.
     taken: HashSet<String>,
 }
 
 impl Namer {
-    pub(crate) fn new(language: Language) -> Self {
+    /// For one program in `language`.
+    pub fn new(language: Language) -> Self {
         Self {
             language,
             taken: HashSet::new(),
         }
     }
 
-    pub(crate) fn name(&mut self, wanted: &str) -> String {
+    /// A legal name that is like `wanted`; another one each time.
+    pub fn name(&mut self, wanted: &str) -> String {
         let legal = match self.language {
             Language::Ladder => ladder_name(wanted),
             Language::StructuredText => structured_text_name(wanted),
