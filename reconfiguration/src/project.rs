@@ -22,7 +22,8 @@ use std::time::Duration;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 use understudy_diagnostic::{Diagnostic, Report, has_errors};
-use understudy_ladder::{Program, parse};
+use understudy_interchange::parse_program;
+use understudy_ladder::Program;
 
 use self::fields::Fields;
 use self::patience::patience;
@@ -278,7 +279,7 @@ impl Reader<'_> {
                 return None;
             }
         };
-        let parsed = parse(&text);
+        let parsed = parse_program(name.get_ref(), &text);
         let wrong = has_errors(&parsed.diagnostics);
         self.ladders.push(Report {
             name: name.get_ref().clone(),
