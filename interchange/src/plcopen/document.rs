@@ -182,6 +182,11 @@ pub(crate) enum Kind {
     SimultaneousConvergence,
     JumpStep(Name),
     Actions(Vec<Action>),
+    /// To the label of that name.
+    Jump(Name),
+    Label(Name),
+    /// To the end of the body.
+    Return,
     /// What has no meaning here, by the name of its element.
     Other(&'static str),
 }

@@ -85,6 +85,9 @@ pub(crate) fn draw(pou: &Pou, globals: &[Variable], plan: &Plan, period: Duratio
                 let contact = drawing.kept_in(power, &format!("power_{object}"), &step.span);
                 drawing.kept.insert(*object, contact);
             }
+            Action::Jump { .. } | Action::Label(_) => {
+                drawing.general("a jump", step.span.clone());
+            }
         }
     }
     drawing.flush();

@@ -5,6 +5,7 @@
 //! it is first asked for, and stays so: what an object has let through is not asked again when a coil has changed the
 //! variable meanwhile. Where that matters, the power is *kept* in a bit of its own.
 
+mod jumps;
 mod links;
 mod walk;
 
@@ -57,6 +58,12 @@ pub(crate) enum Action {
         power: Power,
         guard: Option<Power>,
     },
+    /// With power, what comes before the label is not done; without a name, what comes before the end.
+    Jump {
+        label: Option<Name>,
+        power: Power,
+    },
+    Label(Name),
 }
 
 /// A call of a function block.
@@ -85,6 +92,8 @@ impl Action {
             Self::Write { power, guard, .. } | Self::Keep { power, guard, .. } => {
                 guard.iter().chain([power]).collect()
             }
+            Self::Jump { power, .. } => vec![power],
+            Self::Label(_) => Vec::new(),
             Self::Call(call) => {
                 let inputs = call.inputs.iter().map(|input| &input.power);
                 inputs.chain(&call.enable).collect()
@@ -108,6 +117,7 @@ pub(crate) fn plan(
         plan = Walk::new(graph, &links, &stale).run(&mut found).0;
     }
     diagnostics.append(&mut found);
+    jumps::check(graph, &plan, diagnostics);
     for object in stale {
         let message = "it is asked for again after its variable has been written: it keeps what it let through first, where tools that \
                        write Structured Text read the variable again";
@@ -144,7 +154,7 @@ fn stale(graph: &Graph, links: &Links, plan: &Plan, trace: &Trace) -> HashSet<us
                 let key = format!("{}.", call.instance.to_uppercase());
                 writes.entry(key).or_default().push(place);
             }
-            Action::Keep { .. } => {}
+            Action::Keep { .. } | Action::Jump { .. } | Action::Label(_) => {}
         }
     }
     let changed = |text: &str, first: usize, last: usize| {

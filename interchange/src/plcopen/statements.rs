@@ -9,7 +9,7 @@ use understudy_ladder::Name;
 
 use super::document::{Edge, Modifier, Storage};
 use super::literal::{boolean, integer, time};
-use super::plan::{Action, Call, Input, Plan};
+use super::plan::{Action, Call, Input, Plan, Step};
 use super::power::{Power, Read};
 
 /// Operators of functions that have one.
@@ -111,30 +111,80 @@ impl<'a> Statements<'a> {
         // Objects are numbered by graph, and a unit may have several.
         self.kept.clear();
         self.triggers.clear();
+        // Jumps on their way, with the bits that say whether they are done.
+        let mut jumps: Vec<(Option<String>, String)> = Vec::new();
         for step in &plan.steps {
             match &step.action {
-                Action::Write {
-                    targets,
-                    power,
-                    guard,
-                } => {
-                    self.write(targets, power, guard.as_ref(), &step.span);
+                Action::Jump { label, power } => {
+                    let done = self.jump(&jumps, power, &step.span);
+                    let label = label.as_ref().map(|label| label.to_uppercase());
+                    jumps.push((label, done));
                 }
-                Action::Keep {
-                    object,
-                    power,
-                    guard,
-                } => {
-                    self.prepare(power, &step.span);
-                    let kind = self.kind(power);
-                    let name = self.declare("power", &kind);
-                    self.kept.insert(*object, (name.clone(), kind));
-                    self.guarded(guard.as_ref(), &step.span, |own| {
-                        own.assign(&name, power, &step.span)
-                    });
+                Action::Label(name) => {
+                    jumps.retain(|(label, _)| label.as_deref() != Some(&name.to_uppercase()));
                 }
-                Action::Call(call) => self.call(call, &step.span),
+                _ => self.unless(&jumps, &step.span, |own| own.step(step)),
             }
+        }
+    }
+
+    /// Only where none of the jumps is done.
+    fn unless(
+        &mut self,
+        jumps: &[(Option<String>, String)],
+        span: &Range<usize>,
+        inner: impl FnOnce(&mut Self),
+    ) {
+        if jumps.is_empty() {
+            inner(self);
+            return;
+        }
+        let done: Vec<&str> = jumps.iter().map(|(_, done)| done.as_str()).collect();
+        self.push(&format!("IF NOT ({}) THEN\n", done.join(" OR ")), span);
+        inner(self);
+        self.push("END_IF;\n", span);
+    }
+
+    /// The bit that says whether the jump is done.
+    fn jump(
+        &mut self,
+        jumps: &[(Option<String>, String)],
+        power: &Power,
+        span: &Range<usize>,
+    ) -> String {
+        let done = self.declare("jumped", "BOOL");
+        self.push(&format!("{done} := FALSE;\n"), span);
+        self.unless(jumps, span, |own| {
+            own.prepare(power, span);
+            own.assign(&done, power, span);
+        });
+        done
+    }
+
+    fn step(&mut self, step: &Step) {
+        match &step.action {
+            Action::Jump { .. } | Action::Label(_) => {}
+            Action::Write {
+                targets,
+                power,
+                guard,
+            } => {
+                self.write(targets, power, guard.as_ref(), &step.span);
+            }
+            Action::Keep {
+                object,
+                power,
+                guard,
+            } => {
+                self.prepare(power, &step.span);
+                let kind = self.kind(power);
+                let name = self.declare("power", &kind);
+                self.kept.insert(*object, (name.clone(), kind));
+                self.guarded(guard.as_ref(), &step.span, |own| {
+                    own.assign(&name, power, &step.span)
+                });
+            }
+            Action::Call(call) => self.call(call, &step.span),
         }
     }
 

@@ -260,7 +260,11 @@ impl Lowering<'_> {
             .flat_map(|result| result.keys().copied())
             .collect();
         for cell in written {
-            let base = self.present(cell);
+            let base = if self.cells[cell].role == Role::Passing {
+                Value::Truth(self.graph.constant(false))
+            } else {
+                self.present(cell)
+            };
             let of = |result: &HashMap<usize, Value>| {
                 result.get(&cell).cloned().unwrap_or_else(|| base.clone())
             };

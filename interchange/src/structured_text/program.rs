@@ -17,6 +17,8 @@ pub(super) enum Role {
     Memory,
     /// An output of a block of the ladder, which its block alone writes.
     Pin,
+    /// A bit that means something only where this execution has written it.
+    Passing,
     /// A bit that stands for the output of a timer, which the calls of the timer alone write.
     Held,
 }

@@ -345,7 +345,7 @@ impl Placing {
         if !waiting.is_empty() {
             let mut before: Vec<Truth> = Vec::new();
             for condition in &mut held {
-                let cell = self.bit("held", Role::Memory);
+                let cell = self.bit("held", Role::Passing);
                 let mut parts = vec![condition.clone()];
                 parts.extend(
                     before

@@ -1,6 +1,7 @@
 //! PLCopen XML, from outside.
 
 mod bad_input;
+mod jumps;
 mod meaning;
 mod public_ladders;
 #[path = "../../../ladder/tests/ladder/random.rs"]

@@ -7,10 +7,11 @@ use understudy_interchange::plcopen::read;
 use understudy_ladder::print;
 
 use crate::random::Dice;
-use crate::support::{PERIOD, Run, data, findings, program};
+use crate::support::{PERIOD, data, findings, program};
+use understudy_logic::Running;
 
 /// One contact or coil of a random ladder.
-struct Cell {
+pub(crate) struct Cell {
     id: usize,
     variable: String,
     is_coil: bool,
@@ -70,7 +71,7 @@ impl Naive<'_> {
     }
 }
 
-fn file(variables: &str, objects: &str) -> String {
+pub(crate) fn file(variables: &str, objects: &str) -> String {
     format!(
         r#"<?xml version="1.0" encoding="utf-8"?>
 <project xmlns="http://www.plcopen.org/xml/tc6_0201" xmlns:xhtml="http://www.w3.org/1999/xhtml">
@@ -84,7 +85,7 @@ fn file(variables: &str, objects: &str) -> String {
     )
 }
 
-fn variables(list: &[(&str, &str, &str)]) -> String {
+pub(crate) fn variables(list: &[(&str, &str, &str)]) -> String {
     let mut text = String::new();
     for (section, name, kind) in list {
         let _ = write!(
@@ -102,7 +103,7 @@ fn wires(sources: &[usize]) -> String {
         .collect()
 }
 
-fn element(cell: &Cell) -> String {
+pub(crate) fn element(cell: &Cell) -> String {
     let name = if cell.is_coil { "coil" } else { "contact" };
     let edge = match cell.edge {
         None => "",
@@ -120,7 +121,7 @@ fn element(cell: &Cell) -> String {
     )
 }
 
-const RAIL: &str = "<leftPowerRail localId=\"0\"><position x=\"0\" y=\"0\"/><connectionPointOut formalParameter=\"\"/></leftPowerRail>\n";
+pub(crate) const RAIL: &str = "<leftPowerRail localId=\"0\"><position x=\"0\" y=\"0\"/><connectionPointOut formalParameter=\"\"/></leftPowerRail>\n";
 
 /// Contacts and coils with wires to what stands to the left of them, and coils in between.
 fn random_cells(dice: &mut Dice) -> Vec<Cell> {
@@ -164,7 +165,7 @@ fn random_graphs_mean_what_a_naive_walk_finds() {
         let objects: String = cells.iter().map(element).collect();
         let program = program(&file(&declared, &format!("{RAIL}{objects}")));
         let circuit = program.lower(PERIOD).expect("it was checked");
-        let mut run = Run::new(&circuit);
+        let mut run = Running::new(&circuit);
         let mut order: Vec<usize> = cells
             .iter()
             .filter(|cell| cell.is_coil)
@@ -211,7 +212,7 @@ fn dancing_lights_do_what_another_compiler_s_code_does() {
     let vectors = std::fs::read_to_string(vectors).expect("a file that exists");
     let vectors: serde_json::Value = serde_json::from_str(&vectors).expect("vectors");
     let circuit = program(&text).lower(PERIOD).expect("a sound program");
-    let mut run = Run::new(&circuit);
+    let mut run = Running::new(&circuit);
     let scans = vectors["scans"].as_array().expect("scans");
     for (number, scan) in scans.iter().enumerate() {
         let (inputs, outputs) = scan
@@ -255,7 +256,7 @@ const BITS: [(&str, &str, &str); 4] = [
     ("output", "z", "<BOOL/>"),
 ];
 
-fn contact(id: usize, variable: &str, sources: &[usize]) -> String {
+pub(crate) fn contact(id: usize, variable: &str, sources: &[usize]) -> String {
     element(&Cell {
         id,
         variable: variable.to_owned(),
@@ -267,11 +268,11 @@ fn contact(id: usize, variable: &str, sources: &[usize]) -> String {
     })
 }
 
-fn coil(id: usize, variable: &str, sources: &[usize]) -> String {
+pub(crate) fn coil(id: usize, variable: &str, sources: &[usize]) -> String {
     contact(id, variable, sources).replace("contact", "coil")
 }
 
-fn block(id: usize, kind: &str, instance: &str, inputs: &[(&str, usize)]) -> String {
+pub(crate) fn block(id: usize, kind: &str, instance: &str, inputs: &[(&str, usize)]) -> String {
     let inputs: String = inputs
         .iter()
         .map(|(pin, source)| format!("<variable formalParameter=\"{pin}\"><connectionPointIn>{}</connectionPointIn></variable>", wires(&[*source])))
@@ -287,7 +288,7 @@ fn block(id: usize, kind: &str, instance: &str, inputs: &[(&str, usize)]) -> Str
     )
 }
 
-fn value(id: usize, expression: &str) -> String {
+pub(crate) fn value(id: usize, expression: &str) -> String {
     format!(
         "<inVariable localId=\"{id}\"><position x=\"{x}\" y=\"{x}\"/><connectionPointOut/><expression>{expression}</expression></inVariable>\n",
         x = id * 10
@@ -417,7 +418,7 @@ fn a_sequence_steps_as_its_chart_says() {
     );
     let program = program(&text);
     let circuit = program.lower(PERIOD).expect("it was checked");
-    let mut run = Run::new(&circuit);
+    let mut run = Running::new(&circuit);
     // a, b and then y, z: both branches begin together; y follows b while its step is active and is left as it is after that; z comes
     // two scans after its step.
     let scans = [
@@ -451,7 +452,7 @@ fn units_of_the_file_stand_in_place_of_their_calls() {
     let text = std::fs::read_to_string(path).expect("an example");
     let program = program(&text);
     let circuit = program.lower(PERIOD).expect("it was checked");
-    let mut run = Run::new(&circuit);
+    let mut run = Running::new(&circuit);
     let mut dice = Dice::new(3);
     let mut doubts = 0;
     for scan in 0..200 {

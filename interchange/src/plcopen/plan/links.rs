@@ -258,6 +258,9 @@ fn has_output(object: &Object) -> bool {
             | Kind::Comment(_)
             | Kind::Actions(_)
             | Kind::JumpStep(_)
+            | Kind::Jump(_)
+            | Kind::Label(_)
+            | Kind::Return
     )
 }
 

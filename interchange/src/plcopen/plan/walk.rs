@@ -70,14 +70,9 @@ impl<'a> Walk<'a> {
         let mut acting: Vec<usize> = (0..objects.len())
             .filter(|&place| self.acts(place))
             .collect();
-        acting.sort_by_key(|&place| {
+        acting.sort_by_cached_key(|&place| {
             let object = &objects[place];
-            let order = if object.order == 0 {
-                u64::MAX
-            } else {
-                object.order
-            };
-            (order, object.position.1, object.position.0)
+            (self.order(object), object.position.1, object.position.0)
         });
         for place in acting {
             self.visit(place, diagnostics);
@@ -101,10 +96,30 @@ impl<'a> Walk<'a> {
         (self.plan, self.trace)
     }
 
-    /// Coils, written variables, and function blocks act of themselves.
+    /// When an object acts; a label without an order, just before what stands below it.
+    fn order(&self, object: &Object) -> (u64, bool) {
+        if object.order != 0 {
+            return (object.order, true);
+        }
+        let others = self.graph.objects.iter().filter(|other| {
+            matches!(object.kind, Kind::Label(_))
+                && other.order != 0
+                && other.position.1 >= object.position.1
+        });
+        match others.map(|other| other.order).min() {
+            Some(next) => (next, false),
+            None => (u64::MAX, true),
+        }
+    }
+
+    /// Coils, written variables, function blocks and jumps act of themselves.
     fn acts(&self, place: usize) -> bool {
         match &self.graph.objects[place].kind {
-            Kind::Coil(..) | Kind::OutVariable(..) => true,
+            Kind::Coil(..)
+            | Kind::OutVariable(..)
+            | Kind::Jump(_)
+            | Kind::Label(_)
+            | Kind::Return => true,
             Kind::InOutVariable(..) => !self.graph.objects[place].inputs.is_empty(),
             Kind::Block(_) => self.links.is_block[place],
             Kind::Transition(transition) => matches!(transition.condition, Condition::Wired),

@@ -360,7 +360,9 @@ impl<'a> Rungs<'a> {
                 match cell.role {
                     Role::Input => program.inputs.push(signal),
                     Role::Output => program.outputs.push(signal),
-                    Role::Memory | Role::Pin | Role::Held => program.memory.push(signal),
+                    Role::Memory | Role::Pin | Role::Held | Role::Passing => {
+                        program.memory.push(signal)
+                    }
                 }
             }
         }

@@ -292,7 +292,7 @@ impl Resolver {
                     Role::Pin | Role::Held => {
                         format!("`{name}` is an output of a block, and cannot be assigned")
                     }
-                    Role::Output | Role::Memory => {
+                    Role::Output | Role::Memory | Role::Passing => {
                         self.store_cell(cell, kind, value, value_span, span);
                         return;
                     }

@@ -72,6 +72,9 @@ impl Walk<'_> {
                     },
                 );
             }
+            Kind::Jump(label) => self.jump(place, Some(label.clone()), diagnostics),
+            Kind::Return => self.jump(place, None, diagnostics),
+            Kind::Label(name) => self.step(place, Action::Label(name.clone())),
             Kind::Block(_) if self.links.is_block[place] => self.call(place),
             Kind::Block(_) => self.function(place),
             _ => {}
@@ -173,6 +176,16 @@ impl Walk<'_> {
                 guard,
             },
         );
+    }
+
+    fn jump(&mut self, place: usize, label: Option<Name>, diagnostics: &mut Vec<Diagnostic>) {
+        let object = self.object(place);
+        if object.inputs.iter().all(|pin| pin.wires.is_empty()) {
+            unconnected(object, "the jump", diagnostics);
+            return;
+        }
+        let power = self.power(place, 0);
+        self.step(place, Action::Jump { label, power });
     }
 
     fn inputs(&self, place: usize) -> Vec<Input> {
