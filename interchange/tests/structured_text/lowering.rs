@@ -1,8 +1,9 @@
 //! What texts become, and that they do what they say.
 
 use understudy_ladder::print;
+use understudy_logic::Running;
 
-use crate::support::{PERIOD, Running, findings, program};
+use crate::support::{PERIOD, findings, program};
 
 #[test]
 fn a_text_as_a_ladder() {
