@@ -9,6 +9,7 @@ mod deployment;
 mod keys;
 mod parties;
 mod strangers;
+mod systemd;
 
 use std::fs;
 use std::path::{Path, PathBuf};
