@@ -246,8 +246,13 @@ impl Station {
 
     fn next_wakeup(&self) -> Time {
         let others = [self.copies.wakeup(), self.speaks_at(), self.asks_at()];
-        let earlier = |next: Time, other: Option<Time>| other.map_or(next, |at| at.min(next));
-        others.into_iter().fold(self.paces_at(), earlier)
+        let first = others.into_iter().flatten().fold(Time(u64::MAX), Time::min);
+        // Nobody paces before the cycle is over.
+        let end = self.clock.anchor() + self.settings.agreement.schedule.period();
+        if self.clock.moment().is_some() && first <= end {
+            return first;
+        }
+        first.min(self.paces_at())
     }
 
     fn wake(&mut self, now: Time) {

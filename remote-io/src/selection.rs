@@ -170,20 +170,22 @@ impl<'a> Heard<'a> {
     }
 
     /// Equal lineages and unequal digests: a state was corrupted, here or there.
-    pub(crate) fn digest_differences(self) -> impl Iterator<Item = (ProgramId, StationSet)> {
-        let programs = (0..self.controllers as u8).map(ProgramId);
-        programs.flat_map(move |program| {
-            let mut holdings = (0..self.turns.len() as u8).filter_map(move |rank| {
-                let holding = holding_of(self.turn_of(StationId(rank))?, program)?;
-                Some((StationId(rank), holding))
-            });
-            let first = holdings.next();
-            holdings.filter_map(move |(station, holding)| {
-                let (first_station, first) = first?;
-                let differs = first.lineage == holding.lineage && first.digest != holding.digest;
-                differs.then(|| (program, [first_station, station].into_iter().collect()))
-            })
-        })
+    pub(crate) fn digest_differences(&self) -> Vec<(ProgramId, StationSet)> {
+        let mut differences = Vec::new();
+        for program in (0..self.controllers as u8).map(ProgramId) {
+            let mut first = None;
+            for station in (0..self.turns.len() as u8).map(StationId) {
+                let turn = self.turn_of(station);
+                let Some(holding) = turn.and_then(|turn| holding_of(turn, program)) else {
+                    continue;
+                };
+                let (other, theirs) = *first.get_or_insert((station, holding));
+                if theirs.lineage == holding.lineage && theirs.digest != holding.digest {
+                    differences.push((program, [other, station].into_iter().collect()));
+                }
+            }
+        }
+        differences
     }
 
     fn turn_of(&self, station: StationId) -> Option<&'a Turn> {
@@ -384,7 +386,7 @@ mod tests {
             .iter()
             .filter(|&&case| case == Controller::Corrupted)
             .count();
-        let differences = heard.digest_differences().count();
+        let differences = heard.digest_differences().len();
         assert_eq!(differences, if with_understudy { corrupted } else { 0 });
         assert_eq!(heard.syndromes().count(), 0);
     }

@@ -28,6 +28,7 @@ pub struct Schedule {
     deadline: Duration,
     rest: Duration,
     guard: Duration,
+    grace: Duration,
     stall: Duration,
 }
 
@@ -110,6 +111,7 @@ impl Schedule {
             deadline: share(DEADLINE_PER_MILLE),
             rest: share(REST_PER_MILLE),
             guard: share(GUARD_PER_MILLE),
+            grace: (share(GUARD_PER_MILLE) * (controllers + understudies) as u32).min(period),
             stall: share(STALL_PER_MILLE),
         })
     }
@@ -175,6 +177,11 @@ impl Schedule {
     /// How long the next rank waits for a silent pacemaker.
     pub fn guard(&self) -> Duration {
         self.guard
+    }
+
+    /// How long whoever takes over the pace from silent stations may need for it, at most a period.
+    pub fn grace(&self) -> Duration {
+        self.grace
     }
 
     /// How late a host may wake a party before it has to say so.

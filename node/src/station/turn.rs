@@ -18,15 +18,17 @@ impl Station {
         let own_program = ProgramId(station.0);
         let understudy = self.settings.agreement.schedule.is_understudy(station);
         for word in &turn.words {
-            if !understudy && word.members == ProgramSet::only(own_program) {
-                let holdings = turn.holdings.iter();
-                let own = holdings.filter(|holding| holding.program == own_program);
-                self.cycle.said.extend(own.map(|holding| Said {
+            let mut holdings = turn.holdings.iter();
+            if !understudy
+                && word.members == ProgramSet::only(own_program)
+                && let Some(own) = holdings.find(|holding| holding.program == own_program)
+            {
+                self.cycle.said.push(Said {
                     program: own_program,
-                    lineage: holding.lineage,
-                    digest: holding.digest,
+                    lineage: own.lineage,
+                    digest: own.digest,
                     outputs: word.sum.clone(),
-                }));
+                });
             }
             if station < self.own() {
                 self.cycle.others_have = self.cycle.others_have.or(word.members);

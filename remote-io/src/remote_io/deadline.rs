@@ -74,7 +74,7 @@ impl RemoteIo {
     /// Reports words and states of any program that do not agree, when they begin to differ.
     fn report_differences(&mut self, moment: Moment) {
         let syndromes: Vec<_> = self.heard().syndromes().collect();
-        let states: Vec<_> = self.heard().digest_differences().collect();
+        let states = self.heard().digest_differences();
         let before = std::mem::take(&mut self.differed);
         for (syndrome, accused) in syndromes {
             self.differed.push((None, accused));
@@ -159,8 +159,6 @@ impl RemoteIo {
         if !self.decided && self.clock.moment().is_some() {
             return deadline;
         }
-        // Whoever is to take over the pace from silent stations gets the time for it.
-        let grace = (schedule.guard() * schedule.stations() as u32).min(schedule.period());
-        deadline + schedule.period() * (self.idle + 1) + grace
+        deadline + schedule.period() * (self.idle + 1) + schedule.grace()
     }
 }

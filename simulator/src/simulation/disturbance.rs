@@ -1,12 +1,11 @@
 //! What a fault does to a party. Links do their own part in [`crate::links`].
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
-use understudy_wire::{
-    Agreement, ConfigurationHash, Epoch, Frame, Input, Machine, Party, ProgramId, StationId,
-};
+use understudy_wire::{Agreement, ConfigurationHash, Epoch, Frame, Input, Machine, Party};
 
 use super::{Observe, Record, Simulation};
 use crate::fault::{Action, Fault};
@@ -14,75 +13,70 @@ use crate::slot::Slot;
 
 impl Simulation {
     pub(super) fn apply(&mut self, fault: &Fault, observe: &mut Observe<'_>) {
-        let cycle = self.pace.cycle();
-        observe(self.now, cycle, fault.party, Record::Fault(fault));
-        self.links.disturb(self.now, fault.party, fault.action);
-        match fault.party {
-            Party::Station(station) if station.index() < self.stations.len() => {
-                self.disturb_station(station, fault.action, observe);
+        let &Fault { party, action, .. } = fault;
+        observe(self.now, self.pace.cycle(), party, Record::Fault(fault));
+        self.links.disturb(self.now, party, action);
+        let is_there = match party {
+            Party::Station(station) => station.index() < self.stations.len(),
+            Party::RemoteIo(program) | Party::Plant(program) => {
+                program.index() < self.remote_ios.len()
             }
-            Party::RemoteIo(program) if program.index() < self.remote_ios.len() => {
-                self.disturb_remote_io(program, fault.action, observe);
+        };
+        match (party, action) {
+            _ if !is_there => {}
+            (Party::Plant(program), Action::Crash) => self.plants.crash(program),
+            (Party::Plant(_), Action::Restart) => self.restart(party, action),
+            (Party::Plant(_), _) => {}
+            (_, Action::Restart | Action::RestartMisconfigured | Action::RestartInEpoch { .. }) => {
+                self.restart(party, action)
             }
-            Party::Plant(program) if program.index() < self.remote_ios.len() => {
-                match fault.action {
-                    Action::Crash => self.plants.crash(program),
-                    Action::Restart => self.plants.restart(program),
-                    _ => {}
+            (Party::Station(station), Action::FlipState { program, bit }) => {
+                if let Some(machine) = self.stations[station.index()].machine() {
+                    machine.flip_state(program, usize::from(bit));
                 }
             }
-            _ => {}
+            (Party::RemoteIo(_), Action::Release) => self.give(party, Input::Release, observe),
+            (Party::Station(station), _) => {
+                let waiting = disturb(&mut self.stations[station.index()], action);
+                self.catch_up(party, waiting, observe);
+            }
+            (Party::RemoteIo(program), _) => {
+                let waiting = disturb(&mut self.remote_ios[program.index()], action);
+                self.catch_up(party, waiting, observe);
+            }
         }
     }
 
-    fn disturb_station(&mut self, station: StationId, action: Action, observe: &mut Observe<'_>) {
-        let slot = &mut self.stations[station.index()];
-        match action {
-            Action::Restart | Action::RestartMisconfigured | Action::RestartInEpoch { .. } => {
+    fn restart(&mut self, party: Party, action: Action) {
+        let agreed = |agreement: &Arc<Agreement>| match action {
+            Action::RestartMisconfigured => Arc::new(misconfigured(agreement)),
+            _ => Arc::clone(agreement),
+        };
+        match party {
+            Party::Station(station) => {
                 self.founded += 1;
                 let mut settings = self.parts.stations[station.index()].clone();
                 settings.epoch = match action {
                     Action::RestartInEpoch { epoch } => Epoch(epoch),
                     _ => Epoch(self.founded),
                 };
-                if action == Action::RestartMisconfigured {
-                    settings.agreement = Arc::new(misconfigured(&settings.agreement));
-                }
-                slot.restart(Station::new(self.now, settings));
+                settings.agreement = agreed(&settings.agreement);
+                self.stations[station.index()].restart(Station::new(self.now, settings));
             }
-            Action::FlipState { program, bit } => {
-                if let Some(machine) = slot.machine() {
-                    machine.flip_state(program, usize::from(bit));
-                }
+            Party::RemoteIo(program) => {
+                let mut settings = self.parts.remote_ios[program.index()].clone();
+                settings.agreement = agreed(&settings.agreement);
+                self.remote_ios[program.index()].restart(RemoteIo::new(self.now, settings));
+                self.show_field(program);
             }
-            _ => {
-                let waiting = disturb(slot, action);
-                for frame in waiting {
-                    self.give(Party::Station(station), Input::Frame(&frame), observe);
-                }
-            }
+            Party::Plant(program) => self.plants.restart(program),
         }
     }
 
-    fn disturb_remote_io(&mut self, program: ProgramId, action: Action, observe: &mut Observe<'_>) {
-        let party = Party::RemoteIo(program);
-        let slot = &mut self.remote_ios[program.index()];
-        match action {
-            Action::Restart | Action::RestartMisconfigured | Action::RestartInEpoch { .. } => {
-                let mut settings = self.parts.remote_ios[program.index()].clone();
-                if action == Action::RestartMisconfigured {
-                    settings.agreement = Arc::new(misconfigured(&settings.agreement));
-                }
-                slot.restart(RemoteIo::new(self.now, settings));
-                self.show_field(program);
-            }
-            Action::Release => self.give(party, Input::Release, observe),
-            _ => {
-                let waiting = disturb(slot, action);
-                for frame in waiting {
-                    self.give(party, Input::Frame(&frame), observe);
-                }
-            }
+    /// Frames that have waited for a party that stood still.
+    fn catch_up(&mut self, party: Party, waiting: VecDeque<Arc<Frame>>, observe: &mut Observe<'_>) {
+        for frame in waiting {
+            self.give(party, Input::Frame(&frame), observe);
         }
     }
 }
@@ -94,10 +88,8 @@ fn misconfigured(agreement: &Agreement) -> Agreement {
     }
 }
 
-fn disturb<M: Machine>(
-    slot: &mut Slot<M>,
-    action: Action,
-) -> impl IntoIterator<Item = Arc<Frame>> + use<M> {
+/// Answers with the frames that have waited for it, where it goes on.
+fn disturb<M: Machine>(slot: &mut Slot<M>, action: Action) -> VecDeque<Arc<Frame>> {
     match action {
         Action::Crash => slot.crash(),
         Action::Stop => slot.stop(),
@@ -105,5 +97,5 @@ fn disturb<M: Machine>(
         Action::Slow { by } => slot.slow_down(by),
         _ => {}
     }
-    Default::default()
+    VecDeque::new()
 }
