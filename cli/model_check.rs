@@ -6,8 +6,9 @@ use std::thread::available_parallelism;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use understudy_cluster::Cluster;
-use understudy_model_checking::{ALL, Budget, Counterexample, Model, Promise, check};
+use understudy_model_checking::{ALL, Budget, Counterexample, Model, Promise, Start, check};
 use understudy_scenarios::{Expectation, Parties, Scenario, parts, write};
+use understudy_wire::Party;
 
 use crate::answer::{Answer, Status};
 use crate::files;
@@ -18,6 +19,8 @@ use crate::overrides::OverrideArguments;
 #[command(after_help = "\
 Example:
   understudy model-check examples/press-cell/cluster.toml --faults 1 --cycles 2
+  understudy model-check examples/press-cell/cluster.toml --restarted all --kinds loss,delay --cycles 12
+  understudy model-check examples/press-cell/cluster.toml --behind robot --restarted press-io
 
 The very state machines of stations and remote I/Os run in virtual time, with a slot of the schedule as its grain. What breaks a
 property is written as a scenario that `understudy simulate` replays. States grow with the power of the faults: 2 faults in 2 cycles of the
@@ -34,6 +37,12 @@ pub(crate) struct Arguments {
     /// Cycles in which they may begin
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u64).range(1..=1000))]
     cycles: u64,
+    /// Who has just started again where a run begins; `all` for all stations and remote I/Os. Without it a run begins in step
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    restarted: Vec<String>,
+    /// Who stood still for the cycle before
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    behind: Vec<String>,
     /// Which faults; all of them where none are named
     #[arg(long, value_name = "KIND", value_enum, value_delimiter = ',')]
     kinds: Vec<Kind>,
@@ -82,7 +91,11 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         Ok(read) => read,
         Err(answer) => return answer,
     };
-    let model = match Model::new(parts(&cluster), budget(arguments), &ALL) {
+    let start = match start(arguments, &cluster) {
+        Ok(start) => start,
+        Err(answer) => return answer.with_reports(reports),
+    };
+    let model = match Model::new(parts(&cluster), start, budget(arguments), &ALL) {
         Ok(model) => model,
         Err(error) => {
             return Answer::failed(Status::Failed, "U0530", error.to_string())
@@ -122,6 +135,41 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         answer.status = Status::Failed;
     }
     answer
+}
+
+/// The parties that are named, or every name that is none of a station or of a remote I/O.
+fn start(arguments: &Arguments, cluster: &Cluster) -> Result<Start, Answer> {
+    let plays = |party: &Party| !matches!(party, Party::Plant(_));
+    let mut unknown = Vec::new();
+    let mut find = |names: &[String]| {
+        let mut found = Vec::new();
+        for name in names {
+            match cluster.party(name).filter(plays) {
+                Some(party) => found.push(party),
+                None if name == "all" => found.extend(cluster.parties().filter(plays)),
+                None => unknown.push(name.clone()),
+            }
+        }
+        found.sort_unstable();
+        found.dedup();
+        found
+    };
+    let (restarted, behind) = (find(&arguments.restarted), find(&arguments.behind));
+    if unknown.is_empty() {
+        return Ok(Start { restarted, behind });
+    }
+    let known: Vec<&str> = cluster
+        .parties()
+        .filter(plays)
+        .filter_map(|party| cluster.party_name(party))
+        .collect();
+    let mut answer = Answer::bad_files(Vec::new());
+    for name in unknown {
+        let known = understudy_diagnostic::spelling::suggestion(&name, known.iter().copied());
+        let message = format!("the cluster has no station or remote I/O `{name}`; {known}");
+        answer = answer.and_failure(Status::BadInput, "U0605", message);
+    }
+    Err(answer)
 }
 
 fn budget(arguments: &Arguments) -> Budget {

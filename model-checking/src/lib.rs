@@ -2,7 +2,7 @@
 //!
 //! A state is a whole [`understudy_simulator::Simulation`] between two slots of the schedule; a step waits for the next slot, or does one thing to a
 //! link or to a party first. So time is discrete, nothing is drawn, and all schedules within a [`Budget`] are tried, those that
-//! lead to one state only once. Each property stands in a file of its own under `properties/`; what is wrong is said by the
+//! lead to one state only once. A run begins in step, or with parties that have just restarted or stood still ([`Start`]). Each property stands in a file of its own under `properties/`; what is wrong is said by the
 //! simulator's referee. The faults that lead to a broken property are a schedule that the simulator replays.
 //!
 //! ```text
@@ -14,10 +14,12 @@
 
 mod checker;
 mod properties;
+mod start;
 mod step;
 mod world;
 
 pub use checker::{Counterexample, Verdict, check};
 pub use properties::{ALL, Promise, Property};
+pub use start::Start;
 pub use step::{Budget, Step};
 pub use world::{Model, World};

@@ -9,14 +9,17 @@ use understudy_simulator::{Fault, Network, NotReady, Parts, Simulation};
 use understudy_wire::{Party, ProgramId, StationId};
 
 use crate::properties::{Property, RECOVERY_CYCLES};
+use crate::start::Start;
 use crate::step::{Budget, LATE_PER_MILLE, Place, Step, faults, revivals};
 
 /// Cycles that the undisturbed cluster gets to come into step.
 const PATIENCE_CYCLES: u64 = 200;
 
-/// A cluster in step, what may be done to it, and what must hold all the same.
+/// A cluster that has come into step once, what may be done to it, and what must hold all the same.
 pub struct Model {
-    start: Simulation,
+    /// Where nothing has been done yet that the start asks for.
+    origin: Simulation,
+    start: Start,
     pub(crate) parties: Vec<Party>,
     period: Duration,
     pub(crate) budget: Budget,
@@ -39,19 +42,25 @@ pub struct World {
 }
 
 impl Model {
-    /// A cluster of these parts, once it is in step on a quiet network.
+    /// A cluster of these parts, once it has come into step on a quiet network, and `start` has happened to it.
     ///
     /// # Errors
     /// [`NotReady`] where it does not come into step.
-    pub fn new(parts: Parts, budget: Budget, properties: &[Property]) -> Result<Self, NotReady> {
+    pub fn new(
+        parts: Parts,
+        start: Start,
+        budget: Budget,
+        properties: &[Property],
+    ) -> Result<Self, NotReady> {
         let stations = (0..parts.stations.len()).map(|rank| Party::Station(StationId(rank as u8)));
         let programs = 0..parts.remote_ios.len();
         let remote_ios = programs.map(|program| Party::RemoteIo(ProgramId(program as u8)));
         let parties = stations.chain(remote_ios).collect();
         let period = parts.stations[0].agreement.schedule.period();
-        let mut start = Simulation::new(parts, Self::network(period), 0);
-        start.run(1, PATIENCE_CYCLES, &mut |_, _, _, _| {})?;
+        let mut origin = Simulation::new(parts, Self::network(period), 0);
+        origin.run(1, PATIENCE_CYCLES, &mut |_, _, _, _| {})?;
         Ok(Self {
+            origin,
             start,
             parties,
             period,
@@ -70,17 +79,22 @@ impl Model {
 
     /// A run from the same start in which `faults` are done.
     pub fn replay(&self, faults: &[Fault]) -> Simulation {
-        let mut simulation = self.start.clone();
+        let mut simulation = self.origin.clone();
         for &fault in faults {
             simulation.schedule(fault);
         }
         simulation
     }
 
+    /// Where the first thing is done.
+    fn first(&self) -> Place {
+        self.start.first()
+    }
+
     /// The faults that a path of steps is, in the order in which they have to be scheduled.
     pub fn faults(&self, steps: &[Step]) -> Vec<Fault> {
-        let mut place = FIRST;
-        let mut all = Vec::new();
+        let mut place = self.first();
+        let mut all = self.start.faults();
         let mut down: Vec<(Party, bool)> = Vec::new();
         for &step in steps {
             all.extend(faults(step, place, &self.parties, self.period));
@@ -96,7 +110,7 @@ impl Model {
             }
         }
         // Who is still down where the run is over comes back, as for the property that protection does.
-        if place.cycle >= FIRST.cycle + self.budget.cycles {
+        if place.cycle >= self.last_cycle() {
             all.extend(revivals(&down, place));
         }
         all
@@ -104,7 +118,12 @@ impl Model {
 
     /// Cycles of a run that has all of a path in it, and the time to come into step again.
     pub fn cycles(&self) -> u64 {
-        FIRST.cycle + self.budget.cycles + RECOVERY_CYCLES
+        self.last_cycle() + RECOVERY_CYCLES
+    }
+
+    /// From which on nothing more is done.
+    pub(crate) fn last_cycle(&self) -> u64 {
+        self.first().cycle + self.budget.cycles
     }
 
     /// Parties that send anything in the slot that begins here if nothing is done.
@@ -117,8 +136,6 @@ impl Model {
         self.parties.iter().filter(sends).copied().collect()
     }
 }
-
-const FIRST: Place = Place { cycle: 1, slot: 0 };
 
 impl World {
     fn spend(&mut self, step: Step) {
@@ -134,11 +151,6 @@ impl World {
         *spent += 1;
         used.total += 1;
     }
-
-    /// Whether nothing more is done in this run.
-    pub(crate) fn is_over(&self, budget: &Budget) -> bool {
-        self.place.cycle >= FIRST.cycle + budget.cycles
-    }
 }
 
 impl stateright::Model for Model {
@@ -146,21 +158,22 @@ impl stateright::Model for Model {
     type Action = Step;
 
     fn init_states(&self) -> Vec<World> {
-        let mut simulation = self.start.clone();
-        simulation.go_to(FIRST.cycle, FIRST.phase(), &mut |_, _, _, _| {});
+        let place = self.first();
+        let mut simulation = self.replay(&self.start.faults());
+        simulation.go_to(place.cycle, place.phase(), &mut |_, _, _, _| {});
         vec![World {
             simulation,
-            place: FIRST,
+            place,
             used: Budget::default(),
             down: Vec::new(),
-            was_down: Vec::new(),
+            was_down: self.start.parties().collect(),
             last: None,
         }]
     }
 
     fn actions(&self, world: &World, steps: &mut Vec<Step>) {
         let (budget, used) = (&self.budget, &world.used);
-        if world.is_over(budget) {
+        if world.place.cycle >= self.last_cycle() {
             return;
         }
         let is_down = |party: Party| world.down.iter().any(|&(down, _)| down == party);

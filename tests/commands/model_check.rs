@@ -58,3 +58,18 @@ fn a_broken_property_is_a_scenario_that_is_replayed() {
     let replayed = understudy(&["simulate", &cluster, "--scenario", &scenario, "--json"]);
     assert_eq!(replayed.status, 1, "{}", replayed.shown());
 }
+
+#[test]
+fn a_run_may_begin_with_parties_that_have_restarted() {
+    let cluster = "examples/press-cell/cluster.toml";
+    let common = ["model-check", cluster, "--cycles", "1", "--kinds", "crash"];
+    let ask = |start: &[&str]| understudy(&[&common[..], start, &["--json"]].concat());
+    let answer = ask(&["--restarted", "all"]);
+    assert_eq!(answer.status, 0, "{}", answer.shown());
+    let wrong = ask(&["--restarted", "robt,arm", "--behind", "nobody"]);
+    assert_eq!(wrong.status, 2, "{}", wrong.shown());
+    let failures = wrong.json()["failures"].clone();
+    let codes: Vec<_> = failures.as_array().into_iter().flatten().collect();
+    assert_eq!(codes.len(), 3, "{failures:#}");
+    assert!(codes.iter().all(|failure| failure["code"] == "U0605"));
+}

@@ -11,7 +11,7 @@ pub(super) const PROPERTY: Property = Property {
     name: "protection comes back",
     promise: Promise::Protected,
     holds: |model, world| {
-        if !world.is_over(&model.budget) {
+        if world.place.cycle < model.last_cycle() {
             return true;
         }
         let mut simulation = world.simulation.clone();

@@ -1,0 +1,89 @@
+//! Runs that do not begin in step: everybody or some have just restarted, or stood still for a cycle, and something more happens.
+
+use understudy_model_checking::{Budget, Start};
+use understudy_wire::{Party, ProgramId, StationId};
+
+use crate::{NONE, ONE, check_from};
+
+const STATIONS: [Party; 3] = [station(0), station(1), station(2)];
+const REMOTE_IOS: [Party; 2] = [remote_io(0), remote_io(1)];
+
+const fn station(rank: u8) -> Party {
+    Party::Station(StationId(rank))
+}
+
+const fn remote_io(program: u8) -> Party {
+    Party::RemoteIo(ProgramId(program))
+}
+
+fn restarted(parties: &[Party]) -> Start {
+    Start {
+        restarted: parties.to_vec(),
+        ..Start::default()
+    }
+}
+
+fn behind(party: Party) -> Start {
+    Start {
+        behind: vec![party],
+        ..Start::default()
+    }
+}
+
+/// Anything once, in so many cycles.
+fn one_in(cycles: u64) -> Budget {
+    Budget { cycles, ..ONE }
+}
+
+#[test]
+fn everybody_starts_together() {
+    let everybody = [&STATIONS[..], &REMOTE_IOS[..]].concat();
+    check_from(restarted(&everybody), 1, one_in(5), 27_275);
+}
+
+#[test]
+fn all_stations_start_and_the_remote_ios_run() {
+    check_from(restarted(&STATIONS), 1, one_in(3), 8_998);
+}
+
+#[test]
+fn all_remote_ios_start_and_the_stations_run() {
+    check_from(restarted(&REMOTE_IOS), 1, one_in(3), 10_267);
+}
+
+#[test]
+fn a_remote_io_has_restarted() {
+    check_from(restarted(&[remote_io(0)]), 1, one_in(3), 10_725);
+}
+
+#[test]
+fn the_pacemaker_has_restarted() {
+    check_from(restarted(&[station(0)]), 1, one_in(3), 10_973);
+}
+
+#[test]
+fn the_understudy_has_restarted_with_a_controller() {
+    check_from(restarted(&[station(1), station(2)]), 1, one_in(3), 10_242);
+}
+
+#[test]
+fn a_controller_is_a_cycle_behind() {
+    check_from(behind(station(0)), 1, one_in(3), 10_832);
+}
+
+#[test]
+fn the_understudy_is_a_cycle_behind_and_a_controller_crashes_under_loss() {
+    let budget = Budget {
+        losses: 1,
+        crashes: 1,
+        total: 2,
+        cycles: 1,
+        ..NONE
+    };
+    check_from(behind(station(2)), 1, budget, 9_596);
+}
+
+#[test]
+fn a_remote_io_is_a_cycle_behind() {
+    check_from(behind(remote_io(1)), 1, one_in(3), 11_521);
+}
