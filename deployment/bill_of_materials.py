@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""The bill of materials of the `understudy` binary for a target, as CycloneDX 1.5 in JSON.
+"""The bill of materials of a binary for a target, as CycloneDX 1.5 in JSON.
 
-    deployment/bill_of_materials.py x86_64-unknown-linux-musl > understudy.cdx.json
+    deployment/bill_of_materials.py x86_64-unknown-linux-musl [understudy] > understudy.cdx.json
 
 Every crate that is compiled into the binary, by the lock file: name, version, licence, checksum of its source and who needs whom.
 Build scripts and macros that only run while it is built have the scope `excluded`.
@@ -11,9 +11,6 @@ import json
 import subprocess
 import sys
 import tomllib
-
-ROOT = "understudy"
-
 
 def metadata(target: str) -> dict:
     command = ["cargo", "metadata", "--locked", "--format-version", "1", "--filter-platform", target]
@@ -38,14 +35,14 @@ def is_macro(package: dict) -> bool:
     return any("proc-macro" in target["kind"] for target in package["targets"])
 
 
-def main(target: str) -> None:
+def main(target: str, name: str) -> None:
     tree = metadata(target)
     packages = {package["id"]: package for package in tree["packages"]}
     nodes = {node["id"]: node for node in tree["resolve"]["nodes"]}
     root = next(
         package["id"]
         for package in tree["packages"]
-        if package["name"] == ROOT and package["source"] is None
+        if package["name"] == name and package["source"] is None
     )
     with open("Cargo.lock", "rb") as file:
         locked = tomllib.load(file)["package"]
@@ -112,6 +109,6 @@ def main(target: str) -> None:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
+    if len(sys.argv) not in (2, 3):
         sys.exit(__doc__)
-    main(sys.argv[1])
+    main(sys.argv[1], sys.argv[2] if len(sys.argv) == 3 else "understudy")

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Static binaries of `understudy` for Linux on x86-64 and aarch64, each with its bill of materials and its checksum.
+# Static binaries of `understudy` and `understudy-opcua` for Linux on x86-64 and aarch64, each with its bill of materials and its checksum.
 #
 #   deployment/release.sh [DIRECTORY] [TARGET...]
 #
@@ -18,26 +18,31 @@ mkdir -p "$out"
 
 build() {
     if command -v cargo-zigbuild > /dev/null; then
-        cargo zigbuild --locked --release -p understudy --bin understudy --target "$1"
+        how=zigbuild
     elif [ "$1" = "$(uname -m)-unknown-linux-musl" ] && command -v musl-gcc > /dev/null; then
-        cargo build --locked --release -p understudy --bin understudy --target "$1"
+        how=build
     else
         echo "no C compiler for $1: pip install ziglang cargo-zigbuild, or apt install musl-tools for this machine" >&2
         return 1
     fi
+    cargo "$how" --locked --release --target "$1" \
+        -p understudy -p understudy-opcua-gateway --bin understudy --bin understudy-opcua
 }
 
 for target in "$@"; do
     rustup target add "$target"
     build "$target"
-    name="understudy-$version-$target"
-    cp "$target_directory/$target/release/understudy" "$out/$name"
-    python3 deployment/bill_of_materials.py "$target" > "$out/$name.cdx.json"
-    (cd "$out" && sha256sum "$name" "$name.cdx.json" > "$name.sha256")
-    # A static binary needs no interpreter.
-    if readelf --program-headers "$out/$name" | grep -q INTERP; then
-        echo "$name is not static" >&2
-        exit 1
-    fi
-    echo "$out/$name"
+    for package in understudy understudy-opcua-gateway; do
+        binary=${package%-gateway}
+        name="$binary-$version-$target"
+        cp "$target_directory/$target/release/$binary" "$out/$name"
+        python3 deployment/bill_of_materials.py "$target" "$package" > "$out/$name.cdx.json"
+        (cd "$out" && sha256sum "$name" "$name.cdx.json" > "$name.sha256")
+        # A static binary needs no interpreter.
+        if readelf --program-headers "$out/$name" | grep -q INTERP; then
+            echo "$name is not static" >&2
+            exit 1
+        fi
+        echo "$out/$name"
+    done
 done

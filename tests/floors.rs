@@ -48,7 +48,7 @@ const FLOORS: &[&[&str]] = &[
     ],
     &["understudy-view"],
     &["understudy-gateway", "understudy-watch"],
-    &["understudy", "understudy-fuzz"],
+    &["understudy", "understudy-fuzz", "understudy-opcua-gateway"],
 ];
 
 /// The first floor that may know the outside.

@@ -23,7 +23,7 @@ mod modbus;
 mod register_map;
 
 pub use error::GatewayError;
-pub use followed::Followed;
+pub use followed::{BOUNDS, Followed, Observation};
 pub use http::serve_metrics;
 pub use metrics::{Metrics, exposition_of};
 pub use mirror::{Rate, mirror};
@@ -76,7 +76,10 @@ async fn asked_to_end() {
 }
 
 /// Runs `serve` on a listener at `address` until a signal; `ready` is told where it listens.
-fn serve_until_asked<F>(
+///
+/// # Errors
+/// It cannot listen there, or `serve` fails.
+pub fn serve_until_asked<F>(
     address: SocketAddr,
     ready: impl FnOnce(SocketAddr),
     serve: impl FnOnce(TcpListener) -> F,

@@ -1,0 +1,200 @@
+//! The `understudy-opcua` command: parses, calls one function, prints, exits.
+
+use std::io::Write as _;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap_complete::Shell;
+use serde_json::json;
+use understudy_opcua_gateway::{Login, OpcuaError, Settings, Variable, serve, variables};
+use understudy_view::Run;
+
+/// Show a run as an OPC UA server; nothing can be written.
+#[derive(Debug, Parser)]
+#[command(
+    name = "understudy-opcua",
+    version,
+    after_help = "\
+Example:
+  understudy-opcua serve runs/latest
+  understudy-opcua nodes runs/latest
+  understudy-opcua serve runs/latest --listen 192.0.2.7:4840 --certificates opcua --user reader --password-file password
+
+It reads the journal of the run, finished or not, as `understudy gateway` does (docs/monitoring.md).
+Exit status: 0 when all is well, 1 when it cannot serve, 2 when an input is wrong and nothing was started."
+)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Serve a run until SIGINT or SIGTERM
+    Serve(ServeArguments),
+    /// Print every variable with its identifier, its type and its meaning
+    Nodes {
+        #[command(flatten)]
+        run: RunArgument,
+        /// As JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Print a script that completes commands in a shell
+    Completions {
+        /// For which shell
+        #[arg(value_enum)]
+        shell: Shell,
+    },
+    /// Print the manual page
+    Man,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy-opcua serve runs/latest
+  understudy-opcua serve runs/latest --listen 192.0.2.7:4840 --certificates opcua
+
+Without --certificates there is no security, and only this machine is served. With it the policies are Basic256Sha256 and
+Aes256_Sha256_RsaPss; a client that is not trusted yet is refused, and lies in FOLDER/rejected for you to move to FOLDER/trusted.")]
+struct ServeArguments {
+    #[command(flatten)]
+    run: RunArgument,
+    /// Where it listens; port 0 for any that is free
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:4840")]
+    listen: SocketAddr,
+    /// What clients call this machine, in URLs and in the certificate; its address where nothing is said
+    #[arg(long, value_name = "NAME")]
+    host: Option<String>,
+    /// A folder for the certificate of the server, made where there is none, and for those of clients
+    #[arg(long, value_name = "FOLDER")]
+    certificates: Option<PathBuf>,
+    /// Who may log in; without it nobody has to
+    #[arg(
+        long,
+        value_name = "NAME",
+        requires = "password_file",
+        requires = "certificates"
+    )]
+    user: Option<String>,
+    /// A file whose first line is the password, and that nobody else may read
+    #[arg(long, value_name = "FILE", requires = "user")]
+    password_file: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+struct RunArgument {
+    /// The directory of a run
+    #[arg(value_name = "RUN", default_value = "runs/latest")]
+    run: PathBuf,
+}
+
+fn main() -> ExitCode {
+    let done = match Arguments::parse().command {
+        Command::Serve(arguments) => serve_run(&arguments),
+        Command::Nodes { run, json } => nodes(&run, json),
+        Command::Completions { shell } => {
+            let mut script = Vec::new();
+            clap_complete::generate(
+                shell,
+                &mut Arguments::command(),
+                "understudy-opcua",
+                &mut script,
+            );
+            print(&script);
+            Ok(())
+        }
+        Command::Man => {
+            let mut page = Vec::new();
+            // It is written to memory.
+            let _ = clap_mangen::Man::new(Arguments::command()).render(&mut page);
+            print(&page);
+            Ok(())
+        }
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            let message = error.to_string();
+            // Some messages begin with their code.
+            let prefix = format!("{}: ", error.code());
+            let message = message.strip_prefix(&prefix).unwrap_or(&message);
+            say(&format!("error[{}]: {message}", error.code()));
+            ExitCode::from(if error.is_bad_input() { 2 } else { 1 })
+        }
+    }
+}
+
+fn serve_run(arguments: &ServeArguments) -> Result<(), OpcuaError> {
+    let run = Run::open(&arguments.run.run)?;
+    let login = match (&arguments.user, &arguments.password_file) {
+        (Some(user), Some(file)) => Some(Login::read(user, file)?),
+        _ => None,
+    };
+    let settings = Settings {
+        address: arguments.listen,
+        host: arguments.host.clone(),
+        certificates: arguments.certificates.clone(),
+        login,
+    };
+    serve(&run, &settings, |address| {
+        say(&format!("listening on {address}"));
+    })
+}
+
+fn nodes(run: &RunArgument, json: bool) -> Result<(), OpcuaError> {
+    let run = Run::open(&run.run)?;
+    let cluster = run.cluster();
+    let variables = variables(cluster);
+    let text = if json {
+        let list: Vec<_> = variables.iter().map(document).collect();
+        let namespace = format!("urn:understudy:{}", cluster.name());
+        format!(
+            "{:#}\n",
+            json!({ "namespace": namespace, "variables": list })
+        )
+    } else {
+        table(&variables)
+    };
+    print(text.as_bytes());
+    Ok(())
+}
+
+fn document(variable: &Variable) -> serde_json::Value {
+    json!({
+        "identifier": variable.path(),
+        "type": variable.kind().word(),
+        "meaning": variable.meaning(),
+    })
+}
+
+fn table(variables: &[Variable]) -> String {
+    let width = variables
+        .iter()
+        .map(|variable| variable.path().chars().count())
+        .max()
+        .unwrap_or_default();
+    variables
+        .iter()
+        .map(|variable| {
+            format!(
+                "{:width$}  {:8}  {}\n",
+                variable.path(),
+                variable.kind().word(),
+                variable.meaning()
+            )
+        })
+        .collect()
+}
+
+/// Nobody may be there any more to read it.
+fn print(bytes: &[u8]) {
+    let _ = std::io::stdout().write_all(bytes);
+}
+
+fn say(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{text}");
+}

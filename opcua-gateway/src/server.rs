@@ -1,0 +1,364 @@
+//! The server: nodes that are made once, and values that are set when they change.
+
+use std::collections::{BTreeSet, VecDeque};
+use std::fs;
+use std::io;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use opcua::crypto::SecurityPolicy;
+use opcua::nodes::{BaseEventType, EventNotifier, ObjectBuilder, VariableBuilder};
+use opcua::server::address_space::AddressSpace;
+use opcua::server::diagnostics::NamespaceMetadata;
+use opcua::server::node_manager::memory::{SimpleNodeManager, simple_node_manager};
+use opcua::server::{
+    ANONYMOUS_USER_TOKEN_ID, Server, ServerBuilder, ServerEndpoint, ServerHandle, ServerUserToken,
+};
+use opcua::types::{
+    BuildInfo, ByteString, DataValue, DateTime, MessageSecurityMode, NodeId, ObjectId,
+    ObjectTypeId, QualifiedName, VariableTypeId, Variant,
+};
+use tokio::net::TcpListener;
+use understudy_gateway::{Followed, serve_until_asked};
+use understudy_view::{Event, Level, Run};
+
+use crate::error::OpcuaError;
+use crate::security::{Settings, certificate_and_key};
+use crate::tree::{Kind, Reading, Seen, Variable, variables};
+use crate::trust::{self, Feed};
+
+/// Between two looks at what is newest; a run is followed no faster.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// At once; whoever comes then is refused.
+const MOST_SESSIONS: usize = 64;
+
+/// Of a monitored item, for events that come at once.
+const LONGEST_QUEUE: usize = 1000;
+
+/// In `Events/Recent`.
+const RECENT: usize = 20;
+
+/// Between 1601, where the time of OPC UA begins, and 1970.
+const SECONDS_TO_1970: u64 = 11_644_473_600;
+
+/// The folder that all others are in.
+const ROOT: &str = "Understudy";
+
+const SECURE: [(&str, SecurityPolicy, MessageSecurityMode); 4] = [
+    (
+        "basic256sha256_sign",
+        SecurityPolicy::Basic256Sha256,
+        MessageSecurityMode::Sign,
+    ),
+    (
+        "basic256sha256_encrypt",
+        SecurityPolicy::Basic256Sha256,
+        MessageSecurityMode::SignAndEncrypt,
+    ),
+    (
+        "aes256_sha256_rsapss_sign",
+        SecurityPolicy::Aes256Sha256RsaPss,
+        MessageSecurityMode::Sign,
+    ),
+    (
+        "aes256_sha256_rsapss_encrypt",
+        SecurityPolicy::Aes256Sha256RsaPss,
+        MessageSecurityMode::SignAndEncrypt,
+    ),
+];
+
+/// Serves `run` until SIGINT or SIGTERM; `ready` is told where.
+///
+/// # Errors
+/// All that can be wrong with `settings`; it cannot listen there.
+pub fn serve(
+    run: &Run,
+    settings: &Settings,
+    ready: impl FnOnce(SocketAddr),
+) -> Result<(), OpcuaError> {
+    settings.prepare()?;
+    // The library looks for the folder that it is started in, and panics where that is gone.
+    std::env::current_dir().map_err(|source| understudy_gateway::GatewayError::System {
+        what: "the folder that it is started in",
+        source,
+    })?;
+    let shown = Shown {
+        variables: variables(run.cluster()),
+        journal: run.path().join("journal.jsonl"),
+        followed: Followed::new(run)?,
+    };
+    let served = serve_until_asked(settings.address, ready, |listener| {
+        listen(listener, settings, shown)
+    });
+    Ok(served?)
+}
+
+/// What is served.
+struct Shown {
+    variables: Vec<Variable>,
+    journal: PathBuf,
+    followed: Followed,
+}
+
+async fn listen(listener: TcpListener, settings: &Settings, shown: Shown) -> io::Result<()> {
+    let port = listener.local_addr()?.port();
+    let name = shown.followed.cluster().name().to_owned();
+    let namespace = format!("urn:understudy:{name}");
+    let (server, handle) = server(settings, port, &namespace).map_err(io::Error::other)?;
+    let manager = handle.node_managers().get_of_type::<SimpleNodeManager>();
+    let (Some(manager), Some(index)) = (manager, handle.get_namespace_index(&namespace)) else {
+        return Err(io::Error::other("the server has no place for nodes"));
+    };
+    add_nodes(
+        &mut manager.address_space().write(),
+        index,
+        &name,
+        &shown.variables,
+    );
+    let mut showing = Showing::new(&shown, &handle, manager, index);
+    // Nobody is served before there is something to see.
+    showing.look();
+    let again = async {
+        let mut looks = tokio::time::interval(LOOK);
+        loop {
+            looks.tick().await;
+            showing.look();
+        }
+    };
+    tokio::select! {
+        ended = server.run_with(listener) => ended.map_err(io::Error::other),
+        () = again => Ok(()),
+    }
+}
+
+fn server(
+    settings: &Settings,
+    port: u16,
+    namespace: &str,
+) -> Result<(Server, ServerHandle), String> {
+    let version = env!("CARGO_PKG_VERSION");
+    let product = "urn:understudy:opcua-gateway";
+    let mut builder = ServerBuilder::new()
+        .application_name("Understudy OPC UA gateway")
+        .application_uri(settings.application_uri())
+        .product_uri(product)
+        .host(settings.host())
+        .port(port)
+        .discovery_urls(vec!["/".to_owned()])
+        .build_info(BuildInfo {
+            product_uri: product.into(),
+            product_name: "understudy-opcua".into(),
+            software_version: version.into(),
+            ..Default::default()
+        })
+        .with_node_manager(simple_node_manager(
+            NamespaceMetadata {
+                namespace_uri: namespace.to_owned(),
+                ..Default::default()
+            },
+            "understudy",
+        ));
+    builder.limits_mut().max_sessions = MOST_SESSIONS;
+    builder
+        .limits_mut()
+        .subscriptions
+        .max_monitored_item_queue_size = LONGEST_QUEUE;
+    let user = match &settings.login {
+        None => ANONYMOUS_USER_TOKEN_ID,
+        Some(login) => {
+            let token = ServerUserToken::user_pass(login.user.as_str(), login.password());
+            builder = builder.add_user_token("reader", token);
+            "reader"
+        }
+    };
+    let users = [user.to_owned()];
+    let builder = match &settings.certificates {
+        None => builder
+            // No folder can be made there: nothing is written where nobody asked for it.
+            .pki_dir("/dev/null/none")
+            .add_endpoint("none", ServerEndpoint::new_none("/", &users)),
+        Some(folder) => {
+            let (certificate, key) = certificate_and_key(std::path::Path::new(""));
+            SECURE
+                .iter()
+                .fold(builder, |builder, (name, policy, mode)| {
+                    builder.add_endpoint(*name, ServerEndpoint::new("/", *policy, *mode, &users))
+                })
+                .pki_dir(folder)
+                .certificate_path(certificate)
+                .private_key_path(key)
+        }
+    };
+    builder.build()
+}
+
+/// The folders and variables, without values.
+fn add_nodes(space: &mut AddressSpace, index: u16, cluster: &str, variables: &[Variable]) {
+    let root = NodeId::new(index, ROOT);
+    ObjectBuilder::new(&root, QualifiedName::new(index, cluster), cluster)
+        .is_folder()
+        .event_notifier(EventNotifier::SUBSCRIBE_TO_EVENTS)
+        .organized_by(ObjectId::ObjectsFolder)
+        .insert(space);
+    let mut made = BTreeSet::new();
+    for variable in variables {
+        let folders = variable.folders();
+        let mut parent = root.clone();
+        for depth in 1..=folders.len() {
+            let path = folders[..depth].join("/");
+            let folder = NodeId::new(index, path.as_str());
+            if made.insert(path) {
+                let name = folders[depth - 1].as_str();
+                ObjectBuilder::new(&folder, QualifiedName::new(index, name), name)
+                    .is_folder()
+                    .organized_by(parent)
+                    .insert(space);
+            }
+            parent = folder;
+        }
+        let kind = variable.kind();
+        let name = variable.name();
+        let node = NodeId::new(index, variable.path());
+        let rank = if kind == Kind::Strings { 1 } else { -1 };
+        VariableBuilder::new(&node, QualifiedName::new(index, name), name)
+            .description(variable.meaning())
+            .data_type(kind.data_type())
+            .value_rank(rank)
+            .minimum_sampling_interval(LOOK.as_millis() as f64)
+            .has_type_definition(VariableTypeId::BaseDataVariableType)
+            .organized_by(parent)
+            .insert(space);
+    }
+}
+
+/// What was shown, so that only what has changed is set.
+struct Showing<'a> {
+    shown: &'a Shown,
+    handle: &'a ServerHandle,
+    manager: Arc<SimpleNodeManager>,
+    index: u16,
+    nodes: Vec<NodeId>,
+    said: Vec<Option<Reading>>,
+    recent: VecDeque<String>,
+}
+
+impl<'a> Showing<'a> {
+    fn new(
+        shown: &'a Shown,
+        handle: &'a ServerHandle,
+        manager: Arc<SimpleNodeManager>,
+        index: u16,
+    ) -> Self {
+        let variables = shown.variables.iter();
+        let nodes: Vec<NodeId> = variables
+            .map(|variable| NodeId::new(index, variable.path()))
+            .collect();
+        Self {
+            shown,
+            handle,
+            manager,
+            index,
+            said: vec![None; nodes.len()],
+            nodes,
+            recent: VecDeque::new(),
+        }
+    }
+
+    /// Sets what has changed, and tells the events.
+    fn look(&mut self) {
+        let events = self.shown.followed.take_events();
+        let observation = self.shown.followed.observation();
+        self.recent.extend(
+            events
+                .iter()
+                .map(|event| format!("cycle {}: {}: {}", event.cycle, event.name, message(event))),
+        );
+        let over = self.recent.len().saturating_sub(RECENT);
+        self.recent.drain(..over);
+        let seen = Seen {
+            observation: &observation,
+            feed: trust::feed(&observation, Instant::now()),
+            recent: self.recent.make_contiguous(),
+        };
+        let stamp = stamp(self.shown, seen.feed);
+        let mut changed = Vec::new();
+        for (place, variable) in self.shown.variables.iter().enumerate() {
+            let reading = variable.read(&seen);
+            if self.said[place].as_ref() != Some(&reading) {
+                let value = DataValue {
+                    // The library leaves out the status of a value that is not there.
+                    value: Some(reading.value.clone().unwrap_or(Variant::Empty)),
+                    status: Some(reading.status),
+                    source_timestamp: Some(stamp),
+                    server_timestamp: Some(DateTime::now()),
+                    ..DataValue::default()
+                };
+                changed.push((place, value));
+                self.said[place] = Some(reading);
+            }
+        }
+        let nodes = &self.nodes;
+        let values = changed
+            .into_iter()
+            .map(|(place, value)| (&nodes[place], None, value));
+        // Every one of these nodes is there, and is a variable.
+        let _ = self.manager.set_values(self.handle.subscriptions(), values);
+        tell(self.handle, self.index, &events, stamp);
+    }
+}
+
+/// When what is shown was so: when the journal was written last, and for a silence now.
+fn stamp(shown: &Shown, feed: Feed) -> DateTime {
+    let written = fs::metadata(&shown.journal).and_then(|metadata| metadata.modified());
+    let since = written
+        .ok()
+        .filter(|_| feed != Feed::Silent)
+        .and_then(|written: SystemTime| written.duration_since(UNIX_EPOCH).ok());
+    since.map_or_else(DateTime::now, |since| {
+        let ticks = (since.as_secs() + SECONDS_TO_1970) * 10_000_000;
+        i64::try_from(ticks + u64::from(since.subsec_nanos()) / 100)
+            .map_or_else(|_| DateTime::now(), DateTime::from)
+    })
+}
+
+/// Every event, to whoever has subscribed to those of the server or of the cluster.
+fn tell(handle: &ServerHandle, index: u16, events: &[Event], stamp: DateTime) {
+    let told: Vec<BaseEventType> = events
+        .iter()
+        .map(|event| {
+            let number = ByteString::from(event.number.to_be_bytes().to_vec());
+            let kind = ObjectTypeId::BaseEventType;
+            BaseEventType::new(kind, number, message(event).as_str(), stamp)
+                .set_source_node(NodeId::new(index, ROOT))
+                .set_source_name(event.name.as_str().into())
+                .set_severity(severity(event.level))
+        })
+        .collect();
+    let places = [ObjectId::Server.into(), NodeId::new(index, ROOT)];
+    for place in &places {
+        let events = told
+            .iter()
+            .map(|event| (event as &dyn opcua::nodes::Event, place));
+        handle.subscriptions().notify_events(events);
+    }
+}
+
+fn message(event: &Event) -> String {
+    match &event.cause {
+        None => event.text.clone(),
+        Some(cause) => format!("{}: {cause}", event.text),
+    }
+}
+
+/// From 1 to 1000.
+fn severity(level: Level) -> u16 {
+    match level {
+        Level::Info => 100,
+        Level::Notice => 300,
+        Level::Warning => 600,
+        Level::Alarm => 900,
+    }
+}

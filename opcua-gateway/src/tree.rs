@@ -1,0 +1,415 @@
+//! Which variables there are, and what each says: one table for the server, for `understudy-opcua nodes` and for the tests.
+//!
+//! ```text
+//!   CLUSTER
+//!   ├─ Run, Margin, Alarms, Events
+//!   ├─ Stations/STATION
+//!   └─ Programs/PROGRAM ── Inputs/SIGNAL, Outputs/SIGNAL, Markers/SIGNAL
+//! ```
+//!
+//! The identifier of a node is its path with `/` between the names, in the namespace `urn:understudy:CLUSTER`.
+
+mod signals;
+
+use opcua::types::{DataTypeId, StatusCode, UAString, Variant};
+use understudy_cluster::{Cluster, Controller};
+use understudy_gateway::Observation;
+use understudy_view::{ProgramSnapshot, StationSnapshot};
+
+use crate::trust::{self, Feed};
+
+/// What a variable holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// One bit.
+    Boolean,
+    /// A number that may be negative.
+    Int64,
+    /// A number.
+    UInt64,
+    /// A text.
+    String,
+    /// A list of texts.
+    Strings,
+}
+
+impl Kind {
+    /// As OPC UA calls it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Boolean => "Boolean",
+            Self::Int64 => "Int64",
+            Self::UInt64 => "UInt64",
+            Self::String => "String",
+            Self::Strings => "String[]",
+        }
+    }
+
+    pub(crate) fn data_type(self) -> DataTypeId {
+        match self {
+            Self::Boolean => DataTypeId::Boolean,
+            Self::Int64 => DataTypeId::Int64,
+            Self::UInt64 => DataTypeId::UInt64,
+            Self::String | Self::Strings => DataTypeId::String,
+        }
+    }
+}
+
+/// What is looked at at one moment.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Seen<'a> {
+    pub(crate) observation: &'a Observation,
+    pub(crate) feed: Feed,
+    /// The newest events, in words, oldest first.
+    pub(crate) recent: &'a [String],
+}
+
+impl Seen<'_> {
+    fn program(&self, place: usize) -> Option<&ProgramSnapshot> {
+        self.observation.snapshot.programs.get(place)
+    }
+
+    fn station(&self, rank: usize) -> Option<&StationSnapshot> {
+        self.observation.snapshot.stations.get(rank)
+    }
+
+    /// Something that is so now.
+    fn present(&self, value: Option<Variant>, own: StatusCode) -> Reading {
+        let own = match value {
+            Some(_) => own,
+            None => StatusCode::BadNoDataAvailable,
+        };
+        Reading {
+            value,
+            status: trust::present(self.feed, own),
+        }
+    }
+
+    /// Something that was counted.
+    fn counted(&self, value: Option<Variant>) -> Reading {
+        let status = match value {
+            Some(_) => trust::counted(self.feed),
+            None => StatusCode::BadWaitingForInitialData,
+        };
+        Reading { value, status }
+    }
+}
+
+/// What a variable says at one moment.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Reading {
+    pub(crate) value: Option<Variant>,
+    pub(crate) status: StatusCode,
+}
+
+type Read = Box<dyn Fn(&Seen<'_>) -> Reading + Send + Sync>;
+
+/// One variable.
+pub struct Variable {
+    folders: Vec<String>,
+    name: String,
+    kind: Kind,
+    meaning: &'static str,
+    read: Read,
+}
+
+impl Variable {
+    /// The folders that it is in, the outermost first.
+    pub fn folders(&self) -> &[String] {
+        &self.folders
+    }
+
+    /// Its own name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Its identifier.
+    pub fn path(&self) -> String {
+        format!("{}/{}", self.folders.join("/"), self.name)
+    }
+
+    /// What it holds.
+    pub fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// What that means.
+    pub fn meaning(&self) -> &'static str {
+        self.meaning
+    }
+
+    pub(crate) fn read(&self, seen: &Seen<'_>) -> Reading {
+        (self.read)(seen)
+    }
+}
+
+/// All variables of a cluster.
+pub fn variables(cluster: &Cluster) -> Vec<Variable> {
+    let mut tree = Tree {
+        folders: Vec::new(),
+        variables: Vec::new(),
+    };
+    tree.run();
+    let programs = cluster.controllers().iter().map(|program| &program.name);
+    let understudies = cluster.understudies().iter();
+    let stations = programs.chain(understudies.map(|understudy| &understudy.name));
+    for (rank, name) in stations.enumerate() {
+        tree.station(rank, name);
+    }
+    for (place, controller) in cluster.controllers().iter().enumerate() {
+        tree.program(place, controller);
+    }
+    tree.variables
+}
+
+struct Tree {
+    folders: Vec<String>,
+    variables: Vec<Variable>,
+}
+
+impl Tree {
+    fn enter(&mut self, folders: &[&str]) {
+        self.folders = folders.iter().map(|name| (*name).to_owned()).collect();
+    }
+
+    fn add(
+        &mut self,
+        name: &str,
+        kind: Kind,
+        meaning: &'static str,
+        read: impl Fn(&Seen<'_>) -> Reading + Send + Sync + 'static,
+    ) {
+        self.variables.push(Variable {
+            folders: self.folders.clone(),
+            name: name.to_owned(),
+            kind,
+            meaning,
+            read: Box::new(read),
+        });
+    }
+
+    fn run(&mut self) {
+        self.enter(&["Run"]);
+        self.add(
+            "State",
+            Kind::String,
+            "starting, running, finished or interrupted",
+            |seen| {
+                use understudy_view::RunState;
+                seen.counted(Some(text(match seen.observation.snapshot.run {
+                    RunState::Starting => "starting",
+                    RunState::Running => "running",
+                    RunState::Finished => "finished",
+                    RunState::Interrupted => "interrupted",
+                })))
+            },
+        );
+        self.add(
+            "Cycle",
+            Kind::Int64,
+            "the newest, from the origin",
+            |seen| seen.counted(seen.observation.snapshot.cycle.map(Variant::from)),
+        );
+        self.add(
+            "Period",
+            Kind::UInt64,
+            "of a cycle, in microseconds",
+            |seen| seen.counted(Some(seen.observation.snapshot.period_us.into())),
+        );
+        self.add("Mode", Kind::String, "full or paper", |seen| {
+            seen.counted(Some(text(seen.observation.snapshot.mode)))
+        });
+        self.add(
+            "Records",
+            Kind::UInt64,
+            "of the journal, that were read",
+            |seen| seen.counted(Some(seen.observation.snapshot.records.into())),
+        );
+        self.add(
+            "LeftOut",
+            Kind::UInt64,
+            "records that were gone or could not be read",
+            |seen| seen.counted(Some(seen.observation.snapshot.left_out.into())),
+        );
+        self.enter(&["Margin"]);
+        self.add(
+            "Survives",
+            Kind::UInt64,
+            "further failures of stations that are masked whichever they are",
+            |seen| {
+                let survives = u64::from(seen.observation.snapshot.margin.survives);
+                seen.present(Some(survives.into()), StatusCode::Good)
+            },
+        );
+        self.add(
+            "Served",
+            Kind::Strings,
+            "programs with true outputs",
+            |seen| {
+                let served = &seen.observation.snapshot.margin.served;
+                seen.present(Some(texts(served)), StatusCode::Good)
+            },
+        );
+        self.enter(&["Alarms"]);
+        self.add(
+            "Open",
+            Kind::UInt64,
+            "that last, or that nobody has acknowledged",
+            |seen| {
+                let open = seen.observation.snapshot.alarms.len() as u64;
+                seen.counted(Some(open.into()))
+            },
+        );
+        self.add("Texts", Kind::Strings, "the open ones, in words", |seen| {
+            let alarms = seen.observation.snapshot.alarms.iter();
+            let alarms: Vec<String> = alarms
+                .map(|alarm| format!("cycle {}: {}: {}", alarm.cycle, alarm.name, alarm.text))
+                .collect();
+            seen.counted(Some(texts(&alarms)))
+        });
+        self.enter(&["Events"]);
+        self.add("Count", Kind::UInt64, "so far", |seen| {
+            seen.counted(Some(seen.observation.snapshot.events.into()))
+        });
+        self.add(
+            "Recent",
+            Kind::Strings,
+            "the newest 20, in words, the newest last",
+            |seen| seen.counted(Some(texts(seen.recent))),
+        );
+    }
+
+    fn station(&mut self, rank: usize, name: &str) {
+        self.enter(&["Stations", name]);
+        let of = move |read: fn(&StationSnapshot) -> Variant| {
+            move |seen: &Seen<'_>| seen.present(seen.station(rank).map(read), StatusCode::Good)
+        };
+        self.add(
+            "State",
+            Kind::String,
+            "speaking, silent, flagged, joining, shadow, refused, stopped, killed, ended or not-started",
+            of(|station| text(station.state.word())),
+        );
+        self.add(
+            "Understudy",
+            Kind::Boolean,
+            "whether it is generated from the others",
+            of(|station| station.understudy.into()),
+        );
+        self.add(
+            "Flagged",
+            Kind::Boolean,
+            "whether a remote I/O has closed its slot",
+            of(|station| station.flagged.into()),
+        );
+        self.add(
+            "SpeaksFor",
+            Kind::Strings,
+            "programs",
+            of(|station| texts(&station.speaks_for)),
+        );
+        self.add(
+            "ExcludedFrom",
+            Kind::Strings,
+            "programs whose remote I/O has found its state faulty",
+            of(|station| texts(&station.excluded_from)),
+        );
+    }
+
+    fn program(&mut self, place: usize, controller: &Controller) {
+        let name = controller.name.as_str();
+        self.enter(&["Programs", name]);
+        let of = move |read: fn(&ProgramSnapshot) -> Option<Variant>| {
+            move |seen: &Seen<'_>| {
+                seen.present(seen.program(place).and_then(read), StatusCode::Good)
+            }
+        };
+        let count = move |read: fn(&ProgramSnapshot) -> Option<u64>| {
+            move |seen: &Seen<'_>| {
+                seen.counted(seen.program(place).and_then(read).map(Variant::from))
+            }
+        };
+        self.add(
+            "Source",
+            Kind::String,
+            "of what is driven: direct, reconstructed, held or fail-safe",
+            of(|program| program.source.map(text)),
+        );
+        self.add(
+            "Since",
+            Kind::Int64,
+            "since which cycle",
+            of(|program| program.source.map(|_| program.since.into())),
+        );
+        self.add(
+            "WordOf",
+            Kind::String,
+            "whose word restored it, or nothing",
+            of(|program| Some(text(program.word_of.as_deref().unwrap_or_default()))),
+        );
+        self.add(
+            "Missing",
+            Kind::String,
+            "why nothing true is driven, or nothing",
+            of(|program| Some(text(program.missing.unwrap_or_default()))),
+        );
+        self.add(
+            "AwaitsRelease",
+            Kind::Boolean,
+            "whether an operator has to release the outputs",
+            of(|program| Some(program.awaits_release.into())),
+        );
+        self.add(
+            "Forced",
+            Kind::Strings,
+            "signals that are forced, by whom and why",
+            of(|program| Some(texts(&program.forced))),
+        );
+        let deadlines = "deadlines";
+        self.add(
+            "Direct",
+            Kind::UInt64,
+            deadlines,
+            count(|of| Some(of.direct)),
+        );
+        self.add(
+            "Reconstructed",
+            Kind::UInt64,
+            deadlines,
+            count(|of| Some(of.reconstructed)),
+        );
+        self.add("Held", Kind::UInt64, deadlines, count(|of| Some(of.held)));
+        self.add(
+            "FailSafe",
+            Kind::UInt64,
+            deadlines,
+            count(|of| Some(of.fail_safe)),
+        );
+        self.add(
+            "Finished",
+            Kind::UInt64,
+            "parts, where its plant is simulated",
+            count(|of| of.finished),
+        );
+        self.add(
+            "Mishaps",
+            Kind::UInt64,
+            "things that must not happen, where its plant is simulated",
+            count(|of| of.mishaps),
+        );
+        self.signals(place, controller);
+    }
+}
+
+fn text(text: &str) -> Variant {
+    Variant::from(UAString::from(text))
+}
+
+fn texts(texts: &[String]) -> Variant {
+    let texts: Vec<UAString> = texts.iter().map(|text| text.as_str().into()).collect();
+    Variant::from(texts)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,165 @@
+//! What the variables say of simulated runs, and how far they say that it can be trusted.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use understudy_cluster::{press_cell, read};
+use understudy_gateway::BOUNDS;
+use understudy_scenarios::{Parties, read as read_scenario, simulate};
+use understudy_view::{Model, RunState};
+
+use super::*;
+
+fn cell() -> Cluster {
+    let files = press_cell();
+    let loaded = read("cluster.toml", files[0].text, &mut |name| {
+        let file = files.iter().find(|file| file.name == name);
+        file.map(|file| file.text.to_owned())
+            .ok_or_else(|| "no such file".to_owned())
+    });
+    loaded.cluster.expect("it comes with the program")
+}
+
+/// What was the case when `cycle` of a run with these faults was over.
+fn observed(cluster: &Cluster, faults: &str, cycle: i64) -> Observation {
+    let text = format!("title = \"Faults\"\ncycles = 60\n{faults}");
+    let scenario = read_scenario("faults.toml", &text, Some(&Parties::of(cluster)));
+    assert_eq!(scenario.report.diagnostics, []);
+    let scenario = scenario.scenario.expect("no diagnostics");
+    let mut model = Model::new(Arc::new(cluster.clone()), BOUNDS);
+    simulate(cluster, &scenario, 1, &mut |record| {
+        if model.cycle().is_none_or(|now| now <= cycle) || !model.has_origin() {
+            model.note(record);
+        }
+    })
+    .expect("the cluster comes into step");
+    Observation::new(&model, model.snapshot(), Instant::now())
+}
+
+fn reading(cluster: &Cluster, seen: &Seen<'_>, path: &str) -> Reading {
+    let variables = variables(cluster);
+    let found = variables.iter().find(|variable| variable.path() == path);
+    found.unwrap_or_else(|| panic!("no {path}")).read(seen)
+}
+
+/// The source of the robot's outputs, and the statuses of an output, an input and a marker of it.
+fn check(faults: &str, cycle: i64, feed: Feed, source: &str, statuses: [StatusCode; 3]) {
+    let cluster = cell();
+    let observation = observed(&cluster, faults, cycle);
+    let seen = Seen {
+        observation: &observation,
+        feed,
+        recent: &[],
+    };
+    let of = |path: &str| reading(&cluster, &seen, path);
+    assert_eq!(of("Programs/robot/Source").value, Some(text(source)));
+    let robot = &cluster.controllers()[0].circuit;
+    let paths = [
+        format!("Programs/robot/Outputs/{}", robot.outputs()[0].name),
+        format!("Programs/robot/Inputs/{}", robot.inputs()[0]),
+        format!("Programs/robot/Markers/{}", robot.registers()[0].name),
+    ];
+    for (path, status) in paths.iter().zip(statuses) {
+        let reading = of(path);
+        assert_eq!(reading.status, status, "{path}");
+        assert!(reading.value.is_some(), "{path} keeps its value");
+    }
+}
+
+const GOOD: StatusCode = StatusCode::Good;
+const LAST: StatusCode = StatusCode::UncertainLastUsableValue;
+
+#[test]
+fn a_status_says_how_far_a_value_can_be_trusted() {
+    check("", 30, Feed::Live, "direct", [GOOD, GOOD, GOOD]);
+    let one = "[[step]]\nat = 20\naction = \"crash\"\nstation = \"robot\"\n";
+    check(one, 30, Feed::Live, "reconstructed", [GOOD, GOOD, GOOD]);
+    let both = format!("{one}[[step]]\nat = 20\naction = \"crash\"\nstation = \"understudy\"\n");
+    check(&both, 21, Feed::Live, "held", [LAST, GOOD, LAST]);
+    let failed = StatusCode::BadDeviceFailure;
+    check(&both, 50, Feed::Live, "fail-safe", [failed, GOOD, LAST]);
+    let silent = StatusCode::BadNoCommunication;
+    check("", 30, Feed::Silent, "direct", [silent; 3]);
+    let ended = StatusCode::UncertainNoCommunicationLastUsableValue;
+    check("", 30, Feed::Ended, "direct", [ended; 3]);
+    check(&both, 50, Feed::Ended, "fail-safe", [failed, ended, ended]);
+}
+
+#[test]
+fn what_is_silent_is_found_out() {
+    let cluster = cell();
+    let mut observation = observed(&cluster, "", 30);
+    let now = observation.heard;
+    let check = |observation: &Observation, after: u64, feed: Feed| {
+        let found = trust::feed(observation, now + Duration::from_millis(after));
+        assert_eq!(found, feed, "after {after} ms");
+    };
+    check(&observation, 1_900, Feed::Live);
+    check(&observation, 2_100, Feed::Silent);
+    let mut slow = (*observation.snapshot).clone();
+    slow.period_us = 1_000_000;
+    observation.snapshot = Arc::new(slow.clone());
+    check(&observation, 19_900, Feed::Live);
+    check(&observation, 20_100, Feed::Silent);
+    slow.run = RunState::Finished;
+    observation.snapshot = Arc::new(slow);
+    check(&observation, 20_100, Feed::Ended);
+}
+
+#[test]
+fn before_a_run_nothing_is_known() {
+    let cluster = cell();
+    let model = Model::new(Arc::new(cluster.clone()), BOUNDS);
+    let observation = Observation::new(&model, model.snapshot(), Instant::now());
+    let seen = Seen {
+        observation: &observation,
+        feed: trust::feed(&observation, observation.heard),
+        recent: &[],
+    };
+    assert_eq!(seen.feed, Feed::Waiting);
+    for variable in variables(&cluster) {
+        let reading = variable.read(&seen);
+        let is_now = ["Inputs", "Outputs", "Markers", "Source"];
+        if is_now.iter().any(|part| variable.path().contains(part)) {
+            let waits = StatusCode::BadWaitingForInitialData;
+            assert_eq!(reading.status, waits, "{}", variable.path());
+        }
+    }
+}
+
+#[test]
+fn every_signal_has_one_place_and_a_value_of_its_kind() {
+    let cluster = cell();
+    let observation = observed(&cluster, "", 30);
+    let seen = Seen {
+        observation: &observation,
+        feed: Feed::Live,
+        recent: &["one".to_owned()],
+    };
+    let variables = variables(&cluster);
+    let paths: BTreeSet<String> = variables.iter().map(Variable::path).collect();
+    assert_eq!(paths.len(), variables.len());
+    for controller in cluster.controllers() {
+        for (kind, count) in [
+            ("Inputs", controller.circuit.inputs().len()),
+            ("Outputs", controller.circuit.outputs().len()),
+        ] {
+            let folder = format!("Programs/{}/{kind}/", controller.name);
+            let found = paths.iter().filter(|path| path.starts_with(&folder));
+            assert_eq!(found.count(), count, "{folder}");
+        }
+    }
+    for variable in &variables {
+        let value = variable.read(&seen).value;
+        let of_kind = match (variable.kind(), value) {
+            (Kind::Boolean, Some(Variant::Boolean(_)))
+            | (Kind::Int64, Some(Variant::Int64(_)))
+            | (Kind::UInt64, Some(Variant::UInt64(_)))
+            | (Kind::String, Some(Variant::String(_)))
+            | (Kind::Strings, Some(Variant::Array(_))) => true,
+            (_, value) => panic!("{}: {value:?}", variable.path()),
+        };
+        assert!(of_kind);
+    }
+}

@@ -1,0 +1,108 @@
+//! How far a value can be trusted, as OPC UA says it: the status codes that stand beside every value.
+//!
+//! | the run | what is now (signals, states, margin) | what is counted |
+//! |---|---|---|
+//! | has not begun | Bad_WaitingForInitialData | Good |
+//! | says something | as below | Good |
+//! | is silent for 2 s and 20 cycles | Bad_NoCommunication | Uncertain_NoCommunicationLastUsableValue |
+//! | has ended | Uncertain_NoCommunicationLastUsableValue, unless it was bad | Good |
+//!
+//! An output is Good where it is direct or reconstructed, which is the same value; the variable `Source` beside it says which. Held
+//! is Uncertain_LastUsableValue, fail-safe Bad_DeviceFailure, forced Good_LocalOverride.
+
+use std::time::{Duration, Instant};
+
+use opcua::types::StatusCode;
+use understudy_gateway::Observation;
+use understudy_view::{ProgramSnapshot, RunState};
+
+/// How long a run may say nothing, at least.
+const SILENCE: Duration = Duration::from_secs(2);
+
+/// And in its own time.
+const SILENT_CYCLES: u32 = 20;
+
+/// Whether anything comes from the run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Feed {
+    Waiting,
+    Live,
+    Silent,
+    Ended,
+}
+
+/// What comes of `seen` at `now`.
+pub(crate) fn feed(seen: &Observation, now: Instant) -> Feed {
+    let period = Duration::from_micros(seen.snapshot.period_us);
+    match seen.snapshot.run {
+        RunState::Finished | RunState::Interrupted => Feed::Ended,
+        _ if now.duration_since(seen.heard) > SILENCE.max(period * SILENT_CYCLES) => Feed::Silent,
+        RunState::Starting => Feed::Waiting,
+        RunState::Running => Feed::Live,
+    }
+}
+
+/// Of something that is so now, `own` if it is heard of.
+pub(crate) fn present(feed: Feed, own: StatusCode) -> StatusCode {
+    match feed {
+        Feed::Waiting => StatusCode::BadWaitingForInitialData,
+        Feed::Live => own,
+        Feed::Silent => StatusCode::BadNoCommunication,
+        Feed::Ended if own.is_bad() => own,
+        Feed::Ended => StatusCode::UncertainNoCommunicationLastUsableValue,
+    }
+}
+
+/// Of something that was counted.
+pub(crate) fn counted(feed: Feed) -> StatusCode {
+    match feed {
+        Feed::Silent => StatusCode::UncertainNoCommunicationLastUsableValue,
+        Feed::Waiting | Feed::Live | Feed::Ended => StatusCode::Good,
+    }
+}
+
+/// Of the outputs of a program.
+pub(crate) fn outputs(program: &ProgramSnapshot) -> StatusCode {
+    match program.source {
+        Some("direct" | "reconstructed") => StatusCode::Good,
+        Some("held") => StatusCode::UncertainLastUsableValue,
+        Some(_) => StatusCode::BadDeviceFailure,
+        None => StatusCode::BadWaitingForInitialData,
+    }
+}
+
+/// Of one of its outputs.
+pub(crate) fn output(program: &ProgramSnapshot, name: &str) -> StatusCode {
+    if is_forced(program, name) {
+        StatusCode::GoodLocalOverride
+    } else {
+        outputs(program)
+    }
+}
+
+/// Of an input whose channel `has_failed`: the program is given its last good value then.
+pub(crate) fn input(program: &ProgramSnapshot, name: &str, has_failed: bool) -> StatusCode {
+    if is_forced(program, name) {
+        StatusCode::GoodLocalOverride
+    } else if has_failed {
+        StatusCode::UncertainLastUsableValue
+    } else {
+        StatusCode::Good
+    }
+}
+
+/// Of its state: nobody advances it where its outputs are not true.
+pub(crate) fn state(program: &ProgramSnapshot) -> StatusCode {
+    if outputs(program).is_good() {
+        StatusCode::Good
+    } else {
+        StatusCode::UncertainLastUsableValue
+    }
+}
+
+fn is_forced(program: &ProgramSnapshot, name: &str) -> bool {
+    let forced = program.forced.iter();
+    forced
+        .filter_map(|force| force.split_once(" = "))
+        .any(|(signal, _)| signal == name)
+}
