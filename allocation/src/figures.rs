@@ -177,11 +177,13 @@ pub enum FamilyQuantity {
     MemoryBytesPerPoint,
     /// 1 where a program may have as many timers and counters as its memory holds.
     TimersByMemory,
+    /// Time of one instruction on bits, for models that do not say theirs.
+    BoolInstructionNs,
 }
 
 impl FamilyQuantity {
     /// All.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::ProgramBytesPerInstruction,
         Self::ProgramBytesPerTimer,
         Self::ProgramBytesPerCounter,
@@ -191,6 +193,7 @@ impl FamilyQuantity {
         Self::MemoryBytesBase,
         Self::MemoryBytesPerPoint,
         Self::TimersByMemory,
+        Self::BoolInstructionNs,
     ];
 
     /// The largest number that is believed.
@@ -208,6 +211,7 @@ impl FamilyQuantity {
             Self::MemoryBytesBase => "memory_bytes_base",
             Self::MemoryBytesPerPoint => "memory_bytes_per_point",
             Self::TimersByMemory => "timers_by_memory",
+            Self::BoolInstructionNs => "bool_instruction_ns",
         }
     }
 

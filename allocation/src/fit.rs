@@ -119,7 +119,7 @@ impl Fit {
 
 /// Compares.
 pub fn fit(controller: &Controller, family: Option<&Family>, need: &Need, terms: &Terms) -> Fit {
-    let mut judge = Judge::new(controller, terms);
+    let mut judge = Judge::new(controller, family, terms);
     judge.points(
         Quantity::DigitalInputs,
         need.inputs,
@@ -159,8 +159,8 @@ pub fn fit(controller: &Controller, family: Option<&Family>, need: &Need, terms:
                 memory_of(&mut judge, capacity, Dimension::ProgramMemory, &bytes);
             }
         }
-        let instruction = controller.number(Quantity::BoolInstructionNs);
-        scan_ns = instruction.map(|time| time.saturating_mul(program.instructions));
+        let instruction = judge.instruction_time();
+        scan_ns = instruction.map(|time| time.value.saturating_mul(program.instructions));
         if let Some(within) = need.scan_within {
             judge.scan_time(program.instructions, within);
         }

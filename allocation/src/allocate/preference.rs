@@ -61,11 +61,17 @@ pub(super) fn order(
         }
     }
     if preference == Preference::Cost && known < types.len() {
-        remarks.push(format!(
-            "{} of {} prices are not known: a model without a price is ranked behind those with one, by the size of its memory",
-            types.len() - known,
-            types.len()
-        ));
+        remarks.push(if known == 0 {
+            "no price is known, so nothing here is about cost: the models that suffice stand by the size of their memory, and the fewest boxes are \
+             taken (`understudy catalogue import FILE --update` brings prices)"
+                .to_owned()
+        } else {
+            format!(
+                "{} of {} prices are not known: a model without a price is ranked behind those with one, by the size of its memory",
+                types.len() - known,
+                types.len()
+            )
+        });
     }
     let mut order: Vec<usize> = (0..types.len()).collect();
     order.sort_by_key(|&place| {

@@ -2,13 +2,14 @@
 
 use super::Verdict;
 use super::judge::Judge;
-use crate::figures::{Figure, Quantity};
+use crate::figures::Figure;
 use crate::need::Need;
 use crate::requirement::{Asked, Bound, Requirement};
 
 pub(super) fn judge(judge: &mut Judge<'_>, requirement: &Requirement, need: &Need) {
     let controller = judge.controller;
     let criterion = format!("required: {}", requirement.text);
+    let instruction_time = judge.instruction_time();
     let mut is = |holds: bool, message: String, sources: Vec<String>| {
         let verdict = if holds {
             Verdict::Fits
@@ -67,16 +68,11 @@ pub(super) fn judge(judge: &mut Judge<'_>, requirement: &Requirement, need: &Nee
         },
         Asked::ScanTime(within) => {
             let Some(program) = &need.program else { return };
-            let time = controller.numbers.get(&Quantity::BoolInstructionNs);
-            match time {
+            match instruction_time {
                 Some(figure) => {
                     let scan = u128::from(figure.value) * u128::from(program.instructions);
                     let message = format!("scans in about {scan} ns");
-                    is(
-                        scan <= within.as_nanos(),
-                        message,
-                        vec![figure.source.clone()],
-                    );
+                    is(scan <= within.as_nanos(), message, vec![figure.source]);
                 }
                 None => {
                     let message = "the time of an instruction is not known".to_owned();

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use super::{Dimension, Finding, Load, Verdict};
-use crate::controller::Controller;
-use crate::figures::{Quantity, Statement};
+use crate::controller::{Controller, Family};
+use crate::figures::{FamilyQuantity, Figure, Quantity, Statement};
 use crate::need::Terms;
 
 /// Millionths.
@@ -13,19 +13,34 @@ const WHOLE: u64 = 1_000_000;
 
 pub(super) struct Judge<'a> {
     pub(super) controller: &'a Controller,
+    pub(super) family: Option<&'a Family>,
     pub(super) terms: &'a Terms,
     pub(super) findings: Vec<Finding>,
     pub(super) loads: BTreeMap<Dimension, Load>,
 }
 
 impl<'a> Judge<'a> {
-    pub(super) fn new(controller: &'a Controller, terms: &'a Terms) -> Self {
+    pub(super) fn new(
+        controller: &'a Controller,
+        family: Option<&'a Family>,
+        terms: &'a Terms,
+    ) -> Self {
         Self {
             controller,
+            family,
             terms,
             findings: Vec::new(),
             loads: BTreeMap::new(),
         }
+    }
+
+    /// The time of an instruction on bits: the model's own, its family's, or what is assumed.
+    pub(super) fn instruction_time(&self) -> Option<Figure<u64>> {
+        let own = self.controller.numbers.get(&Quantity::BoolInstructionNs);
+        own.cloned().or_else(|| {
+            self.terms
+                .of_family(self.family, FamilyQuantity::BoolInstructionNs)
+        })
     }
 
     /// A finding without numbers.
@@ -212,15 +227,15 @@ impl<'a> Judge<'a> {
         let criterion = "scan_time";
         let within_ns = u64::try_from(within.as_nanos()).unwrap_or(u64::MAX).max(1);
         let usable = self.terms.usable(within_ns.min(1 << 50));
-        let Some(time) = self.controller.number(Quantity::BoolInstructionNs) else {
+        let Some(time) = self.instruction_time() else {
             let most = usable / instructions.max(1);
             let message = format!(
                 "the time of an instruction is not known; up to {most} ns would do for {instructions} in {within:?}"
             );
             return self.unknown(criterion, message);
         };
-        let need = instructions.saturating_mul(time);
-        let sources = self.source(Quantity::BoolInstructionNs);
+        let need = instructions.saturating_mul(time.value);
+        let sources = vec![time.source];
         self.compare(criterion, " ns", need, within_ns, sources);
         let share = |part: u64| {
             let share = u128::from(part) * u128::from(WHOLE) / u128::from(within_ns);

@@ -270,3 +270,31 @@ fn what_is_not_needed_need_not_be_known() {
     let found = fit(&bare, None, &nothing, &Terms::default());
     assert_eq!((found.verdict, found.findings.len()), (Verdict::Fits, 0));
 }
+
+#[test]
+fn an_assumed_time_of_an_instruction_decides_and_is_named() {
+    let numbers: Vec<_> = ALL
+        .into_iter()
+        .filter(|(quantity, _)| *quantity != Quantity::BoolInstructionNs)
+        .collect();
+    let assumptions = [(FamilyQuantity::BoolInstructionNs, 1000)].into();
+    let assumed = Terms {
+        assumptions,
+        ..Terms::default()
+    };
+    let scan = |family: &Family, terms: &Terms| {
+        let found = fit(&controller("A", &numbers), Some(family), &need(), terms);
+        let mut findings = found.findings.into_iter();
+        let finding = findings.find(|finding| finding.criterion == "scan_time");
+        let finding = finding.expect("it is asked for");
+        (finding.verdict, finding.sources.join(", "))
+    };
+    let silent = known_family();
+    assert_eq!(scan(&silent, &Terms::default()).0, Verdict::Unknown);
+    let (verdict, source) = scan(&silent, &assumed);
+    assert_eq!(verdict, Verdict::Fits);
+    assert_eq!(source, "assumed: bool_instruction_ns = 1000");
+    // What the family says goes before what is assumed.
+    let slow = family(&[(FamilyQuantity::BoolInstructionNs, 1_000_000)]);
+    assert_eq!(scan(&slow, &assumed).0, Verdict::DoesNotFit);
+}
