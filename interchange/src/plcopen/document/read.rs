@@ -235,7 +235,16 @@ impl Reader {
         let kind = elements(node).next()?;
         let name = kind.tag_name().name();
         Some(match name {
-            "derived" => VariableType::Derived(self.needed(kind, "name")?),
+            "derived" => {
+                let name = self.needed(kind, "name")?;
+                match panel_type(&name) {
+                    Some(usual) => {
+                        self.ignore("what a panel shows of a variable", kind);
+                        VariableType::Elementary(usual.to_owned())
+                    }
+                    None => VariableType::Derived(name),
+                }
+            }
             "subrangeSigned" | "subrangeUnsigned" => {
                 let range = child(kind, "range");
                 let bound = |which| {
@@ -303,4 +312,13 @@ fn documentation(node: Node<'_, '_>) -> Option<String> {
     let text = word(child(node, "documentation")?);
     let words: Vec<&str> = text.split_whitespace().collect();
     (!words.is_empty()).then(|| words.join(" "))
+}
+
+/// What the types of variables are that Beremiz shows on a panel.
+fn panel_type(name: &str) -> Option<&'static str> {
+    match name {
+        "HMI_BOOL" => Some("BOOL"),
+        "HMI_INT" => Some("INT"),
+        _ => None,
+    }
 }
