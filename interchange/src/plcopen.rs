@@ -6,6 +6,7 @@
 
 mod document;
 mod fidelity;
+mod instructions;
 mod ladder;
 mod literal;
 mod plan;

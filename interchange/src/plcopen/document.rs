@@ -119,8 +119,8 @@ pub(crate) enum Body {
     Graph(Graph),
     /// ST, with the place of its first letter.
     StructuredText(Name),
-    /// Something else, in words.
-    Foreign(&'static str, Range<usize>),
+    /// IL, likewise.
+    InstructionList(Name),
 }
 
 /// Objects and the wires between them.

@@ -249,7 +249,9 @@ impl Chart<'_, '_, '_> {
                     .verbatim(&Name::at(bare, start..start + bare.len()));
                 self.line(");\n", place);
             }
-            Body::Foreign(what, span) => self.foreign(what, span.clone()),
+            Body::InstructionList(text) => {
+                self.foreign("an instruction list in a sequence", text.span());
+            }
         }
         bit
     }
@@ -367,7 +369,9 @@ impl Chart<'_, '_, '_> {
                         network(self.project, graph, self.statements, self.lowered);
                     }
                     Some(Body::StructuredText(text)) => self.statements.verbatim(text),
-                    Some(Body::Foreign(what, span)) => self.foreign(what, span.clone()),
+                    Some(Body::InstructionList(text)) => {
+                        self.foreign("an instruction list in a sequence", text.span());
+                    }
                     None => {}
                 }
                 self.line("\nEND_IF;\n", deed.place);

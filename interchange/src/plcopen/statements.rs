@@ -13,7 +13,7 @@ use super::plan::{Action, Call, Input, Plan, Step};
 use super::power::{Power, Read};
 
 /// Operators of functions that have one.
-const OPERATORS: [(&str, &str); 14] = [
+pub(super) const OPERATORS: [(&str, &str); 14] = [
     ("AND", "AND"),
     ("OR", "OR"),
     ("XOR", "XOR"),
@@ -129,7 +129,7 @@ impl<'a> Statements<'a> {
     }
 
     /// Only where none of the jumps is done.
-    fn unless(
+    pub(super) fn unless(
         &mut self,
         jumps: &[(Option<String>, String)],
         span: &Range<usize>,
@@ -467,6 +467,11 @@ impl<'a> Statements<'a> {
             self.value(input, span);
         }
         self.push(")", span);
+    }
+
+    /// The type of a variable, of a literal, or of what a function answers.
+    pub(super) fn kind_of(&self, text: &str) -> String {
+        self.kind(&read(text, &(0..0)))
     }
 
     /// The type of a value, as far as it is needed to keep it.

@@ -129,8 +129,9 @@ fn mentions(pou: &Pou, name: &str) -> bool {
         Body::Graph(graph) => graph.objects.iter().any(|object| {
             matches!(&object.kind, super::document::Kind::Block(block) if block.type_name.eq_ignore_ascii_case(name))
         }),
-        Body::StructuredText(text) => words(text).any(|word| word.eq_ignore_ascii_case(name)),
-        Body::Foreign(..) => false,
+        Body::StructuredText(text) | Body::InstructionList(text) => {
+            words(text).any(|word| word.eq_ignore_ascii_case(name))
+        }
     })
 }
 
@@ -152,12 +153,8 @@ fn unit<'a>(project: &'a Project, pou: &'a Pou, lowered: &mut Lowered) -> Option
         }
         Some(Body::Graph(graph)) => network(project, graph, &mut statements, lowered),
         Some(Body::StructuredText(text)) => statements.text = Text::verbatim(text),
-        Some(Body::Foreign(what, span)) => {
-            let message = format!("{what} is not taken");
-            lowered
-                .diagnostics
-                .push(Diagnostic::error("U1010", message, span.clone()));
-            return None;
+        Some(Body::InstructionList(text)) => {
+            statements.instruction_list(text, &mut lowered.diagnostics);
         }
         None => {
             let message = format!("`{}` has no body", pou.name);

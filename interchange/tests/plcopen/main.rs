@@ -1,6 +1,7 @@
 //! PLCopen XML, from outside.
 
 mod bad_input;
+mod instruction_lists;
 mod jumps;
 mod meaning;
 mod public_ladders;

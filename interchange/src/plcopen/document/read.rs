@@ -160,7 +160,7 @@ impl Reader {
                 "FBD" => Body::Graph(graph(self, language, Language::FunctionBlocks)),
                 "SFC" => Body::Graph(graph(self, language, Language::Sequence)),
                 "ST" => Body::StructuredText(text(language)),
-                "IL" => Body::Foreign("an instruction list", start_tag(language)),
+                "IL" => Body::InstructionList(text(language)),
                 _ => continue,
             };
             return Some(found);
