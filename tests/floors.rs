@@ -14,6 +14,7 @@ const FLOORS: &[&[&str]] = &[
         "understudy-wire",
     ],
     &[
+        "understudy-form",
         "understudy-ladder",
         "understudy-parity",
         "understudy-reliability",

@@ -1,4 +1,4 @@
-//! Taking the values of a TOML table key by key, so that one run finds everything that is wrong with it.
+//! The tables of a cluster file as [`crate::format`] describes them: its keys, their types, bounds and defaults.
 //!
 //! Invariant: a value that leaves here has the type and the bounds of its [`Key`]; where the text has another one, that is
 //! reported and the default goes on in its place, so that the rest is still checked.
@@ -8,12 +8,11 @@ use std::net::SocketAddr;
 use std::ops::Range;
 use std::time::Duration;
 
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::DeTable;
 use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::suggestion;
+pub(crate) use understudy_form::Placed;
+use understudy_form::{Codes, Value, unknown_key};
 
-use crate::duration::{parse_time, spoken};
 use crate::format::{Key, Kind, Section};
 
 /// The longest name of a party, in characters.
@@ -22,12 +21,14 @@ pub const MAXIMUM_NAME_LENGTH: usize = 48;
 /// Names of one place that are looked up and not found; those past it are only counted, so that no file takes long.
 pub(crate) const MAXIMUM_MISFITS: usize = 100;
 
-/// A value and where it stands, or where it would stand.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Placed<T> {
-    pub(crate) value: T,
-    pub(crate) span: Range<usize>,
-}
+pub(crate) const CODES: Codes = Codes {
+    no_toml: "U0201",
+    unknown_key: "U0202",
+    missing_key: "U0203",
+    wrong_type: "U0204",
+    out_of_bounds: "U0205",
+    unknown_word: "U0207",
+};
 
 /// One table of the file.
 pub(crate) struct Fields<'a, 't> {
@@ -40,14 +41,14 @@ impl<'a, 't> Fields<'a, 't> {
     /// Reports the unknown and the missing keys at once.
     pub(crate) fn new(
         section: &'static Section,
-        table: &'a DeTable<'t>,
-        span: Range<usize>,
+        table: Placed<&'a DeTable<'t>>,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Self {
+        let Placed { value: table, span } = table;
         let known: Vec<&str> = section.keys.iter().map(|key| key.name).collect();
         for key in table.keys() {
             if !known.contains(&key.get_ref().as_ref()) {
-                diagnostics.push(unknown_key(key, &section.header(), &known));
+                diagnostics.push(unknown_key(&CODES, &section.header(), key, &known));
             }
         }
         for key in section.keys {
@@ -73,30 +74,27 @@ impl<'a, 't> Fields<'a, 't> {
         self.table.contains_key(name)
     }
 
-    fn get(&self, name: &str) -> (&'static Key, Option<&'a Spanned<DeValue<'t>>>) {
-        (self.section.key(name), self.table.get(name))
+    fn get(&self, name: &'static str) -> (&'static Key, Option<Value<'a, 't>>) {
+        let value = self.table.get(name);
+        let value = value.map(|value| Value::new(name, value, &CODES));
+        (self.section.key(name), value)
     }
 
     /// Any text.
     pub(crate) fn text(
         &self,
-        name: &str,
+        name: &'static str,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Option<Placed<String>> {
         let (key, value) = self.get(name);
-        let value = value?;
-        let text = value.get_ref().as_str();
-        let text = expect(key, value, text, diagnostics)?;
-        Some(Placed {
-            value: text.to_owned(),
-            span: value.span(),
-        })
+        let text = value?.text_as(&key.kind.expected(), diagnostics)?;
+        Some(text.map(str::to_owned))
     }
 
     /// The name of a party.
     pub(crate) fn name(
         &self,
-        name: &str,
+        name: &'static str,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Option<Placed<String>> {
         let text = self.text(name, diagnostics)?;
@@ -117,20 +115,17 @@ impl<'a, 't> Fields<'a, 't> {
 
     pub(crate) fn address(
         &self,
-        name: &str,
+        name: &'static str,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Option<Placed<SocketAddr>> {
-        let text = self.text(name, diagnostics)?;
-        match text.value.parse() {
-            Ok(value) => Some(Placed {
-                value,
-                span: text.span,
-            }),
+        let Placed { value, span } = self.text(name, diagnostics)?;
+        match value.parse() {
+            Ok(value) => Some(Placed { value, span }),
             Err(_) => {
-                let message = format!("{:?} is no address", text.value);
+                let message = format!("{value:?} is no address");
                 let expected = self.section.key(name).kind.expected();
                 diagnostics.push(
-                    Diagnostic::error("U0210", message, text.span)
+                    Diagnostic::error("U0210", message, span)
                         .with_label(format!("expected {expected}"))
                         .with_help("a numeric host, a colon and a port"),
                 );
@@ -140,7 +135,7 @@ impl<'a, 't> Fields<'a, 't> {
     }
 
     /// A whole number in its bounds; its default where absent or wrong.
-    pub(crate) fn count(&self, name: &str, diagnostics: &mut Vec<Diagnostic>) -> u32 {
+    pub(crate) fn count(&self, name: &'static str, diagnostics: &mut Vec<Diagnostic>) -> u32 {
         let (key, value) = self.get(name);
         let Kind::Count {
             least,
@@ -150,25 +145,13 @@ impl<'a, 't> Fields<'a, 't> {
         else {
             unreachable!("`{name}` is a count in its table");
         };
-        let Some(value) = value else {
-            return default;
-        };
-        let number = value.get_ref().as_integer();
-        let Some(number) = expect(key, value, number, diagnostics) else {
-            return default;
-        };
-        let parsed = u32::from_str_radix(number.as_str(), number.radix());
-        match parsed {
-            Ok(count) if (least..=most).contains(&count) => count,
-            _ => {
-                diagnostics.push(out_of_bounds(key, value, &number.to_string()));
-                default
-            }
-        }
+        let bounds = u64::from(least)..=u64::from(most);
+        let count = value.and_then(|value| value.count(bounds, diagnostics));
+        count.map_or(default, |count| count.value as u32)
     }
 
     /// A time in its bounds; its default where absent or wrong.
-    pub(crate) fn time(&self, name: &str, diagnostics: &mut Vec<Diagnostic>) -> Duration {
+    pub(crate) fn time(&self, name: &'static str, diagnostics: &mut Vec<Diagnostic>) -> Duration {
         let (key, value) = self.get(name);
         let Kind::Time {
             least,
@@ -178,162 +161,78 @@ impl<'a, 't> Fields<'a, 't> {
         else {
             unreachable!("`{name}` is a time in its table");
         };
-        let Some(value) = value else {
-            return default;
-        };
-        let text = value.get_ref().as_str();
-        let time = text.and_then(parse_time);
-        match expect(key, value, time, diagnostics) {
-            Some(time) if (least..=most).contains(&time) => time,
-            Some(time) => {
-                diagnostics.push(out_of_bounds(key, value, &spoken(time)));
-                default
-            }
-            None => default,
-        }
+        let time = value.and_then(|value| value.time(least..=most, diagnostics));
+        time.map_or(default, |time| time.value)
     }
 
     /// The index of one of the words of the key; 0 where absent or wrong.
-    pub(crate) fn word(&self, name: &str, diagnostics: &mut Vec<Diagnostic>) -> usize {
-        let Kind::Word { words, .. } = self.section.key(name).kind else {
+    pub(crate) fn word(&self, name: &'static str, diagnostics: &mut Vec<Diagnostic>) -> usize {
+        let (key, value) = self.get(name);
+        let Kind::Word { words, .. } = key.kind else {
             unreachable!("`{name}` is a word in its table");
         };
-        let Some(text) = self.text(name, diagnostics) else {
-            return 0;
-        };
-        let found = words.iter().position(|word| *word == text.value);
-        found.unwrap_or_else(|| {
-            let message = format!("`{name}` cannot be {:?}", text.value);
-            diagnostics.push(
-                Diagnostic::error("U0207", message, text.span)
-                    .with_help(suggestion(&text.value, words.iter().copied())),
-            );
-            0
-        })
+        let word = value.and_then(|value| value.word(words, diagnostics));
+        word.map_or(0, |word| word.value)
     }
 
     /// A table from names to bits, in the order of its places.
     pub(crate) fn bits(
         &self,
-        name: &str,
+        name: &'static str,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Vec<(Placed<String>, bool)> {
-        let entries = self.entries(name, diagnostics, DeValue::as_bool, "`true` or `false`");
-        let mut entries: Vec<_> = entries
-            .into_iter()
-            .map(|(name, bit)| (name, bit.value))
+        let entries = self.entries(name, diagnostics).into_iter();
+        let mut bits: Vec<_> = entries
+            .filter_map(|(name, value)| Some((name, value.flag(diagnostics)?.value)))
             .collect();
-        entries.sort_by_key(|(name, _)| name.span.start);
-        entries
+        bits.sort_by_key(|(name, _)| name.span.start);
+        bits
     }
 
     /// A table from names to names.
     pub(crate) fn names(
         &self,
-        name: &str,
+        name: &'static str,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> BTreeMap<String, (Range<usize>, Placed<String>)> {
-        let text = |value: &DeValue<'t>| value.as_str().map(str::to_owned);
-        let entries = self.entries(name, diagnostics, text, "a name in quotes");
+        let entries = self.entries(name, diagnostics).into_iter();
         entries
-            .into_iter()
-            .map(|(name, value)| (name.value, (name.span, value)))
+            .filter_map(|(name, value)| {
+                let text = value.text_as("a name in quotes", diagnostics)?;
+                Some((name.value, (name.span, text.map(str::to_owned))))
+            })
             .collect()
     }
 
-    fn entries<T>(
+    fn entries(
         &self,
-        name: &str,
+        name: &'static str,
         diagnostics: &mut Vec<Diagnostic>,
-        read: impl Fn(&DeValue<'t>) -> Option<T>,
-        wanted: &str,
-    ) -> Vec<(Placed<String>, Placed<T>)> {
+    ) -> Vec<(Placed<String>, Value<'a, 't>)> {
         let (key, value) = self.get(name);
-        let Some(value) = value else {
-            return Vec::new();
-        };
-        let table = value.get_ref().as_table();
-        let Some(table) = expect(key, value, table, diagnostics) else {
-            return Vec::new();
-        };
-        let mut entries = Vec::new();
-        for (name, value) in table {
-            let Some(found) = read(value.get_ref()) else {
-                diagnostics.push(wrong_type(name.get_ref(), value, wanted));
-                continue;
-            };
-            let name = Placed {
-                value: name.get_ref().clone().into_owned(),
-                span: name.span(),
-            };
-            let value = Placed {
-                value: found,
-                span: value.span(),
-            };
-            entries.push((name, value));
-        }
+        let entries = value.map_or_else(Vec::new, |value| {
+            value.entries(&key.kind.expected(), diagnostics)
+        });
+        let entries = entries.into_iter();
         entries
+            .map(|(name, value)| (name.map(str::to_owned), value))
+            .collect()
     }
 
     /// A table with keys of its own; an empty one where absent or wrong.
     pub(crate) fn table(
         &self,
-        name: &str,
+        name: &'static str,
         section: &'static Section,
         empty: &'a DeTable<'t>,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Fields<'a, 't> {
         let (key, value) = self.get(name);
-        let table = value.and_then(|value| {
-            let table = value.get_ref().as_table();
-            expect(key, value, table, diagnostics).map(|table| (table, value.span()))
-        });
-        let (table, span) = table.unwrap_or((empty, self.span.clone()));
-        Fields::new(section, table, span, diagnostics)
+        let table = value.and_then(|value| value.table(&key.kind.expected(), diagnostics));
+        let empty = Placed {
+            value: empty,
+            span: self.span.clone(),
+        };
+        Fields::new(section, table.unwrap_or(empty), diagnostics)
     }
-}
-
-fn expect<T>(
-    key: &Key,
-    value: &Spanned<DeValue<'_>>,
-    found: Option<T>,
-    diagnostics: &mut Vec<Diagnostic>,
-) -> Option<T> {
-    if found.is_none() {
-        diagnostics.push(wrong_type(key.name, value, &key.kind.expected()));
-    }
-    found
-}
-
-/// A value of another type than expected.
-pub(crate) fn wrong_type(name: &str, value: &Spanned<DeValue<'_>>, wanted: &str) -> Diagnostic {
-    let found = match value.get_ref() {
-        DeValue::String(text) => format!("the text {text:?}"),
-        DeValue::Integer(number) => format!("the number {number}"),
-        DeValue::Float(number) => format!("the number {number}"),
-        DeValue::Boolean(bit) => format!("`{bit}`"),
-        DeValue::Datetime(_) => "a date".into(),
-        DeValue::Array(_) => "a list".into(),
-        DeValue::Table(_) => "a table".into(),
-    };
-    Diagnostic::error("U0204", format!("`{name}` is {found}"), value.span())
-        .with_label(format!("expected {wanted}"))
-}
-
-fn out_of_bounds(key: &Key, value: &Spanned<DeValue<'_>>, found: &str) -> Diagnostic {
-    let message = format!("`{}` is {found}", key.name);
-    Diagnostic::error("U0205", message, value.span())
-        .with_label(format!("expected {}", key.kind.expected()))
-}
-
-/// A key that nothing has.
-pub(crate) fn unknown_key(
-    key: &Spanned<std::borrow::Cow<'_, str>>,
-    owner: &str,
-    known: &[&str],
-) -> Diagnostic {
-    let name = key.get_ref();
-    let message = format!("{owner} has no key `{name}`");
-    Diagnostic::error("U0202", message, key.span())
-        .with_help(suggestion(name, known.iter().copied()))
 }

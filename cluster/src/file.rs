@@ -5,12 +5,12 @@ use std::net::SocketAddr;
 use std::ops::Range;
 use std::time::Duration;
 
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::DeTable;
 use understudy_diagnostic::Diagnostic;
+use understudy_form::{Value, unknown_key};
 use understudy_plant::{PressParameters, RobotParameters};
 
-use crate::fields::{Fields, Placed, unknown_key, wrong_type};
+use crate::fields::{CODES, Fields, Placed};
 use crate::format::{
     CLUSTER, CONTROLLER, FIELD, LADDER_PARAMETERS, MODELS, PLANT, PRESS_PARAMETERS, REMOTE_IO,
     ROBOT_PARAMETERS, SECTIONS, Section, UNDERSTUDY,
@@ -111,21 +111,12 @@ pub(crate) enum ModelSection {
 
 /// Reads all sections; where the text is no TOML, says so and nothing else.
 pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<ClusterFile> {
-    let (root, errors) = DeTable::parse_recoverable(text);
-    for error in &errors {
-        let span = error.span().unwrap_or(text.len()..text.len());
-        let message = format!("this is no TOML: {}", error.message().trim_end());
-        diagnostics.push(Diagnostic::error("U0201", message, span));
-    }
-    // What the recovery made of a broken text would only bring errors that follow from the first ones.
-    if !errors.is_empty() {
-        return None;
-    }
+    let root = understudy_form::parse(text, &CODES, diagnostics)?;
     let root = root.get_ref();
     let known = SECTIONS.map(|section| section.name);
     for key in root.keys() {
         if !known.contains(&key.get_ref().as_ref()) {
-            diagnostics.push(unknown_key(key, "a cluster file", &known));
+            diagnostics.push(unknown_key(&CODES, "a cluster file", key, &known));
         }
     }
     let empty = DeTable::new();
@@ -199,11 +190,8 @@ fn cluster(root: &DeTable<'_>, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
         diagnostics.push(missing(&CLUSTER));
         return None;
     };
-    let Some(table) = value.get_ref().as_table() else {
-        diagnostics.push(wrong_type(CLUSTER.name, value, "a table, [cluster]"));
-        return None;
-    };
-    let fields = Fields::new(&CLUSTER, table, value.span(), diagnostics);
+    let table = Value::new(CLUSTER.name, value, &CODES).table("a table, [cluster]", diagnostics)?;
+    let fields = Fields::new(&CLUSTER, table, diagnostics);
     Some(ClusterSection {
         span: fields.span.clone(),
         name: fields.name("name", diagnostics),
@@ -226,19 +214,13 @@ fn tables<'a, 't>(
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<Vec<Fields<'a, 't>>> {
     let value = root.get(section.name)?;
-    let wanted = format!("tables, each under {}", section.header());
-    let Some(entries) = value.get_ref().as_array() else {
-        diagnostics.push(wrong_type(section.name, value, &wanted));
-        return Some(Vec::new());
-    };
-    let table = |entry: &'a Spanned<DeValue<'t>>| match entry.get_ref().as_table() {
-        Some(table) => Some(Fields::new(section, table, entry.span(), diagnostics)),
-        None => {
-            diagnostics.push(wrong_type(section.name, entry, &wanted));
-            None
-        }
-    };
-    Some(entries.iter().filter_map(table).collect())
+    let tables = Value::new(section.name, value, &CODES).tables(diagnostics);
+    let tables = tables.into_iter();
+    Some(
+        tables
+            .map(|table| Fields::new(section, table, diagnostics))
+            .collect(),
+    )
 }
 
 fn field<'a, 't>(

@@ -4,9 +4,8 @@
 
 use std::time::Duration;
 
+use understudy_form::spoken;
 use understudy_wire::MAXIMUM_HISTORY;
-
-use crate::duration::spoken;
 
 /// A table of the file.
 #[derive(Debug)]

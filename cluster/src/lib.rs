@@ -11,7 +11,6 @@ mod canonical;
 mod cluster;
 mod configuration;
 mod device;
-mod duration;
 mod fields;
 mod file;
 mod format;

@@ -12,20 +12,19 @@
 //! | U1208 | a file that cannot be read, or a ladder that is wrong |
 //! | U1251 | warning: a relation that concerns no state |
 
-mod fields;
 mod patience;
 mod relations;
 
-use std::collections::BTreeMap;
+use std::ops::{Range, RangeInclusive};
 use std::time::Duration;
 
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::DeTable;
+use understudy_diagnostic::spelling::suggestion;
 use understudy_diagnostic::{Diagnostic, Report, has_errors};
+use understudy_form::{Codes, Fields, Placed, Value};
 use understudy_interchange::parse_program;
 use understudy_ladder::Program;
 
-use self::fields::Fields;
 use self::patience::patience;
 pub use self::relations::{Pattern, RelationEntry};
 use crate::command::Objective;
@@ -34,6 +33,30 @@ use crate::mega::Analysis;
 
 /// The longest project file in bytes.
 pub const MAXIMUM_TEXT_BYTES: usize = 1 << 20;
+
+const CODES: Codes = Codes {
+    no_toml: "U1201",
+    unknown_key: "U1202",
+    missing_key: "U1203",
+    wrong_type: "U1204",
+    out_of_bounds: "U1207",
+    unknown_word: "U1207",
+};
+
+/// Every time of a project.
+const TIMES: RangeInclusive<Duration> = Duration::from_micros(1)..=Duration::from_secs(3600);
+
+const WEIGHTS: RangeInclusive<f64> = 0.0..=1e6;
+
+/// What holds where a project does not say.
+const PERIOD: Duration = Duration::from_millis(10);
+const SIMULTANEOUS: usize = 2;
+
+/// A name that nothing has.
+fn unknown(what: &str, name: &str, span: Range<usize>, known: &[&str]) -> Diagnostic {
+    Diagnostic::error("U1205", format!("there is no {what} `{name}`"), span)
+        .with_help(suggestion(name, known.iter().copied()))
+}
 
 /// A project without errors.
 #[derive(Debug, Clone)]
@@ -78,7 +101,7 @@ impl Project {
                 Some(place) if places.contains(&place) => {}
                 Some(place) => places.push(place),
                 None => {
-                    let found = fields::unknown("input", name, 0..0, &inputs);
+                    let found = unknown("input", name, 0..0, &inputs);
                     return Err(format!(
                         "{}; {}",
                         found.message,
@@ -152,41 +175,20 @@ impl Reader<'_> {
                 .push(Diagnostic::error("U1207", message, 0..0));
             return None;
         }
-        let (table, errors) = DeTable::parse_recoverable(text);
-        for error in errors {
-            let span = error.span().unwrap_or(0..0);
-            self.diagnostics
-                .push(Diagnostic::error("U1201", error.message().to_owned(), span));
-        }
-        if has_errors(&self.diagnostics) {
-            return None;
-        }
-        let span = table.span();
-        let top = Fields::new(
-            "the file",
-            table.get_ref(),
-            span,
-            &["project", "relation", "diagnosis"],
-            &mut self.diagnostics,
-        );
-        let section = top.table("project", &mut self.diagnostics);
-        let Some((section, span)) = section else {
-            top.require(&["project"], &mut self.diagnostics);
-            return None;
+        let root = understudy_form::parse(text, &CODES, &mut self.diagnostics)?;
+        let table = Placed {
+            value: root.get_ref(),
+            span: root.span(),
         };
-        const KEYS: [&str; 9] = [
-            "ladder",
-            "plant",
-            "records",
-            "period",
-            "channels",
-            "simultaneous",
-            "detection",
-            "objective",
-            "weights",
-        ];
-        let fields = Fields::new("[project]", section, span, &KEYS, &mut self.diagnostics);
-        fields.require(&["ladder"], &mut self.diagnostics);
+        let found = &mut self.diagnostics;
+        let mut top = Fields::new("the file", table, &CODES);
+        top.require(&["project"], found);
+        let project = top.table("project", "[project]", found);
+        let diagnosis = top.table("diagnosis", "[diagnosis]", found);
+        let relations = top.tables("relation", "[[relation]]", found);
+        top.finish(found);
+        let mut fields = project?;
+        fields.require(&["ladder"], found);
         let ladder = fields
             .text("ladder", &mut self.diagnostics)
             .and_then(|name| self.ladder(&name));
@@ -196,23 +198,32 @@ impl Reader<'_> {
         let records = fields.texts("records", &mut self.diagnostics);
         let mut read_records = Vec::new();
         for record in &records {
-            match (self.open)(record.get_ref()) {
-                Ok(text) => read_records.push((record.get_ref().clone(), text)),
+            match (self.open)(record.value) {
+                Ok(text) => read_records.push((record.value.to_owned(), text)),
                 Err(reason) => self.unreadable(record, &reason),
             }
         }
-        if fields.lacks("plant") && records.is_empty() {
+        if !fields.has("plant") && records.is_empty() {
             let message = "[project] has neither a `plant` nor `records`";
             self.diagnostics.push(
-                Diagnostic::error("U1203", message, fields.span.clone())
+                Diagnostic::error("U1203", message, fields.span())
                     .with_help("a plant is a ladder whose outputs are the inputs of this one; records are files of scans"),
             );
         }
-        let period = fields.time("period", Duration::from_millis(10), &mut self.diagnostics);
-        let analysis = fields.word("detection", &["late", "prompt"], &mut self.diagnostics);
-        let objective = fields.word("objective", &["fewest", "nearest"], &mut self.diagnostics);
-        let simultaneous = fields.count("simultaneous", 1..=64, &mut self.diagnostics);
-        let channels = fields.texts("channels", &mut self.diagnostics);
+        let found = &mut self.diagnostics;
+        let period = fields.time("period", TIMES, found).unwrap_or(PERIOD);
+        let analysis = fields.word("detection", &["late", "prompt"], found);
+        let objective = fields.word("objective", &["fewest", "nearest"], found);
+        let simultaneous = fields.count("simultaneous", 1..=64, found);
+        let simultaneous = simultaneous.map_or(SIMULTANEOUS, |count| count.value as usize);
+        let channels = fields.texts("channels", found);
+        let weights = fields.get("weights").map(|weights| {
+            let wanted = "a table from names of outputs to numbers";
+            weights.entries(wanted, found)
+        });
+        let all_channels = !fields.has("channels");
+        let has_plant = fields.has("plant");
+        fields.finish(found);
         let ladder = ladder?;
         let inputs: Vec<&str> = ladder
             .inputs
@@ -224,32 +235,32 @@ impl Reader<'_> {
             .iter()
             .map(|signal| signal.name.as_str())
             .collect();
-        let chosen = if fields.lacks("channels") {
+        let chosen = if all_channels {
             (0..inputs.len().min(64)).collect()
         } else {
-            self.places(&channels, &inputs, "input")
+            self.places(channels, &inputs, "input")
         };
-        let objective = match self.weights(&fields, &outputs) {
+        let objective = match weights.map(|weights| self.weights(weights, &outputs)) {
             Some(weights) => Objective::Weights(weights),
             None if objective == 1 => Objective::Nearest,
             None => Objective::Fewest,
         };
-        let patience = patience(&top, period, &mut self.diagnostics);
-        if let Some(span) = top.place("diagnosis")
-            && plant.is_none()
-            && fields.lacks("plant")
+        if let Some(diagnosis) = &diagnosis
+            && !has_plant
         {
             let message =
                 "[diagnosis] needs a `plant`: records do not say how long a state may last";
             self.diagnostics
-                .push(Diagnostic::error("U1203", message, span));
+                .push(Diagnostic::error("U1203", message, diagnosis.span()));
         }
-        let relation = relations::read(&top, &inputs, &outputs, &mut self.diagnostics);
+        let patience =
+            diagnosis.map(|diagnosis| patience(diagnosis, period, &mut self.diagnostics));
+        let relation = relations::read(relations, &inputs, &outputs, &mut self.diagnostics);
         Some(Project {
             plant,
             records: read_records,
             period,
-            simultaneous: simultaneous.unwrap_or(2).min(chosen.len()),
+            simultaneous: simultaneous.min(chosen.len()),
             channels: chosen,
             analysis: if analysis == 1 {
                 Analysis::Prompt
@@ -263,79 +274,62 @@ impl Reader<'_> {
         })
     }
 
-    fn unreadable(&mut self, name: &Spanned<String>, reason: &str) {
-        let message = format!("{} cannot be read: {reason}", name.get_ref());
+    fn unreadable(&mut self, name: &Placed<&str>, reason: &str) {
+        let message = format!("{} cannot be read: {reason}", name.value);
         self.diagnostics.push(
-            Diagnostic::error("U1208", message, name.span())
+            Diagnostic::error("U1208", message, name.span.clone())
                 .with_help("names of files are relative to the project file"),
         );
     }
 
-    fn ladder(&mut self, name: &Spanned<String>) -> Option<Program> {
-        let text = match (self.open)(name.get_ref()) {
+    fn ladder(&mut self, name: &Placed<&str>) -> Option<Program> {
+        let text = match (self.open)(name.value) {
             Ok(text) => text,
             Err(reason) => {
                 self.unreadable(name, &reason);
                 return None;
             }
         };
-        let parsed = parse_program(name.get_ref(), &text);
+        let parsed = parse_program(name.value, &text);
         let wrong = has_errors(&parsed.diagnostics);
         self.ladders.push(Report {
-            name: name.get_ref().clone(),
+            name: name.value.to_owned(),
             text,
             diagnostics: parsed.diagnostics,
         });
         (!wrong).then_some(parsed.program)
     }
 
-    fn places(&mut self, names: &[Spanned<String>], known: &[&str], what: &str) -> Vec<usize> {
+    fn places(&mut self, names: Vec<Placed<&str>>, known: &[&str], what: &str) -> Vec<usize> {
         let mut places = Vec::new();
-        for name in names {
-            match known.iter().position(|known| *known == name.get_ref()) {
+        for Placed { value: name, span } in names {
+            match known.iter().position(|known| *known == name) {
                 Some(place) if places.contains(&place) => {}
                 Some(place) => places.push(place),
-                None => {
-                    self.diagnostics
-                        .push(fields::unknown(what, name.get_ref(), name.span(), known))
-                }
+                None => self.diagnostics.push(unknown(what, name, span, known)),
             }
         }
         places.truncate(64);
         places
     }
 
-    fn weights(&mut self, fields: &Fields<'_, '_>, outputs: &[&str]) -> Option<Vec<f64>> {
-        let (table, _) = fields.table("weights", &mut self.diagnostics)?;
-        let mut weights: BTreeMap<&str, f64> = BTreeMap::new();
-        for (name, value) in table.iter() {
-            let text = name.get_ref().as_ref();
-            let Some(output) = outputs.iter().find(|output| **output == text) else {
+    /// The weight of each output; 1 where the file does not say.
+    fn weights(
+        &mut self,
+        entries: Vec<(Placed<&str>, Value<'_, '_>)>,
+        outputs: &[&str],
+    ) -> Vec<f64> {
+        let mut weights = vec![1.0; outputs.len()];
+        for (Placed { value: name, span }, weight) in entries {
+            let Some(place) = outputs.iter().position(|output| *output == name) else {
                 self.diagnostics
-                    .push(fields::unknown("output", text, name.span(), outputs));
+                    .push(unknown("output", name, span, outputs));
                 continue;
             };
-            let number = match value.get_ref() {
-                DeValue::Integer(number) => number.as_str().parse::<f64>().ok(),
-                DeValue::Float(number) => number.as_str().parse::<f64>().ok(),
-                _ => None,
-            };
-            match number.filter(|number| (0.0..=1e6).contains(number)) {
-                Some(number) => {
-                    weights.insert(output, number);
-                }
-                None => {
-                    let message = format!("the weight of `{text}` is no number from 0 to 1000000");
-                    self.diagnostics
-                        .push(Diagnostic::error("U1207", message, value.span()));
-                }
+            if let Some(weight) = weight.number(WEIGHTS, &mut self.diagnostics) {
+                weights[place] = weight.value;
             }
         }
-        Some(
-            outputs
-                .iter()
-                .map(|output| weights.get(output).copied().unwrap_or(1.0))
-                .collect(),
-        )
+        weights
     }
 }

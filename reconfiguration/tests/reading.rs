@@ -72,7 +72,7 @@ rows = ["Motr", "", "Motor /Motor"]
 states = ["0101", "00000_00x0"]
 
 [[relation]]
-events = "ps1-"
+events = 1
 "#
     ));
     assert!(findings("[project]\nladder = 5\n[[relation]\n").contains("U1201"));

@@ -2,7 +2,6 @@
 
 mod account;
 mod campaign;
-mod fields;
 mod figure;
 mod injection;
 mod joining;

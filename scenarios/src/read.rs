@@ -15,15 +15,16 @@
 
 mod steps;
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
+use std::time::Duration;
 
 use toml::de::DeTable;
 use understudy_diagnostic::spelling::suggestion;
 use understudy_diagnostic::{Diagnostic, Report, has_errors};
+use understudy_form::{Codes, Fields, Placed, parse};
 use understudy_simulator::{Disturbance, Network};
 use understudy_wire::{Party, ProgramId, Source};
 
-use crate::fields::Fields;
 use crate::parties::Parties;
 use crate::scenario::{During, Expectation, SOURCES, Scenario, source_word};
 
@@ -32,6 +33,23 @@ pub const MAXIMUM_CYCLES: u64 = 100_000_000;
 
 /// Steps of one scenario, at most.
 pub const MAXIMUM_STEPS: usize = 10_000;
+
+const CODES: Codes = Codes {
+    no_toml: "U0301",
+    unknown_key: "U0302",
+    missing_key: "U0303",
+    wrong_type: "U0304",
+    out_of_bounds: "U0305",
+    unknown_word: "U0306",
+};
+
+/// Any whole number that is not negative.
+const ANY: RangeInclusive<u64> = 0..=u64::MAX;
+
+const SHARE: RangeInclusive<f64> = 0.0..=1.0;
+
+/// How long a frame is on its way, at most.
+const MAXIMUM_LATENCY: Duration = Duration::from_secs(3600);
 
 /// A scenario file that was read.
 #[derive(Debug, Clone)]
@@ -50,20 +68,14 @@ pub fn read(name: &str, text: &str, parties: Option<&Parties>) -> ReadScenario {
         parties,
         diagnostics: Vec::new(),
     };
-    let (table, errors) = DeTable::parse_recoverable(text);
-    for error in &errors {
-        let place = error.span().unwrap_or(text.len()..text.len());
-        let message = format!("this is no TOML: {}", error.message());
-        reader
-            .diagnostics
-            .push(Diagnostic::error("U0301", message, place));
-    }
-    // What the recovery made of a broken text would only bring errors that follow from the first ones.
-    let scenario = if errors.is_empty() {
-        reader.scenario(Fields::new(table.get_ref(), 0..0, "a scenario"))
-    } else {
-        None
-    };
+    let root = parse(text, &CODES, &mut reader.diagnostics);
+    let scenario = root.as_ref().and_then(|root| {
+        let table = Placed {
+            value: root.get_ref(),
+            span: 0..0,
+        };
+        reader.scenario(Fields::new("a scenario", table, &CODES))
+    });
     let mut diagnostics = reader.diagnostics;
     diagnostics.sort_by_key(|diagnostic| (diagnostic.span.start, diagnostic.span.end));
     ReadScenario {
@@ -95,21 +107,13 @@ struct Reader<'p> {
 impl Reader<'_> {
     fn scenario(&mut self, mut fields: Fields<'_, '_>) -> Option<Scenario> {
         let found = &mut self.diagnostics;
+        fields.require(&["title", "cycles"], found);
         let title = fields.text("title", found);
-        let title = fields.required("title", title, found);
-        let cycles = fields.count("cycles", found);
-        let cycles = fields.required("cycles", cycles, found);
-        let cycles = cycles.and_then(|(cycles, place)| {
-            if (1..=MAXIMUM_CYCLES).contains(&cycles) {
-                return Some(cycles);
-            }
-            let message = format!("{cycles} cycles: there must be 1 to {MAXIMUM_CYCLES}");
-            found.push(Diagnostic::error("U0305", message, place));
-            None
-        });
+        let cycles = fields.count("cycles", 1..=MAXIMUM_CYCLES, found);
+        let cycles = cycles.map(|cycles| cycles.value);
         // Later checks need some end; an unknown one must not bring further errors.
         let end = cycles.unwrap_or(MAXIMUM_CYCLES);
-        let seed = fields.count("seed", found);
+        let seed = fields.count("seed", ANY, found);
         let steps = fields.tables("step", "a step", found);
         let network = fields.table("network", "the network", found);
         let expect = fields.table("expect", "the expectation", found);
@@ -119,9 +123,9 @@ impl Reader<'_> {
         let expect =
             expect.map_or_else(Expectation::default, |expect| self.expectation(expect, end));
         Some(Scenario {
-            title: title?.0.to_owned(),
+            title: title?.value.to_owned(),
             cycles: cycles?,
-            seed: seed.map(|(seed, _)| seed),
+            seed: seed.map(|seed| seed.value),
             steps,
             network: disturbance.as_ref().map(|disturbance| disturbance.network),
             network_cycles: disturbance.and_then(|disturbance| disturbance.cycles),
@@ -132,27 +136,30 @@ impl Reader<'_> {
     fn network(&mut self, mut fields: Fields<'_, '_>, end: u64) -> Disturbance {
         let found = &mut self.diagnostics;
         let usual = Network::default();
-        let latency = fields.duration("latency", found);
-        let jitter = fields.duration("jitter", found);
-        let mut share = |key| fields.share(key, found).map_or(0.0, |(share, _)| share);
+        let latency = fields.time("latency", Duration::ZERO..=MAXIMUM_LATENCY, found);
+        let jitter = fields.time("jitter", Duration::ZERO..=MAXIMUM_LATENCY, found);
+        let mut share = |key| {
+            let share = fields.number(key, SHARE, found);
+            share.map_or(0.0, |share| share.value)
+        };
         let network = Network {
             loss: share("loss"),
             duplicate: share("duplicate"),
             corruption: share("corruption"),
-            latency: latency.map_or(usual.latency, |(latency, _)| latency),
-            jitter: jitter.map_or(usual.jitter, |(jitter, _)| jitter),
+            latency: latency.unwrap_or(usual.latency),
+            jitter: jitter.unwrap_or(usual.jitter),
         };
-        let from = fields.count("from", found);
-        let to = fields.count("to", found);
-        let place = fields.place();
+        let from = fields.count("from", ANY, found);
+        let to = fields.count("to", ANY, found);
+        let place = fields.span();
         fields.finish(found);
         let cycles = (from.is_some() || to.is_some()).then(|| {
             let place = to
                 .as_ref()
                 .or(from.as_ref())
-                .map_or(place, |(_, place)| place.clone());
-            let from = from.map_or(0, |(from, _)| from);
-            let to = to.map_or(end, |(to, _)| to);
+                .map_or(place, |bound| bound.span.clone());
+            let from = from.map_or(0, |from| from.value);
+            let to = to.map_or(end, |to| to.value);
             self.range(from, to, end, place)
         });
         Disturbance { network, cycles }
@@ -176,14 +183,21 @@ impl Reader<'_> {
 
     fn expectation(&mut self, mut fields: Fields<'_, '_>, end: u64) -> Expectation {
         let found = &mut self.diagnostics;
-        let mut count = |key| fields.count(key, found).map(|(count, _)| count);
+        let mut count = |key| Some(fields.count(key, ANY, found)?.value);
         let wrong = count("wrong").unwrap_or(0);
         let held = count("held");
         let fail_safe = count("fail_safe");
         let mishaps = count("mishaps");
         let protected = fields.flag("protected", found);
         let functional = fields.texts("functional", found);
-        let finished = fields.counts("finished", found);
+        let finished = fields.get("finished").map_or_else(Vec::new, |finished| {
+            let wanted = "a table from names to numbers, such as { ram = 15 }";
+            finished.entries(wanted, found)
+        });
+        let finished: Vec<_> = finished
+            .into_iter()
+            .filter_map(|(name, parts)| Some((name, parts.count(ANY, found)?.value)))
+            .collect();
         let during = fields.tables("during", "a range", found);
         fields.finish(found);
         Expectation {
@@ -191,14 +205,14 @@ impl Reader<'_> {
             held,
             fail_safe,
             mishaps,
-            protected: protected.is_some_and(|(protected, _)| protected),
+            protected: protected.unwrap_or(false),
             functional: functional
-                .into_iter()
-                .filter_map(|(name, place)| self.plant(name, &place))
+                .iter()
+                .filter_map(|name| self.plant(name))
                 .collect(),
             finished: finished
-                .into_iter()
-                .filter_map(|((name, place), parts)| Some((self.plant(name, &place)?, parts)))
+                .iter()
+                .filter_map(|(name, parts)| Some((self.plant(name)?, *parts)))
                 .collect(),
             during: during
                 .into_iter()
@@ -209,17 +223,14 @@ impl Reader<'_> {
 
     fn during(&mut self, mut fields: Fields<'_, '_>, end: u64) -> Option<During> {
         let found = &mut self.diagnostics;
-        let from = fields.count("from", found);
-        let from = fields.required("from", from, found);
-        let to = fields.count("to", found);
-        let to = fields.required("to", to, found);
+        fields.require(&["from", "to", "remote_io", "source"], found);
+        let from = fields.count("from", ANY, found);
+        let to = fields.count("to", ANY, found);
         let remote_io = fields.text("remote_io", found);
-        let remote_io = fields.required("remote_io", remote_io, found);
         let words = fields.texts("source", found);
-        fields.required("source", Some(()), found);
         fields.finish(found);
         let mut sources = Vec::new();
-        for (word, place) in words {
+        for Placed { value: word, span } in words {
             match SOURCES
                 .into_iter()
                 .find(|source| source_word(*source) == word)
@@ -228,62 +239,63 @@ impl Reader<'_> {
                 None => {
                     let message = format!("there is no source `{word}`");
                     let help = suggestion(word, SOURCES.into_iter().map(source_word));
-                    found.push(Diagnostic::error("U0306", message, place).with_help(help));
+                    found.push(Diagnostic::error("U0306", message, span).with_help(help));
                 }
             }
         }
-        let ((from, _), (to, to_place)) = (from?, to?);
-        self.range(from, to, end, to_place);
-        let (name, place) = remote_io?;
-        let remote_io = match self.party(name, &place)? {
+        let (from, to) = (from?.value, to?);
+        self.range(from, to.value, end, to.span);
+        let name = remote_io?;
+        let remote_io = match self.party(&name)? {
             Party::RemoteIo(program) => program,
             _ => {
                 let known = self.parties.map(|parties| {
                     let names = parties.remote_ios().map(|(_, name)| name);
-                    suggestion(name, names)
+                    suggestion(name.value, names)
                 });
-                self.unfit(name, "a remote I/O", place, known);
+                self.unfit(&name, "a remote I/O", known);
                 return None;
             }
         };
         Some(During {
             from,
-            to,
+            to: to.value,
             remote_io,
             sources: sources_or_any(sources),
         })
     }
 
-    fn plant(&mut self, name: &str, place: &Range<usize>) -> Option<ProgramId> {
-        match self.party(name, place)? {
+    fn plant(&mut self, name: &Placed<&str>) -> Option<ProgramId> {
+        match self.party(name)? {
             Party::Plant(program) => Some(program),
             _ => {
                 let known = self.parties.map(|parties| {
                     let names = parties.plants().map(|(_, name)| name);
-                    suggestion(name, names)
+                    suggestion(name.value, names)
                 });
-                self.unfit(name, "a plant", place.clone(), known);
+                self.unfit(name, "a plant", known);
                 None
             }
         }
     }
 
-    fn unfit(&mut self, name: &str, wanted: &str, place: Range<usize>, help: Option<String>) {
-        let message = format!("`{name}` is not {wanted}");
-        let mut diagnostic = Diagnostic::error("U0309", message, place);
+    fn unfit(&mut self, name: &Placed<&str>, wanted: &str, help: Option<String>) {
+        let message = format!("`{}` is not {wanted}", name.value);
+        let mut diagnostic = Diagnostic::error("U0309", message, name.span.clone());
         diagnostic.help = help;
         self.diagnostics.push(diagnostic);
     }
 
     /// Nothing without a cluster, too, where no name can be wrong.
-    fn party(&mut self, name: &str, place: &Range<usize>) -> Option<Party> {
+    fn party(&mut self, name: &Placed<&str>) -> Option<Party> {
         let parties = self.parties?;
+        let Placed { value: name, span } = name;
         let party = parties.find(name);
         if party.is_none() {
             let message = format!("the cluster has no station, remote I/O or plant `{name}`");
             let help = suggestion(name, parties.iter().map(|(_, name)| name));
             self.diagnostics
-                .push(Diagnostic::error("U0307", message, place.clone()).with_help(help));
+                .push(Diagnostic::error("U0307", message, span.clone()).with_help(help));
         }
         party
     }

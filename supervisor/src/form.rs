@@ -1,5 +1,5 @@
-//! Files in TOML as tables of known keys: what every reader of this crate does alike, so that one run finds everything that
-//! is wrong with the form of a file, each with its place.
+//! What every reader of this crate does alike with the tables of its files, so that one run finds everything that is wrong with
+//! the form of a file, each with its place.
 
 use std::ops::Range;
 use std::time::Duration;
@@ -8,6 +8,7 @@ use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
 use understudy_diagnostic::Diagnostic;
 use understudy_diagnostic::spelling::nearest;
+use understudy_form::Codes;
 use understudy_ladder::{Name, parse_time};
 
 /// A place in the text, in bytes.
@@ -16,52 +17,36 @@ pub(crate) type Place = Range<usize>;
 /// A word with its place.
 pub(crate) type Word<'t> = (&'t str, Place);
 
-/// Stable codes for what can be wrong with the form of a kind of file.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Codes {
-    pub(crate) no_toml: &'static str,
-    pub(crate) unknown_key: &'static str,
-    pub(crate) missing_key: &'static str,
-    pub(crate) wrong_type: &'static str,
-    /// A word, number or time that is none of those possible.
-    pub(crate) no_word: &'static str,
-}
-
 /// Those of maps of signals and of nets.
 pub(crate) const CODES: Codes = Codes {
     no_toml: "U0861",
     unknown_key: "U0862",
     missing_key: "U0863",
     wrong_type: "U0864",
-    no_word: "U0865",
+    out_of_bounds: "U0865",
+    unknown_word: "U0865",
 };
 
 /// A text that is being read, and what is wrong with it.
 pub(crate) struct Form<'t> {
     pub(crate) text: &'t str,
-    codes: Codes,
+    codes: &'static Codes,
     pub(crate) diagnostics: Vec<Diagnostic>,
 }
 
-/// Parses `text` and reads it; nothing where it is no TOML, because what the recovery makes of a broken text would only bring
-/// errors that follow from the first ones. The diagnostics are in the order of their places.
+/// Parses `text` and reads it; nothing where it is no TOML. The diagnostics are in the order of their places.
 pub(crate) fn read<'t, T>(
     text: &'t str,
-    codes: Codes,
+    codes: &'static Codes,
     read: impl FnOnce(&mut Form<'t>, &DeTable<'t>) -> T,
 ) -> (Option<T>, Vec<Diagnostic>) {
-    let (table, errors) = DeTable::parse_recoverable(text);
     let mut form = Form {
         text,
         codes,
         diagnostics: Vec::new(),
     };
-    for error in &errors {
-        let place = error.span().unwrap_or(text.len()..text.len());
-        let message = format!("this is no TOML: {}", error.message().trim_end());
-        form.error(codes.no_toml, message, place);
-    }
-    let result = errors.is_empty().then(|| read(&mut form, table.get_ref()));
+    let root = understudy_form::parse(text, codes, &mut form.diagnostics);
+    let result = root.map(|root| read(&mut form, root.get_ref()));
     form.diagnostics
         .sort_by_key(|diagnostic| diagnostic.span.start);
     (result, form.diagnostics)
@@ -197,7 +182,7 @@ impl<'t> Form<'t> {
                 range.start(),
                 range.end()
             );
-            self.error(self.codes.no_word, message, value.span());
+            self.error(self.codes.out_of_bounds, message, value.span());
         }
         number
     }
@@ -221,7 +206,7 @@ impl<'t> Form<'t> {
             let listed: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
             let message = format!("{:?} is none of {}", text.as_str(), listed.join(", "));
             let word = (text.as_str(), text.span());
-            self.error_near(self.codes.no_word, message, word, listed, None);
+            self.error_near(self.codes.unknown_word, message, word, listed, None);
         }
         found.map(|(_, value)| *value)
     }
@@ -232,7 +217,7 @@ impl<'t> Form<'t> {
         if time.is_none() {
             let message = format!("{:?} is no time", text.as_str());
             self.diagnostics.push(
-                Diagnostic::error(self.codes.no_word, message, text.span())
+                Diagnostic::error(self.codes.unknown_word, message, text.span())
                     .with_label("expected a number and its unit, at most 100 days")
                     .with_help("such as \"15s\", \"1500ms\" or \"2m\""),
             );

@@ -3,8 +3,9 @@
 use std::time::Duration;
 
 use understudy_diagnostic::Diagnostic;
+use understudy_form::Fields;
 
-use super::fields::Fields;
+use super::TIMES;
 use crate::diagnosis::Patience;
 
 /// Scans of the defaults.
@@ -12,23 +13,26 @@ const STEADY_SCANS: u32 = 1;
 const GRACE_SCANS: u32 = 3;
 const LATE_SCANS: u32 = 5;
 const QUIET: Duration = Duration::from_secs(5);
-const REPAIRS: usize = 3;
+const REPAIRS: u16 = 3;
 
-/// Nothing where the file has no such section.
+/// Of a ladder that is scanned once in a `period`.
 pub(super) fn patience(
-    top: &Fields<'_, '_>,
+    mut fields: Fields<'_, '_>,
     period: Duration,
     diagnostics: &mut Vec<Diagnostic>,
-) -> Option<Patience> {
-    const KEYS: [&str; 5] = ["steady", "grace", "late", "quiet", "repairs"];
-    let (section, span) = top.table("diagnosis", diagnostics)?;
-    let fields = Fields::new("[diagnosis]", section, span, &KEYS, diagnostics);
+) -> Patience {
     let repairs = fields.count("repairs", 1..=1000, diagnostics);
-    Some(Patience {
-        steady: fields.time("steady", period * STEADY_SCANS, diagnostics),
-        grace: fields.time("grace", period * GRACE_SCANS, diagnostics),
-        late: fields.time("late", period * LATE_SCANS, diagnostics),
-        quiet: fields.time("quiet", QUIET, diagnostics),
-        repairs: repairs.unwrap_or(REPAIRS) as u16,
-    })
+    let mut time = |key, absent| {
+        let time = fields.time(key, TIMES, diagnostics);
+        time.unwrap_or(absent)
+    };
+    let patience = Patience {
+        steady: time("steady", period * STEADY_SCANS),
+        grace: time("grace", period * GRACE_SCANS),
+        late: time("late", period * LATE_SCANS),
+        quiet: time("quiet", QUIET),
+        repairs: repairs.map_or(REPAIRS, |repairs| repairs.value as u16),
+    };
+    fields.finish(diagnostics);
+    patience
 }

@@ -4,8 +4,9 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use understudy_diagnostic::Diagnostic;
+use understudy_form::Fields;
 
-use super::fields::{Fields, unknown};
+use super::unknown;
 use crate::controller::Controller;
 use crate::relation::{Relation, Row};
 use crate::signals::{Bits, Event, Signals};
@@ -93,7 +94,7 @@ impl RelationEntry {
 }
 
 pub(super) fn read(
-    top: &Fields<'_, '_>,
+    tables: Vec<Fields<'_, '_>>,
     inputs: &[&str],
     outputs: &[&str],
     diagnostics: &mut Vec<Diagnostic>,
@@ -104,13 +105,11 @@ pub(super) fn read(
         outputs: names(outputs),
     };
     let mut entries = Vec::new();
-    for (table, span) in top.tables("relation", diagnostics) {
-        const KEYS: [&str; 4] = ["events", "rows", "states", "except"];
-        let fields = Fields::new("[[relation]]", table, span.clone(), &KEYS, diagnostics);
+    for mut fields in tables {
         fields.require(&["events", "rows"], diagnostics);
         let mut events = Vec::new();
         for name in fields.texts("events", diagnostics) {
-            match signals.event(name.get_ref()) {
+            match signals.event(name.value) {
                 Some(event) => events.push(event),
                 None => {
                     let known: Vec<String> = signals
@@ -118,44 +117,42 @@ pub(super) fn read(
                         .map(|event| signals.event_name(event))
                         .collect();
                     let known: Vec<&str> = known.iter().map(String::as_str).collect();
-                    diagnostics.push(unknown("event", name.get_ref(), name.span(), &known));
+                    diagnostics.push(unknown("event", name.value, name.span, &known));
                 }
             }
         }
         let mut rows = Vec::new();
         for text in fields.texts("rows", diagnostics) {
             let mut row = vec![None; outputs.len()];
-            for word in text.get_ref().split_whitespace() {
+            for word in text.value.split_whitespace() {
                 let (name, value) = match word.strip_prefix('/') {
                     Some(name) => (name, false),
                     None => (word, true),
                 };
                 match outputs.iter().position(|output| *output == name) {
                     Some(place) if row[place] == Some(!value) => {
-                        let message = format!(
-                            "the row {:?} wants `{name}` both on and off",
-                            text.get_ref()
-                        );
-                        diagnostics.push(Diagnostic::error("U1206", message, text.span()));
+                        let message =
+                            format!("the row {:?} wants `{name}` both on and off", text.value);
+                        diagnostics.push(Diagnostic::error("U1206", message, text.span.clone()));
                     }
                     Some(place) => row[place] = Some(value),
-                    None => diagnostics.push(unknown("output", name, text.span(), outputs)),
+                    None => diagnostics.push(unknown("output", name, text.span.clone(), outputs)),
                 }
             }
             if row.iter().all(Option::is_none) {
                 let message =
                     "a row without an output would always hold; leave the event out instead";
-                diagnostics.push(Diagnostic::error("U1206", message, text.span()));
+                diagnostics.push(Diagnostic::error("U1206", message, text.span));
             }
             rows.push(Row(row));
         }
-        let mut patterns = |key: &str| -> Vec<Pattern> {
+        let mut patterns = |key| -> Vec<Pattern> {
             let texts = fields.texts(key, diagnostics);
             let parsed = texts.iter().filter_map(|text| {
-                let pattern = Pattern::parse(text.get_ref(), inputs.len(), outputs.len());
+                let pattern = Pattern::parse(text.value, inputs.len(), outputs.len());
                 if pattern.is_none() {
-                    let message = format!("{:?} is no pattern of states", text.get_ref());
-                    diagnostics.push(Diagnostic::error("U1206", message, text.span()).with_help(format!(
+                    let message = format!("{:?} is no pattern of states", text.value);
+                    diagnostics.push(Diagnostic::error("U1206", message, text.span.clone()).with_help(format!(
                         "{} characters for the inputs, `_`, and {} for the outputs, each 0, 1 or -",
                         inputs.len(),
                         outputs.len()
@@ -167,6 +164,8 @@ pub(super) fn read(
         };
         let states = patterns("states");
         let except = patterns("except");
+        let span = fields.span();
+        fields.finish(diagnostics);
         entries.push(RelationEntry {
             events,
             rows: rows.into(),

@@ -1,16 +1,16 @@
 //! The steps of a scenario: what is done to whom, and whether it can be done then.
 
 use std::collections::BTreeMap;
-use std::ops::{Range, RangeInclusive};
+use std::ops::Range;
 use std::time::Duration;
 
 use understudy_diagnostic::Diagnostic;
 use understudy_diagnostic::spelling::suggestion;
+use understudy_form::{Fields, Placed};
 use understudy_simulator::{Action, Fault};
 use understudy_wire::{Party, ProgramId};
 
-use super::{MAXIMUM_NUMBER, MAXIMUM_STEPS, Reader};
-use crate::fields::{Fields, Placed};
+use super::{ANY, MAXIMUM_NUMBER, MAXIMUM_STEPS, Reader, SHARE};
 use crate::scenario::{ACTIONS, action_word};
 
 /// Keys that only some actions have.
@@ -28,14 +28,14 @@ const KEYS_OF_ACTIONS: [&str; 8] = [
 /// How late a slow party is, at most.
 const MAXIMUM_SLOWNESS: Duration = Duration::from_secs(1);
 
-/// A step with the name of its party and its place. One step of a file may be several: a cut to many, or both ways.
+/// A step with the name of its party. One step of a file may be several: a cut to many, or both ways.
 type Step = Placed<(Vec<Fault>, String)>;
 
 impl Reader<'_> {
     pub(super) fn steps(&mut self, tables: Vec<Fields<'_, '_>>, end: u64) -> Vec<Fault> {
         if let Some(first_too_many) = tables.get(MAXIMUM_STEPS) {
             let message = format!("{} steps: {MAXIMUM_STEPS} at most", tables.len());
-            let place = first_too_many.place();
+            let place = first_too_many.span();
             self.diagnostics
                 .push(Diagnostic::error("U0305", message, place));
         }
@@ -44,8 +44,8 @@ impl Reader<'_> {
             .take(MAXIMUM_STEPS)
             .filter_map(|fields| self.step(fields, end))
             .collect();
-        let time = |((faults, _), _): &Step| {
-            let fault = faults.first();
+        let time = |step: &Step| {
+            let fault = step.value.0.first();
             fault.map_or((0, 0.0), |fault| (fault.at_cycle, fault.phase))
         };
         placed.sort_by(|left, right| {
@@ -53,68 +53,58 @@ impl Reader<'_> {
             left.0.cmp(&right.0).then(left.1.total_cmp(&right.1))
         });
         self.steps_are_possible(&placed);
-        placed
-            .into_iter()
-            .flat_map(|((faults, _), _)| faults)
-            .collect()
+        placed.into_iter().flat_map(|step| step.value.0).collect()
     }
 
     fn step(&mut self, mut fields: Fields<'_, '_>, end: u64) -> Option<Step> {
         let found = &mut self.diagnostics;
-        let place = fields.place();
-        let at = fields.count("at", found);
-        let at = fields.required("at", at, found);
-        let phase = fields.share("phase", found);
+        let span = fields.span();
+        fields.require(&["at", "action", "station"], found);
+        let at = fields.count("at", ANY, found);
+        let phase = fields.number("phase", SHARE, found);
         let action = fields.text("action", found);
-        let action = fields.required("action", action, found);
         let station = fields.text("station", found);
-        let station = fields.required("station", station, found);
-        if let Some((at, place)) = &at
+        if let Some(Placed { value: at, span }) = &at
             && *at >= end
         {
             let message =
                 format!("this step is at cycle {at}, and the run ends before cycle {end}");
-            found.push(Diagnostic::error("U0305", message, place.clone()));
+            found.push(Diagnostic::error("U0305", message, span.clone()));
         }
-        if let Some((phase, place)) = &phase
+        if let Some(Placed { value: phase, span }) = &phase
             && *phase >= 1.0
         {
             let message = format!("a phase of {phase} is the next cycle; it is below 1");
-            found.push(Diagnostic::error("U0305", message, place.clone()));
+            found.push(Diagnostic::error("U0305", message, span.clone()));
         }
-        let word = action.and_then(|(word, place)| {
+        let word = action.and_then(|Placed { value: word, span }| {
             let known = ACTIONS.into_iter().find(|known| *known == word);
             if known.is_none() {
                 let message = format!("there is no action `{word}`");
                 let help = suggestion(word, ACTIONS);
-                found.push(Diagnostic::error("U0306", message, place).with_help(help));
+                found.push(Diagnostic::error("U0306", message, span).with_help(help));
             }
             known
         });
-        let party = station.as_ref().map(|(name, place)| {
-            let party = self.party(name, place);
-            (party, *name, place.clone())
-        });
-        let actions = match (word, &party) {
-            (Some(word), Some((party, name, place))) => {
-                self.actions(word, &mut fields, *party, name, place)
-            }
+        let party = station.as_ref().and_then(|name| self.party(name));
+        let actions = match (word, &station) {
+            (Some(word), Some(name)) => self.actions(word, &mut fields, party, name),
             _ => {
                 fields.ignore(&KEYS_OF_ACTIONS);
                 None
             }
         };
         fields.finish(&mut self.diagnostics);
-        let (party, name, _) = party?;
-        let (party, (at_cycle, _)) = (party?, at?);
-        let phase = phase.map_or(0.0, |(phase, _)| phase);
+        let (party, at_cycle) = (party?, at?.value);
+        let phase = phase.map_or(0.0, |phase| phase.value);
         let faults = actions?.into_iter().map(|(by, action)| Fault {
             at_cycle,
             phase,
             party: by.unwrap_or(party),
             action,
         });
-        Some(((faults.collect(), name.to_owned()), place))
+        let value = (faults.collect(), station?.value.to_owned());
+        Some(Placed { value, span })
     }
 
     /// What an action is in full: each with the party that does it, where that is another one than the step names.
@@ -123,8 +113,7 @@ impl Reader<'_> {
         word: &'static str,
         fields: &mut Fields<'_, '_>,
         party: Option<Party>,
-        name: &str,
-        place: &Range<usize>,
+        station: &Placed<&str>,
     ) -> Option<Vec<(Option<Party>, Action)>> {
         let one = |action| Some(vec![(None, action)]);
         let any = |_: Party| true;
@@ -138,12 +127,13 @@ impl Reader<'_> {
             _ => (in_cluster, "names a station or a remote I/O, and no plant"),
         };
         if let Some(party) = party.filter(|&party| !fits(party)) {
+            let name = station.value;
             let message = match (word, party) {
                 ("release", _) => format!("`{name}` has no outputs that could be released"),
                 _ => format!("`{name}` is nobody to whom `{word}` can be done"),
             };
             self.diagnostics.push(
-                Diagnostic::error("U0309", message, place.clone())
+                Diagnostic::error("U0309", message, station.span.clone())
                     .with_help(format!("{word} {wanted}")),
             );
             fields.ignore(&KEYS_OF_ACTIONS);
@@ -154,9 +144,9 @@ impl Reader<'_> {
             "restart" => one(Action::Restart),
             "restart-misconfigured" => one(Action::RestartMisconfigured),
             "restart-in-epoch" => {
-                let epoch = fields.count("epoch", &mut self.diagnostics);
-                let epoch = fields.required("epoch", epoch, &mut self.diagnostics);
-                one(Action::RestartInEpoch { epoch: epoch?.0 })
+                fields.require(&["epoch"], &mut self.diagnostics);
+                let epoch = fields.count("epoch", ANY, &mut self.diagnostics)?;
+                one(Action::RestartInEpoch { epoch: epoch.value })
             }
             "stop" => one(Action::Stop),
             "continue" => one(Action::Continue),
@@ -208,29 +198,20 @@ impl Reader<'_> {
         key: &'static str,
         least: u16,
     ) -> Option<u16> {
-        let Some((number, place)) = fields.count(key, &mut self.diagnostics) else {
-            return Some(least);
-        };
-        let bounds: RangeInclusive<u64> = u64::from(least)..=u64::from(MAXIMUM_NUMBER);
-        if bounds.contains(&number) {
-            return u16::try_from(number).ok();
+        let bounds = u64::from(least)..=u64::from(MAXIMUM_NUMBER);
+        match fields.get(key) {
+            Some(number) => {
+                let number = number.count(bounds, &mut self.diagnostics)?;
+                u16::try_from(number.value).ok()
+            }
+            None => Some(least),
         }
-        let message = format!("`{key}` is {number}: it is from {least} to {MAXIMUM_NUMBER}");
-        self.diagnostics
-            .push(Diagnostic::error("U0305", message, place));
-        None
     }
 
     fn slowness(&mut self, fields: &mut Fields<'_, '_>) -> Option<Duration> {
-        let by = fields.duration("by", &mut self.diagnostics);
-        let (by, place) = fields.required("by", by, &mut self.diagnostics)?;
-        if by <= MAXIMUM_SLOWNESS {
-            return Some(by);
-        }
-        let message = format!("{by:?} late: {MAXIMUM_SLOWNESS:?} at most");
-        self.diagnostics
-            .push(Diagnostic::error("U0305", message, place));
-        None
+        fields.require(&["by"], &mut self.diagnostics);
+        let bounds = Duration::ZERO..=MAXIMUM_SLOWNESS;
+        fields.time("by", bounds, &mut self.diagnostics)
     }
 
     /// One action for each party that is named by `to`, or for all others where nobody is; with `both_ways`, one for each of
@@ -243,18 +224,19 @@ impl Reader<'_> {
     ) -> Option<Vec<(Option<Party>, Action)>> {
         let names = fields.texts("to", &mut self.diagnostics);
         let both_ways = fields.flag("both_ways", &mut self.diagnostics);
-        let both_ways = both_ways.is_some_and(|(both, _)| both);
+        let both_ways = both_ways.unwrap_or(false);
         let mut peers = Vec::new();
-        for (name, place) in &names {
-            match self.party(name, place) {
+        for name in &names {
+            match self.party(name) {
                 Some(peer @ (Party::Station(_) | Party::RemoteIo(_))) if Some(peer) != party => {
                     peers.push(peer);
                 }
                 Some(_) => {
-                    let message = format!("`{name}` is nobody who could hear it");
-                    let help = "another station or a remote I/O";
-                    self.diagnostics
-                        .push(Diagnostic::error("U0309", message, place.clone()).with_help(help));
+                    let message = format!("`{}` is nobody who could hear it", name.value);
+                    self.diagnostics.push(
+                        Diagnostic::error("U0309", message, name.span.clone())
+                            .with_help("another station or a remote I/O"),
+                    );
                 }
                 None => {}
             }
@@ -282,9 +264,9 @@ impl Reader<'_> {
             }
             _ => None,
         };
-        let (asked, place) = match &named {
-            Some((name, place)) => (self.party(name, place), place.clone()),
-            None => (party, fields.place()),
+        let (asked, place) = match named {
+            Some(name) => (self.party(&name), name.span),
+            None => (party, fields.span()),
         };
         let program = controller(asked);
         if program.is_none() && asked.is_some() {
@@ -300,7 +282,8 @@ impl Reader<'_> {
     /// Nobody is crashed twice without a restart between, and nobody is restarted who runs.
     fn steps_are_possible(&mut self, placed: &[Step]) {
         let mut last: BTreeMap<&str, (Action, Range<usize>)> = BTreeMap::new();
-        for ((faults, name), place) in placed {
+        for Placed { value, span } in placed {
+            let (faults, name) = value;
             let Some(step) = faults.first() else {
                 continue;
             };
@@ -330,13 +313,13 @@ impl Reader<'_> {
                     action_word(step.action),
                     step.at_cycle
                 );
-                let mut diagnostic = Diagnostic::error("U0308", message, place.clone());
+                let mut diagnostic = Diagnostic::error("U0308", message, span.clone());
                 if let Some((_, before)) = before {
                     diagnostic = diagnostic.with_related(before.clone(), "its last step");
                 }
                 self.diagnostics.push(diagnostic);
             }
-            last.insert(name, (action, place.clone()));
+            last.insert(name, (action, span.clone()));
         }
     }
 }

@@ -56,7 +56,7 @@ pub struct ReadMap {
 /// U0864 a value of a wrong type, U0865 a word or time that is none of those possible, U0867 an address that is none. Whether
 /// the names mean something is the business of [`Partition::new`](super::Partition::new).
 pub fn read_map(text: &str) -> ReadMap {
-    let (map, diagnostics) = form::read(text, CODES, map);
+    let (map, diagnostics) = form::read(text, &CODES, map);
     ReadMap {
         map: map.filter(|_| !has_errors(&diagnostics)),
         diagnostics,

@@ -3,6 +3,7 @@ use std::collections::HashMap;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 use understudy_diagnostic::{Diagnostic, Report, has_errors};
+use understudy_form::Codes;
 
 use super::Model;
 use super::component::read_component;
@@ -10,7 +11,7 @@ use crate::ads::read_ads;
 use crate::alphabet::Alphabet;
 use crate::automaton::Automaton;
 use crate::events::Events;
-use crate::form::{self, Codes, Form, Place};
+use crate::form::{self, Form, Place};
 use crate::ladder::{check_signals, read_addresses};
 use crate::petri::{Net, NetFile, buffers, read_net, reduce};
 
@@ -30,7 +31,8 @@ const CODES: Codes = Codes {
     unknown_key: "U0821",
     missing_key: "U0822",
     wrong_type: "U0823",
-    no_word: "U0823",
+    out_of_bounds: "U0823",
+    unknown_word: "U0823",
 };
 
 /// Nets of more markings need capacities to be plants.
@@ -42,7 +44,7 @@ const ROLES: [&str; 3] = ["plant", "specification", "supervisor"];
 /// the model, or says why it cannot.
 pub fn read_model(text: &str, mut load: impl FnMut(&str) -> Result<String, String>) -> ReadModel {
     let mut files = Vec::new();
-    let (model, diagnostics) = form::read(text, CODES, |form, table| {
+    let (model, diagnostics) = form::read(text, &CODES, |form, table| {
         let mut loader = Loader {
             load: &mut load,
             files: &mut files,

@@ -69,7 +69,7 @@ pub struct ReadNet {
 /// Reads a net and finds everything that is wrong with it: U0861 to U0865 its form, U0823 to U0827 its events, U0855, U0856 and U0867
 /// its signals, U0888 a condition, U0890 to U0894 the net.
 pub fn read_net(text: &str) -> ReadNet {
-    let (file, mut diagnostics) = form::read(text, CODES, read_file);
+    let (file, mut diagnostics) = form::read(text, &CODES, read_file);
     diagnostics.sort_by_key(|diagnostic| diagnostic.span.start);
     ReadNet {
         file: file.flatten().filter(|_| !has_errors(&diagnostics)),

@@ -10,7 +10,7 @@ const UNITS: [(&str, u128); 4] = [
 ];
 
 /// A time in the largest unit in which it is whole.
-pub(crate) fn spoken(time: Duration) -> String {
+pub fn spoken(time: Duration) -> String {
     let nanoseconds = time.as_nanos();
     let (unit, length) = UNITS
         .into_iter()
@@ -20,7 +20,7 @@ pub(crate) fn spoken(time: Duration) -> String {
 }
 
 /// `10ms`, `1.5s`, `200us`: a decimal number and its unit. At most a day.
-pub(crate) fn parse_time(text: &str) -> Option<Duration> {
+pub fn parse_time(text: &str) -> Option<Duration> {
     let text = text.trim();
     let unit_at = text.find(|character: char| character.is_ascii_alphabetic())?;
     let (number, unit) = (text[..unit_at].trim(), &text[unit_at..]);

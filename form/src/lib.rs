@@ -1,0 +1,52 @@
+//! Files in TOML as tables of known keys, read so that one run finds everything that is wrong with them, each with its place.
+//!
+//! Invariant: a value that leaves here has the type and the bounds that were asked for; where the text has another one, that
+//! is reported, and the reader goes on without it to check the rest. What the values mean is the reader's own affair.
+
+mod fields;
+mod time;
+mod value;
+
+pub use fields::{Fields, unknown_key};
+pub use time::{parse_time, spoken};
+pub use value::{Placed, Value};
+
+use toml::Spanned;
+use toml::de::DeTable;
+use understudy_diagnostic::Diagnostic;
+
+/// The stable codes of one kind of file for what can be wrong with its form.
+#[derive(Debug)]
+pub struct Codes {
+    /// The text is no TOML.
+    pub no_toml: &'static str,
+    /// A key that its table does not have.
+    pub unknown_key: &'static str,
+    /// A key that is missing.
+    pub missing_key: &'static str,
+    /// A value of another type than expected.
+    pub wrong_type: &'static str,
+    /// A number or a time out of its bounds.
+    pub out_of_bounds: &'static str,
+    /// A word that is none of those possible.
+    pub unknown_word: &'static str,
+}
+
+/// The tables of `text`; nothing where it is no TOML, because what the recovery makes of a broken text would only bring
+/// errors that follow from the first ones.
+pub fn parse<'t>(
+    text: &'t str,
+    codes: &Codes,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<Spanned<DeTable<'t>>> {
+    let (table, errors) = DeTable::parse_recoverable(text);
+    for error in &errors {
+        let span = error.span().unwrap_or(text.len()..text.len());
+        let message = format!("this is no TOML: {}", error.message().trim_end());
+        diagnostics.push(Diagnostic::error(codes.no_toml, message, span));
+    }
+    errors.is_empty().then_some(table)
+}
+
+#[cfg(test)]
+mod tests;
