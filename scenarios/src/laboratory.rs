@@ -9,6 +9,7 @@ mod keys;
 mod operator;
 mod patience;
 mod process;
+mod processes;
 mod site;
 mod steps;
 
@@ -17,20 +18,19 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use nix::time::{ClockId, clock_gettime};
-use tokio::process::Command as ProcessCommand;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::mpsc::{Receiver, Sender, channel};
-use understudy_bus::{HostEvent, LinkKind, ZENOH_RUNTIME};
+use understudy_bus::LinkKind;
 use understudy_cluster::Cluster;
-use understudy_simulator::{Action, Fault};
+use understudy_simulator::Action;
 use understudy_wire::Party;
 
 use crate::account::{Account, OriginRule, Terms};
 use crate::journal::{Journal, JournalState};
 use crate::kept::keep_cluster;
-use crate::record::{Happening, Record, RunEvent};
+use crate::record::{Record, RunEvent};
 use crate::run_directory::RunDirectory;
-use crate::scenario::{Scenario, action_word};
+use crate::scenario::Scenario;
 
 pub(crate) use conductor::Conductor;
 pub use error::LaboratoryError;
@@ -39,14 +39,12 @@ pub use site::{HostKind, NetworkSettings};
 
 use keys::RunKeys;
 use patience::Waits;
-use process::{Process, Said, Saying};
+use process::{Process, Said};
 use site::Site;
 use steps::Steps;
 
 /// What the parties say and nobody has read yet, at most; then they wait, and lose records rather than cycles.
 const UNREAD_LINES: usize = 16_384;
-
-const END_PATIENCE: Duration = Duration::from_secs(3);
 
 /// How often the clock is looked at when nobody says anything.
 const TICK: Duration = Duration::from_millis(50);
@@ -377,157 +375,6 @@ impl Laboratory<'_> {
     fn show_journal(&mut self) {
         if let Some(journal) = &mut self.journal {
             journal.flush();
-        }
-    }
-
-    // ── processes ───────────────────────────────────────────────────────────────────────────────────────────────────
-
-    fn start(&mut self, party: Party) -> Result<(), LaboratoryError> {
-        let name = self.name(party);
-        let mut command = ProcessCommand::new(&self.settings.program);
-        command
-            .arg(match party {
-                Party::Station(_) => "node",
-                Party::RemoteIo(_) => "remote-io",
-                Party::Plant(_) => "plant",
-            })
-            .arg(&self.settings.cluster_file)
-            .args(["--name", &name])
-            .arg("--endpoints")
-            .args(self.site.endpoints(party))
-            .arg("--in-laboratory")
-            .args(self.keys.arguments(&name))
-            .args(&self.settings.arguments)
-            .env(ZENOH_RUNTIME.0, ZENOH_RUNTIME.1);
-        let life = self
-            .lives
-            .entry(party)
-            .and_modify(|life| *life += 1)
-            .or_insert(1);
-        let start = || Process::start(party, *life, command, self.sender.clone());
-        let process = self.site.at(party, start)?;
-        let process = process.map_err(|source| LaboratoryError::Start {
-            name,
-            program: self.settings.program.clone(),
-            source,
-        })?;
-        self.processes.insert(party, process);
-        self.note(RunEvent::Started { party });
-        Ok(())
-    }
-
-    async fn hear(&mut self, said: Said) -> Result<(), LaboratoryError> {
-        let Said { party, life, what } = said;
-        match what {
-            Saying::Line(line) => self.read(party, &line),
-            Saying::End(lines) => {
-                let Some(process) = self.processes.get_mut(&party) else {
-                    return Ok(());
-                };
-                if process.life() != life || process.may_end {
-                    return Ok(());
-                }
-                let status = process.end(END_PATIENCE).await;
-                let how = status.map_or("by no status".to_owned(), |status| status.to_string());
-                self.note(RunEvent::Ended {
-                    party,
-                    how: how.clone(),
-                });
-                Err(LaboratoryError::Ended {
-                    name: self.name(party),
-                    how,
-                    lines,
-                })
-            }
-        }
-    }
-
-    fn read(&mut self, party: Party, line: &str) -> Result<(), LaboratoryError> {
-        let Ok(record) = serde_json::from_str::<Record>(line) else {
-            return Err(LaboratoryError::Record {
-                name: self.name(party),
-                line: line.chars().take(200).collect(),
-            });
-        };
-        if let Happening::Host(HostEvent::Ready { rights, .. }) = &record.event {
-            self.ready.insert(party);
-            self.machine.extend(rights.lacking.iter().cloned());
-        }
-        self.take(&record);
-        Ok(())
-    }
-
-    async fn do_step(&mut self, step: &Fault) -> Result<(), LaboratoryError> {
-        let name = self.name(step.party);
-        let Some(process) = self.processes.get_mut(&step.party) else {
-            return Ok(());
-        };
-        let done = match step.action {
-            Action::Cut { to } => self.site.cut(step.party, to, true),
-            Action::Heal { to } => self.site.cut(step.party, to, false),
-            Action::Crash => process.crash().await,
-            Action::Restart => return self.restarted(step, &name),
-            Action::Stop => process.stop(),
-            Action::Continue => process.go_on(),
-            Action::Release => process.command("release").await,
-            // Refused before the run began.
-            _ => Err(std::io::ErrorKind::Unsupported.into()),
-        };
-        done.map_err(|source| LaboratoryError::Step {
-            action: action_word(step.action),
-            name: name.clone(),
-            source,
-        })?;
-        self.step_done(step, &name);
-        Ok(())
-    }
-
-    fn restarted(&mut self, step: &Fault, name: &str) -> Result<(), LaboratoryError> {
-        self.start(step.party)?;
-        self.step_done(step, name);
-        Ok(())
-    }
-
-    fn step_done(&mut self, step: &Fault, name: &str) {
-        self.note(RunEvent::Fault {
-            action: step.action,
-            party: step.party,
-            asked: step.at_cycle,
-        });
-        (self.watch)(Progress::Step {
-            cycle: step.at_cycle,
-            what: format!("{} {name}", action_word(step.action)),
-        });
-    }
-
-    /// Everybody ends: asked first, then made to.
-    async fn end(&mut self, receiver: &mut Receiver<Said>) {
-        for process in self.processes.values_mut() {
-            process.ask_to_end().await;
-        }
-        let deadline = tokio::time::Instant::now() + END_PATIENCE;
-        let mut living: BTreeSet<(Party, u32)> = self
-            .processes
-            .values()
-            .map(|process| (process.party(), process.life()))
-            .collect();
-        // What they still say belongs to the journal, and they only end when somebody listens.
-        while !living.is_empty() {
-            match tokio::time::timeout_at(deadline, receiver.recv()).await {
-                Ok(Some(said)) => match said.what {
-                    Saying::Line(line) => {
-                        // The run is over; a last line that is cut is none of its failures.
-                        let _ = self.read(said.party, &line);
-                    }
-                    Saying::End(_) => {
-                        living.remove(&(said.party, said.life));
-                    }
-                },
-                Ok(None) | Err(_) => break,
-            }
-        }
-        for (_, mut process) in std::mem::take(&mut self.processes) {
-            process.end(Duration::from_millis(100)).await;
         }
     }
 }
