@@ -1,12 +1,13 @@
 //! From supervisors to ladders: generation of a large one, and the proof of a reduced one with its plants.
 
-use std::fs;
-use std::path::PathBuf;
+#[path = "../tests/reference_models/mod.rs"]
+mod reference_models;
 
 use divan::Bencher;
+use reference_models::automaton;
 use understudy_supervisor::ladder::{Conversion, InputOutputMap, Mode, Modules, convert};
 use understudy_supervisor::proof::{ProofSettings, Verdict, prove};
-use understudy_supervisor::{Automaton, Label, State, Transition, read_ads};
+use understudy_supervisor::{Automaton, Label, State, Transition};
 
 fn main() {
     divan::main();
@@ -42,9 +43,7 @@ fn generation(bencher: Bencher, states: u32) {
 }
 
 fn agv(name: &str) -> Automaton {
-    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/agv");
-    let text = fs::read_to_string(folder.join(name).with_extension("ADS")).expect("a model");
-    read_ads(&text).automaton.expect("an automaton")
+    automaton("agv", name)
 }
 
 /// The AGV's reduced supervisor of 494 states, with the five vehicles that it does not know by itself.

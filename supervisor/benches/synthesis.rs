@@ -2,8 +2,7 @@
 
 #[path = "../tests/automata/families.rs"]
 mod families;
-#[path = "../tests/automata/models.rs"]
-#[allow(dead_code, reason = "tests need more of it")]
+#[path = "../tests/reference_models/mod.rs"]
 mod models;
 
 use divan::counter::ItemsCount;
@@ -58,7 +57,7 @@ fn supcon_of_the_guided_vehicles(bencher: Bencher<'_, '_>) {
 fn supreduce_of_the_guided_vehicles(bencher: Bencher<'_, '_>) {
     let model = Model::read("agv");
     let plant = sync(&model.plants(), Bounds::default()).expect("it fits");
-    let supervisor = model.file("_SUPER.ADS");
+    let supervisor = model.file("_SUPER");
     bencher.bench_local(|| supreduce(&plant, &supervisor, Bounds::default()));
 }
 
@@ -66,7 +65,7 @@ fn supreduce_of_the_guided_vehicles(bencher: Bencher<'_, '_>) {
 fn condat_of_the_guided_vehicles(bencher: Bencher<'_, '_>) {
     let model = Model::read("agv");
     let plant = sync(&model.plants(), Bounds::default()).expect("it fits");
-    let supervisor = model.file("_SUPER.ADS");
+    let supervisor = model.file("_SUPER");
     bencher.bench_local(|| condat(&plant, &supervisor, Bounds::default()));
 }
 

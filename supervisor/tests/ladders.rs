@@ -2,7 +2,7 @@
 
 mod reference_models;
 
-use reference_models::{automaton, json, plants};
+use reference_models::{Model, OF_PAPERS, automaton, json};
 use understudy_ladder::check;
 use understudy_supervisor::Label;
 use understudy_supervisor::ladder::{InputOutputMap, Mode, Modules, avalanche_events, convert};
@@ -28,17 +28,13 @@ fn expected_numbers(value: &serde_json::Value) -> Vec<u64> {
 
 #[test]
 fn avalanche_events_are_those_of_the_reference() {
-    for (model, name) in [
-        ("uzam_test_ads", "TEST"),
-        ("uzam_fig4", "FIG4"),
-        ("uzam_fig6", "FIG6"),
-    ] {
-        let expected = json(model, "expected.json");
-        let found = avalanche_events(&automaton(model, name));
+    for name in OF_PAPERS {
+        let expected = json("avalanche", &format!("{name}.expected.json"));
+        let found = avalanche_events(&automaton("avalanche", name));
         assert_eq!(
             numbers(&found),
             expected_numbers(&expected["avalanche_events"]),
-            "{model}"
+            "{name}"
         );
     }
     for model in MODELS.into_iter().chain(["agv", "line4_3"]) {
@@ -62,7 +58,7 @@ fn findings_are_those_of_the_reference() {
     for model in MODELS.into_iter().chain(["agv", "line4_3"]) {
         let expected = json(model, "expected.json");
         let supervisors = [automaton(model, "_SUPER")];
-        let plants = plants(model);
+        let plants = Model::read(model).plants;
         let modules = Modules {
             supervisors: &supervisors,
             plants: &plants,
@@ -119,12 +115,8 @@ fn proved(modules: &Modules, mode: Mode) -> Proof {
 
 #[test]
 fn ladders_of_the_papers_examples_are_proved() {
-    for (model, name) in [
-        ("uzam_test_ads", "TEST"),
-        ("uzam_fig4", "FIG4"),
-        ("uzam_fig6", "FIG6"),
-    ] {
-        let supervisor = automaton(model, name);
+    for name in OF_PAPERS {
+        let supervisor = automaton("avalanche", name);
         proved(&Modules::supervisor(&supervisor), Mode::Requested);
         proved(&Modules::supervisor(&supervisor), Mode::Automatic);
     }
@@ -147,7 +139,7 @@ fn ladders_of_supervisors_are_proved() {
 fn ladders_of_reduced_supervisors_with_their_plants_are_proved() {
     for model in MODELS {
         let supervisors = [automaton(model, "_SIMSUP")];
-        let plants = plants(model);
+        let plants = Model::read(model).plants;
         let modules = Modules {
             supervisors: &supervisors,
             plants: &plants,

@@ -71,7 +71,7 @@ fn from_machines_to_a_reduced_supervisor_as_in_tct() {
 
 #[test]
 fn the_events_of_the_avalanche_effect() {
-    let answer = des(&["avalanche", "supervisor/tests/data/uzam_test_ads/TEST.ADS"]).json();
+    let answer = des(&["avalanche", "examples/avalanche/TEST.ADS"]).json();
     assert_eq!(answer["result"]["events"], json!([1, 2, 3]));
 }
 

@@ -33,7 +33,7 @@ digraph "E" {
 #[test]
 fn a_picture_has_all_states_and_events_and_a_bound() {
     let model = Model::read("transfer_line");
-    let reduced = model.file("_SIMSUP.ADS");
+    let reduced = model.file("_SIMSUP");
     let picture = draw_automaton_svg(&reduced).expect("it fits");
     let marked = reduced.marked().count();
     assert_eq!(

@@ -1,6 +1,6 @@
-//! Every figure that TCT, libFAUDES, the literature and two independent programs found for the models of `tests/data`.
+//! Every figure that TCT, libFAUDES, the literature and two independent programs found for the reference models.
 
-use crate::models::{MODELS, Model, counts};
+use crate::models::{MODELS, Model, OF_PAPERS, automaton, counts, counts_in, json};
 use understudy_supervisor::operations::{
     condat, control_equivalent, isomorph, lift, meet, minstate, nonconflict, supcon, supreduce,
     sync,
@@ -50,7 +50,7 @@ fn check(name: &str) {
     expect("super", &made.supervisor);
     expect("minstate_of_super", &minstate(&made.supervisor));
 
-    let of_tct = model.file("_SUPER.ADS");
+    let of_tct = model.file("_SUPER");
     assert_eq!(
         isomorph(&made.supervisor, &of_tct).err(),
         None,
@@ -89,8 +89,8 @@ fn check(name: &str) {
         );
     }
 
-    let of_tct = model.file("_SIMSUP.ADS");
-    for supervisor in [&made.supervisor, &model.file("_SUPER.ADS")] {
+    let of_tct = model.file("_SIMSUP");
+    for supervisor in [&made.supervisor, &model.file("_SUPER")] {
         let reduced = supreduce(&made.plant, supervisor, bounds).expect("it fits");
         assert!(
             reduced.state_count() <= of_tct.state_count(),
@@ -118,13 +118,10 @@ fn guided_vehicles() {
 
 #[test]
 fn sizes_of_the_papers_examples() {
-    for name in ["uzam_test_ads", "uzam_fig4", "uzam_fig6"] {
-        let model = Model::read(name);
-        assert_eq!(
-            Some(counts(&model.plants[0])),
-            model.counts("size"),
-            "{name}"
-        );
-        assert_ne!(model.plants[0].alphabet(), &Alphabet::new([]));
+    for name in OF_PAPERS {
+        let plant = automaton("avalanche", name);
+        let expected = json("avalanche", &format!("{name}.expected.json"));
+        assert_eq!(Some(counts(&plant)), counts_in(&expected, "size"), "{name}");
+        assert_ne!(plant.alphabet(), &Alphabet::new([]));
     }
 }

@@ -4,6 +4,7 @@ mod drawing;
 mod explanations;
 mod families;
 mod figures;
+#[path = "../reference_models/mod.rs"]
 mod models;
 mod modular;
 mod properties;
