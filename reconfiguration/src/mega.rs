@@ -190,11 +190,6 @@ impl MegaController {
             .map(|(_, target)| *target)
     }
 
-    /// How many transitions.
-    pub fn edge_count(&self) -> usize {
-        self.edges.iter().map(Vec::len).sum()
-    }
-
     /// Φ̃(y, e) for an event of Σ, step 2.
     pub fn feedback(
         &self,

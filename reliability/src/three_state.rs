@@ -213,11 +213,6 @@ impl ThreeState {
         )
     }
 
-    /// Rates a and b of the two exponential phases whose sum the time to failure is, where coverage is perfect.
-    pub fn phases_per_hour(&self) -> (f64, f64) {
-        (self.fast, self.slow)
-    }
-
     /// Rates of the chain: first failures that are covered, those that are not, repairs, second failures.
     pub(crate) fn rates(&self) -> (f64, f64, f64, f64) {
         let repair = self.leaving - self.second;
