@@ -114,6 +114,11 @@ impl<'a> Statements<'a> {
         // Jumps on their way, with the bits that say whether they are done.
         let mut jumps: Vec<(Option<String>, String)> = Vec::new();
         for step in &plan.steps {
+            for line in &step.comments {
+                // The end of a comment in it would end it.
+                let line = line.replace("*)", "* )").replace("(*", "( *");
+                self.push(&format!("(* {line} *)\n"), &step.span);
+            }
             match &step.action {
                 Action::Jump { label, power } => {
                     let done = self.jump(&jumps, power, &step.span);

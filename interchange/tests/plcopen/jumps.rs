@@ -261,3 +261,31 @@ fn jumps_that_are_not_taken_are_said() {
     let found = findings(&text, &read(&text, None));
     insta::assert_snapshot!(found.join("\n"));
 }
+
+#[test]
+fn comments_stay_above_what_they_stand_above() {
+    let declared = variables(&[("input", "i0", "<BOOL/>"), ("output", "q0", "<BOOL/>")]);
+    let comment = |id: usize, text: &str| {
+        format!(
+            "<comment localId=\"{id}\" height=\"9\" width=\"9\"><position x=\"{0}\" y=\"{0}\"/><content><xhtml:p>{text}</xhtml:p></content></comment>\n",
+            id * 10
+        )
+    };
+    let objects = [
+        RAIL.to_owned(),
+        contact(1, "i0", &[0]),
+        "<jump localId=\"2\" label=\"end\"><position x=\"20\" y=\"20\"/><connectionPointIn><connection refLocalId=\"1\"/></connectionPointIn></jump>".to_owned(),
+        comment(3, "What (*is*) skipped"),
+        contact(4, "i0", &[0]),
+        coil(5, "q0", &[4]),
+        "<label localId=\"6\" label=\"end\"><position x=\"60\" y=\"60\"/></label>".to_owned(),
+    ];
+    let text = file(&declared, &objects.concat());
+    let program = program(&text);
+    let commented = program
+        .rungs
+        .iter()
+        .filter(|rung| !rung.comments.is_empty());
+    let comments: Vec<_> = commented.flat_map(|rung| &rung.comments).collect();
+    assert_eq!(comments, ["What ( *is* ) skipped"]);
+}
