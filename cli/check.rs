@@ -1,14 +1,18 @@
 //! `understudy check`: everything that is wrong with files of the project, in one run.
 
+mod remarks;
+
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use clap::Args;
 use serde::Serialize;
-use understudy_cluster::Overrides;
-use understudy_diagnostic::{Diagnostic, Report, Severity};
+use understudy_cluster::{Cluster, Overrides};
+use understudy_diagnostic::{Diagnostic, Report, Severity, has_errors};
 use understudy_interchange::parse_program;
+use understudy_ladder::parse_time;
 use understudy_reconfiguration::project::looks_like_a_project;
 use understudy_scenarios::{Parties, looks_like_a_scenario, read};
 use understudy_supervisor::ladder::read_map;
@@ -19,6 +23,7 @@ use crate::answer::{Answer, Failure, Status};
 use crate::automata;
 use crate::files::read_cluster;
 use crate::reconfigure::read_project;
+use remarks::Looking;
 
 /// Read ladders, clusters, scenarios, models, nets, maps of signals and projects, and report everything that is wrong with them
 #[derive(Debug, Args)]
@@ -29,12 +34,23 @@ Example:
   understudy check model.toml net.toml map.toml SUPER.ADS
 
 The ladders that a cluster names are checked with it. The names in a scenario are checked against the cluster file that is
-given with it, or else against the cluster.toml beside it. Warnings do not change the exit status.")]
+given with it, or else against the cluster.toml beside it. Ladders are also looked at for rungs without effect, coils that want different
+values in one scan, and steps that are run through in one; `understudy verify` shows the runs. Warnings do not change the exit status.")]
 pub(crate) struct Arguments {
     /// Ladder programs (.ladder), automata of TCT (.ADS), and clusters, scenarios, models, nets and maps of signals (.toml)
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
+    /// For what nobody asked about large ladders; small ones take none of it
+    #[arg(long, value_name = "TIME", default_value = "1s", value_parser = time)]
+    budget: Duration,
 }
+
+fn time(text: &str) -> std::result::Result<Duration, String> {
+    parse_time(text).ok_or_else(|| format!("{text:?} is no time such as 1s"))
+}
+
+/// Timers of a ladder by itself last so many scans, as they do for `verify`.
+const PERIOD: Duration = Duration::from_millis(10);
 
 #[derive(Serialize)]
 struct Result {
@@ -50,16 +66,20 @@ struct CheckedFile {
     kind: Option<&'static str>,
     errors: usize,
     warnings: usize,
+    /// The budget was over before everything that nobody asked had been looked at.
+    cut_short: bool,
 }
 
 #[derive(Default)]
 struct Found {
+    cut_short: Vec<String>,
     reports: Vec<(&'static str, Report)>,
     failures: Vec<Failure>,
     unreadable: Vec<String>,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Answer {
+    let looking = Looking::new(arguments.budget);
     let mut found = Found::default();
     let mut scenarios = Vec::new();
     let mut clusters = Vec::new();
@@ -76,7 +96,13 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         } else if let Some(kind) = kind {
             found.add_kind(kind, path, text);
         } else if !is_toml {
-            let diagnostics = parse_program(&path.display().to_string(), &text).diagnostics;
+            let parsed = parse_program(&path.display().to_string(), &text);
+            let mut diagnostics = parsed.diagnostics;
+            if !has_errors(&diagnostics)
+                && looking.at_rungs(&parsed.program, PERIOD, &mut diagnostics)
+            {
+                found.cut_short.push(path.display().to_string());
+            }
             found.add_file("ladder", path, text, diagnostics);
         } else if looks_like_a_scenario(&text) {
             scenarios.push((path, text));
@@ -85,7 +111,10 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
                 found.add(if index == 0 { "project" } else { "ladder" }, report);
             }
         } else {
-            let loaded = read_cluster(path, &text, Overrides::default());
+            let mut loaded = read_cluster(path, &text, Overrides::default());
+            if let Some(cluster) = &loaded.cluster {
+                found.look(&looking, cluster, &mut loaded.reports);
+            }
             for (index, report) in loaded.reports.into_iter().enumerate() {
                 found.add(if index == 0 { "cluster" } else { "ladder" }, report);
             }
@@ -112,6 +141,29 @@ fn parties_beside(scenario: &Path) -> Option<Parties> {
 }
 
 impl Found {
+    /// Looks at the rungs of the programs of a cluster, and at its understudy.
+    fn look(&mut self, looking: &Looking, cluster: &Cluster, reports: &mut [Report]) {
+        let period = cluster.agreement().schedule.period();
+        let mut seen = Vec::new();
+        for controller in cluster.controllers() {
+            let of_it =
+                |report: &&mut Report| Path::new(&report.name).ends_with(&controller.ladder);
+            let Some(report) = reports.iter_mut().find(of_it) else {
+                continue;
+            };
+            let known = seen.contains(&report.name) || has_errors(&report.diagnostics);
+            seen.push(report.name.clone());
+            if !known && looking.at_rungs(&controller.program, period, &mut report.diagnostics) {
+                self.cut_short.push(report.name.clone());
+            }
+        }
+        if let Some(report) = reports.first_mut()
+            && looking.at_understudy(cluster, report)
+        {
+            self.cut_short.push(report.name.clone());
+        }
+    }
+
     fn text(&mut self, path: &Path) -> Option<String> {
         match fs::read_to_string(path) {
             Ok(text) => Some(text),
@@ -191,12 +243,14 @@ impl Found {
             kind: Some(kind),
             errors: count(report, Severity::Error),
             warnings: count(report, Severity::Warning),
+            cut_short: self.cut_short.contains(&report.name),
         });
         let unreadable = self.unreadable.into_iter().map(|name| CheckedFile {
             name,
             kind: None,
             errors: 1,
             warnings: 0,
+            cut_short: false,
         });
         let files: Vec<CheckedFile> = checked.chain(unreadable).collect();
         let errors = files.iter().map(|file| file.errors).sum();
@@ -221,7 +275,12 @@ impl Found {
                 }
             };
             let kind = file.kind.unwrap_or("");
-            let _ = writeln!(text, "{:width$}  {kind:8}  {verdict}", file.name);
+            let more = if file.cut_short {
+                "; not looked at from all sides: a larger --budget, or `understudy verify`, tells more"
+            } else {
+                ""
+            };
+            let _ = writeln!(text, "{:width$}  {kind:8}  {verdict}{more}", file.name);
         }
         let status = if errors == 0 {
             Status::Done

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use codespan_reporting::diagnostic::{Diagnostic as Drawn, Label};
 use codespan_reporting::files::SimpleFile;
-use codespan_reporting::term::termcolor::{ColorChoice, StandardStream};
+use codespan_reporting::term::termcolor::{BufferedStandardStream, ColorChoice};
 use codespan_reporting::term::{self, Config};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use understudy_diagnostic::{Diagnostic, Report, Severity};
@@ -141,9 +141,7 @@ fn print_json(command: &str, answer: &Answer) -> io::Result<()> {
 
 fn print_text(answer: &Answer) -> io::Result<()> {
     for report in &answer.reports {
-        for diagnostic in &report.diagnostics {
-            print_diagnostic(report, diagnostic)?;
-        }
+        print_report(report)?;
     }
     let mut output = io::stdout().lock();
     output.write_all(answer.text.as_bytes())?;
@@ -164,12 +162,27 @@ fn print_text(answer: &Answer) -> io::Result<()> {
     Ok(())
 }
 
-fn print_diagnostic(report: &Report, diagnostic: &Diagnostic) -> io::Result<()> {
+/// There may be thousands of diagnostics of one file: its lines are counted once, and all goes out together.
+fn print_report(report: &Report) -> io::Result<()> {
+    if report.diagnostics.is_empty() {
+        return Ok(());
+    }
     let choice = if io::stderr().is_terminal() {
         ColorChoice::Auto
     } else {
         ColorChoice::Never
     };
+    let file = SimpleFile::new(&report.name, &report.text);
+    let config = Config::default();
+    let mut errors = BufferedStandardStream::stderr(choice);
+    for diagnostic in &report.diagnostics {
+        term::emit_to_write_style(&mut errors, &config, &file, &drawn(diagnostic))
+            .map_err(io::Error::other)?;
+    }
+    errors.flush()
+}
+
+fn drawn(diagnostic: &Diagnostic) -> Drawn<()> {
     let drawn = match diagnostic.severity {
         Severity::Error => Drawn::error(),
         Severity::Warning => Drawn::warning(),
@@ -180,7 +193,7 @@ fn print_diagnostic(report: &Report, diagnostic: &Diagnostic) -> io::Result<()> 
         .related
         .iter()
         .map(|related| Label::secondary((), related.span.clone()).with_message(&related.message));
-    let drawn = drawn
+    drawn
         .with_code(diagnostic.code)
         .with_message(&diagnostic.message)
         .with_labels(std::iter::once(label).chain(related).collect())
@@ -190,9 +203,5 @@ fn print_diagnostic(report: &Report, diagnostic: &Diagnostic) -> io::Result<()> 
                 .iter()
                 .map(|help| format!("help: {help}"))
                 .collect(),
-        );
-    let file = SimpleFile::new(&report.name, &report.text);
-    let mut errors = StandardStream::stderr(choice);
-    term::emit_to_write_style(&mut errors, &Config::default(), &file, &drawn)
-        .map_err(io::Error::other)
+        )
 }

@@ -1,9 +1,10 @@
 //! `understudy verify`: ladders against their properties, and against what everybody wants of a ladder.
 
 mod answer;
+mod patience;
 
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -12,16 +13,16 @@ use understudy_diagnostic::{Report, has_errors};
 use understudy_interchange::parse_program;
 use understudy_ladder::{Program, parse_time};
 use understudy_logic::Circuit;
-use understudy_verification::induction::{Induction, invariant, prove_always};
-use understudy_verification::program::{Answer as Proof, Bounds, Remarks, Subject};
+use understudy_verification::program::{Bounds, Remarks, Subject};
 use understudy_verification::property::{Properties, Property, not_of_one_scan, read, read_one};
 use understudy_verification::symbolic::Resolved;
-use understudy_verification::{draw_runs, prove_parity, smv};
+use understudy_verification::{GoOn, draw_runs, prove_parity, smv};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
 use answer::{Finding, ProgramAnswer};
+use patience::Patience;
 
 /// Prove properties of a ladder, or show a run that breaks them
 #[derive(Debug, Args)]
@@ -33,6 +34,7 @@ Example:
   understudy verify press.ladder --property \"never ram_down and ram_up\" --draw runs.html
   understudy verify press.ladder --smv scan --output press.smv
   understudy verify examples/press-cell/cluster.toml
+  understudy verify examples/boiler/complete.ladder --period 100ms --budget 60s
 
 Without a property it asks what is asked of every ladder: can each output be switched on and off, again and again? It also remarks on rungs
 without effect, on coils that want different values in one scan, and on steps that are run through in one. Of a cluster also whether the
@@ -58,6 +60,9 @@ pub(crate) struct Arguments {
     /// Nodes of decision diagrams alive at once
     #[arg(long, value_name = "NUMBER", default_value_t = 4_000_000)]
     nodes: usize,
+    /// Time after which what is not decided stays undecided; without it, as long as the bounds let it take
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    budget: Option<Duration>,
     /// For what stays undecided: induction over at most so many scans
     #[arg(long, value_name = "SCANS", default_value_t = 20)]
     induction: u32,
@@ -90,8 +95,9 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
         .file
         .extension()
         .is_some_and(|extension| extension == "toml");
+    let patience = Patience::new(arguments.budget, console);
     if is_cluster {
-        return cluster(arguments);
+        return cluster(arguments, &patience);
     }
     let source = match files::text(&arguments.file) {
         Ok(source) => source,
@@ -121,7 +127,10 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
     let answer = match arguments.smv {
         Some(form) => text_for_nusmv(arguments, form, &program, &subject, &asked),
         None => {
-            let remarks = match subject.remarks(&program, arguments.period, bounds(arguments)) {
+            let go_on = |work| patience.goes_on(work);
+            let bounds = bounds(arguments, &go_on);
+            patience.turn_to("the order and the effect of the rungs".to_owned());
+            let remarks = match subject.remarks(&program, arguments.period, bounds) {
                 Ok(remarks) => remarks,
                 Err(error) => {
                     return Answer::failed(Status::BadInput, "U0436", error.to_string());
@@ -131,15 +140,19 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
             report
                 .diagnostics
                 .extend(found.map(|remark| remark.diagnostic.clone()));
-            proved(arguments, &program, &subject, &remarks, &asked, console)
+            proved(
+                arguments, &program, &subject, &remarks, &asked, &patience, bounds,
+            )
         }
     };
     answer.with_reports(vec![report])
 }
 
-fn bounds(arguments: &Arguments) -> Bounds {
+fn bounds<'a>(arguments: &Arguments, go_on: GoOn<'a>) -> Bounds<'a> {
     Bounds {
         nodes: arguments.nodes,
+        scans: arguments.induction,
+        go_on,
         ..Bounds::default()
     }
 }
@@ -240,37 +253,24 @@ fn proved(
     subject: &Subject,
     remarks: &Remarks,
     asked: &Asked,
-    console: &mut Console,
+    patience: &Patience<'_>,
+    bounds: Bounds<'_>,
 ) -> Answer {
-    let bounds = bounds(arguments);
+    patience.turn_to("what every output can do".to_owned());
     let mut program = ProgramAnswer::of(subject, bounds, remarks);
     let formulas: Vec<Resolved> = asked
         .properties
         .iter()
         .map(|(_, formula)| formula.clone())
         .collect();
-    let mut last_told = Instant::now();
-    let mut told = |place: usize, _: &Proof| {
-        if last_told.elapsed() > Duration::from_secs(1) {
-            last_told = Instant::now();
-            console.note(&format!("{} of {} properties", place + 1, formulas.len()));
-        }
-    };
-    let answers = subject.check(&formulas, asked.fair.clone(), bounds, &mut told);
+    let mut answered = 0;
+    let about = |answered| format!("{answered} of {} properties answered", formulas.len());
+    patience.turn_to(about(0));
+    let answers = subject.check(&formulas, asked.fair.clone(), bounds, &mut |_, _| {
+        answered += 1;
+        patience.turn_to(about(answered));
+    });
     for ((property, formula), proof) in asked.properties.iter().zip(answers) {
-        // Induction knows no fairness; what it proves of all runs holds of the fair ones, and its counterexample may be unfair.
-        let proof = match (&proof, invariant(formula)) {
-            (Proof::Undecided(_), Some(kept)) => {
-                match prove_always(subject.circuit(), kept, arguments.induction) {
-                    Some(Induction::Holds(_)) => Proof::Holds(None),
-                    Some(Induction::Fails(trace)) if asked.fair.is_empty() => {
-                        Proof::Fails(Some(trace))
-                    }
-                    _ => proof,
-                }
-            }
-            _ => proof,
-        };
         program
             .properties
             .push(Finding::new(subject.circuit(), property, formula, proof));
@@ -301,7 +301,7 @@ fn draw(
 }
 
 /// Every program of a cluster against what is asked of all, and the understudy against its members.
-fn cluster(arguments: &Arguments) -> Answer {
+fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Answer {
     let of_a_ladder = !arguments.property.is_empty()
         || arguments.properties.is_some()
         || arguments.smv.is_some()
@@ -314,9 +314,11 @@ fn cluster(arguments: &Arguments) -> Answer {
         Ok(read) => read,
         Err(answer) => return answer,
     };
-    let bounds = bounds(arguments);
+    let go_on = |work| patience.goes_on(work);
+    let bounds = bounds(arguments, &go_on);
     let mut programs = Vec::new();
     for controller in cluster.controllers() {
+        patience.turn_to(format!("`{}`", controller.program.name));
         let period = cluster.agreement().schedule.period();
         let subject = match Subject::new(&controller.program, period) {
             Ok(subject) => subject,

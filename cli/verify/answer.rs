@@ -115,7 +115,7 @@ impl Scans {
 
 impl ProgramAnswer {
     /// With what is asked of every ladder, and no property yet.
-    pub(super) fn of(subject: &Subject, bounds: Bounds, remarks: &Remarks) -> Self {
+    pub(super) fn of(subject: &Subject, bounds: Bounds<'_>, remarks: &Remarks) -> Self {
         let circuit = subject.circuit();
         let switches = subject.switches(bounds).into_iter();
         let remarked = remarks.found.iter().map(|remark| RemarkAnswer {

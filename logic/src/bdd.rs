@@ -70,6 +70,11 @@ impl Diagrams {
 
     /// Diagrams over `order`, the top variable first, with at most `limit` nodes alive at once.
     pub fn new(order: impl IntoIterator<Item = Variable>, limit: usize) -> Self {
+        Self::with_room(order, limit, limit)
+    }
+
+    /// With room for so many nodes, dead ones and those of unfinished results included.
+    fn with_room(order: impl IntoIterator<Item = Variable>, limit: usize, room: usize) -> Self {
         let mut numbers = HashMap::new();
         let mut variables = Vec::new();
         for variable in order {
@@ -79,7 +84,7 @@ impl Diagrams {
             });
         }
         let cache = (limit / 8).clamp(1 << 8, 1 << 17);
-        let manager = new_manager(limit, cache, 1);
+        let manager = new_manager(room, cache, 1);
         manager.with_manager_exclusive(|manager| manager.add_vars(variables.len() as VarNo));
         Self {
             manager,
@@ -90,13 +95,15 @@ impl Diagrams {
         }
     }
 
-    /// The same, but the order changes between operations when the diagrams have grown, and when there is no node left. Verdicts are the same with and
+    /// The same without any diagram yet, but the order changes between operations when the diagrams have grown, and when there is no node left; within an
+    /// operation there may be twice as many. Verdicts are the same with and
     /// without; sizes, and which of several assignments is found, are not.
     #[must_use]
     pub fn reordered_by_need(self) -> Self {
+        let limit = self.limit;
         Self {
-            need: Some(Need::new(self.limit)),
-            ..self
+            need: Some(Need::new(limit)),
+            ..Self::with_room(self.variables, limit, Need::room(limit))
         }
     }
 
@@ -335,7 +342,9 @@ impl Diagrams {
         let mut made = self.deep(&operation);
         if let Some(need) = &self.need {
             if made.is_ok() {
-                need.look(&self.manager);
+                if !need.look(&self.manager) {
+                    return Err(BddError::TooManyNodes { limit: self.limit });
+                }
             } else if need.make_room(&self.manager) {
                 made = self.deep(&operation);
             }

@@ -52,7 +52,7 @@ fn every_wrong_line_of_a_file_is_said_and_nothing_is_proved() {
 }
 
 #[test]
-fn a_bound_that_is_too_small_leaves_it_undecided_or_to_induction() {
+fn a_bound_that_is_too_small_leaves_it_to_other_methods() {
     let check = |property: &str| {
         let robot = "examples/press-cell/robot.ladder";
         let few = ["verify", robot, "--nodes", "20", "--json", "--property"];
@@ -62,8 +62,23 @@ fn a_bound_that_is_too_small_leaves_it_undecided_or_to_induction() {
     assert_eq!(check("never move_down and stop"), json!("holds"));
     assert_eq!(
         check("AG (move_up -> EF (grip & EF move_left))"),
-        json!("undecided")
+        json!("holds")
     );
+}
+
+#[test]
+fn what_is_not_decided_in_time_is_said_to_be_undecided() {
+    let property = "AG EF gas_valve_high";
+    let boiler = "examples/boiler/complete.ladder";
+    let asked = ["verify", boiler, "--budget", "1ms", "--property", property];
+    let answer = understudy(&[&asked[..], &["--json"]].concat());
+    assert_eq!(answer.status, 1, "{}", answer.shown());
+    let program = &answer.json()["result"]["programs"][0];
+    let found = &program["properties"][0];
+    assert_eq!(found["verdict"], json!("undecided"));
+    let message = found["message"].as_str().expect("why");
+    assert!(message.contains("the time for it was over"), "{message}");
+    assert_eq!(program["switches"][0]["verdict"], json!("undecided"));
 }
 
 /// A light whose button sets and resets it by the same edge, as a vendor's example does.

@@ -10,9 +10,9 @@ use understudy_ladder::{
 use understudy_logic::Circuit;
 
 use crate::symbolic::Trace;
-use crate::table::scan_table;
+use crate::table::{Part, parts, scan_table};
 
-/// Scans of one run that are drawn; of a longer run, the first and the last ones.
+/// Scans of one run that are drawn, those without a change folded; of a longer run, the first and the last ones.
 pub const MAXIMUM_DRAWN: usize = 60;
 
 /// A run that a page shows.
@@ -51,16 +51,23 @@ pub fn draw_runs(
         let rungs = rungs_behind(program, names);
         let evaluations = evaluations(program, period, run.trace)?;
         let last = evaluations.len().saturating_sub(1);
-        for (scan, evaluation) in evaluations.iter().enumerate() {
-            let cut = evaluations.len() > MAXIMUM_DRAWN;
-            let half = MAXIMUM_DRAWN / 2;
-            if cut && (half..evaluations.len() - half).contains(&scan) {
-                if scan == half {
-                    let left_out = evaluations.len() - 2 * half;
-                    let _ = writeln!(body, "<p>{left_out} scans are not drawn</p>");
+        let parts = parts(run.trace);
+        let half = MAXIMUM_DRAWN / 2;
+        for (place, part) in parts.iter().enumerate() {
+            if parts.len() > MAXIMUM_DRAWN && (half..parts.len() - half).contains(&place) {
+                if place == half {
+                    body.push_str("<p>What comes here is not drawn.</p>\n");
                 }
                 continue;
             }
+            let scan = match *part {
+                Part::Scan(scan) => scan,
+                Part::Unchanged(from, to) => {
+                    let _ = writeln!(body, "<h3>scans {from} to {to}: as scan {}</h3>", from - 1);
+                    continue;
+                }
+            };
+            let evaluation = &evaluations[scan];
             let again = match run.trace.again_from {
                 Some(again) if scan == last => format!("; all goes on as from scan {again}"),
                 _ => String::new(),

@@ -3,14 +3,15 @@
 //!
 //! A state is (x, u), numbered x · 2^|u| + u; registers x are numbered as they are found, the first ones first. A set is a bit a state.
 
+mod check;
+
 use std::hash::BuildHasher;
 
 use hashbrown::HashTable;
 use rustc_hash::FxBuildHasher;
 use understudy_logic::{Circuit, Scan, Scratch};
 
-use crate::property::{Formula, Path};
-use crate::symbolic::{Core, Resolved, Signal};
+use crate::effort::{ALWAYS, GoOn, Work};
 
 /// Inputs past which nothing is listed: every state has 2^|u| ways on.
 pub const MAXIMUM_INPUTS: usize = 12;
@@ -33,7 +34,23 @@ pub enum ExplicitError {
         /// The bound that was given, in pairs of registers and inputs.
         bound: usize,
     },
+    /// Nobody waited until the end.
+    #[error("the time was over after {states} states")]
+    Time {
+        /// So many were listed.
+        states: usize,
+    },
 }
+
+/// What is looked at while states are listed: where in the list, and the outputs of 64 scans from there with the inputs 64 · block and on.
+pub(crate) struct Seen<'a> {
+    pub(crate) from: usize,
+    pub(crate) block: usize,
+    pub(crate) outputs: &'a [u64],
+}
+
+/// Operations, each on 64 scans, before anybody is asked whether to go on: so a small program is listed whole on any machine.
+const AT_LEAST: usize = 20_000_000;
 
 /// Where a state was first entered from: registers, and the inputs of the scan.
 #[derive(Debug, Clone, Copy)]
@@ -43,8 +60,8 @@ struct Origin {
 }
 
 /// Every state that can be reached, and where it leads.
-pub struct Explicit<'c> {
-    circuit: &'c Circuit,
+#[derive(Debug)]
+pub struct Explicit {
     scan: Scan,
     /// 2^|u|
     ways: usize,
@@ -75,29 +92,41 @@ impl Set {
     }
 }
 
-impl<'c> Explicit<'c> {
+impl Explicit {
     /// Lists the states of `circuit`, at most `bound` of them.
     ///
     /// # Errors
     /// There are more, or too many inputs.
-    pub fn new(circuit: &'c Circuit, bound: usize) -> Result<Self, ExplicitError> {
+    pub fn new(circuit: &Circuit, bound: usize) -> Result<Self, ExplicitError> {
+        let (listed, error) = Self::explore(circuit, bound, ALWAYS, &mut |_| {});
+        error.map_or(Ok(listed), Err)
+    }
+
+    /// Lists states, the nearest first, and shows every scan from them to `see`. With an error the list is not complete.
+    pub(crate) fn explore(
+        circuit: &Circuit,
+        bound: usize,
+        go_on: GoOn<'_>,
+        see: &mut dyn FnMut(Seen<'_>),
+    ) -> (Self, Option<ExplicitError>) {
         let inputs = circuit.inputs().len();
-        if inputs > MAXIMUM_INPUTS {
-            return Err(ExplicitError::Inputs { inputs });
-        }
         let scan = Scan::new(circuit);
         let width = scan.initial().len().max(1);
         let mut first = scan.initial().to_vec();
         first.resize(width, 0);
         let mut listed = Self {
-            circuit,
-            ways: 1 << inputs,
+            ways: 1 << inputs.min(MAXIMUM_INPUTS),
             width,
             registers: first,
             origins: vec![Origin { from: 0, inputs: 0 }],
             next: Vec::new(),
             scan,
         };
+        if inputs > MAXIMUM_INPUTS {
+            return (listed, Some(ExplicitError::Inputs { inputs }));
+        }
+        let work = listed.scan.instruction_count() * listed.ways.div_ceil(64);
+        let at_least = AT_LEAST / work.max(1);
         let hasher = FxBuildHasher;
         let mut known: HashTable<u32> = HashTable::new();
         let hash = |words: &[u64]| hasher.hash_one(words);
@@ -106,10 +135,18 @@ impl<'c> Explicit<'c> {
         let mut from = 0;
         while from < listed.origins.len() {
             if (from + 1) * listed.ways > bound || listed.origins.len() > MAXIMUM_COUNT {
-                return Err(ExplicitError::States { bound });
+                return (listed, Some(ExplicitError::States { bound }));
+            }
+            if from >= at_least && from.is_multiple_of(64) && !go_on(Work::States(from)) {
+                return (listed, Some(ExplicitError::Time { states: from }));
             }
             for block in 0..listed.ways.div_ceil(64) {
                 lanes.scan(&listed, from, block);
+                see(Seen {
+                    from,
+                    block,
+                    outputs: &lanes.outputs,
+                });
                 for lane in 0..listed.ways.min(64) {
                     let state = &lanes.packed[lane * width..][..width];
                     let code = hash(state);
@@ -136,7 +173,7 @@ impl<'c> Explicit<'c> {
             }
             from += 1;
         }
-        Ok(listed)
+        (listed, None)
     }
 
     /// How many x can be reached.
@@ -144,60 +181,19 @@ impl<'c> Explicit<'c> {
         self.origins.len()
     }
 
-    /// Whether each of `properties` holds from every first scan, and the inputs of a run that shows it: for `AG p` that fails, or `EF p` that holds.
-    pub fn check(&self, properties: &[Resolved]) -> Vec<(bool, Option<Vec<Vec<bool>>>)> {
-        let mut signals: Vec<Signal> = properties
-            .iter()
-            .flat_map(|property| property.signals().into_iter().copied())
-            .collect();
-        signals.sort_unstable();
-        signals.dedup();
-        let values = self.values(&signals);
-        let model = Model {
-            listed: self,
-            signals,
-            values,
-        };
-        properties
-            .iter()
-            .map(|property| model.check(property))
-            .collect()
+    /// The inputs of the shortest run that ends with a scan that was shown, by its place in the list, block and lane.
+    pub(crate) fn run_to_scan(&self, from: usize, block: usize, lane: usize) -> Vec<Vec<bool>> {
+        self.run_to(from * self.ways + (block * 64 + lane) % self.ways)
     }
 
+    /// How many pairs (x, u).
     fn states(&self) -> usize {
         self.origins.len() * self.ways
     }
 
-    fn empty(&self) -> Set {
-        Set(vec![0; self.states().div_ceil(64)])
-    }
-
-    /// For each signal the states in which it is 1.
-    fn values(&self, signals: &[Signal]) -> Vec<Set> {
-        let mut values = vec![self.empty(); signals.len()];
-        let mut lanes = Lanes::default();
-        for from in 0..self.origins.len() {
-            for block in 0..self.ways.div_ceil(64) {
-                lanes.scan(self, from, block);
-                for (signal, value) in signals.iter().zip(&mut values) {
-                    let word = match signal {
-                        Signal::Output(output) => lanes.outputs[*output],
-                        Signal::Input(input) => lanes.inputs[*input],
-                    };
-                    for lane in 0..self.ways.min(64) {
-                        if word >> lane & 1 == 1 {
-                            value.insert(from * self.ways + block * 64 + lane);
-                        }
-                    }
-                }
-            }
-        }
-        values
-    }
-
     /// u by its number.
     fn inputs(&self, number: usize) -> Vec<bool> {
-        let width = self.circuit.inputs().len();
+        let width = self.scan.input_count();
         (0..width).map(|input| number >> input & 1 == 1).collect()
     }
 
@@ -228,7 +224,7 @@ struct Lanes {
 
 impl Lanes {
     /// All scans of the x of this number with the inputs 64 · `block` and on.
-    fn scan(&mut self, listed: &Explicit<'_>, from: usize, block: usize) {
+    fn scan(&mut self, listed: &Explicit, from: usize, block: usize) {
         let registers = &listed.registers[from * listed.width..][..listed.width];
         let count = listed.scan.register_count();
         self.state.clear();
@@ -281,157 +277,5 @@ fn transpose(square: &mut [u64; 64]) {
         }
         half >>= 1;
         mask ^= mask << half;
-    }
-}
-
-/// The states with the signals that are asked for.
-struct Model<'e, 'c> {
-    listed: &'e Explicit<'c>,
-    signals: Vec<Signal>,
-    values: Vec<Set>,
-}
-
-impl Model<'_, '_> {
-    fn check(&self, property: &Resolved) -> (bool, Option<Vec<Vec<bool>>>) {
-        let ways = self.listed.ways;
-        let first_in = |set: &Set, wanted: bool| {
-            (0..self.listed.states()).find(|&state| set.contains(state) == wanted)
-        };
-        match property {
-            // All states that are listed can be reached, so this needs no fixed point.
-            Formula::Always(Path::All, inner) => {
-                let lost = first_in(&self.set(&Core::of(inner)), false);
-                (lost.is_none(), lost.map(|state| self.listed.run_to(state)))
-            }
-            Formula::Eventually(Path::Some, inner) => {
-                let holds = self.set(&Core::of(property));
-                let holds = (0..ways).all(|state| holds.contains(state));
-                let shown = first_in(&self.set(&Core::of(inner)), true);
-                let run = shown.filter(|_| holds);
-                (holds, run.map(|state| self.listed.run_to(state)))
-            }
-            _ => {
-                let set = self.set(&Core::of(property));
-                ((0..ways).all(|state| set.contains(state)), None)
-            }
-        }
-    }
-
-    fn set(&self, formula: &Core) -> Set {
-        match formula {
-            Core::Constant(value) => Set(vec![
-                u64::from(*value).wrapping_neg();
-                self.listed.states().div_ceil(64)
-            ]),
-            Core::Signal(signal) => {
-                let place = self.signals.binary_search(signal);
-                self.values[place.expect("signals were collected")].clone()
-            }
-            Core::Not(inner) => {
-                let mut set = self.set(inner);
-                for word in &mut set.0 {
-                    *word = !*word;
-                }
-                set
-            }
-            Core::And(left, right) => {
-                let mut set = self.set(left);
-                for (word, other) in set.0.iter_mut().zip(&self.set(right).0) {
-                    *word &= other;
-                }
-                set
-            }
-            Core::Next(inner) => self.before(&self.set(inner)),
-            Core::Until(hold, end) => self.until(&self.set(hold), self.set(end)),
-            Core::Always(inner) => self.always(self.set(inner)),
-            Core::Reaches(scans, inner) => {
-                let end = self.set(inner);
-                self.rounds(*scans, &end, |end, before| end | before)
-            }
-            Core::Stays(scans, inner) => {
-                let kept = self.set(inner);
-                self.rounds(*scans, &kept, |kept, before| kept & before)
-            }
-        }
-    }
-
-    /// For each x whether some inputs lead into the set.
-    fn some(&self, set: &Set) -> Vec<bool> {
-        let ways = self.listed.ways;
-        let registers = 0..self.listed.origins.len();
-        registers
-            .map(|from| (from * ways..(from + 1) * ways).any(|state| set.contains(state)))
-            .collect()
-    }
-
-    /// EX
-    fn before(&self, set: &Set) -> Set {
-        let some = self.some(set);
-        let mut before = self.listed.empty();
-        for (state, &next) in self.listed.next.iter().enumerate() {
-            if some[next as usize] {
-                before.insert(state);
-            }
-        }
-        before
-    }
-
-    /// E[hold U end]. States lead to later numbers and back; so the states are gone through in both directions, until nothing is added.
-    fn until(&self, hold: &Set, end: Set) -> Set {
-        let mut set = end;
-        let mut some = self.some(&set);
-        let mut added = true;
-        let mut add = |state: usize, set: &mut Set| {
-            let adds = !set.contains(state)
-                && hold.contains(state)
-                && some[self.listed.next[state] as usize];
-            if adds {
-                set.insert(state);
-                some[state / self.listed.ways] = true;
-            }
-            adds
-        };
-        while added {
-            added = false;
-            for state in (0..self.listed.states()).rev() {
-                added |= add(state, &mut set);
-            }
-            for state in 0..self.listed.states() {
-                added |= add(state, &mut set);
-            }
-        }
-        set
-    }
-
-    /// EG
-    fn always(&self, inside: Set) -> Set {
-        let mut set = inside;
-        loop {
-            let some = self.some(&set);
-            let mut lost = false;
-            for (state, &next) in self.listed.next.iter().enumerate() {
-                if set.contains(state) && !some[next as usize] {
-                    set.remove(state);
-                    lost = true;
-                }
-            }
-            if !lost {
-                return set;
-            }
-        }
-    }
-
-    fn rounds(&self, scans: u32, start: &Set, join: impl Fn(u64, u64) -> u64) -> Set {
-        let mut set = start.clone();
-        for _ in 0..scans {
-            let before = self.before(&set);
-            let words = start.0.iter().zip(&before.0);
-            let next = Set(words.map(|(&start, &before)| join(start, before)).collect());
-            if next == set {
-                break;
-            }
-            set = next;
-        }
-        set
     }
 }

@@ -10,11 +10,14 @@
 
 mod clauses;
 
+use std::cell::Cell;
+
 use understudy_logic::Circuit;
 
+use crate::effort::{ALWAYS, GoOn};
 use crate::property::{Formula, Path};
 use crate::symbolic::{Cone, Resolved, Trace, rows};
-use clauses::Unrolling;
+use clauses::{Patience, Unrolling};
 
 /// What came of it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -23,37 +26,72 @@ pub enum Induction {
     Holds(u32),
     /// It does not hold at the end of this run.
     Fails(Trace),
-    /// Neither was proved with so many scans; no run of that length refutes it.
+    /// Neither was proved. No run of so many scans refutes it.
     Undecided(u32),
+}
+
+/// How far induction goes.
+#[derive(Clone, Copy)]
+pub struct Depth<'g> {
+    /// The largest k.
+    pub scans: u32,
+    /// Steps of each search for an assignment.
+    pub steps: u64,
+    /// Whether anybody still waits.
+    pub go_on: GoOn<'g>,
+}
+
+impl Depth<'_> {
+    /// Up to k scans, however long it takes.
+    pub fn of(scans: u32) -> Self {
+        Self {
+            scans,
+            steps: u64::MAX,
+            go_on: ALWAYS,
+        }
+    }
 }
 
 /// Whether `invariant`, which speaks of one scan, holds in every scan that can be reached (AG), with k up to `most`.
 ///
 /// Nothing for a formula that speaks of more than one scan.
-pub fn prove_always(circuit: &Circuit, invariant: &Resolved, most: u32) -> Option<Induction> {
+pub fn prove_always(
+    circuit: &Circuit,
+    invariant: &Resolved,
+    depth: Depth<'_>,
+) -> Option<Induction> {
     if !invariant.is_of_one_scan() {
         return None;
     }
     let cone = Cone::of(circuit, [invariant]);
-    let mut base = Unrolling::new(circuit, &cone, true);
-    let mut step = Unrolling::new(circuit, &cone, false);
-    for scans in 0..=most {
+    let patience = Patience {
+        go_on: depth.go_on,
+        scans: 0,
+        steps: Cell::new(depth.steps),
+    };
+    let mut base = Unrolling::new(circuit, &cone, true, patience.clone());
+    let mut step = Unrolling::new(circuit, &cone, false, patience);
+    for scans in 0..=depth.scans {
         base.scan();
-        let wrong = base.literal(invariant, scans as usize);
-        if base.satisfiable(!wrong) {
-            let inputs = (0..=scans as usize).map(|scan| base.inputs(scan));
-            return Some(Induction::Fails(rows(circuit, &cone, inputs.collect())));
+        let right = base.literal(invariant, scans as usize);
+        match base.satisfiable(!right) {
+            Some(true) => {
+                let inputs = (0..=scans as usize).map(|scan| base.inputs(scan));
+                return Some(Induction::Fails(rows(circuit, &cone, inputs.collect())));
+            }
+            Some(false) => base.require(right),
+            None => return Some(Induction::Undecided(scans)),
         }
-        base.require(wrong);
         step.scan();
         let right = step.literal(invariant, scans as usize);
         step.differ(scans as usize);
-        if !step.satisfiable(!right) {
-            return Some(Induction::Holds(scans));
+        match step.satisfiable(!right) {
+            Some(false) => return Some(Induction::Holds(scans)),
+            Some(true) => step.require(right),
+            None => return Some(Induction::Undecided(scans + 1)),
         }
-        step.require(right);
     }
-    Some(Induction::Undecided(most))
+    Some(Induction::Undecided(depth.scans + 1))
 }
 
 /// The part under AG of `formula`, where that speaks of one scan.

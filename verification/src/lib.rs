@@ -1,6 +1,7 @@
 //! Independent proofs about circuits, by code that shares nothing with what made them.
 
 mod drawing;
+mod effort;
 pub mod explicit;
 pub mod induction;
 mod parity;
@@ -11,7 +12,10 @@ pub mod symbolic;
 mod table;
 
 pub use drawing::{MAXIMUM_DRAWN, Shown, draw_runs, rungs_behind};
-pub use parity::{Assignment, Place, Proof, Refutation, prove_parity, prove_parity_within};
+pub use effort::{GoOn, Stopped, Work};
+pub use parity::{
+    Assignment, Place, Proof, Refutation, prove_parity, prove_parity_while, prove_parity_within,
+};
 pub use table::scan_table;
 
 /// The examples of the codes of this crate are run with its own.

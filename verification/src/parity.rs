@@ -13,8 +13,10 @@
 use std::collections::HashMap;
 use std::fmt;
 
-use understudy_logic::bdd::{BddError, Builder, Diagram, Diagrams, depth_first_order};
+use understudy_logic::bdd::{Builder, Diagram, Diagrams, depth_first_order};
 use understudy_logic::{Circuit, Expression, Variable};
+
+use crate::effort::{ALWAYS, GoOn, Stopped, Work};
 
 /// What was compared, all found equal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -115,7 +117,7 @@ pub enum Refutation {
         /// Which function.
         place: Place,
         /// What was in the way.
-        error: BddError,
+        error: Stopped,
     },
 }
 
@@ -149,6 +151,22 @@ pub fn prove_parity_within(
     members: &[Circuit],
     generated: &Circuit,
     nodes: usize,
+) -> Result<Proof, Refutation> {
+    prove_parity_while(members, generated, nodes, ALWAYS)
+}
+
+/// Functions that are compared before anybody is asked whether to go on.
+const AT_LEAST: usize = 200;
+
+/// [`prove_parity_within`], as long as `go_on` says so.
+///
+/// # Errors
+/// As [`prove_parity`].
+pub fn prove_parity_while(
+    members: &[Circuit],
+    generated: &Circuit,
+    nodes: usize,
+    go_on: GoOn<'_>,
 ) -> Result<Proof, Refutation> {
     let places = Places::of(members, generated)?;
     for (member, registers) in members.iter().zip(&places.registers) {
@@ -184,6 +202,8 @@ pub fn prove_parity_within(
                 })
             })
             .collect(),
+        go_on,
+        compared: 0,
     };
     for (number, member) in members.iter().enumerate() {
         for (register, &place) in member.registers().iter().zip(&places.registers[number]) {
@@ -310,6 +330,8 @@ struct Comparison<'a> {
     generated: &'a Circuit,
     copies: Builder<'a>,
     originals: Vec<Builder<'a>>,
+    go_on: GoOn<'a>,
+    compared: usize,
 }
 
 impl Comparison<'_> {
@@ -340,7 +362,11 @@ impl Comparison<'_> {
         &mut self,
         copy: Expression,
         terms: &[(usize, Expression)],
-    ) -> Result<Option<Vec<(Variable, bool)>>, BddError> {
+    ) -> Result<Option<Vec<(Variable, bool)>>, Stopped> {
+        self.compared += 1;
+        if self.compared > AT_LEAST && !(self.go_on)(Work::Diagrams(self.compared as u64)) {
+            return Err(Stopped::Time);
+        }
         let found: Diagram = self.copies.diagram(copy)?;
         let mut expected = self.diagrams.constant(false);
         // The last program is the lowest in the order, and a sum is cheapest from the bottom up.
@@ -348,7 +374,7 @@ impl Comparison<'_> {
             let term = self.originals[number].diagram(term)?;
             expected = self.diagrams.xor(&term, &expected)?;
         }
-        self.diagrams.difference(&found, &expected)
+        Ok(self.diagrams.difference(&found, &expected)?)
     }
 }
 

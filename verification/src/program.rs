@@ -1,41 +1,52 @@
 //! A ladder against its properties, and against what everybody wants of a ladder without saying so.
 
+mod questions;
 mod remarks;
 mod sampled;
+mod search;
+mod stages;
 mod unasked;
 
+use std::cell::OnceCell;
 use std::time::Duration;
 
 use understudy_diagnostic::Diagnostic;
 use understudy_diagnostic::spelling::suggestion;
 use understudy_ladder::{LowerError, Program};
 use understudy_logic::Circuit;
-use understudy_logic::bdd::{BddError, Diagrams};
+use understudy_logic::bdd::Diagrams;
 
+use crate::effort::{ALWAYS, GoOn};
 use crate::explicit::Explicit;
 use crate::property::{Named, Property};
-use crate::symbolic::{Checker, Cone, Resolved, Signal, Trace, Verdict, resolve, rows};
+use crate::symbolic::{Resolved, Signal, Trace, resolve};
 
 pub use remarks::{Remark, Remarks};
+pub(crate) use sampled::word;
+use stages::Stages;
+pub use stages::Undecided;
 pub use unasked::{Lamp, OutputFinding};
 
-/// Nodes with which most properties of ladders are decided, in a second or two.
-const FEW_NODES: usize = 1 << 20;
-
 /// Bounds of a proof.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Bounds {
+#[derive(Clone, Copy)]
+pub struct Bounds<'a> {
     /// Nodes of decision diagrams alive at once.
     pub nodes: usize,
     /// States, each with inputs, that are listed where diagrams grow large; four bytes each.
     pub states: usize,
+    /// Scans of induction.
+    pub scans: u32,
+    /// Whether anybody still waits.
+    pub go_on: GoOn<'a>,
 }
 
-impl Default for Bounds {
+impl Default for Bounds<'_> {
     fn default() -> Self {
         Self {
             nodes: Diagrams::DEFAULT_LIMIT,
             states: 1 << 26,
+            scans: 20,
+            go_on: ALWAYS,
         }
     }
 }
@@ -48,7 +59,7 @@ pub enum Answer {
     /// It does not hold; the scans show a run, where a run can show it.
     Fails(Option<Trace>),
     /// Neither was proved within the bounds.
-    Undecided(BddError),
+    Undecided(Undecided),
 }
 
 /// A program as its properties see it.
@@ -56,6 +67,8 @@ pub enum Answer {
 pub struct Subject {
     circuit: Circuit,
     outputs: usize,
+    /// Every state that can be reached, once somebody needed all of them.
+    listed: OnceCell<Explicit>,
 }
 
 impl Subject {
@@ -67,6 +80,7 @@ impl Subject {
         Ok(Self {
             circuit: program.lower_observed(period)?,
             outputs: program.outputs.len(),
+            listed: OnceCell::new(),
         })
     }
 
@@ -101,66 +115,14 @@ impl Subject {
         Diagnostic::error("U0435", message, named.span.clone()).with_help(help)
     }
 
-    /// Decides `properties` one after the other; `fair` restricts the runs that are looked at. Each answer is told as it comes.
-    ///
-    /// Diagrams of few nodes come first. Once they are not enough, the states that can be reached are listed, where they are not too many; what is left is
-    /// tried with as many nodes as allowed.
+    /// Decides `properties`; `fair` restricts the runs that are looked at. Each answer is told as it comes.
     pub fn check(
         &self,
         properties: &[Resolved],
         fair: Vec<Resolved>,
-        bounds: Bounds,
+        bounds: Bounds<'_>,
         answered: &mut dyn FnMut(usize, &Answer),
     ) -> Vec<Answer> {
-        let few = bounds.nodes.min(FEW_NODES);
-        let lists = fair.is_empty() && bounds.nodes > few;
-        let first = if lists { few } else { bounds.nodes };
-        let mut answers = Vec::with_capacity(properties.len());
-        let mut tell = |answer: Answer| {
-            answered(answers.len(), &answer);
-            answers.push(answer);
-            answers.len()
-        };
-        let mut checker = Checker::new(&self.circuit, fair.clone(), first);
-        let mut place = 0;
-        for property in properties {
-            let answer = decided(checker.check(property));
-            if lists && matches!(answer, Answer::Undecided(_)) {
-                break;
-            }
-            place = tell(answer);
-        }
-        let left = &properties[place..];
-        if left.is_empty() {
-            return answers;
-        }
-        drop(checker);
-        if let Ok(listed) = Explicit::new(&self.circuit, bounds.states) {
-            for (property, (holds, run)) in left.iter().zip(listed.check(left)) {
-                let trace = run.map(|run| {
-                    let cone = Cone::of(&self.circuit, [property]);
-                    rows(&self.circuit, &cone, run)
-                });
-                tell(if holds {
-                    Answer::Holds(trace)
-                } else {
-                    Answer::Fails(trace)
-                });
-            }
-            return answers;
-        }
-        let mut checker = Checker::new(&self.circuit, fair, bounds.nodes);
-        for property in left {
-            tell(decided(checker.check(property)));
-        }
-        answers
-    }
-}
-
-fn decided(verdict: Result<Verdict, BddError>) -> Answer {
-    match verdict {
-        Ok(Verdict::Holds(trace)) => Answer::Holds(trace),
-        Ok(Verdict::Fails(trace)) => Answer::Fails(trace),
-        Err(error) => Answer::Undecided(error),
+        Stages::new(self, properties, fair, bounds, answered).run()
     }
 }

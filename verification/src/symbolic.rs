@@ -16,8 +16,9 @@ mod model;
 mod trace;
 
 use understudy_logic::Circuit;
-use understudy_logic::bdd::BddError;
+use understudy_logic::bdd::Diagrams;
 
+use crate::effort::{ALWAYS, GoOn, Stopped};
 use crate::property::{Formula, Named};
 
 pub(crate) use self::core::Core;
@@ -79,9 +80,11 @@ pub struct Checker<'c> {
     circuit: &'c Circuit,
     fair: Vec<Resolved>,
     nodes: usize,
+    go_on: GoOn<'c>,
+    reorders: bool,
     models: Vec<model::Model<'c>>,
     /// The part of the circuit that was too large, and why: it is not tried again.
-    too_large: Option<(Cone, BddError)>,
+    too_large: Option<(Cone, Stopped)>,
 }
 
 impl Signal {
@@ -101,16 +104,33 @@ impl<'c> Checker<'c> {
             circuit,
             fair,
             nodes,
+            go_on: ALWAYS,
+            reorders: true,
             models: Vec::new(),
             too_large: None,
+        }
+    }
+
+    /// The same, as long as `go_on` says so.
+    #[must_use]
+    pub fn while_wanted(self, go_on: GoOn<'c>) -> Self {
+        Self { go_on, ..self }
+    }
+
+    /// The same, in the order of the circuit: what needs another one is soon too large.
+    #[must_use]
+    pub fn in_fixed_order(self) -> Self {
+        Self {
+            reorders: false,
+            ..self
         }
     }
 
     /// Whether every first scan satisfies `property`: the registers as they start, the inputs any.
     ///
     /// # Errors
-    /// The diagrams need more nodes than allowed.
-    pub fn check(&mut self, property: &Resolved) -> Result<Verdict, BddError> {
+    /// The diagrams need more nodes than allowed, or nobody waits any longer.
+    pub fn check(&mut self, property: &Resolved) -> Result<Verdict, Stopped> {
         let cone = model::Cone::of(self.circuit, self.fair.iter().chain([property]));
         if let Some((_, error)) = self.too_large.as_ref().filter(|(large, _)| {
             // More signals make it no smaller.
@@ -124,7 +144,21 @@ impl<'c> Checker<'c> {
             None => {
                 // What other properties need is dropped: the bound is on what is alive at once.
                 self.models.clear();
-                let model = model::Model::new(self.circuit, cone.clone(), &self.fair, self.nodes);
+                let (nodes, reorders) = (self.nodes, self.reorders);
+                let model = model::Model::new(
+                    self.circuit,
+                    cone.clone(),
+                    &self.fair,
+                    |order| {
+                        let diagrams = Diagrams::new(order, nodes);
+                        if reorders {
+                            diagrams.reordered_by_need()
+                        } else {
+                            diagrams
+                        }
+                    },
+                    self.go_on,
+                );
                 if let Err(error) = &model {
                     self.too_large = Some((cone, *error));
                 }

@@ -11,11 +11,8 @@ use oxidd::{HasLevel, LevelNo, Manager, ManagerRef, VarNo};
 use oxidd_core::LevelView;
 use oxidd_reorder::set_var_order_seq;
 
-/// Nodes alive with which an order is looked at for the first time, where the bound allows as many.
-const FIRST_LOOK: usize = 50_000;
-
-/// Nodes that one reordering may move, one or two seconds of work.
-const MOVES: usize = 10_000_000;
+/// Times the living nodes: what one reordering may move.
+const MOVES: usize = 40;
 
 /// Variables that one reordering moves, those with the most nodes.
 const VARIABLES: usize = 500;
@@ -33,7 +30,8 @@ pub(super) struct Need {
 
 impl Need {
     pub(super) fn new(limit: usize) -> Self {
-        let first = FIRST_LOOK.min(limit / 8);
+        // A good order is left alone as long as there is room.
+        let first = limit / 4 * 3;
         Self {
             limit,
             count_at: AtomicUsize::new(first),
@@ -46,11 +44,16 @@ impl Need {
         self.changes.load(Ordering::Relaxed)
     }
 
-    /// After an operation that went well: changes the order if the diagrams have grown enough.
-    pub(super) fn look(&self, manager: &BDDManagerRef) {
+    /// Nodes that there are in all: swaps need room.
+    pub(super) fn room(limit: usize) -> usize {
+        limit.saturating_mul(2)
+    }
+
+    /// After an operation that went well: changes the order if the diagrams have grown enough. Whether they are within the bound.
+    pub(super) fn look(&self, manager: &BDDManagerRef) -> bool {
         let nodes = manager.with_manager_shared(|manager| manager.approx_num_inner_nodes());
         if nodes < self.count_at.load(Ordering::Relaxed) {
-            return;
+            return true;
         }
         let alive = alive(manager);
         let change_at = self.change_at.load(Ordering::Relaxed);
@@ -66,6 +69,7 @@ impl Need {
         let change_at = self.change_at.load(Ordering::Relaxed);
         self.count_at
             .store(alive.max(change_at / 2) + change_at / 2, Ordering::Relaxed);
+        alive <= self.limit
     }
 
     /// After an operation that found no free node: whether a new order made room, so that another try is worth while.
@@ -75,13 +79,13 @@ impl Need {
         let left = alive_now(manager);
         self.change_at.store(2 * left, Ordering::Relaxed);
         self.count_at.store(2 * left, Ordering::Relaxed);
-        left < before || before < self.limit / 2
+        left < before.min(self.limit)
     }
 
     fn change(&self, manager: &BDDManagerRef) {
         self.changes.fetch_add(1, Ordering::Relaxed);
         let slack = (self.limit / 8).min(1 << 17);
-        let room = self.limit.saturating_sub(slack);
+        let room = Self::room(self.limit) - slack;
         manager.with_manager_exclusive(|manager| {
             manager.reorder(|manager| Sifting::new(manager, room).run());
         });
@@ -126,11 +130,12 @@ where
             order,
             sizes,
             room,
-            moves: MOVES,
+            moves: 0,
         }
     }
 
     fn run(mut self) {
+        self.moves = MOVES * self.total;
         let mut largest: Vec<(usize, VarNo)> = self
             .sizes
             .iter()
@@ -169,7 +174,7 @@ where
         }
     }
 
-    /// Takes a variable from place to place; every order on the way has been there before, so there is room for it.
+    /// Takes a variable back to a place where it has been, as far as there is room for the swaps.
     fn back(&mut self, from: usize, to: usize) -> usize {
         let mut at = from;
         while at < to && self.swap(at) {

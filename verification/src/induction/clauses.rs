@@ -1,17 +1,39 @@
 //! Scans one after the other as clauses, after Tseitin: a variable an operation and scan.
 
+use std::cell::Cell;
 use std::collections::HashMap;
 
-use batsat::{BasicSolver, Lit, SolverInterface, lbool};
+use batsat::{Callbacks, Lit, Solver, SolverInterface, SolverOpts, lbool};
 use understudy_logic::{Circuit, Expression, Operation, Variable};
 
+use crate::effort::{GoOn, Work};
 use crate::property::Formula;
 use crate::symbolic::{Cone, Resolved, Signal};
+
+/// How much of its search a solver may do.
+#[derive(Clone)]
+pub(super) struct Patience<'g> {
+    pub(super) go_on: GoOn<'g>,
+    /// Scans so far, for whoever waits.
+    pub(super) scans: u32,
+    /// Steps of the search that are left; none after the first refusal.
+    pub(super) steps: Cell<u64>,
+}
+
+impl Callbacks for Patience<'_> {
+    fn stop(&self) -> bool {
+        let left = self.steps.get();
+        let wanted =
+            left > 0 && (!left.is_multiple_of(64) || (self.go_on)(Work::Scans(self.scans)));
+        self.steps.set(if wanted { left - 1 } else { 0 });
+        !wanted
+    }
+}
 
 /// The scans so far.
 pub(super) struct Unrolling<'c> {
     circuit: &'c Circuit,
-    solver: BasicSolver,
+    solver: Solver<Patience<'c>>,
     one: Lit,
     /// Registers of the cone.
     registers: Vec<u32>,
@@ -24,8 +46,13 @@ pub(super) struct Unrolling<'c> {
 
 impl<'c> Unrolling<'c> {
     /// No scan yet; the first one starts from the initial registers, or from any.
-    pub(super) fn new(circuit: &'c Circuit, cone: &Cone, from_start: bool) -> Self {
-        let mut solver = BasicSolver::default();
+    pub(super) fn new(
+        circuit: &'c Circuit,
+        cone: &Cone,
+        from_start: bool,
+        patience: Patience<'c>,
+    ) -> Self {
+        let mut solver = Solver::new(SolverOpts::default(), patience);
         let one = Lit::new(solver.new_var_default(), true);
         solver.add_clause_reuse(&mut vec![one]);
         let registers: Vec<u32> = (0..circuit.registers().len() as u32)
@@ -55,6 +82,7 @@ impl<'c> Unrolling<'c> {
 
     /// Adds a scan.
     pub(super) fn scan(&mut self) {
+        self.solver.cb_mut().scans += 1;
         self.inputs.push(HashMap::new());
         self.made.push(HashMap::new());
         let scan = self.made.len() - 1;
@@ -112,9 +140,13 @@ impl<'c> Unrolling<'c> {
         }
     }
 
-    /// Whether all that is required can hold together with `assumed`.
-    pub(super) fn satisfiable(&mut self, assumed: Lit) -> bool {
-        self.solver.solve_limited(&[assumed]) == lbool::TRUE
+    /// Whether all that is required can hold together with `assumed`; nothing where the search was given up.
+    pub(super) fn satisfiable(&mut self, assumed: Lit) -> Option<bool> {
+        match self.solver.solve_limited(&[assumed]) {
+            found if found == lbool::TRUE => Some(true),
+            found if found == lbool::FALSE => Some(false),
+            _ => None,
+        }
     }
 
     pub(super) fn require(&mut self, literal: Lit) {

@@ -16,10 +16,11 @@ use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{Coil, CoilKind, Element, LowerError, Program, Write, visit};
 use understudy_logic::Circuit;
 
-use super::sampled::Sampled;
+use super::questions::{Questions, Target};
+use super::search::{Found, Search};
 use super::{Bounds, Subject};
 use crate::property::Formula;
-use crate::symbolic::{Checker, Cone, Resolved, Signal, Trace, Verdict, rows};
+use crate::symbolic::{Cone, Resolved, ScanRow, Signal, Trace, rows};
 
 /// Something suspicious.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -39,9 +40,6 @@ pub struct Remarks {
     pub undecided: usize,
 }
 
-/// Nodes for one question: these are many, and none of them was asked for.
-const NODES: usize = 200_000;
-
 impl Subject {
     /// What is suspicious about the order and the effect of the rungs.
     ///
@@ -51,23 +49,26 @@ impl Subject {
         &self,
         program: &Program,
         period: Duration,
-        bounds: Bounds,
+        bounds: Bounds<'_>,
     ) -> Result<Remarks, LowerError> {
         let (circuit, writes) = program.lower_writes(period)?;
-        let mut search = Search {
+        let questions = Questions::of(program, &circuit, &writes);
+        let mut remarking = Remarking {
             subject: self,
             program,
             circuit: &circuit,
-            nodes: bounds.nodes.min(NODES),
+            search: Search::new(&questions.circuit, bounds),
             remarks: Remarks::default(),
         };
-        search.effects(&writes);
-        for signal in program.writable() {
-            let of_target = writes.iter().copied();
-            let of_target = of_target.filter(|write| coil(program, *write).target == signal.name);
-            search.target(&of_target.collect::<Vec<Write>>());
+        for (rung, change) in questions.changes.iter().enumerate() {
+            if let Some(change) = *change {
+                remarking.effect(rung, change);
+            }
         }
-        let mut remarks = search.remarks;
+        for target in &questions.targets {
+            remarking.target(target);
+        }
+        let mut remarks = remarking.remarks;
         remarks
             .found
             .sort_by_key(|remark| remark.diagnostic.span.start);
@@ -83,167 +84,109 @@ fn output(output: usize) -> Resolved {
     Formula::Signal(Signal::Output(output))
 }
 
-fn any(formulas: impl Iterator<Item = Resolved>) -> Resolved {
-    formulas.fold(Formula::Constant(false), |left, right| {
-        Formula::Or(Box::new(left), Box::new(right))
-    })
-}
-
-fn rises(write: Write) -> Resolved {
-    output(write.before).negated().and(output(write.after))
-}
-
-fn falls(write: Write) -> Resolved {
-    output(write.before).and(output(write.after).negated())
-}
-
-/// What one question came to.
-enum Found {
-    Never,
-    /// In the last of these scans.
-    Yes(Vec<Vec<bool>>),
-    Unknown,
-}
-
-struct Search<'a> {
+struct Remarking<'a> {
     subject: &'a Subject,
     program: &'a Program,
     circuit: &'a Circuit,
-    nodes: usize,
+    search: Search<'a>,
     remarks: Remarks,
 }
 
-impl Search<'_> {
-    /// U0443.
-    fn effects(&mut self, writes: &[Write]) {
-        let rungs = self.program.rungs.len();
-        let changes: Vec<Resolved> = (0..rungs)
-            .map(|rung| {
-                let of_rung = writes.iter().filter(|write| write.rung == rung);
-                any(of_rung.map(|write| {
-                    Formula::Same(
-                        Box::new(output(write.before)),
-                        Box::new(output(write.after)),
-                    )
-                    .negated()
-                }))
-            })
-            .collect();
-        let sampled = Sampled::new(self.circuit, &changes);
-        for (rung, change) in changes.iter().enumerate() {
-            let Some(first) = self.program.rungs[rung].coils.first() else {
-                continue;
-            };
-            if sampled.seen(rung).is_some() {
-                continue;
-            }
-            match self.proved(change) {
-                Found::Yes(_) => {}
-                Found::Unknown => self.remarks.undecided += 1,
-                Found::Never => {
-                    let message = format!(
-                        "rung {} has no effect: no coil of it ever changes anything",
-                        rung + 1
-                    );
-                    let diagnostic = Diagnostic::warning("U0443", message, first.target.span());
-                    let help = "leave the rung out, or look for a contact that never closes";
-                    self.remarks.found.push(Remark {
-                        diagnostic: diagnostic.with_help(help),
-                        trace: None,
-                    });
-                }
-            }
+impl Remarking<'_> {
+    fn ask(&mut self, question: usize) -> Found {
+        let found = self.search.ask(question);
+        if matches!(found, Found::Unknown) {
+            self.remarks.undecided += 1;
         }
+        found
     }
 
-    /// U0444 to U0446 of one target, whose coils these are.
-    fn target(&mut self, writes: &[Write]) {
-        let Some((first, last)) = writes.first().zip(writes.last()) else {
-            return;
-        };
-        if writes.len() < 2 {
+    /// U0443.
+    fn effect(&mut self, rung: usize, change: usize) {
+        if self.search.is_seen(change) || !matches!(self.ask(change), Found::Never) {
             return;
         }
-        let lost = output(last.after).negated();
-        for (place, &set) in writes.iter().enumerate() {
-            let rises = rises(set);
-            let stays = rises.clone().and(lost.clone().negated());
-            let undone = any(writes[place + 1..].iter().map(|&write| falls(write)));
-            let lost_now = rises.clone().and(undone).and(lost.clone());
+        let message = format!(
+            "rung {} has no effect: no coil of it ever changes anything",
+            rung + 1
+        );
+        let place = self.program.rungs[rung].coils[0].target.span();
+        let help = "leave the rung out, or look for a contact that never closes";
+        self.remarks.found.push(Remark {
+            diagnostic: Diagnostic::warning("U0443", message, place).with_help(help),
+            trace: None,
+        });
+    }
+
+    /// U0444 to U0446 of one target.
+    fn target(&mut self, target: &Target) {
+        let writes = &target.writes;
+        for (place, &(lost_now, stays)) in target.sets.iter().enumerate() {
+            if self.search.is_seen(stays) {
+                continue;
+            }
             // It happens, and it never happens that the target stays set.
-            let Found::Yes(inputs) = self.happens(&lost_now) else {
+            let Found::Yes(inputs) = self.ask(lost_now) else {
                 continue;
             };
-            if matches!(self.happens(&stays), Found::Never) {
-                let resets = self.resets(&writes[place + 1..], &inputs);
-                let message = format!(
-                    "`{}` is set in rung {} and reset in rung {} of the same scan, always: it is never seen set",
-                    self.name(set),
-                    set.rung + 1,
-                    resets.rung + 1
-                );
-                let help = "swap the rungs, or let the reset ask for what was so before the set, by a memory bit";
-                self.remark("U0445", message, help, [set, resets], inputs);
-                return;
+            if !matches!(self.ask(stays), Found::Never) {
+                continue;
             }
+            let (set, resets) = (
+                writes[place],
+                self.resets(&writes[place + 1..], &self.last(&inputs)),
+            );
+            let message = format!(
+                "`{}` is set in rung {} and reset in rung {} of the same scan, always: it is never seen set",
+                self.name(set),
+                set.rung + 1,
+                resets.rung + 1
+            );
+            let help = "swap the rungs, or let the reset ask for what was so before the set, by a memory bit";
+            self.remark("U0445", message, help, [set, resets], inputs);
+            return;
         }
-        let through = output(first.before)
-            .negated()
-            .and(any(writes.iter().map(|&write| rises(write))))
-            .and(lost);
-        if let Found::Yes(inputs) = self.happens(&through) {
-            let resets = self.resets(&writes[1..], &inputs);
+        if let Found::Yes(inputs) = self.ask(target.through) {
+            let resets = self.resets(&writes[1..], &self.last(&inputs));
             if self.reads_target(resets) {
                 let message = format!(
                     "`{}` is set and reset in one scan: the program can run through it in one go (avalanche)",
                     self.name(resets)
                 );
                 let help = "turn the rungs around, so that the rung that leaves a step stands above the one that enters it";
-                self.remark("U0446", message, help, [*first, resets], inputs);
+                self.remark("U0446", message, help, [writes[0], resets], inputs);
                 return;
             }
         }
-        self.race(writes);
-    }
-
-    /// U0444: the first pair that wants different values.
-    fn race(&mut self, writes: &[Write]) {
-        for (place, &later) in writes.iter().enumerate() {
-            for &earlier in &writes[..place] {
-                if earlier.rung == later.rung && self.kind(earlier) == self.kind(later) {
-                    continue;
-                }
-                let differ = Formula::Same(
-                    Box::new(output(earlier.after)),
-                    Box::new(output(later.after)),
-                )
-                .negated();
-                let both = self.acts(earlier).and(self.acts(later)).and(differ);
-                let Found::Yes(inputs) = self.happens(&both) else {
-                    continue;
-                };
-                let message = format!(
-                    "the coils of `{}` in rungs {} and {} can want different values in one scan; the order of the rungs decides, and rung {} wins",
-                    self.name(later),
-                    earlier.rung + 1,
-                    later.rung + 1,
-                    later.rung + 1
-                );
-                let help =
-                    "write it from one rung, or close out the one condition in the other rung";
-                self.remark("U0444", message, help, [earlier, later], inputs);
-                return;
-            }
+        if let Found::Yes(inputs) = self.ask(target.race) {
+            self.race(writes, inputs);
         }
     }
 
-    /// When a coil writes at all.
-    fn acts(&self, write: Write) -> Resolved {
-        if self.kind(write).is_latch() {
-            output(write.power)
-        } else {
-            Formula::Constant(true)
-        }
+    /// U0444: the first pair that wants different values at the end of the run.
+    fn race(&mut self, writes: &[Write], inputs: Vec<Vec<bool>>) {
+        let last = self.last(&inputs);
+        let acts = |write: Write| !self.kind(write).is_latch() || last.outputs[write.power];
+        let after = |write: Write| last.outputs[write.after];
+        let pairs = writes.iter().enumerate().flat_map(|(place, &later)| {
+            let earlier = writes[..place].iter();
+            earlier.map(move |&earlier| (earlier, later))
+        });
+        let mut differing = pairs.filter(|&(earlier, later)| {
+            acts(earlier) && acts(later) && after(earlier) != after(later)
+        });
+        let Some((earlier, later)) = differing.next() else {
+            return;
+        };
+        let message = format!(
+            "the coils of `{}` in rungs {} and {} can want different values in one scan; the order of the rungs decides, and rung {} wins",
+            self.name(later),
+            earlier.rung + 1,
+            later.rung + 1,
+            later.rung + 1
+        );
+        let help = "write it from one rung, or close out the one condition in the other rung";
+        self.remark("U0444", message, help, [earlier, later], inputs);
     }
 
     fn kind(&self, write: Write) -> CoilKind {
@@ -266,43 +209,19 @@ impl Search<'_> {
         reads
     }
 
-    /// The coil that resets the target in the last scan of the run.
-    fn resets(&self, writes: &[Write], inputs: &[Vec<bool>]) -> Write {
-        let told = rows(self.circuit, &Cone::default(), inputs.to_vec());
-        let last = &told.scans[told.scans.len() - 1].outputs;
+    /// What every coil does in the last scan of the run.
+    fn last(&self, inputs: &[Vec<bool>]) -> ScanRow {
+        let mut told = rows(self.circuit, &Cone::default(), inputs.to_vec());
+        told.scans.pop().expect("a run has a scan")
+    }
+
+    /// The coil that resets the target in that scan.
+    fn resets(&self, writes: &[Write], last: &ScanRow) -> Write {
         let falling = writes
             .iter()
             .rev()
-            .find(|write| last[write.before] && !last[write.after]);
+            .find(|write| last.outputs[write.before] && !last.outputs[write.after]);
         *falling.unwrap_or(&writes[writes.len() - 1])
-    }
-
-    /// A run as short as can be, or one at random where the diagrams grow too large.
-    fn happens(&mut self, question: &Resolved) -> Found {
-        let found = self.proved(question);
-        if !matches!(found, Found::Unknown) {
-            return found;
-        }
-        let sampled = Sampled::new(self.circuit, std::slice::from_ref(question));
-        match sampled.seen(0) {
-            Some(seen) => Found::Yes(sampled.inputs(seen)),
-            None => {
-                self.remarks.undecided += 1;
-                Found::Unknown
-            }
-        }
-    }
-
-    fn proved(&self, question: &Resolved) -> Found {
-        let mut checker = Checker::new(self.circuit, Vec::new(), self.nodes);
-        // `EF` asks it of every first scan, and one is enough here.
-        match checker.check(&question.clone().negated().always()) {
-            Ok(Verdict::Fails(Some(trace))) => {
-                Found::Yes(trace.scans.into_iter().map(|scan| scan.inputs).collect())
-            }
-            Ok(Verdict::Holds(_)) => Found::Never,
-            Ok(Verdict::Fails(None)) | Err(_) => Found::Unknown,
-        }
     }
 
     fn remark(

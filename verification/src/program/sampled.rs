@@ -85,7 +85,7 @@ fn flips(mixed: &mut u64) -> u64 {
 }
 
 /// In which runs the formula holds; what speaks of more than one scan holds in none.
-fn word(formula: &Resolved, outputs: &[u64], inputs: &[u64]) -> u64 {
+pub(crate) fn word(formula: &Resolved, outputs: &[u64], inputs: &[u64]) -> u64 {
     let of = |formula: &Resolved| word(formula, outputs, inputs);
     match formula {
         Formula::Constant(value) => u64::from(*value).wrapping_neg(),

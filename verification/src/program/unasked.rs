@@ -29,7 +29,7 @@ pub enum OutputFinding {
 
 impl Subject {
     /// Whether each output can be switched on and off for ever.
-    pub fn switches(&self, bounds: Bounds) -> Vec<(Signal, OutputFinding)> {
+    pub fn switches(&self, bounds: Bounds<'_>) -> Vec<(Signal, OutputFinding)> {
         let outputs: Vec<Signal> = self.outputs().collect();
         let questions: Vec<Resolved> = outputs
             .iter()
@@ -53,11 +53,6 @@ fn questions(output: Signal) -> [Resolved; 4] {
 }
 
 fn finding(answers: &[Answer]) -> OutputFinding {
-    for answer in answers {
-        if let Answer::Undecided(error) = answer {
-            return OutputFinding::Undecided(error.to_string());
-        }
-    }
     let lamps = [Lamp::On, Lamp::Off];
     for (answer, lamp) in answers.iter().zip(lamps) {
         if matches!(answer, Answer::Holds(_)) {
@@ -69,5 +64,20 @@ fn finding(answers: &[Answer]) -> OutputFinding {
             return OutputFinding::Stuck(lamp, trace.clone());
         }
     }
-    OutputFinding::Free
+    let mut open = answers.iter().filter_map(|answer| match answer {
+        Answer::Undecided(undecided) => Some(undecided.to_string()),
+        _ => None,
+    });
+    let Some(why) = open.next() else {
+        return OutputFinding::Free;
+    };
+    // Never on was refuted, and never off.
+    let changes = answers[..2]
+        .iter()
+        .all(|answer| matches!(answer, Answer::Fails(_)));
+    OutputFinding::Undecided(if changes {
+        format!("it can be on and off; whether again and again is not decided: {why}")
+    } else {
+        why
+    })
 }

@@ -1,14 +1,15 @@
 //! The sets of states that satisfy formulas, as least and greatest fixed points.
 
-use understudy_logic::bdd::{BddError, Diagram};
+use understudy_logic::bdd::Diagram;
 
 use super::core::Core;
 use super::model::Model;
 use super::trace::Tracer;
 use super::{Resolved, Verdict};
+use crate::effort::Stopped;
 
 /// See [`super::Checker::check`].
-pub(super) fn check(model: &Model<'_>, property: &Resolved) -> Result<Verdict, BddError> {
+pub(super) fn check(model: &Model<'_>, property: &Resolved) -> Result<Verdict, Stopped> {
     let formula = Core::of(property);
     let holds = model.states(&formula)?;
     let fails = model.diagrams.not(&holds)?;
@@ -30,7 +31,7 @@ pub(super) fn check(model: &Model<'_>, property: &Resolved) -> Result<Verdict, B
 
 impl Model<'_> {
     /// The states that satisfy `formula`, ways on being fair ones.
-    pub(super) fn states(&self, formula: &Core) -> Result<Diagram, BddError> {
+    pub(super) fn states(&self, formula: &Core) -> Result<Diagram, Stopped> {
         let diagrams = &self.diagrams;
         Ok(match formula {
             Core::Constant(value) => diagrams.constant(*value),
@@ -57,15 +58,15 @@ impl Model<'_> {
     }
 
     /// Those of `set` from which a fair run goes on.
-    pub(super) fn fair_only(&self, set: &Diagram) -> Result<Diagram, BddError> {
+    pub(super) fn fair_only(&self, set: &Diagram) -> Result<Diagram, Stopped> {
         match &self.fair_states {
             None => Ok(set.clone()),
-            Some(fair) => self.diagrams.and(set, fair),
+            Some(fair) => Ok(self.diagrams.and(set, fair)?),
         }
     }
 
     /// E[hold U end] by the number of steps: ring k holds the states that need at most k; the last ring is the fixed point.
-    pub(super) fn rings(&self, hold: &Diagram, end: &Diagram) -> Result<Vec<Diagram>, BddError> {
+    pub(super) fn rings(&self, hold: &Diagram, end: &Diagram) -> Result<Vec<Diagram>, Stopped> {
         self.within(u32::MAX, hold, end)
     }
 
@@ -75,7 +76,7 @@ impl Model<'_> {
         scans: u32,
         hold: &Diagram,
         end: &Diagram,
-    ) -> Result<Vec<Diagram>, BddError> {
+    ) -> Result<Vec<Diagram>, Stopped> {
         let mut rings = vec![end.clone()];
         let mut newest = end.clone();
         for _ in 0..scans {
@@ -93,7 +94,7 @@ impl Model<'_> {
     }
 
     /// `stays(n)[k]`: from here `set` can be kept for k more scans, fairly after that.
-    pub(super) fn stays(&self, scans: u32, set: &Diagram) -> Result<Vec<Diagram>, BddError> {
+    pub(super) fn stays(&self, scans: u32, set: &Diagram) -> Result<Vec<Diagram>, Stopped> {
         let mut kept = vec![self.fair_only(set)?];
         for _ in 0..scans {
             let last = &kept[kept.len() - 1];
@@ -107,7 +108,7 @@ impl Model<'_> {
     }
 
     /// EG `set` on fair runs: the greatest Z = set ∧ ⋀ EX E[set U (Z ∧ condition)] over the conditions, after Emerson and Lei.
-    pub(super) fn always(&self, set: &Diagram) -> Result<Diagram, BddError> {
+    pub(super) fn always(&self, set: &Diagram) -> Result<Diagram, Stopped> {
         let diagrams = &self.diagrams;
         let mut kept = set.clone();
         loop {

@@ -1,12 +1,14 @@
 //! The part of a circuit that a property depends on, as diagrams.
 
+use std::cell::Cell;
 use std::collections::BTreeSet;
 
-use understudy_logic::bdd::{BddError, Diagram, Diagrams, Substitution, depth_first_order};
+use understudy_logic::bdd::{Diagram, Diagrams, Substitution, depth_first_order};
 use understudy_logic::{Circuit, Expression, Operation, Variable};
 
 use super::core::Core;
 use super::{Resolved, Signal};
+use crate::effort::{GoOn, Stopped, Work};
 
 /// The inputs and registers that some signals depend on, now and later.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -65,6 +67,8 @@ impl Cone {
 /// A circuit's part as diagrams over (x, u).
 pub(super) struct Model<'c> {
     pub(super) circuit: &'c Circuit,
+    go_on: GoOn<'c>,
+    steps: Cell<u64>,
     pub(super) cone: Cone,
     pub(super) diagrams: Diagrams,
     /// u of the cone.
@@ -83,8 +87,9 @@ impl<'c> Model<'c> {
         circuit: &'c Circuit,
         cone: Cone,
         fair: &[Resolved],
-        nodes: usize,
-    ) -> Result<Self, BddError> {
+        diagrams: impl FnOnce(Vec<Variable>) -> Diagrams,
+        go_on: GoOn<'c>,
+    ) -> Result<Self, Stopped> {
         let graph = circuit.graph();
         let registers: Vec<u32> = cone
             .variables
@@ -94,13 +99,16 @@ impl<'c> Model<'c> {
                 Variable::Input(_) => None,
             })
             .collect();
-        let diagrams = Diagrams::new(order(circuit, &cone, &registers), nodes).reordered_by_need();
+        let diagrams = diagrams(order(circuit, &cone, &registers));
         let inputs = cone.variables.iter().copied();
         let inputs = inputs.filter(|variable| matches!(variable, Variable::Input(_)));
         let inputs = diagrams.product(inputs)?;
         let mut builder = diagrams.builder(graph, |variable| variable);
         let mut pairs = Vec::with_capacity(registers.len());
         for &register in &registers {
+            if !go_on(Work::Diagrams(0)) {
+                return Err(Stopped::Time);
+            }
             let next = builder.diagram(circuit.registers()[register as usize].next)?;
             pairs.push((Variable::Register(register), next));
         }
@@ -116,6 +124,8 @@ impl<'c> Model<'c> {
         let step = diagrams.substitution(pairs)?;
         let mut model = Self {
             circuit,
+            go_on,
+            steps: Cell::new(0),
             cone,
             diagrams,
             inputs,
@@ -141,9 +151,13 @@ impl<'c> Model<'c> {
     }
 
     /// EX `set`.
-    pub(super) fn before(&self, set: &Diagram) -> Result<Diagram, BddError> {
+    pub(super) fn before(&self, set: &Diagram) -> Result<Diagram, Stopped> {
+        self.steps.set(self.steps.get() + 1);
+        if !(self.go_on)(Work::Diagrams(self.steps.get())) {
+            return Err(Stopped::Time);
+        }
         let some_input = self.diagrams.exists(set, &self.inputs)?;
-        self.diagrams.substitute(&some_input, &self.step)
+        Ok(self.diagrams.substitute(&some_input, &self.step)?)
     }
 
     /// The states of `set` whose registers are `registers`, of which those of the cone count.
@@ -151,7 +165,7 @@ impl<'c> Model<'c> {
         &self,
         set: &Diagram,
         registers: &[bool],
-    ) -> Result<Diagram, BddError> {
+    ) -> Result<Diagram, Stopped> {
         let mut states = set.clone();
         for &variable in self.cone.variables.iter().rev() {
             let Variable::Register(register) = variable else {

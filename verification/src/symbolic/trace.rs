@@ -3,12 +3,13 @@
 //! A run is found in the sets, and then told by evaluating the circuit itself on the inputs that were found. A run without end is a
 //! *lasso*: it goes on from its last scan to an earlier one.
 
-use understudy_logic::bdd::{BddError, Diagram};
+use understudy_logic::bdd::Diagram;
 use understudy_logic::{Circuit, Scan, Scratch, Variable};
 
 use super::Signal;
 use super::core::Core;
 use super::model::{Cone, Model};
+use crate::effort::Stopped;
 
 /// One scan of a [`Trace`].
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -33,10 +34,15 @@ pub struct Trace {
 impl Trace {
     /// The values of one signal, scan by scan.
     pub fn values(&self, signal: Signal) -> impl Iterator<Item = bool> + '_ {
-        self.scans.iter().map(move |scan| match signal {
-            Signal::Output(output) => scan.outputs[output],
-            Signal::Input(input) => scan.inputs[input],
-        })
+        (0..self.scans.len()).map(move |scan| self.value(signal, scan))
+    }
+
+    /// The value of one signal in one scan.
+    pub fn value(&self, signal: Signal, scan: usize) -> bool {
+        match signal {
+            Signal::Output(output) => self.scans[scan].outputs[output],
+            Signal::Input(input) => self.scans[scan].inputs[input],
+        }
     }
 }
 
@@ -71,7 +77,7 @@ impl<'m, 'c> Tracer<'m, 'c> {
         formula: &Core,
         registers: &[bool],
         first: &Diagram,
-    ) -> Result<Option<Trace>, BddError> {
+    ) -> Result<Option<Trace>, Stopped> {
         if matches!(formula, Core::Not(inner) if inner.is_temporal()) {
             return Ok(None);
         }
@@ -88,7 +94,7 @@ impl<'m, 'c> Tracer<'m, 'c> {
     }
 
     /// Those of `states`, all of which satisfy `formula`, from which the fewest scans show it.
-    fn nearest(&self, formula: &Core, states: &Diagram) -> Result<Diagram, BddError> {
+    fn nearest(&self, formula: &Core, states: &Diagram) -> Result<Diagram, Stopped> {
         let model = self.model;
         let rings = match formula {
             Core::And(left, right) => {
@@ -115,7 +121,7 @@ impl<'m, 'c> Tracer<'m, 'c> {
     }
 
     /// Lengthens a run whose last state satisfies `formula` until it shows that.
-    fn extend(&self, run: &mut Run, formula: &Core) -> Result<(), BddError> {
+    fn extend(&self, run: &mut Run, formula: &Core) -> Result<(), Stopped> {
         let model = self.model;
         match formula {
             Core::Constant(_) | Core::Signal(_) | Core::Not(_) => Ok(()),
@@ -157,7 +163,7 @@ impl<'m, 'c> Tracer<'m, 'c> {
     }
 
     /// Walks from ring to ring until the innermost.
-    fn descend(&self, run: &mut Run, rings: &[Diagram]) -> Result<(), BddError> {
+    fn descend(&self, run: &mut Run, rings: &[Diagram]) -> Result<(), Stopped> {
         let within = |ring: &&Diagram| self.contains(ring, run.last());
         let Some(mut ring) = rings.iter().position(|ring| within(&ring)) else {
             return Ok(());
@@ -174,7 +180,7 @@ impl<'m, 'c> Tracer<'m, 'c> {
     }
 
     /// Stays `inside`, which every state of it can, meets every condition of fairness, and comes back to where it was.
-    fn lasso(&self, run: &mut Run, inside: &Diagram) -> Result<(), BddError> {
+    fn lasso(&self, run: &mut Run, inside: &Diagram) -> Result<(), Stopped> {
         let model = self.model;
         while run.states.len() < MAXIMUM_SCANS {
             let start = run.states.len() - 1;
@@ -198,7 +204,7 @@ impl<'m, 'c> Tracer<'m, 'c> {
     }
 
     /// One scan on, into `states`.
-    fn step(&self, run: &mut Run, states: &Diagram) -> Result<(), BddError> {
+    fn step(&self, run: &mut Run, states: &Diagram) -> Result<(), Stopped> {
         let registers = self.next(run.last());
         if let Some(state) = self.pick(registers, states)? {
             run.states.push(state);
@@ -207,7 +213,7 @@ impl<'m, 'c> Tracer<'m, 'c> {
     }
 
     /// One of `states` with these registers; inputs that do not matter are 0.
-    fn pick(&self, registers: Vec<bool>, states: &Diagram) -> Result<Option<State>, BddError> {
+    fn pick(&self, registers: Vec<bool>, states: &Diagram) -> Result<Option<State>, Stopped> {
         let here = self.model.with_registers(states, &registers)?;
         let Some(chosen) = self.model.diagrams.satisfying(&here) else {
             return Ok(None);
@@ -231,7 +237,7 @@ impl<'m, 'c> Tracer<'m, 'c> {
     }
 
     /// The set of one state, as far as the cone sees it.
-    fn only(&self, state: &State) -> Result<Diagram, BddError> {
+    fn only(&self, state: &State) -> Result<Diagram, Stopped> {
         let model = self.model;
         let mut states = model.with_registers(&model.diagrams.constant(true), &state.registers)?;
         for &variable in &model.cone.variables {

@@ -1,14 +1,15 @@
 //! Ladders as people write them.
 
+use std::cell::Cell;
 use std::time::Duration;
 
 use understudy_ladder::parse;
 use understudy_logic::Circuit;
 use understudy_logic::bdd::Diagrams;
-use understudy_verification::program::{Bounds, Lamp, OutputFinding, Subject};
+use understudy_verification::program::{Answer, Bounds, Lamp, OutputFinding, Subject};
 use understudy_verification::property::read_one;
-use understudy_verification::smv;
 use understudy_verification::symbolic::{Checker, Trace, Verdict, replays, resolve};
+use understudy_verification::{Stopped, Work, smv};
 
 const SEAL_IN: &str = "\
 program pump
@@ -198,4 +199,112 @@ fn listed_states_of_many_inputs_and_registers() {
     let bound = 70 * 256;
     let refused = Explicit::new(&circuit, bound).err();
     assert_eq!(refused, Some(ExplicitError::States { bound }));
+}
+
+/// All the `a` stand before all the `b` in the order that the program suggests, where `any` needs 2^13 nodes; in pairs it needs two a pair.
+#[test]
+fn an_order_that_is_bad_is_changed_by_need() {
+    let pairs = 13;
+    let mut text = String::from("program twins\n");
+    let all = |name: &str| -> String { (0..pairs).map(|k| format!("{name}{k} ")).collect() };
+    for k in 0..pairs {
+        text += &format!("input a{k}\ninput b{k}\n");
+    }
+    text += "output left\noutput right\noutput any\n";
+    text += &format!("rung\n    {}( left )\n", all("a"));
+    text += &format!("rung\n    {}( right )\n", all("b"));
+    let twins: Vec<String> = (0..pairs).map(|k| format!("a{k} b{k}")).collect();
+    text += &format!("rung\n    [ {} ] ( any )\n", twins.join(" | "));
+    let circuit = parse(&text)
+        .program
+        .lower_observed(Duration::from_millis(10))
+        .expect("a right program");
+    let verdict = |property: &str, nodes: usize, fixed: bool| {
+        let property = read_one(property).expect("right");
+        let formula = resolve(&property.formula, &circuit).expect("known signals");
+        let checker = Checker::new(&circuit, Vec::new(), nodes);
+        let mut checker = if fixed {
+            checker.in_fixed_order()
+        } else {
+            checker
+        };
+        checker.check(&formula).map(|verdict| match verdict {
+            Verdict::Holds(_) => true,
+            Verdict::Fails(trace) => {
+                assert!(trace.is_none_or(|trace| replays(&circuit, &trace)));
+                false
+            }
+        })
+    };
+    for (property, holds) in [
+        ("AG (left & right -> any)", true),
+        ("AG (left & b3 -> any)", true),
+        ("AG EF (any & !left & !right)", true),
+        ("AG (any -> left | right)", false),
+        ("AG (any & right -> left)", false),
+    ] {
+        assert!(verdict(property, 3_000, true).is_err(), "{property}");
+        assert_eq!(verdict(property, 3_000, false), Ok(holds), "{property}");
+        assert_eq!(verdict(property, 400_000, true), Ok(holds), "{property}");
+    }
+}
+
+/// A supervisor of 234 rungs: diagrams of all its states do not end, and it reaches 2,464 with a period of 5 s.
+#[test]
+fn a_large_supervisor_is_decided() {
+    let text = include_str!("../../../examples/boiler/complete.ladder");
+    let program = parse(text).program;
+    let period = Duration::from_secs(5);
+    let subject = Subject::new(&program, period).expect("a right program");
+    let bounds = Bounds {
+        nodes: 1 << 14,
+        ..Bounds::default()
+    };
+    for (signal, finding) in subject.switches(bounds) {
+        let name = signal.name(subject.circuit());
+        assert_eq!(finding, OutputFinding::Free, "{name}");
+    }
+    let decide = |property: &str| {
+        let property = read_one(property).expect("right");
+        let formula = subject.resolve(&property).expect("known signals");
+        let answers = subject.check(&[formula], Vec::new(), bounds, &mut |_, _| {});
+        match &answers[0] {
+            Answer::Holds(_) => true,
+            Answer::Fails(trace) => {
+                let trace = trace.as_ref();
+                assert!(trace.is_none_or(|trace| replays(subject.circuit(), trace)));
+                false
+            }
+            Answer::Undecided(why) => panic!("{}: {why}", property.text),
+        }
+    };
+    assert!(decide("never gas_valve_low and gas_valve_high"));
+    assert!(decide("gas_valve_high only while blower"));
+    assert!(decide("AG (gas_valve_low -> EF gas_valve_high)"));
+    assert!(!decide("never purging and blower"));
+}
+
+/// Whoever has a clock can end it, and is told what was proved until then.
+#[test]
+fn a_proof_ends_when_nobody_waits() {
+    let text = include_str!("../../../examples/boiler/complete.ladder");
+    let program = parse(text).program;
+    let subject = Subject::new(&program, Duration::from_millis(10)).expect("a right program");
+    let asked = Cell::new(0);
+    let go_on = |_: Work| {
+        asked.set(asked.get() + 1);
+        asked.get() < 40
+    };
+    let bounds = Bounds {
+        go_on: &go_on,
+        ..Bounds::default()
+    };
+    let property = read_one("AG EF gas_valve_high").expect("right");
+    let formula = subject.resolve(&property).expect("known signals");
+    let mut told = 0;
+    let answers = subject.check(&[formula], Vec::new(), bounds, &mut |_, _| told += 1);
+    let Answer::Undecided(undecided) = &answers[0] else {
+        panic!("{answers:?}");
+    };
+    assert_eq!((undecided.why, told), (Stopped::Time, 1));
 }

@@ -5,3 +5,4 @@ mod naive;
 mod random;
 mod reading;
 mod remarks;
+mod smv;

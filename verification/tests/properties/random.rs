@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use understudy_logic::bdd::Diagrams;
 use understudy_logic::{Circuit, CircuitBuilder, Expression};
 use understudy_verification::explicit::Explicit;
-use understudy_verification::induction::{Induction, prove_always};
+use understudy_verification::induction::{Depth, Induction, prove_always};
 use understudy_verification::property::{Formula, Path};
 use understudy_verification::symbolic::{Checker, Resolved, Signal, Verdict, replays};
 
@@ -141,7 +141,7 @@ proptest! {
     ) {
         let circuit = circuit(&recipe, initial);
         let naive = Naive::new(&circuit, &[]);
-        let holds = match prove_always(&circuit, &kept, 1 << REGISTERS).expect("of one scan") {
+        let holds = match prove_always(&circuit, &kept, Depth::of(1 << REGISTERS)).expect("of one scan") {
             Induction::Holds(_) => true,
             Induction::Fails(trace) => {
                 prop_assert!(replays(&circuit, &trace));

@@ -12,7 +12,7 @@ use understudy_verification::{Shown, draw_runs};
 
 #[path = "../../../ladder/tests/ladder/random.rs"]
 #[allow(dead_code, reason = "made for the tests of another crate")]
-mod random;
+pub(crate) mod random;
 
 const PERIOD: Duration = Duration::from_millis(100);
 

@@ -1,0 +1,51 @@
+//! How long a proof may take, and what is said while it does.
+
+use std::cell::{Cell, RefCell};
+use std::time::{Duration, Instant};
+
+use understudy_verification::Work;
+
+use crate::console::Console;
+
+/// From one line about what is being done to the next.
+const BETWEEN: Duration = Duration::from_secs(3);
+
+/// The budget of a command.
+pub(super) struct Patience<'c> {
+    begin: Instant,
+    told: Cell<Instant>,
+    budget: Option<Duration>,
+    about: RefCell<String>,
+    console: RefCell<&'c mut Console>,
+}
+
+impl<'c> Patience<'c> {
+    /// From now on, for `budget`, or as long as it takes.
+    pub(super) fn new(budget: Option<Duration>, console: &'c mut Console) -> Self {
+        let now = Instant::now();
+        Self {
+            begin: now,
+            told: Cell::new(now),
+            budget,
+            about: RefCell::default(),
+            console: RefCell::new(console),
+        }
+    }
+
+    /// What the work is about from here on.
+    pub(super) fn turn_to(&self, about: String) {
+        self.about.replace(about);
+    }
+
+    /// Whether there is time left; says what is being done, every few seconds.
+    pub(super) fn goes_on(&self, work: Work) -> bool {
+        let now = Instant::now();
+        if now - self.told.get() >= BETWEEN {
+            self.told.set(now);
+            let seconds = (now - self.begin).as_secs();
+            let line = format!("{seconds} s: {}, {work}", self.about.borrow());
+            self.console.borrow_mut().note(&line);
+        }
+        self.budget.is_none_or(|budget| now - self.begin < budget)
+    }
+}

@@ -1,0 +1,261 @@
+//! Properties of a program by several methods, the cheap ones first:
+//!
+//! ```text
+//! diagrams of few nodes          most properties of most ladders, with runs that show why
+//! induction over few scans       invariants, however large the program is
+//! few states listed one by one   programs in steps: few of many states can be reached
+//! diagrams of more nodes, more states, diagrams of as many nodes as allowed
+//! induction over many scans
+//! ```
+//!
+//! A method sees what those before it left undecided.
+
+use std::fmt;
+
+use understudy_logic::bdd::BddError;
+
+use super::{Answer, Bounds, Subject};
+use crate::effort::{Stopped, Work};
+use crate::explicit::{Explicit, ExplicitError};
+use crate::induction::{Depth, Induction, invariant, prove_always};
+use crate::symbolic::{Checker, Cone, Resolved, Verdict, rows};
+
+/// Nodes of the first and the second try.
+const NODES: [usize; 2] = [1 << 17, 1 << 20];
+/// States, with inputs, of the first list: less than a second.
+const FEW_STATES: usize = 1 << 23;
+/// Parts of a program that may be too large before diagrams of that many nodes are given up.
+const REFUSED: u32 = 3;
+/// The first induction: its scans, and the steps of each search.
+const FEW_SCANS: u32 = 2;
+const FEW_STEPS: u64 = 200_000;
+
+/// Why a property was not decided, and what was proved of it all the same.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Undecided {
+    /// What was in the way of decision diagrams.
+    pub why: Stopped,
+    /// No run of at most so many scans breaks it.
+    pub unbroken: Option<u32>,
+    /// None of so many states, those nearest to the start, breaks it.
+    pub listed: Option<usize>,
+}
+
+impl fmt::Display for Undecided {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{}", self.why)?;
+        match self.unbroken {
+            Some(1) => write!(formatter, "; the first scan does not break it")?,
+            Some(scans) => write!(formatter, "; no run of up to {scans} scans breaks it")?,
+            None => {}
+        }
+        if let Some(states) = self.listed {
+            write!(
+                formatter,
+                "; none of the {states} states nearest to the start breaks it"
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// Properties on their way to an answer.
+pub(super) struct Stages<'s, 'b> {
+    pub(super) subject: &'s Subject,
+    pub(super) properties: &'s [Resolved],
+    pub(super) fair: Vec<Resolved>,
+    pub(super) bounds: Bounds<'b>,
+    pub(super) answered: &'s mut dyn FnMut(usize, &Answer),
+    answers: Vec<Option<Answer>>,
+    so_far: Vec<Undecided>,
+    over: bool,
+}
+
+impl<'s, 'b> Stages<'s, 'b> {
+    pub(super) fn new(
+        subject: &'s Subject,
+        properties: &'s [Resolved],
+        fair: Vec<Resolved>,
+        bounds: Bounds<'b>,
+        answered: &'s mut dyn FnMut(usize, &Answer),
+    ) -> Self {
+        let nothing = Undecided {
+            why: Stopped::Diagrams(BddError::TooManyNodes {
+                limit: bounds.nodes,
+            }),
+            unbroken: None,
+            listed: None,
+        };
+        Self {
+            subject,
+            properties,
+            fair,
+            bounds,
+            answered,
+            answers: vec![None; properties.len()],
+            so_far: vec![nothing; properties.len()],
+            over: false,
+        }
+    }
+
+    pub(super) fn run(mut self) -> Vec<Answer> {
+        let [few, more] = NODES;
+        let all = self.bounds.nodes;
+        self.diagrams(few.min(all));
+        self.induction(FEW_SCANS.min(self.bounds.scans), FEW_STEPS);
+        let listed = self.list(FEW_STATES.min(self.bounds.states));
+        if all > few {
+            self.diagrams(more.min(all));
+        }
+        if matches!(listed, Some(ExplicitError::States { .. })) && self.bounds.states > FEW_STATES {
+            self.list(self.bounds.states);
+        }
+        if all > more {
+            self.diagrams(all);
+        }
+        self.induction(self.bounds.scans, u64::MAX);
+        self.leave();
+        self.answers.into_iter().flatten().collect()
+    }
+
+    fn left(&self) -> Vec<usize> {
+        let places = self.answers.iter().enumerate();
+        let open = places.filter(|(_, answer)| answer.is_none() && !self.over);
+        open.map(|(place, _)| place).collect()
+    }
+
+    fn answer(&mut self, place: usize, answer: Answer) {
+        (self.answered)(place, &answer);
+        self.answers[place] = Some(answer);
+    }
+
+    /// With fewer nodes than allowed the order of variables stays as it is.
+    fn diagrams(&mut self, nodes: usize) {
+        let circuit = &self.subject.circuit;
+        let go_on = self.bounds.go_on;
+        let mut checker = Checker::new(circuit, self.fair.clone(), nodes).while_wanted(go_on);
+        if nodes < self.bounds.nodes {
+            checker = checker.in_fixed_order();
+        }
+        let mut failures = 0;
+        for place in self.left() {
+            match checker.check(&self.properties[place]) {
+                Ok(Verdict::Holds(trace)) => self.answer(place, Answer::Holds(trace)),
+                Ok(Verdict::Fails(trace)) => self.answer(place, Answer::Fails(trace)),
+                Err(Stopped::Time) => {
+                    self.so_far[place].why = Stopped::Time;
+                    self.over = true;
+                    return;
+                }
+                Err(stopped) => {
+                    self.so_far[place].why = stopped;
+                    failures += 1;
+                    if failures >= REFUSED && nodes < self.bounds.nodes {
+                        return;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Invariants. Induction knows no fairness: what it proves of all runs holds of the fair ones, and its counterexample may be unfair.
+    fn induction(&mut self, scans: u32, steps: u64) {
+        let depth = Depth {
+            scans,
+            steps,
+            go_on: self.bounds.go_on,
+        };
+        for place in self.left() {
+            let Some(kept) = invariant(&self.properties[place]) else {
+                continue;
+            };
+            match prove_always(&self.subject.circuit, kept, depth) {
+                Some(Induction::Holds(_)) => self.answer(place, Answer::Holds(None)),
+                Some(Induction::Fails(trace)) if self.fair.is_empty() => {
+                    self.answer(place, Answer::Fails(Some(trace)));
+                }
+                Some(Induction::Undecided(scans)) if scans > 0 => {
+                    let known = &mut self.so_far[place].unbroken;
+                    *known = Some(known.unwrap_or(0).max(scans));
+                }
+                _ => {}
+            }
+            if !(depth.go_on)(Work::Scans(0)) {
+                self.so_far[place].why = Stopped::Time;
+                self.over = true;
+                return;
+            }
+        }
+    }
+
+    /// All properties by one list of states, which is kept for the next questions.
+    fn list(&mut self, bound: usize) -> Option<ExplicitError> {
+        let left = self.left();
+        if left.is_empty() || !self.fair.is_empty() {
+            return None;
+        }
+        let circuit = &self.subject.circuit;
+        if self.subject.listed.get().is_none() {
+            let (listed, error) = Explicit::explore(circuit, bound, self.bounds.go_on, &mut |_| {});
+            if let Some(error) = error {
+                self.broken_nearby(&listed, &left);
+                if matches!(error, ExplicitError::Time { .. }) {
+                    self.over = true;
+                }
+                return Some(error);
+            }
+            // Nobody else can have made it meanwhile.
+            let _ = self.subject.listed.set(listed);
+        }
+        let listed = self.subject.listed.get()?;
+        let asked: Vec<Resolved> = left
+            .iter()
+            .map(|&place| self.properties[place].clone())
+            .collect();
+        for ((place, property), (holds, run)) in
+            left.into_iter().zip(&asked).zip(listed.check(&asked))
+        {
+            let trace = run.map(|run| rows(circuit, &Cone::of(circuit, [property]), run));
+            let answer = if holds {
+                Answer::Holds(trace)
+            } else {
+                Answer::Fails(trace)
+            };
+            self.answer(place, answer);
+        }
+        None
+    }
+
+    /// What a list that was not ended says: of invariants whether they are broken in it.
+    fn broken_nearby(&mut self, listed: &Explicit, left: &[usize]) {
+        let invariants = left.iter().copied();
+        let invariants: Vec<(usize, Resolved)> = invariants
+            .filter_map(|place| Some((place, invariant(&self.properties[place])?.clone())))
+            .collect();
+        let kept: Vec<Resolved> = invariants.iter().map(|(_, kept)| kept.clone()).collect();
+        let circuit = &self.subject.circuit;
+        for ((place, kept), broken) in invariants.into_iter().zip(listed.broken(&kept)) {
+            match broken {
+                Some(run) => {
+                    let trace = rows(circuit, &Cone::of(circuit, [&kept]), run);
+                    self.answer(place, Answer::Fails(Some(trace)));
+                }
+                None if listed.ended() > 0 => self.so_far[place].listed = Some(listed.ended()),
+                None => {}
+            }
+        }
+    }
+
+    /// What is left stays undecided.
+    fn leave(&mut self) {
+        for place in 0..self.answers.len() {
+            if self.answers[place].is_none() {
+                if self.over {
+                    self.so_far[place].why = Stopped::Time;
+                }
+                let answer = Answer::Undecided(self.so_far[place].clone());
+                self.answer(place, answer);
+            }
+        }
+    }
+}
