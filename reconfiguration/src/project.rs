@@ -224,6 +224,16 @@ impl Reader<'_> {
         let all_channels = !fields.has("channels");
         let has_plant = fields.has("plant");
         fields.finish(found);
+        if let Some(diagnosis) = &diagnosis
+            && !has_plant
+        {
+            let message =
+                "[diagnosis] needs a `plant`: records do not say how long a state may last";
+            self.diagnostics
+                .push(Diagnostic::error("U1203", message, diagnosis.span()));
+        }
+        let patience =
+            diagnosis.map(|diagnosis| patience(diagnosis, period, &mut self.diagnostics));
         let ladder = ladder?;
         let inputs: Vec<&str> = ladder
             .inputs
@@ -245,16 +255,6 @@ impl Reader<'_> {
             None if objective == 1 => Objective::Nearest,
             None => Objective::Fewest,
         };
-        if let Some(diagnosis) = &diagnosis
-            && !has_plant
-        {
-            let message =
-                "[diagnosis] needs a `plant`: records do not say how long a state may last";
-            self.diagnostics
-                .push(Diagnostic::error("U1203", message, diagnosis.span()));
-        }
-        let patience =
-            diagnosis.map(|diagnosis| patience(diagnosis, period, &mut self.diagnostics));
         let relation = relations::read(relations, &inputs, &outputs, &mut self.diagnostics);
         Some(Project {
             plant,

@@ -77,6 +77,8 @@ events = 1
     ));
     assert!(findings("[project]\nladder = 5\n[[relation]\n").contains("U1201"));
     assert!(findings("relation = []").contains("U1203"));
+    let without_a_ladder = "[project]\nladder = 5\n[diagnosis]\nquiet = 5\n";
+    assert!(findings(without_a_ladder).contains("`quiet` is the number 5"));
 }
 
 #[test]
