@@ -57,21 +57,28 @@ async fn listen(address: SocketAddr) -> Result<TcpListener, GatewayError> {
         .map_err(|source| GatewayError::Listen { address, source })
 }
 
-/// Ends with SIGINT or with SIGTERM.
-async fn asked_to_end() {
+/// Ends with SIGINT or with SIGTERM, which are listened for from this call on, within a runtime.
+fn asked_to_end() -> impl Future<Output = ()> {
     use tokio::signal::unix::{SignalKind, signal};
-    let of = |kind| async move {
-        match signal(kind) {
-            Ok(mut signal) => {
-                signal.recv().await;
+    let of = |kind| {
+        let listened = signal(kind);
+        async move {
+            match listened {
+                Ok(mut signal) => {
+                    signal.recv().await;
+                }
+                // Without the right to listen to signals their default ends the process.
+                Err(_) => std::future::pending().await,
             }
-            // Without the right to listen to signals their default ends the process.
-            Err(_) => std::future::pending().await,
         }
     };
-    tokio::select! {
-        () = of(SignalKind::interrupt()) => {}
-        () = of(SignalKind::terminate()) => {}
+    let interrupt = of(SignalKind::interrupt());
+    let terminate = of(SignalKind::terminate());
+    async move {
+        tokio::select! {
+            () = interrupt => {}
+            () = terminate => {}
+        }
     }
 }
 
@@ -89,6 +96,8 @@ where
 {
     runtime()?.block_on(async {
         let listener = listen(address).await?;
+        // Whoever was told that it listens may ask it to end.
+        let end = asked_to_end();
         let system = |source| GatewayError::System {
             what: "serving",
             source,
@@ -96,7 +105,7 @@ where
         ready(listener.local_addr().map_err(system)?);
         tokio::select! {
             ended = serve(listener) => ended.map_err(system),
-            () = asked_to_end() => Ok(()),
+            () = end => Ok(()),
         }
     })
 }

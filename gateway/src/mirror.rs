@@ -45,10 +45,13 @@ pub fn mirror(
     let runtime = runtime()?;
     let root = format!("understudy/mirror/{}", run.cluster().name());
     let announcer = Announcer::open(address, &root)?;
+    let end = {
+        let _entered = runtime.enter();
+        asked_to_end()
+    };
     ready(address);
     let mut said: BTreeMap<String, String> = BTreeMap::new();
     runtime.block_on(async {
-        let end = asked_to_end();
         tokio::pin!(end);
         loop {
             for (key, document) in documents(run.cluster(), &run.snapshot()) {
