@@ -61,8 +61,8 @@ pub(crate) struct Arguments {
     /// Processors to use, by default all
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
-    /// Run only the K-th of N parts; `merge` makes one of them
-    #[arg(long, value_name = "K/N", default_value = "1/1")]
+    /// Run only the K-th of N parts of this seed; `merge` makes one of them
+    #[arg(long, value_name = "K/N", default_value = "1/1", requires = "seed")]
     shard: Shard,
     #[command(flatten)]
     overrides: OverrideArguments,
