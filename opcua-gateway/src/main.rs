@@ -20,10 +20,11 @@ use understudy_view::Run;
 Example:
   understudy-opcua serve runs/latest
   understudy-opcua nodes runs/latest
-  understudy-opcua serve runs/latest --listen 192.0.2.7:4840 --certificates opcua --user reader --password-file password
+  understudy-opcua serve runs/latest --listen 192.0.2.7:4840 --certificates opcua
 
-It reads the journal of the run, finished or not, as `understudy gateway` does (docs/monitoring.md).
-Exit status: 0 when all is well, 1 when it cannot serve, 2 when an input is wrong and nothing was started."
+It reads the journal of the run, finished or not, as `understudy gateway` does
+(docs/monitoring.md). Exit status: 0 when all is well, 1 when it cannot serve, 2 when an
+input is wrong and nothing was started."
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -58,8 +59,9 @@ Example:
   understudy-opcua serve runs/latest
   understudy-opcua serve runs/latest --listen 192.0.2.7:4840 --certificates opcua
 
-Without --certificates there is no security, and only this machine is served. With it the policies are Basic256Sha256 and
-Aes256_Sha256_RsaPss; a client that is not trusted yet is refused, and lies in FOLDER/rejected for you to move to FOLDER/trusted.")]
+Without --certificates there is no security, and only this machine is served. With it the
+policies are Basic256Sha256 and Aes256_Sha256_RsaPss. A client that is not trusted yet is
+refused, and lies in FOLDER/rejected for you to move to FOLDER/trusted.")]
 struct ServeArguments {
     #[command(flatten)]
     run: RunArgument,
