@@ -13,7 +13,7 @@ use crate::symbolic::{Checker, Resolved, Signal, Verdict};
 /// Nodes for one question: these are many, and none of them was asked for.
 const NODES: usize = 200_000;
 /// States of the first list, with inputs.
-const FEW_STATES: usize = 1 << 22;
+const FEW_STATES: usize = 1 << 23;
 /// Questions for which diagrams may grow too large before they are given up.
 const REFUSED: u32 = 3;
 /// Questions that clauses are tried on, the scans of their runs, and the steps of each search.
