@@ -1,5 +1,7 @@
 //! The units of `deployment/`, started by a systemd of their own in namespaces, over a copy of this machine that is thrown away.
 
+#![allow(clippy::print_stderr, reason = "a test that is skipped says why")]
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
