@@ -232,7 +232,6 @@ pub(crate) fn judged(
     };
     let served = page.map(|page| page.beside(directory.path(), console));
     let (_served, commands) = served.transpose()?.unzip();
-    let commands = commands.flatten();
     let mut watch = |progress| console.show(&progress);
     let run = run_commanded(cluster, scenario, settings, directory, commands, &mut watch)
         .map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))?;

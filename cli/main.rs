@@ -7,6 +7,7 @@
 
 mod allocate;
 mod answer;
+mod attach;
 mod automata;
 mod bench;
 mod campaign;
@@ -198,7 +199,7 @@ impl Command {
             Self::Outlook(arguments) => outlook::run(&arguments),
             Self::ModelCheck(arguments) => model_check::run(&arguments),
             Self::Campaign(arguments) => campaign::run(&arguments, console),
-            Self::Top(arguments) => top::run(&arguments, console.is_json()),
+            Self::Top(arguments) => top::run(&arguments, console),
             Self::Why(arguments) => why::run(&arguments),
             Self::Journal(arguments) => journal::run(&arguments, console.is_json()),
             Self::Diff(arguments) => diff::run(&arguments),

@@ -91,7 +91,7 @@ fn asked(arguments: &Arguments) -> Result<Answer, Answer> {
             return Ok(Answer::done("", json!(null)));
         }
     };
-    let text = call.ask(request).map_err(failed)?;
+    let text = call.ask(&request).map_err(failed)?;
     let result = serde_json::from_str(&text).unwrap_or_else(|_| json!({ "text": text }));
     Ok(Answer::done(text, result))
 }

@@ -2,15 +2,19 @@
 
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use clap::Args;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::{self, KeyCode, KeyEventKind, KeyModifiers};
-use understudy_view::{Bounds, Key, Model, Run, Screen, Source, find_run_of};
+use understudy_attach::Attached;
+use understudy_scenarios::{Commander, JOURNAL_LIMIT_BYTES, RunDirectory};
+use understudy_view::{Alarm, Bounds, Key, Model, Run, Screen, Source, find_run_of};
 
 use crate::answer::{Answer, Status};
+use crate::attach::AttachArguments;
+use crate::console::Console;
 use crate::files;
 use crate::view::{RUN, refused};
 
@@ -21,8 +25,9 @@ Example:
   understudy top
   understudy top runs/latest --once
   understudy top examples/press-cell/cluster.toml
+  understudy top cell/cluster.toml --keys keys/parties/operator          what runs on other machines
 
-A cluster file stands for its newest run below runs/. Keys: q quit, space stand still, tab events, alarms, failures to come, a
+A cluster file stands for its newest run below --out. Keys: q quit, space stand still, tab events, alarms, failures to come, a
 acknowledge, arrows scroll, h help. With --once or --json it says how the run is now, and ends.")]
 pub(crate) struct Arguments {
     /// The directory of a run, or a cluster file
@@ -31,6 +36,11 @@ pub(crate) struct Arguments {
     /// Print how it is now, and end
     #[arg(long)]
     once: bool,
+    /// Where runs are kept
+    #[arg(long, value_name = "DIR", default_value = "runs")]
+    out: PathBuf,
+    #[command(flatten)]
+    elsewhere: AttachArguments,
 }
 
 /// How often it is drawn where no key is pressed.
@@ -40,13 +50,22 @@ const LOOK: Duration = Duration::from_millis(200);
 const WIDTH: u16 = 100;
 const HEIGHT: u16 = 30;
 
-pub(crate) fn run(arguments: &Arguments, json: bool) -> Answer {
-    answered(arguments, json).unwrap_or_else(|answer| answer)
+/// A cluster elsewhere that says nothing of a cycle for so long is printed as it is.
+const HEARD_FOR: Duration = Duration::from_secs(20);
+
+/// What its parties say in so long, all of them have begun to say something.
+const ALL_SAY: Duration = Duration::from_secs(1);
+
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
+    answered(arguments, console).unwrap_or_else(|answer| answer)
 }
 
-fn answered(arguments: &Arguments, json: bool) -> Result<Answer, Answer> {
-    let run = open(&arguments.run)?;
-    if json || arguments.once {
+fn answered(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
+    let (run, attached) = open(arguments, console)?;
+    if console.is_json() || arguments.once {
+        if attached.is_some() {
+            wait_for_a_cycle(&run);
+        }
         let model = run
             .read(Bounds::default())
             .map_err(|error| refused(&error))?;
@@ -59,21 +78,65 @@ fn answered(arguments: &Arguments, json: bool) -> Result<Answer, Answer> {
         return Err(Answer::failed(Status::BadInput, "U0578", message));
     }
     let mut terminal = ratatui::try_init().map_err(failed)?;
-    let shown = show(&mut terminal, &run);
+    let commander = match &attached {
+        Some((_, attached)) => attached.commander(),
+        None => run.commander(),
+    };
+    let shown = show(&mut terminal, &run, &commander);
     ratatui::restore();
     shown.map_err(failed)?;
     Ok(Answer::done("", ()))
 }
 
-fn open(path: &Path) -> Result<Run, Answer> {
+/// Until parties elsewhere have begun to tell of their cycles.
+fn wait_for_a_cycle(run: &Run) {
+    let mut source = run.follow();
+    let mut model = run.model(Bounds::default());
+    let started = Instant::now();
+    while model.cycle().is_none() && started.elapsed() < HEARD_FOR {
+        source.poll(&mut |found| {
+            if let Ok(record) = found {
+                model.note(&record);
+            }
+        });
+        std::thread::sleep(LOOK);
+    }
+    std::thread::sleep(ALL_SAY);
+}
+
+type Opened = (Run, Option<(RunDirectory, Attached)>);
+
+fn open(arguments: &Arguments, console: &mut Console) -> Result<Opened, Answer> {
+    let path = arguments.run.as_path();
     let is_cluster = path
         .extension()
         .is_some_and(|extension| extension == "toml");
-    if !is_cluster {
-        return Run::open(path).map_err(|error| refused(&error));
+    let open = |path: &Path| Run::open(path).map_err(|error| refused(&error));
+    if !is_cluster && !arguments.elsewhere.is_wanted() {
+        return Ok((open(path)?, None));
     }
     let (cluster, _) = files::cluster(path, Default::default())?;
-    find_run_of(Path::new("runs"), &cluster).map_err(|error| refused(&error))
+    if arguments.elsewhere.is_wanted() {
+        let (out, limit) = (&arguments.out, JOURNAL_LIMIT_BYTES);
+        let attached = arguments
+            .elsewhere
+            .attach(path, &cluster, out, limit, console)?;
+        return Ok((open(attached.0.path())?, Some(attached)));
+    }
+    let run = find_run_of(&arguments.out, &cluster).map_err(|error| refused(&error))?;
+    Ok((run, None))
+}
+
+/// Writes into the journal that somebody has seen these alarms. They are shown as seen when they are read there.
+fn acknowledge(seen: &[Alarm], commander: &Commander) {
+    let owner = std::env::var("USER").unwrap_or_else(|_| "terminal".to_owned());
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    let now = since.map_or(0, |since| since.as_secs());
+    for alarm in seen {
+        let seen = alarm.acknowledgement(owner.clone(), now);
+        // One that cannot be written stays unseen, and is shown so.
+        let _ = commander.acknowledge_and_wait(seen);
+    }
 }
 
 fn failed(error: io::Error) -> Answer {
@@ -98,7 +161,11 @@ fn printed(screen: &mut Screen, model: &Model) -> Result<String, Answer> {
 }
 
 /// Until somebody quits.
-fn show(terminal: &mut ratatui::DefaultTerminal, run: &Run) -> io::Result<()> {
+fn show(
+    terminal: &mut ratatui::DefaultTerminal,
+    run: &Run,
+    commander: &Commander,
+) -> io::Result<()> {
     let mut source: Source = run.follow();
     let mut model = run.model(Bounds::default());
     let mut screen = Screen::default();
@@ -142,6 +209,9 @@ fn show(terminal: &mut ratatui::DefaultTerminal, run: &Run) -> io::Result<()> {
             KeyCode::Right => Key::Right,
             _ => continue,
         };
-        screen.press(key, &mut model);
+        let seen = screen.press(key, &model);
+        if !seen.is_empty() {
+            acknowledge(&seen, commander);
+        }
     }
 }

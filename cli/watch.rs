@@ -6,13 +6,15 @@ use std::time::SystemTime;
 
 use clap::Args;
 use serde::Serialize;
+use understudy_cluster::Cluster;
 use understudy_scenarios::{
-    Commands, LaboratoryError, MAXIMUM_CYCLES, RunDirectory, Scenario, commands,
+    Commander, Commands, LaboratoryError, MAXIMUM_CYCLES, RunDirectory, Scenario, commands,
 };
-use understudy_view::Run;
+use understudy_view::{Run, find_running};
 use understudy_watch::{Certificate, Commanding, Logins, Served, Settings, WatchError, serve};
 
 use crate::answer::{Answer, Status};
+use crate::attach::{AttachArguments, who_runs_already};
 use crate::console::Console;
 use crate::files;
 use crate::lab::{RunArguments, judged};
@@ -28,16 +30,25 @@ Example:
   understudy watch examples/press-cell/cluster.toml --allow-commands     run it until Ctrl-C, and command it
   understudy watch runs/latest                                           a run that is finished, or is being written
   understudy watch runs/latest --address 0.0.0.0:7480 --logins logins.txt
+  understudy watch cell/cluster.toml --keys keys/parties/operator        what runs on other machines
 
-The page looks only, unless it is told --allow-commands. Where other machines can reach its address, it is served over TLS, and only to
+A cluster file whose laboratory runs already below --out is looked at, and no other one is started. The page looks only, unless it is told --allow-commands. Where other machines can reach its address, it is served over TLS, and only to
 those that the file of --logins names (docs/watch.md).")]
 pub(crate) struct Arguments {
-    /// A cluster file, whose laboratory is run; or the directory of a run
+    /// A cluster file, whose laboratory is run or looked at; or the directory of a run
     #[arg(value_name = "CLUSTER.toml|RUN")]
     target: PathBuf,
     /// Where the page is served
     #[arg(long, value_name = "ADDRESS", default_value_t = ADDRESS)]
     address: SocketAddr,
+    /// Only look at what runs already, and start nothing
+    #[arg(long)]
+    attach: bool,
+    /// Start a laboratory, also where one of this cluster runs already
+    #[arg(long, conflicts_with_all = ["attach", "keys"])]
+    start: bool,
+    #[command(flatten)]
+    elsewhere: AttachArguments,
     #[command(flatten)]
     page: PageArguments,
     #[command(flatten)]
@@ -102,16 +113,23 @@ impl Page {
         &self,
         run: &Path,
         console: &mut Console,
-    ) -> Result<(Served, Option<Commands>), Answer> {
-        let (commanding, commands) = if self.may_command() {
-            let (commander, commands) = commands();
-            (Commanding::Allowed(commander), Some(commands))
-        } else {
-            let why = "the page was not told --allow-commands";
-            (Commanding::Forbidden(why), None)
-        };
-        let served = self.serve(run, commanding, console)?;
+    ) -> Result<(Served, Commands), Answer> {
+        let (commander, commands) = commands();
+        let served = self.serve(run, self.commanding(commander, Vec::new()), console)?;
         Ok((served, commands))
+    }
+
+    fn commanding(
+        &self,
+        commander: Commander,
+        impossible: Vec<(&'static str, String)>,
+    ) -> Commanding {
+        let forbidden = (!self.may_command()).then_some("the page was not told --allow-commands");
+        Commanding {
+            commander,
+            forbidden: forbidden.map(str::to_owned),
+            impossible,
+        }
     }
 
     fn serve(
@@ -162,23 +180,91 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
     if arguments.target.is_dir() {
         watch_run(&arguments.target, &page, console)
     } else {
-        run_and_watch(&arguments.target, &page, &arguments.run, console)
+        watch_cluster(arguments, &page, console)
     }
+}
+
+/// The cluster of a file: elsewhere, in a laboratory that runs already, or in one that is started.
+fn watch_cluster(arguments: &Arguments, page: &Page, console: &mut Console) -> Answer {
+    let (target, run) = (&arguments.target, &arguments.run);
+    let (cluster, reports) = match files::cluster(target, run.overrides.overrides()) {
+        Ok(read) => read,
+        Err(answer) => return answer,
+    };
+    if arguments.elsewhere.is_wanted() {
+        return watch_elsewhere(arguments, &cluster, page, console).with_reports(reports);
+    }
+    let running = (!arguments.start).then(|| find_running(&run.out, &cluster));
+    if let Some(running) = running.flatten() {
+        let path = running.path().to_owned();
+        console.note(&format!(
+            "it runs already, and is looked at: {}",
+            path.display()
+        ));
+        return watch_run(&path, page, console).with_reports(reports);
+    }
+    if arguments.attach {
+        let out = run.out.display();
+        let message = format!(
+            "no laboratory of `{}` runs below {out}; parties on other machines are called with the keys of an operator (--keys DIR)",
+            cluster.name()
+        );
+        return Answer::failed(Status::BadInput, "U0614", message);
+    }
+    if let Some(who) = who_runs_already(&cluster).filter(|_| !arguments.start) {
+        let message = format!(
+            "the cluster runs already, for something takes calls at the address of {who}: look at it with the keys of an operator (--keys DIR)"
+        );
+        return Answer::failed(Status::BadInput, "U0615", message);
+    }
+    run_and_watch(&cluster, arguments, page, console).with_reports(reports)
+}
+
+fn watch_elsewhere(
+    arguments: &Arguments,
+    cluster: &Cluster,
+    page: &Page,
+    console: &mut Console,
+) -> Answer {
+    let (target, run) = (&arguments.target, &arguments.run);
+    let attached =
+        arguments
+            .elsewhere
+            .attach(target, cluster, &run.out, run.journal_limit, console);
+    let (directory, attached) = match attached {
+        Ok(attached) => attached,
+        Err(answer) => return answer,
+    };
+    let commanding = page.commanding(attached.commander(), understudy_attach::impossible());
+    serve_until_asked_to_end(directory.path(), page, commanding, console)
 }
 
 fn watch_run(target: &Path, page: &Page, console: &mut Console) -> Answer {
     // What is wrong with it is said here, and not on a page that nobody sees.
     let run = match Run::open(target) {
-        Ok(run) => run.path().to_owned(),
+        Ok(run) => run,
         Err(error) => return Answer::failed(Status::BadInput, error.code(), error.to_string()),
     };
-    let why = "this page only follows the run: command it on the page of the process that runs it";
-    let served = match page.serve(&run, Commanding::Forbidden(why), console) {
+    let (path, commander) = (run.path().to_owned(), run.commander());
+    let mut commanding = page.commanding(commander, Vec::new());
+    if !run.is_written() {
+        commanding.forbidden = Some("the run is over".to_owned());
+    }
+    serve_until_asked_to_end(&path, page, commanding, console)
+}
+
+fn serve_until_asked_to_end(
+    run: &Path,
+    page: &Page,
+    commanding: Commanding,
+    console: &mut Console,
+) -> Answer {
+    let served = match page.serve(run, commanding, console) {
         Ok(served) => served,
         Err(answer) => return answer,
     };
     match served.until_asked_to_end() {
-        Ok(()) => watched(&run),
+        Ok(()) => watched(run),
         Err(error) => failed(&error),
     }
 }
@@ -190,15 +276,12 @@ fn watched(run: &Path) -> Answer {
 
 /// Runs the laboratory of a cluster until it is asked to end.
 fn run_and_watch(
-    target: &Path,
+    cluster: &Cluster,
+    arguments: &Arguments,
     page: &Page,
-    arguments: &RunArguments,
     console: &mut Console,
 ) -> Answer {
-    let (cluster, reports) = match files::cluster(target, arguments.overrides.overrides()) {
-        Ok(read) => read,
-        Err(answer) => return answer,
-    };
+    let (target, arguments) = (&arguments.target, &arguments.run);
     let scenario = Scenario {
         title: cluster.name().to_owned(),
         cycles: MAXIMUM_CYCLES,
@@ -209,14 +292,14 @@ fn run_and_watch(
         Ok(directory) => directory,
         Err(error) => return Answer::failed(Status::Failed, "U0602", error.to_string()),
     };
-    let file = target.to_owned();
+    let file = target.clone();
     let page = Some(page);
     match judged(
-        &cluster, &scenario, file, arguments, &directory, page, console,
+        cluster, &scenario, file, arguments, &directory, page, console,
     ) {
-        Err(answer) => answer.with_reports(reports),
+        Err(answer) => answer,
         Ok((_, run)) => {
-            let answer = watched(directory.path()).with_reports(reports);
+            let answer = watched(directory.path());
             match run.failure {
                 Some(failure) => answer.and_failure(
                     Status::Failed,

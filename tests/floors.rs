@@ -47,7 +47,7 @@ const FLOORS: &[&[&str]] = &[
         "understudy-model-checking",
         "understudy-scenarios",
     ],
-    &["understudy-view"],
+    &["understudy-attach", "understudy-view"],
     &["understudy-gateway", "understudy-watch"],
     &["understudy", "understudy-fuzz", "understudy-opcua-gateway"],
 ];

@@ -8,7 +8,10 @@
 //! | `configuration` | asked: the canonical text of the configuration | yes | yes |
 //! | `status` | asked: what it said when it was ready | yes | yes |
 //! | `command/release`, `command/stop` | asked: done | yes | no |
-//! | `journal` | told: each line of its journal | yes | no |
+//! | `command/force`, `command/unforce` | asked with a force or a signal as JSON: done, or why not | yes | no |
+//! | `journal` | told: the lines of its journal, those of a moment at once | yes | no |
+//!
+//! and under `understudy/cluster/<party>`, for callers whose cluster file may be another one: asked, the hash of its configuration.
 //!
 //! Invariants: the cycle never waits for the channel, which has a thread and a bounded queue of its own; a channel that cannot be
 //! opened is tried again, and the party runs without it; who is revoked is cut off as soon as the list of the admitted changes.
@@ -23,13 +26,14 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, channel};
 use std::time::Duration;
 
 use serde_json::json;
-use understudy_wire::Time;
+use understudy_wire::{ClusterHash, Time};
 use zenoh::Wait;
 use zenoh::pubsub::Publisher;
 use zenoh::qos::CongestionControl;
 use zenoh::query::{Query, Queryable};
 
 use crate::clock::Clock;
+use crate::control::{LINE_BYTES, order};
 use crate::endpoints::Endpoints;
 use crate::error::BusError;
 use crate::journal::{EventSink, HostEvent, JournalSender, Noted};
@@ -38,18 +42,27 @@ use crate::rights::run_in_background;
 
 pub(crate) use followed::{Telemetry, followed};
 pub use tls::{Admitted, TlsKeys};
-pub(crate) use tls::{insert, prefix, tls_config};
+pub(crate) use tls::{hash_key, insert, prefix, tls_config};
 
 use tls::access_control;
 
 /// How often it is looked who is admitted.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
 
+/// Who follows a journal is told of it so often.
+const GATHER: Duration = Duration::from_millis(50);
+
+/// Bytes that are told at once, but for the last line.
+const GATHERED_BYTES: usize = 64 * 1024;
+
 /// After a channel could not be opened.
 const TRY_AGAIN_AFTER: Duration = Duration::from_secs(5);
 
 /// A party that ends waits so long for its channel to end, at most.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(1);
+
+/// The answer to a command that was taken.
+pub const DONE: &str = "done";
 
 /// What a party needs for its channel.
 pub struct ChannelSettings {
@@ -92,6 +105,8 @@ impl Drop for RunningChannel {
 pub(crate) struct Channel<E> {
     settings: ChannelSettings,
     prefix: String,
+    cluster: ClusterHash,
+    name: String,
     address: SocketAddr,
     /// What it said when it was ready.
     status: String,
@@ -129,6 +144,8 @@ impl<E: Send + 'static> Channel<E> {
         let party = Self {
             settings,
             prefix: prefix(endpoints.cluster(), &own.name),
+            cluster: endpoints.cluster(),
+            name: own.name.clone(),
             address: own.address,
             status,
             control,
@@ -166,9 +183,10 @@ impl<E: Send + 'static> Channel<E> {
             }
             match self.telemetry.lines.recv_timeout(LOOK_EVERY) {
                 Ok(line) => {
+                    let lines = self.gather(line);
                     if let Some(opened) = &opened {
-                        // One that nobody takes is lost to those who follow, and is in the journal.
-                        let _ = opened.journal.put(line).wait();
+                        // What nobody takes is lost to those who follow, and is in the journal.
+                        let _ = opened.journal.put(lines).wait();
                     }
                 }
                 Err(RecvTimeoutError::Timeout) => {}
@@ -203,6 +221,22 @@ impl<E: Send + 'static> Channel<E> {
         close(opened);
     }
 
+    /// Lines that come within a moment are told at once: to seal and send each of them would cost a station more.
+    #[allow(
+        clippy::disallowed_methods,
+        reason = "who looks on is told a moment later, and the cycle never waits for this thread"
+    )]
+    fn gather(&self, first: Vec<u8>) -> Vec<u8> {
+        std::thread::sleep(GATHER);
+        let mut lines = first;
+        while lines.len() < GATHERED_BYTES
+            && let Ok(line) = self.telemetry.lines.try_recv()
+        {
+            lines.extend_from_slice(&line);
+        }
+        lines
+    }
+
     fn open(&mut self, admitted: &Admitted) -> Option<Opened> {
         let event = match self.listen(admitted) {
             Ok(opened) => {
@@ -228,7 +262,7 @@ impl<E: Send + 'static> Channel<E> {
         let listen = format!("tls/{}", self.address);
         let mut config = tls_config("peer", &self.settings.keys)?;
         insert(&mut config, "listen/endpoints", &json!([listen]))?;
-        let rules = access_control(&self.prefix, admitted);
+        let rules = access_control(&self.prefix, &hash_key(&self.name), admitted);
         insert(&mut config, "access_control", &rules)?;
         let session = zenoh::open(config).wait()?;
         let journal = session
@@ -241,28 +275,54 @@ impl<E: Send + 'static> Channel<E> {
             ("status", self.status.clone()),
         ] {
             let key = format!("{}/{what}", self.prefix);
-            answers.push(answer(&session, key, move || text.clone())?);
+            answers.push(answer(&session, key, move |_| text.clone())?);
         }
+        let hash = self.cluster.to_string();
+        let key = hash_key(&self.name);
+        answers.push(answer(&session, key, move |_| hash.clone())?);
         let control = self.control.clone();
-        let release = move || {
+        let release = move |_: &Query| {
             control.give(Order::Release);
-            "done".to_owned()
+            DONE.to_owned()
         };
         let key = format!("{}/command/release", self.prefix);
         answers.push(answer(&session, key, release)?);
         let wanted = Arc::clone(&self.stop_wanted);
-        let stop = move || {
+        let stop = move |_: &Query| {
             wanted.store(true, Ordering::SeqCst);
-            "done".to_owned()
+            DONE.to_owned()
         };
         let key = format!("{}/command/stop", self.prefix);
         answers.push(answer(&session, key, stop)?);
+        for word in ["force", "unforce"] {
+            let control = self.control.clone();
+            let force = move |query: &Query| match forcing(word, query) {
+                Ok(order) => {
+                    control.give(order);
+                    DONE.to_owned()
+                }
+                Err(reason) => reason,
+            };
+            let key = format!("{}/command/{word}", self.prefix);
+            answers.push(answer(&session, key, force)?);
+        }
         Ok(Opened {
             session,
             journal,
             _answers: answers,
         })
     }
+}
+
+/// What a force or its end comes with.
+fn forcing(word: &str, query: &Query) -> Result<Order, String> {
+    let bytes = query.payload().map(|payload| payload.to_bytes());
+    let bytes = bytes.unwrap_or_default();
+    let line = format!("{word} {}", String::from_utf8_lossy(&bytes));
+    if line.len() > LINE_BYTES {
+        return Err(format!("more than {LINE_BYTES} bytes"));
+    }
+    order(&line).ok_or_else(|| format!("no signal, value, time, owner and reason: {line:.200}"))
 }
 
 fn close(opened: Option<Opened>) {
@@ -276,12 +336,12 @@ fn close(opened: Option<Opened>) {
 fn answer(
     session: &zenoh::Session,
     key: String,
-    say: impl Fn() -> String + Send + Sync + 'static,
+    say: impl Fn(&Query) -> String + Send + Sync + 'static,
 ) -> zenoh::Result<Queryable<()>> {
     session
         .declare_queryable(key.clone())
         .callback(move |query: Query| {
-            if let Err(error) = query.reply(key.clone(), say()).wait() {
+            if let Err(error) = query.reply(key.clone(), say(&query)).wait() {
                 tracing::debug!(%error, "an answer was not sent");
             }
         })

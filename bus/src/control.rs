@@ -24,7 +24,7 @@ pub enum Commands {
 }
 
 /// A line without an end is cut here.
-const LINE_BYTES: usize = 1024;
+pub(crate) const LINE_BYTES: usize = 1024;
 
 /// Holds SIGINT and SIGTERM back from the calling thread, and from all that it starts. To be called before any other thread
 /// starts: one that does not hold them back dies of them, and the process with it.
@@ -113,7 +113,7 @@ pub(crate) fn watch(
 }
 
 /// What a line says.
-fn order(line: &str) -> Option<Order> {
+pub(crate) fn order(line: &str) -> Option<Order> {
     let (word, rest) = line.split_once(' ').unwrap_or((line, ""));
     match (word, rest) {
         ("stop", "") => Some(Order::Stop),

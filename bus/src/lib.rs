@@ -32,7 +32,7 @@ mod watchdog;
 mod zenoh_link;
 
 pub use announcer::Announcer;
-pub use channel::{Admitted, ChannelSettings, TlsKeys};
+pub use channel::{Admitted, ChannelSettings, DONE, TlsKeys};
 pub use clock::Clock;
 pub use control::{Commands, hold_back_signals};
 pub use endpoints::{Endpoints, Peer};

@@ -4,10 +4,10 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 use serde_json::json;
-use understudy_wire::ClusterHash;
+use understudy_wire::{ClusterHash, Force, SignalPlace};
 use zenoh::Wait;
 
-use crate::channel::{TlsKeys, insert, prefix, tls_config};
+use crate::channel::{TlsKeys, hash_key, insert, prefix, tls_config};
 use crate::error::BusError;
 
 /// Longer than it takes a party on a network that works.
@@ -17,26 +17,45 @@ const PATIENCE: Duration = Duration::from_secs(5);
 const WAITING_LINES: usize = 4096;
 
 /// What can be asked of a party.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Request {
+    /// The hash of its configuration, also where the caller has another one.
+    Cluster,
     /// The canonical text of its configuration.
     Configuration,
     /// What it said when it was ready, as JSON.
     Status,
     /// To release the outputs of a program that was started cold.
     Release,
+    /// To put a value in the place of a signal of a remote I/O.
+    Force(Force),
+    /// To take it back.
+    Unforce(SignalPlace),
     /// To end.
     Stop,
 }
 
 impl Request {
-    fn key(self) -> &'static str {
+    fn key(&self) -> &'static str {
         match self {
+            Self::Cluster => "cluster",
             Self::Configuration => "configuration",
             Self::Status => "status",
             Self::Release => "command/release",
+            Self::Force(_) => "command/force",
+            Self::Unforce(_) => "command/unforce",
             Self::Stop => "command/stop",
         }
+    }
+
+    /// What it comes with.
+    fn payload(&self) -> String {
+        let text = match self {
+            Self::Force(force) => serde_json::to_string(force),
+            Self::Unforce(signal) => serde_json::to_string(signal),
+            _ => return String::new(),
+        };
+        text.unwrap_or_default()
     }
 }
 
@@ -92,7 +111,7 @@ impl Call {
     ///
     /// # Errors
     /// [`BusError::Unanswered`] where none comes: this certificate is not admitted to what was asked.
-    pub fn ask(&self, request: Request) -> Result<String, BusError> {
+    pub fn ask(&self, request: &Request) -> Result<String, BusError> {
         let unanswered = || BusError::Unanswered {
             name: self.name.clone(),
             address: self.address,
@@ -100,7 +119,11 @@ impl Call {
         };
         let replies = self
             .session
-            .get(format!("{}/{}", self.prefix, request.key()))
+            .get(match request {
+                Request::Cluster => hash_key(&self.name),
+                _ => format!("{}/{}", self.prefix, request.key()),
+            })
+            .payload(request.payload())
             .timeout(PATIENCE)
             .wait()
             .map_err(|_| unanswered())?;
@@ -136,8 +159,9 @@ impl Call {
         loop {
             match subscriber.recv_timeout(patience) {
                 Ok(Some(sample)) => {
-                    let line = sample.payload().to_bytes();
-                    if !take(String::from_utf8_lossy(&line).trim_end()) {
+                    let bytes = sample.payload().to_bytes();
+                    let text = String::from_utf8_lossy(&bytes);
+                    if !text.lines().all(&mut take) {
                         return Ok(());
                     }
                 }

@@ -140,7 +140,7 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
         run_party(Chatter::new(station(0), 1), settings, std::io::sink())
     });
     let call = |address, who: &str| Call::to(address, hash, "robot", &keys(&folder, who));
-    let asked = |address, who: &str, request| call(address, who)?.ask(request);
+    let asked = |address, who: &str, request| call(address, who)?.ask(&request);
 
     let text = until("the party itself", || {
         asked(party, "shift-leader", Request::Configuration)

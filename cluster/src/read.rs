@@ -199,12 +199,10 @@ fn build(
         Ok(parity) => parity,
         // Names of stations are unique here unless that was reported; only dots in names of signals could still collide.
         Err(error) => {
-            let code = error.code();
-            diagnostics.push(Diagnostic::error(
-                code,
-                error.to_string(),
-                cluster.span.clone(),
-            ));
+            // A diagnostic has its code beside its words.
+            let (code, words) = (error.code(), error.to_string());
+            let words = words.strip_prefix(&format!("{code}: ")).unwrap_or(&words);
+            diagnostics.push(Diagnostic::error(code, words, cluster.span.clone()));
             return None;
         }
     };

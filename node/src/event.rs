@@ -5,7 +5,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 use understudy_wire::{
-    ConfigurationHash, Lineage, Moment, Party, ProgramId, ProgramSet, StationId, Word,
+    ConfigurationHash, Image, Lineage, Moment, Party, ProgramId, ProgramSet, StationId, Word,
 };
 
 /// One thing that happened to a station.
@@ -18,6 +18,18 @@ pub enum Event {
         moment: Moment,
         /// Its outputs.
         words: SmallVec<[Word; 2]>,
+    },
+    /// The state of a program as it holds it. Said now and then, so that whoever begins to look at a cluster that runs can follow
+    /// its programs from there.
+    Holds {
+        /// After the sample of this cycle.
+        moment: Moment,
+        /// Whose state.
+        program: ProgramId,
+        /// Where it stands.
+        lineage: Lineage,
+        /// x(t+1).
+        state: Image,
     },
     /// It starts the cycles from now on.
     Paces {

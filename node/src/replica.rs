@@ -117,6 +117,12 @@ impl Replica {
         &self.outputs
     }
 
+    /// Where it stands, and in which state.
+    pub(crate) fn state(&self) -> Option<(Lineage, &Image)> {
+        let state = &self.copy.as_ref()?.state;
+        Some((state.lineage, &state.bits))
+    }
+
     pub(crate) fn lineage(&self) -> Option<Lineage> {
         self.copy.as_ref().map(|copy| copy.state.lineage)
     }

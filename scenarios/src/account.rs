@@ -376,6 +376,9 @@ impl Account {
             RunEvent::Started { .. }
             | RunEvent::Origin { .. }
             | RunEvent::Commanded { .. }
+            | RunEvent::Acknowledged(_)
+            | RunEvent::Attached { .. }
+            | RunEvent::Detached { .. }
             | RunEvent::Ended { .. }
             | RunEvent::Finished => {}
         }

@@ -37,13 +37,13 @@ struct Kept {
 #[derive(Debug, thiserror::Error)]
 pub enum KeptError {
     /// The run has no folder `cluster/`.
-    #[error("{} does not say which programs it ran: it has no folder `cluster/`", run.display())]
+    #[error("U0571: {} does not say which programs it ran: it has no folder `cluster/`", run.display())]
     NotKept {
         /// The directory of the run.
         run: PathBuf,
     },
     /// A file cannot be read.
-    #[error("{} cannot be read: {reason}", path.display())]
+    #[error("U0572: {} cannot be read: {reason}", path.display())]
     Read {
         /// Which.
         path: PathBuf,
@@ -51,7 +51,7 @@ pub enum KeptError {
         reason: String,
     },
     /// The files have errors: somebody has changed them, or another version of this program wrote them.
-    #[error("the cluster that was kept with the run has errors")]
+    #[error("U0572: the cluster that was kept with the run has errors")]
     Files {
         /// With what was found in them.
         reports: Vec<Report>,

@@ -28,13 +28,13 @@ use understudy_wire::Party;
 use crate::account::{Account, OriginRule, Terms};
 use crate::journal::{Journal, JournalState};
 use crate::kept::keep_cluster;
+use crate::operator::{Commands, RunSocket, commands as queue_of_commands};
 use crate::record::{Record, RunEvent};
 use crate::run_directory::RunDirectory;
 use crate::scenario::Scenario;
 
 pub(crate) use conductor::Conductor;
 pub use error::LaboratoryError;
-pub use operator::{Command, Commander, Commands, Refusal, commands};
 pub use site::{HostKind, NetworkSettings};
 
 use keys::RunKeys;
@@ -213,9 +213,11 @@ fn run(
         machine: BTreeSet::new(),
         conductor,
         commanded: commands.is_some(),
+        directory: directory.path().to_owned(),
         sender,
         watch,
     };
+    let commands = commands.unwrap_or_else(|| queue_of_commands().1);
     Ok(runtime.block_on(laboratory.run(receiver, commands)))
 }
 
@@ -257,21 +259,21 @@ struct Laboratory<'w> {
     ready: BTreeSet<Party>,
     machine: BTreeSet<String>,
     conductor: &'w mut dyn Conductor,
-    /// Whether somebody may give commands.
+    /// Whether somebody gives commands, or said that he might.
     commanded: bool,
+    directory: PathBuf,
     sender: Sender<Said>,
     watch: &'w mut dyn FnMut(Progress),
 }
 
 impl Laboratory<'_> {
-    async fn run(
-        mut self,
-        mut receiver: Receiver<Said>,
-        mut commands: Option<Commands>,
-    ) -> LaboratoryRun {
+    async fn run(mut self, mut receiver: Receiver<Said>, mut commands: Commands) -> LaboratoryRun {
+        // Without it nobody can act from another process; the run is none the worse.
+        let socket = RunSocket::open(&self.directory, commands.commander());
         let failure = self.work(&mut receiver, &mut commands).await.err();
         (self.watch)(Progress::Ending);
         self.end(&mut receiver).await;
+        drop(socket);
         self.note(RunEvent::Finished);
         self.machine.extend(self.site.describe());
         LaboratoryRun {
@@ -285,7 +287,7 @@ impl Laboratory<'_> {
     async fn work(
         &mut self,
         receiver: &mut Receiver<Said>,
-        commands: &mut Option<Commands>,
+        commands: &mut Commands,
     ) -> Result<(), LaboratoryError> {
         let system = |what| move |source| LaboratoryError::System { what, source };
         let mut interrupt = signal(SignalKind::interrupt()).map_err(system("to hear SIGINT"))?;
@@ -311,7 +313,7 @@ impl Laboratory<'_> {
                 _ = interrupt.recv() => return self.interrupted(),
                 _ = terminate.recv() => return self.interrupted(),
                 () = sleep, if due.is_some() => {}
-                commanded = Commands::next(commands) => self.obey(commanded).await,
+                commanded = commands.next() => self.obey(commanded).await,
                 said = receiver.recv() => {
                     if let Some(said) = said {
                         self.hear(said).await?;
@@ -380,7 +382,7 @@ impl Laboratory<'_> {
 }
 
 /// The clock of the parties' records.
-fn monotonic_ns() -> u64 {
+pub fn monotonic_ns() -> u64 {
     // It exists on every Linux; a journal without times is still a journal.
     clock_gettime(ClockId::CLOCK_MONOTONIC).map_or(0, |now| {
         let nanoseconds = Duration::new(

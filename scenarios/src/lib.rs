@@ -9,6 +9,7 @@ mod journal;
 mod kept;
 mod laboratory;
 mod observed;
+mod operator;
 mod outlook;
 mod parties;
 mod read;
@@ -23,6 +24,7 @@ mod table;
 mod terms;
 mod troubles;
 mod write;
+mod writer;
 
 pub use account::{
     Account, Counts, Interval, Numbering, OriginRule, Presence, Service, Stall, Terms,
@@ -42,10 +44,14 @@ pub use joining::{JOIN_CYCLES, Joined, join_trial};
 pub use journal::{JOURNAL_LIMIT_BYTES, Journal, JournalError, JournalState, records, records_of};
 pub use kept::{KeptError, keep_cluster, kept_cluster};
 pub use laboratory::{
-    Command, Commander, Commands, HostKind, LaboratoryError, LaboratoryRun, LaboratorySettings,
-    NetworkSettings, Progress, Refusal, commands, run_commanded, run_laboratory,
+    HostKind, LaboratoryError, LaboratoryRun, LaboratorySettings, NetworkSettings, Progress,
+    monotonic_ns, run_commanded, run_laboratory,
 };
 pub use observed::{JournalView, ObservationError, observe_journal};
+pub use operator::{
+    Acknowledgement, Command, Commanded, Commander, Commands, OperatorAction, Refusal, RunSocket,
+    commands,
+};
 pub use outlook::{JournalOutlook, look_ahead};
 pub use parties::Parties;
 pub use read::{MAXIMUM_CYCLES, MAXIMUM_STEPS, ReadScenario, looks_like_a_scenario, read};
@@ -66,3 +72,4 @@ pub use terms::parts;
 pub use troubles::{Target, Trouble, TroubleRow};
 pub use understudy_simulator::{Action, Disturbance, Fault, Network};
 pub use write::write;
+pub use writer::{Writing, writing};

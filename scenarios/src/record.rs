@@ -8,7 +8,7 @@ use understudy_bus::{HostEvent, Noted};
 use understudy_simulator::Action;
 use understudy_wire::{Moment, Party};
 
-use crate::laboratory::Command;
+use crate::operator::{Acknowledgement, Command};
 use crate::parties::Parties;
 
 /// One line of `journal.jsonl`.
@@ -71,6 +71,20 @@ pub enum RunEvent {
         /// Why it was not done, where it was not.
         refused: Option<String>,
     },
+    /// Somebody has seen an alarm.
+    Acknowledged(Acknowledgement),
+    /// What a party of a cluster elsewhere says is heard from now on.
+    Attached {
+        /// Who.
+        party: Party,
+    },
+    /// What a party of a cluster elsewhere says is not heard; what it does is another matter.
+    Detached {
+        /// Who.
+        party: Party,
+        /// Why, in words.
+        reason: String,
+    },
     /// A party's process ended; asked for or not.
     Ended {
         /// Who.
@@ -123,6 +137,7 @@ pub fn moment(event: &Happening) -> Option<Moment> {
     match event {
         Happening::Station(event) => match event {
             Station::Spoke { moment, .. }
+            | Station::Holds { moment, .. }
             | Station::Paces { moment }
             | Station::Flagged { moment, .. }
             | Station::Cleared { moment, .. }

@@ -3,20 +3,23 @@
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::SystemTime;
 
 use crate::account::Account;
 use crate::figure::{FigureError, figure};
 use crate::report::{ReportError, report};
 use crate::summary::Summary;
+use crate::writer::WriterLock;
 
 /// Directories with one name and a number, at most; then something is wrong.
 const MAXIMUM_TRIES: u32 = 1000;
 
-/// The directory of one run.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// The directory of one run. Whoever has it writes the run.
+#[derive(Debug, Clone)]
 pub struct RunDirectory {
     path: PathBuf,
+    _lock: Option<Arc<WriterLock>>,
 }
 
 /// Something could not be written.
@@ -62,7 +65,11 @@ impl RunDirectory {
             match fs::create_dir(&path) {
                 Ok(()) => {
                     point_latest(runs, &name).map_err(at(&runs.join("latest")))?;
-                    return Ok(Self { path });
+                    let lock = WriterLock::take(&path).map_err(at(&path))?;
+                    return Ok(Self {
+                        path,
+                        _lock: lock.map(Arc::new),
+                    });
                 }
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(at(&path)(error)),
@@ -81,7 +88,14 @@ impl RunDirectory {
             path: path.clone(),
             source,
         })?;
-        Ok(Self { path })
+        let lock = WriterLock::take(&path).map_err(|source| RunDirectoryError::Write {
+            path: path.clone(),
+            source,
+        })?;
+        Ok(Self {
+            path,
+            _lock: lock.map(Arc::new),
+        })
     }
 
     /// Where it is.

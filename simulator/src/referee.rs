@@ -191,6 +191,12 @@ impl Referee {
         }
     }
 
+    /// The reference run goes on from a state that is known from elsewhere, for want of a start that was seen.
+    pub fn goes_on_from(&mut self, lineage: Lineage, state: Image) {
+        self.truth = None;
+        self.remember(lineage, state);
+    }
+
     fn remember(&mut self, lineage: Lineage, state: Image) {
         if self.states.len() == REMEMBERED {
             self.states.pop_front();

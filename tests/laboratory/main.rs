@@ -13,67 +13,27 @@ mod boiler;
 mod campaigns;
 mod field;
 mod hosts;
+#[allow(dead_code, reason = "each test uses its part")]
+#[path = "../shared/mod.rs"]
+mod shared;
 
 use std::collections::BTreeSet;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::net::UdpSocket;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::sync::{Mutex, MutexGuard};
-use std::time::{Duration, Instant};
+use std::path::Path;
+use std::process::{Child, Stdio};
+use std::time::Instant;
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
 
-/// Two clusters at once on two processors would measure each other.
-static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+use shared::{DEADLINE, answer, empty_folder, one_at_a_time, understudy};
 
 const PRESS_CELL: &str = "examples/press-cell/cluster.toml";
 /// Its deadline is long beside the delays of a busy machine.
 const PERIOD: &str = "50ms";
-const DEADLINE: Duration = Duration::from_secs(60);
-
-fn one_at_a_time() -> MutexGuard<'static, ()> {
-    ONE_AT_A_TIME
-        .lock()
-        .unwrap_or_else(|poisoned| poisoned.into_inner())
-}
-
-fn empty_folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .join("laboratory")
-        .join(name);
-    if folder.exists() {
-        fs::remove_dir_all(&folder).expect("an old run's folder goes");
-    }
-    fs::create_dir_all(&folder).expect("a folder");
-    folder
-}
-
-fn understudy(arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_understudy"));
-    command
-        .args(arguments)
-        .current_dir(env!("CARGO_MANIFEST_DIR"));
-    command
-}
-
-/// Runs to the end: the exit status, the answer, and what was said on standard error.
-fn answer(arguments: &[&str]) -> (i32, Value, String) {
-    let output = understudy(arguments)
-        .arg("--json")
-        .output()
-        .expect("the binary is built");
-    let document = serde_json::from_slice(&output.stdout).expect("one JSON document");
-    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
-    (
-        output.status.code().expect("an exit status"),
-        document,
-        errors,
-    )
-}
 
 /// No process of a run is left: each of them has the run's list of addresses among its arguments.
 fn no_orphan(out: &Path) {

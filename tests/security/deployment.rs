@@ -23,7 +23,7 @@ fn units_call_commands_as_they_are() {
         let arguments: Vec<&str> = called.split_whitespace().collect();
         assert_eq!(arguments[0], kind);
         // Its arguments are understood; only the cluster file is not here.
-        let (status, document) = answer(&arguments);
+        let (status, document, _) = answer(&arguments);
         assert_eq!((status, codes(&document)), (2, vec!["U0601"]), "{called}");
         assert_eq!(value("Type="), "notify");
         assert_eq!(value("User="), "understudy");

@@ -3,27 +3,27 @@
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 
-use super::{addressed_cell, alone, answer, codes, empty_folder, text};
+use super::{addressed_cell, answer, codes, empty_folder, one_at_a_time, text};
 
 #[test]
 fn keys_are_made_listed_revoked_and_made_again() {
-    let _one = alone();
+    let _one = one_at_a_time();
     let folder = empty_folder("life_of_keys");
     let cluster = addressed_cell(&folder);
     let keys = folder.join("keys");
     let (cluster, keys) = (text(&cluster), text(&keys));
 
-    let (status, made) = answer(&["keys", "init", cluster, "--folder", keys, "--days", "90"]);
+    let (status, made, _) = answer(&["keys", "init", cluster, "--folder", keys, "--days", "90"]);
     assert_eq!(status, 0, "{made:#}");
     assert_eq!(made["result"]["holders"].as_array().map(Vec::len), Some(8));
     assert_eq!(made["result"]["folders"].as_array().map(Vec::len), Some(8));
     let again = answer(&["keys", "init", cluster, "--folder", keys]);
     assert_eq!((again.0, codes(&again.1)), (2, vec!["U0904"]));
 
-    let (status, revoked) = answer(&["keys", "revoke", "press", "--folder", keys]);
+    let (status, revoked, _) = answer(&["keys", "revoke", "press", "--folder", keys]);
     assert_eq!(status, 0, "{revoked:#}");
     let state = |name: &str| {
-        let (status, list) = answer(&["keys", "list", "--folder", keys]);
+        let (status, list, _) = answer(&["keys", "list", "--folder", keys]);
         assert_eq!(status, 0, "{list:#}");
         let holders = list["result"]["holders"]
             .as_array()
@@ -43,7 +43,7 @@ fn keys_are_made_listed_revoked_and_made_again() {
     let started = answer(&["node", cluster, "--name", "press", "--keys", &press]);
     assert_eq!((started.0, codes(&started.1)), (2, vec!["U0909"]));
 
-    let (status, issued) = answer(&["keys", "issue", cluster, "press", "--folder", keys]);
+    let (status, issued, _) = answer(&["keys", "issue", cluster, "press", "--folder", keys]);
     assert_eq!(status, 0, "{issued:#}");
     assert_eq!(state("press"), (Some("valid".into()), Some(2)));
     let wrong = answer(&[
@@ -55,15 +55,15 @@ fn keys_are_made_listed_revoked_and_made_again() {
 
 #[test]
 fn a_party_without_its_own_keys_does_not_start() {
-    let _one = alone();
+    let _one = one_at_a_time();
     let folder = empty_folder("wrong_keys");
     let cluster = addressed_cell(&folder);
     let keys = folder.join("keys");
     let (cluster, keys) = (text(&cluster), text(&keys));
-    let (status, made) = answer(&["keys", "init", cluster, "--folder", keys]);
+    let (status, made, _) = answer(&["keys", "init", cluster, "--folder", keys]);
     assert_eq!(status, 0, "{made:#}");
     let node = |more: &[&str]| {
-        let (status, document) = answer(&[&["node", cluster, "--name", "robot"], more].concat());
+        let (status, document, _) = answer(&[&["node", cluster, "--name", "robot"], more].concat());
         let codes = codes(&document)
             .into_iter()
             .map(str::to_owned)

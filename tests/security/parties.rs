@@ -8,7 +8,7 @@ use std::process::Stdio;
 use std::time::Instant;
 
 use super::{
-    DEADLINE, Running, addressed_cell, alone, answer, codes, empty_folder, text, understudy,
+    DEADLINE, Running, addressed_cell, answer, codes, empty_folder, one_at_a_time, text, understudy,
 };
 
 fn doctor<'a>(document: &'a serde_json::Value, check: &str, health: &str) -> Vec<&'a str> {
@@ -22,12 +22,12 @@ fn doctor<'a>(document: &'a serde_json::Value, check: &str, health: &str) -> Vec
 
 #[test]
 fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
-    let _one = alone();
+    let _one = one_at_a_time();
     let folder = empty_folder("operator");
     let cluster = addressed_cell(&folder);
     let keys = folder.join("keys");
     let (cluster, keys) = (text(&cluster), text(&keys));
-    let (status, made) = answer(&["keys", "init", cluster, "--folder", keys]);
+    let (status, made, _) = answer(&["keys", "init", cluster, "--folder", keys]);
     assert_eq!(status, 0, "{made:#}");
     let second = [
         "keys",
@@ -58,14 +58,14 @@ fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
     let operator = of("operator");
     let started = Instant::now();
     let status = loop {
-        let (status, document) = operate(&operator, &["status"]);
+        let (status, document, _) = operate(&operator, &["status"]);
         if status == 0 {
             break document;
         }
         assert!(started.elapsed() < DEADLINE, "{document:#}");
     };
     assert_eq!(status["result"]["event"], "ready", "{status:#}");
-    let (code, configuration) = operate(&operator, &["configuration"]);
+    let (code, configuration, _) = operate(&operator, &["configuration"]);
     assert_eq!(code, 0, "{configuration:#}");
     let canonical = configuration["result"]["text"].as_str().expect("a text");
     assert!(canonical.contains("cluster press-cell"), "{canonical}");
@@ -101,7 +101,7 @@ fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
     assert_eq!(answer(&["keys", "revoke", "guest", "--folder", keys]).0, 0);
     let started = Instant::now();
     loop {
-        let (code, document) = operate(text(&kept), &["status"]);
+        let (code, document, _) = operate(text(&kept), &["status"]);
         if code == 1 && codes(&document) == ["U0510"] {
             break;
         }
@@ -121,7 +121,7 @@ fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
 /// It runs, because its own list is an old one; the others have the new one.
 #[test]
 fn a_party_whose_keys_were_revoked_is_named_and_not_heard() {
-    let _one = alone();
+    let _one = one_at_a_time();
     let folder = empty_folder("revoked_party");
     let cluster = addressed_cell(&folder);
     let keys = folder.join("keys");
@@ -161,7 +161,7 @@ fn a_party_whose_keys_were_revoked_is_named_and_not_heard() {
 /// What systemd is told, of a party that runs and of one that stands still.
 #[test]
 fn signs_of_life_come_from_a_cycle_that_runs() {
-    let _one = alone();
+    let _one = one_at_a_time();
     let folder = empty_folder("watchdog");
     let cluster = addressed_cell(&folder);
     let path = std::env::temp_dir().join(format!("understudy-{}.notify", std::process::id()));
@@ -205,12 +205,12 @@ fn copy(from: &Path, to: &Path) {
 
 #[test]
 fn doctor_names_what_is_wrong_with_its_remedy() {
-    let _one = alone();
+    let _one = one_at_a_time();
     let folder = empty_folder("doctor");
     let cluster = addressed_cell(&folder);
     let keys = folder.join("keys");
     let (cluster, keys) = (text(&cluster), text(&keys));
-    let (status, machine) = answer(&["doctor", cluster]);
+    let (status, machine, _) = answer(&["doctor", cluster]);
     assert_eq!(status, 0, "{machine:#}");
     for check in ["clock", "scheduler", "memory", "configuration"] {
         let findings = machine["result"]["findings"].as_array().expect("a list");
@@ -223,7 +223,7 @@ fn doctor_names_what_is_wrong_with_its_remedy() {
     let robot = [
         "doctor", cluster, "--name", "robot", "--link", "udp", "--listen", "20",
     ];
-    let (status, without) = answer(&robot);
+    let (status, without, _) = answer(&robot);
     assert_eq!(status, 1);
     assert_eq!(doctor(&without, "keys", "bad").len(), 1, "{without:#}");
 
@@ -233,7 +233,7 @@ fn doctor_names_what_is_wrong_with_its_remedy() {
     );
     let own = of("robot");
     let with_keys = [&robot[..], &["--keys", &own]].concat();
-    let (status, alone) = answer(&with_keys);
+    let (status, alone, _) = answer(&with_keys);
     assert_eq!(status, 0, "{alone:#}");
     assert_eq!(
         doctor(&alone, "keys", "warning").len(),
@@ -255,7 +255,7 @@ fn doctor_names_what_is_wrong_with_its_remedy() {
     let _running = Running::start(&[&start[..], &["--no-real-time"]].concat());
     let started = Instant::now();
     loop {
-        let (_, document) = answer(&with_keys);
+        let (_, document, _) = answer(&with_keys);
         let heard = doctor(&document, "peer", "good");
         if heard.iter().any(|found| found.starts_with("press ")) {
             break;
@@ -265,7 +265,7 @@ fn doctor_names_what_is_wrong_with_its_remedy() {
     let here = [
         "doctor", cluster, "--name", "press", "--link", "udp", "--keys", &press,
     ];
-    let (_, document) = answer(&here);
+    let (_, document, _) = answer(&here);
     assert_eq!(
         doctor(&document, "ports", "warning").len(),
         2,

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use understudy_scenarios::Acknowledgement;
 
 /// Alarms that are kept, at most; the oldest that are over and acknowledged go first.
 const MOST: usize = 1000;
@@ -23,11 +24,27 @@ pub struct Alarm {
     pub alarm: &'static str,
     /// What is wrong.
     pub text: String,
+    /// The time of the record that raised it.
+    pub raised_ns: u64,
     /// Who has seen it.
     pub acknowledged_by: Option<String>,
+    /// In which cycle.
+    pub acknowledged_in: Option<i64>,
 }
 
 impl Alarm {
+    /// What the journal keeps when `owner` has seen it.
+    pub fn acknowledgement(&self, owner: String, at_unix_s: u64) -> Acknowledgement {
+        Acknowledgement {
+            name: self.name.clone(),
+            alarm: self.alarm.to_owned(),
+            raised_ns: self.raised_ns,
+            cycle: self.cycle,
+            owner,
+            at_unix_s,
+        }
+    }
+
     /// Whether it still asks for somebody.
     pub fn is_open(&self) -> bool {
         self.over.is_none() || self.acknowledged_by.is_none()
@@ -42,6 +59,8 @@ pub(crate) struct Alarms {
     alarms: BTreeMap<u64, Alarm>,
     lasting: BTreeMap<Subject, u64>,
     count: u64,
+    /// The time of the record that is taken.
+    pub(crate) now_ns: u64,
 }
 
 impl Alarms {
@@ -66,7 +85,9 @@ impl Alarms {
             name: subject.0.clone(),
             alarm: subject.1,
             text,
+            raised_ns: self.now_ns,
             acknowledged_by: None,
+            acknowledged_in: None,
         };
         self.alarms.insert(self.count, alarm);
         self.lasting.insert(subject, self.count);
@@ -92,16 +113,24 @@ impl Alarms {
         for alarm in self.alarms.values_mut() {
             alarm.cycle = alarm.cycle.saturating_add(by);
             alarm.over = alarm.over.map(|over| over.saturating_add(by));
+            let seen = &mut alarm.acknowledged_in;
+            *seen = seen.map(|seen| seen.saturating_add(by));
         }
     }
 
-    /// False where there is no such alarm.
-    pub(crate) fn acknowledge(&mut self, number: u64, by: &str) -> bool {
-        let Some(alarm) = self.alarms.get_mut(&number) else {
-            return false;
-        };
-        alarm.acknowledged_by.get_or_insert_with(|| by.to_owned());
-        true
+    /// Somebody has seen one; one that is not kept any more is passed over.
+    pub(crate) fn acknowledged(&mut self, seen: &Acknowledgement, cycle: i64) {
+        let found = self.alarms.values_mut().find(|alarm| {
+            alarm.raised_ns == seen.raised_ns
+                && alarm.name == seen.name
+                && alarm.alarm == seen.alarm
+        });
+        if let Some(alarm) = found
+            && alarm.acknowledged_by.is_none()
+        {
+            alarm.acknowledged_by = Some(seen.owner.clone());
+            alarm.acknowledged_in = Some(cycle);
+        }
     }
 
     pub(crate) fn iter(&self) -> impl DoubleEndedIterator<Item = &Alarm> {
@@ -122,8 +151,22 @@ mod tests {
         assert_eq!(alarms.iter().count(), 1);
         alarms.over(&subject(), 9);
         assert!(alarms.iter().all(Alarm::is_open));
-        assert!(alarms.acknowledge(1, "anna"));
-        assert!(!alarms.acknowledge(2, "anna"));
+        let seen = |alarms: &Alarms, by: &str| {
+            let alarm = alarms.iter().next().expect("one");
+            alarm.acknowledgement(by.to_owned(), 0)
+        };
+        let other = Acknowledgement {
+            raised_ns: 1,
+            ..seen(&alarms, "anna")
+        };
+        alarms.acknowledged(&other, 10);
+        assert!(alarms.iter().all(Alarm::is_open), "another one");
+        alarms.acknowledged(&seen(&alarms, "anna"), 10);
+        alarms.acknowledged(&seen(&alarms, "bert"), 11);
+        alarms.shift(100);
+        let first = alarms.iter().next().expect("one");
+        assert_eq!(first.acknowledged_by.as_deref(), Some("anna"));
+        assert_eq!(first.acknowledged_in, Some(110));
         assert!(!alarms.iter().any(Alarm::is_open));
         alarms.raise(subject(), 12, "again".to_owned());
         assert_eq!(alarms.iter().filter(|alarm| alarm.is_open()).count(), 1);

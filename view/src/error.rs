@@ -8,7 +8,7 @@ use understudy_scenarios::KeptError;
 #[derive(Debug, thiserror::Error)]
 pub enum ViewError {
     /// There is no run in this place.
-    #[error("no run in {}{hint}", path.display())]
+    #[error("U0570: no run in {}{hint}", path.display())]
     NoRun {
         /// The place.
         path: PathBuf,
@@ -19,7 +19,7 @@ pub enum ViewError {
     #[error(transparent)]
     Kept(#[from] KeptError),
     /// The journal cannot be read.
-    #[error("{} cannot be read: {reason}", path.display())]
+    #[error("U0572: {} cannot be read: {reason}", path.display())]
     Journal {
         /// Which file.
         path: PathBuf,
@@ -27,7 +27,7 @@ pub enum ViewError {
         reason: String,
     },
     /// No program has an output of this name.
-    #[error("no program has an output `{name}`; {hint}")]
+    #[error("U0573: no program has an output `{name}`; {hint}")]
     NoOutput {
         /// As it was asked for.
         name: String,
@@ -35,7 +35,7 @@ pub enum ViewError {
         hint: String,
     },
     /// Several programs have an output of this name.
-    #[error("{} have an output `{name}`; say which, as in `{}.{name}`", programs.join(" and "), programs.first().map_or("robot", String::as_str))]
+    #[error("U0574: {} have an output `{name}`; say which, as in `{}.{name}`", programs.join(" and "), programs.first().map_or("robot", String::as_str))]
     SeveralOutputs {
         /// As it was asked for.
         name: String,
@@ -43,7 +43,7 @@ pub enum ViewError {
         programs: Vec<String>,
     },
     /// The cycle is not in what is left of the journal.
-    #[error("cycle {cycle} is not in the journal of {program}, which has {known}")]
+    #[error("U0575: cycle {cycle} is not in the journal of {program}, which has {known}")]
     NoCycle {
         /// As it was asked for.
         cycle: i64,
@@ -53,7 +53,7 @@ pub enum ViewError {
         known: String,
     },
     /// The state of the program is not known in this cycle.
-    #[error("the state of {program} is not known in cycle {cycle}: {reason}")]
+    #[error("U0576: the state of {program} is not known in cycle {cycle}: {reason}")]
     NoState {
         /// As it was asked for.
         cycle: i64,
@@ -63,7 +63,7 @@ pub enum ViewError {
         reason: String,
     },
     /// No party or program has this name.
-    #[error("no {kind} is called `{name}`; {hint}")]
+    #[error("U0577: no {kind} is called `{name}`; {hint}")]
     NoName {
         /// What was looked for.
         kind: &'static str,
@@ -75,6 +75,14 @@ pub enum ViewError {
 }
 
 impl ViewError {
+    /// What is wrong, without the code.
+    pub fn words(&self) -> String {
+        let text = self.to_string();
+        let words = text.strip_prefix(self.code());
+        let words = words.and_then(|words| words.strip_prefix(": "));
+        words.unwrap_or(&text).to_owned()
+    }
+
     /// Stable code.
     pub fn code(&self) -> &'static str {
         match self {

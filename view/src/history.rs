@@ -64,6 +64,10 @@ pub struct History {
     most: usize,
     /// Whether steps have gone, or were never seen.
     cut: bool,
+    /// The newest samples, while it is not known which state they belong to.
+    unplaced: VecDeque<(Moment, Image)>,
+    /// The state after a sample that is still to come.
+    awaited: Option<(Moment, Lineage, Image)>,
 }
 
 impl History {
@@ -77,6 +81,8 @@ impl History {
             steps: VecDeque::new(),
             most: most.max(2),
             cut: false,
+            unplaced: VecDeque::new(),
+            awaited: None,
         })
     }
 
@@ -128,33 +134,84 @@ impl History {
         self.referee.saw(sensors);
     }
 
+    /// A station holds this state after the sample of `moment`: where a journal begins in the middle of a run, it is known from here on.
+    pub(crate) fn holds(&mut self, moment: Moment, lineage: Lineage, state: &Image) {
+        if self.referee.standing().is_some() {
+            return;
+        }
+        let place = self.unplaced.iter().position(|(of, _)| *of == moment);
+        let Some(place) = place else {
+            self.awaited = Some((moment, lineage, state.clone()));
+            return;
+        };
+        self.referee.goes_on_from(lineage, state.clone());
+        let later: Vec<(Moment, Image)> = self.unplaced.drain(..).skip(place + 1).collect();
+        self.awaited = None;
+        for (moment, inputs) in later {
+            let sampled = self.sample(moment, &inputs);
+            let mut steps = self.steps.iter_mut().rev();
+            if let Some(step) = steps.find(|step| step.moment == moment) {
+                step.sampled = sampled;
+            }
+        }
+    }
+
+    /// Takes a sample; what it did, where the state before it is known.
+    fn sample(&mut self, moment: Moment, inputs: &Image) -> Option<Sampled> {
+        let standing = self.referee.standing();
+        let before = standing.map(|(lineage, state)| (lineage, state.clone()));
+        let event = Event::Sampled {
+            moment,
+            inputs: inputs.clone(),
+        };
+        // A sample violates nothing.
+        let _ = self.referee.observe(&event);
+        let (before, state) = before?;
+        let (_, outputs) = self.referee.truth().filter(|(of, _)| *of == moment)?;
+        Some(Sampled {
+            inputs: inputs.clone(),
+            before,
+            state,
+            after: before.after(inputs),
+            outputs: outputs.clone(),
+        })
+    }
+
+    /// Keeps a sample until it is known which state it belongs to.
+    fn place_later(&mut self, moment: Moment, inputs: &Image) {
+        if self.referee.standing().is_some() {
+            self.unplaced.clear();
+            return;
+        }
+        match self.awaited.take_if(|(of, ..)| *of == moment) {
+            Some((_, lineage, state)) => {
+                self.unplaced.clear();
+                self.referee.goes_on_from(lineage, state);
+            }
+            None => {
+                if self.unplaced.len() == NEWEST {
+                    self.unplaced.pop_front();
+                }
+                self.unplaced.push_back((moment, inputs.clone()));
+            }
+        }
+    }
+
     /// A report of its remote I/O, of a cycle; the wrong thing that it is, if it is one.
     pub(crate) fn note(&mut self, cycle: i64, event: &Event) -> Option<Violation> {
-        let before = match event {
-            Event::Sampled { .. } => {
-                let standing = self.referee.standing();
-                standing.map(|(lineage, state)| (lineage, state.clone()))
-            }
-            _ => None,
-        };
         if let Event::Voided { samples, .. } = event {
             let sampled = self.steps.iter_mut().rev();
             let sampled = sampled.filter(|step| step.sampled.is_some() && !step.void);
             sampled.take(*samples).for_each(|step| step.void = true);
         }
-        let violation = self.referee.observe(event).err();
+        let violation = match event {
+            Event::Sampled { .. } => None,
+            _ => self.referee.observe(event).err(),
+        };
         match event {
             Event::Sampled { moment, inputs } => {
-                let sampled = before.and_then(|(before, state)| {
-                    let (_, outputs) = self.referee.truth().filter(|(of, _)| of == moment)?;
-                    Some(Sampled {
-                        inputs: inputs.clone(),
-                        before,
-                        state,
-                        after: before.after(inputs),
-                        outputs: outputs.clone(),
-                    })
-                });
+                let sampled = self.sample(*moment, inputs);
+                self.place_later(*moment, inputs);
                 self.push(Step {
                     cycle,
                     moment: *moment,

@@ -187,7 +187,9 @@ impl Listing {
                 self.cycles.origin_is(*moment, cycle);
                 cycle
             }
-            (Happening::Run(RunEvent::Finished), _) => self.cycles.of(None),
+            (Happening::Run(RunEvent::Finished | RunEvent::Acknowledged(_)), _) => {
+                self.cycles.of(None)
+            }
             // What is done is felt in the next cycle.
             (Happening::Run(_), _) if self.cycles.latest().is_some() => {
                 self.cycles.of(None).saturating_add(1)

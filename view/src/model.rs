@@ -1,5 +1,6 @@
 //! The model of a run: everything that views show, folded from its records one by one.
 
+mod asked;
 mod programs;
 mod turns;
 
@@ -7,23 +8,20 @@ use std::sync::{Arc, OnceLock};
 
 use understudy_bus::HostEvent;
 use understudy_cluster::Cluster;
-use understudy_ladder::{Evaluation, Observer};
-use understudy_logic::Scratch;
+use understudy_ladder::Observer;
 use understudy_node::Event as StationEvent;
 use understudy_scenarios::{Happening, Parties, Record, RunEvent, moment};
 use understudy_wire::{Moment, Party, ProgramId, StationId};
 
-use crate::alarm::{Alarm, Alarms};
+use crate::alarm::Alarms;
 use crate::cycles::Cycles;
 use crate::describe::{describe, fault_text};
-use crate::error::ViewError;
 use crate::event::{Event, Events, Level};
 use crate::history::History;
-use crate::margin::Holders;
 use crate::series::Series;
 use crate::source::Trouble;
-use crate::station::{StationState, StationTrack};
-use crate::timing::{CycleTiming, Timings};
+use crate::station::StationTrack;
+use crate::timing::Timings;
 
 pub(crate) use programs::ProgramTrack;
 pub use turns::Spoken;
@@ -111,6 +109,7 @@ impl Model {
     pub fn note(&mut self, record: &Record) {
         self.records += 1;
         self.at_ns = record.at_ns;
+        self.alarms.now_ns = record.at_ns;
         match (&record.event, record.party) {
             (Happening::Station(event), Some(Party::Station(station))) => {
                 self.station(record, station, event);
@@ -196,6 +195,17 @@ impl Model {
                 self.check_words(*moment);
                 return;
             }
+            StationEvent::Holds {
+                moment,
+                program,
+                lineage,
+                state,
+            } => {
+                if let Some(history) = self.histories.get_mut(program.index()) {
+                    history.holds(*moment, *lineage, state);
+                }
+                return;
+            }
             StationEvent::Joins { .. } => self.stations[station.index()].joins(),
             StationEvent::Adopted { program, from, .. } => {
                 self.stations[station.index()].adopted(*program, from.is_some());
@@ -269,7 +279,7 @@ impl Model {
         // What is done is felt in the next cycle.
         let cycle = match event {
             RunEvent::Origin { moment, .. } => self.cycles.of(Some(*moment)),
-            RunEvent::Finished => self.cycles.of(None),
+            RunEvent::Finished | RunEvent::Acknowledged(_) => self.cycles.of(None),
             _ => self
                 .cycles
                 .of(None)
@@ -317,7 +327,8 @@ impl Model {
                 let name = self.parties.name(*party).to_owned();
                 self.alarms.over(&(name, "ended"), cycle);
             }
-            RunEvent::Commanded { .. } => {}
+            RunEvent::Acknowledged(seen) => self.alarms.acknowledged(seen, cycle),
+            RunEvent::Commanded { .. } | RunEvent::Attached { .. } | RunEvent::Detached { .. } => {}
         }
         self.happened(record, cycle, None);
     }
@@ -349,181 +360,5 @@ impl Model {
     fn cause_of_silence(&self, station: StationId) -> Option<String> {
         let (what, cycle) = self.stations.get(station.index())?.done.as_ref()?;
         Some(format!("{what} in cycle {cycle}"))
-    }
-
-    // ── what is asked ───────────────────────────────────────────────────────────────────────────────────────────────
-
-    /// What is run.
-    pub fn cluster(&self) -> &Arc<Cluster> {
-        &self.cluster
-    }
-
-    /// Who is who.
-    pub fn parties(&self) -> &Parties {
-        &self.parties
-    }
-
-    /// The newest cycle that was decided, from the origin of the run.
-    pub fn cycle(&self) -> Option<i64> {
-        self.cycles.latest()
-    }
-
-    /// Whether it is known where cycles are counted from.
-    pub fn has_origin(&self) -> bool {
-        self.cycles.has_origin()
-    }
-
-    /// Records taken so far, and those that were left out, at least.
-    pub fn records(&self) -> (u64, u64) {
-        (self.records, self.left_out)
-    }
-
-    /// The time of the newest record.
-    pub fn at_ns(&self) -> u64 {
-        self.at_ns
-    }
-
-    /// The last record of the run was read.
-    pub fn is_finished(&self) -> bool {
-        self.finished
-    }
-
-    /// What a station is now.
-    pub fn station_state(&self, station: StationId) -> Option<StationState> {
-        let track = self.stations.get(station.index())?;
-        Some(track.state(self.cycles.latest(), 1))
-    }
-
-    /// What a program did in its last cycles.
-    pub fn history(&self, program: ProgramId) -> Option<&History> {
-        self.histories.get(program.index())
-    }
-
-    /// The trends.
-    pub fn series(&self) -> &Series {
-        &self.series
-    }
-
-    /// The newest events, oldest first.
-    pub fn events(&self) -> impl DoubleEndedIterator<Item = &Event> {
-        self.events.iter()
-    }
-
-    /// Events so far, the forgotten ones too: the number of the newest.
-    pub fn event_count(&self) -> u64 {
-        self.events.count()
-    }
-
-    /// Alarms, oldest first.
-    pub fn alarms(&self) -> impl DoubleEndedIterator<Item = &Alarm> {
-        self.alarms.iter()
-    }
-
-    /// Somebody has seen an alarm; false where there is none of this number.
-    pub fn acknowledge(&mut self, alarm: u64, by: &str) -> bool {
-        self.alarms.acknowledge(alarm, by)
-    }
-
-    /// Times of the newest cycles, oldest first.
-    pub fn timings(&self) -> impl DoubleEndedIterator<Item = &CycleTiming> {
-        self.timings.iter()
-    }
-
-    /// What the stations said in a cycle of the cluster.
-    pub fn spoken(&self, moment: Moment) -> &[Spoken] {
-        self.turns.of(moment)
-    }
-
-    /// Who is alive, and holds what: what the margin of survival is calculated from.
-    pub fn holders(&self) -> Holders {
-        let latest = self.cycles.latest();
-        let widths = self.cluster.controllers().iter();
-        let holds = self.stations.iter().map(|track| {
-            if track.state(latest, 1) == StationState::Speaking {
-                track.covers.without(track.excluded)
-            } else {
-                Default::default()
-            }
-        });
-        Holders {
-            mode: self.cluster.agreement().mode,
-            widths: widths
-                .map(|controller| controller.circuit.outputs().len())
-                .collect(),
-            holds: holds.collect(),
-            heard: self.programs.iter().map(ProgramTrack::hears).collect(),
-            excluded: self.programs.iter().map(|track| track.excluded).collect(),
-            blocked: (0..)
-                .map(ProgramId)
-                .zip(&self.programs)
-                .filter(|(_, track)| track.is_blocked())
-                .map(|(program, _)| program)
-                .collect(),
-        }
-    }
-
-    /// The scan of a program in a cycle as its station evaluated it: what the power did in every rung.
-    ///
-    /// # Errors
-    /// Where the cycle or the state is not known.
-    pub fn evaluation(&self, program: ProgramId, cycle: i64) -> Result<Evaluation, ViewError> {
-        let history = self.history_of(program)?;
-        let place = history
-            .place_of(cycle)
-            .ok_or_else(|| self.no_cycle(program, cycle))?;
-        self.evaluation_at(history, place)
-    }
-
-    pub(crate) fn evaluation_at(
-        &self,
-        history: &History,
-        place: usize,
-    ) -> Result<Evaluation, ViewError> {
-        let program = history.program();
-        let step = &history.steps()[place];
-        let no_state = |reason: &str| ViewError::NoState {
-            cycle: step.cycle,
-            program: self.program_name(program).to_owned(),
-            reason: reason.to_owned(),
-        };
-        let sampled = step.sampled.as_ref().ok_or_else(|| {
-            no_state(
-                match step.driven.as_ref().and_then(|driven| driven.missing) {
-                    Some(missing) => crate::describe::missing_text(missing),
-                    None => "the journal does not reach back to where its history starts",
-                },
-            )
-        })?;
-        let controller = &self.cluster.controllers()[program.index()];
-        let period = self.cluster.agreement().schedule.period();
-        let observer = self.observers[program.index()]
-            .get_or_init(|| Observer::new(&controller.program, period).ok());
-        let observer = observer
-            .as_ref()
-            .ok_or_else(|| no_state("its ladder cannot be lowered"))?;
-        let mut scratch = Scratch::default();
-        Ok(observer.evaluate(&mut scratch, sampled.state.words(), sampled.inputs.words()))
-    }
-
-    pub(crate) fn history_of(&self, program: ProgramId) -> Result<&History, ViewError> {
-        self.history(program).ok_or_else(|| ViewError::NoName {
-            kind: "program",
-            name: program.0.to_string(),
-            hint: format!("it has {}", self.programs.len()),
-        })
-    }
-
-    pub(crate) fn no_cycle(&self, program: ProgramId, cycle: i64) -> ViewError {
-        let steps = self.history(program).map(History::steps);
-        let ends = steps.and_then(|steps| Some((steps.front()?.cycle, steps.back()?.cycle)));
-        ViewError::NoCycle {
-            cycle,
-            program: self.program_name(program).to_owned(),
-            known: ends.map_or("none".to_owned(), |(from, to)| format!("{from} to {to}")),
-        }
-    }
-
-    pub(crate) fn program_name(&self, program: ProgramId) -> &str {
-        crate::describe::program_name(program, &self.parties)
     }
 }

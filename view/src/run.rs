@@ -6,7 +6,7 @@ use std::sync::Arc;
 use serde_json::Value;
 use understudy_bus::segments_of;
 use understudy_cluster::Cluster;
-use understudy_scenarios::kept_cluster;
+use understudy_scenarios::{Commander, Writing, kept_cluster, writing};
 use understudy_wire::{Cycle, Epoch, Moment};
 
 use crate::error::ViewError;
@@ -91,6 +91,20 @@ pub fn find_run_of(runs: &Path, cluster: &Cluster) -> Result<Run, ViewError> {
     })
 }
 
+/// The run of a cluster, with the same configuration, that a process writes now, where there is one below a directory of runs.
+pub fn find_running(runs: &Path, cluster: &Cluster) -> Option<Run> {
+    let folders = std::fs::read_dir(runs).into_iter().flatten().flatten();
+    let mut written: Vec<PathBuf> = folders
+        .map(|entry| entry.path())
+        .filter(|path| !path.is_symlink() && writing(path) == Writing::Now)
+        .collect();
+    written.sort();
+    let configuration = cluster.agreement().configuration;
+    let runs = written.iter().rev().take(LOOKED_AT);
+    runs.filter_map(|path| Run::open(path).ok())
+        .find(|run| run.cluster.agreement().configuration == configuration)
+}
+
 /// Runs that are opened to find one of a cluster.
 const LOOKED_AT: usize = 50;
 
@@ -115,9 +129,19 @@ impl Run {
         &self.cluster
     }
 
-    /// Whether its results lie there, so that nothing more will come.
+    /// Whether nothing more will come: its results lie there, or whoever wrote it does not any more.
     pub fn is_finished(&self) -> bool {
-        self.path.join("summary.json").is_file()
+        self.path.join("summary.json").is_file() || writing(&self.path) == Writing::Over
+    }
+
+    /// Whether a process that lives writes it.
+    pub fn is_written(&self) -> bool {
+        writing(&self.path) == Writing::Now
+    }
+
+    /// The end of whoever acts on it, by the process that writes it.
+    pub fn commander(&self) -> Commander {
+        Commander::of_run(self.path.clone())
     }
 
     /// Its records, also those that are still to be written.

@@ -20,6 +20,7 @@ use ratatui::style::{Modifier, Style};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Sparkline};
 
+use crate::alarm::Alarm;
 use crate::margin::{Holders, Margin};
 use crate::model::Model;
 use crate::snapshot::{RunState, Snapshot};
@@ -80,8 +81,8 @@ impl Screen {
         self.paused
     }
 
-    /// Does what a key asks for.
-    pub fn press(&mut self, key: Key, model: &mut Model) {
+    /// Does what a key asks for; answers with the alarms that have been seen by that.
+    pub fn press(&mut self, key: Key, model: &Model) -> Vec<Alarm> {
         match key {
             Key::Up => self.back += 1,
             Key::Down => self.back = self.back.saturating_sub(1),
@@ -98,14 +99,15 @@ impl Screen {
                 };
             }
             Key::Acknowledge => {
-                let numbers: Vec<u64> = model.alarms().map(|alarm| alarm.number).collect();
-                for number in numbers {
-                    model.acknowledge(number, "terminal");
-                }
+                let unseen = model
+                    .alarms()
+                    .filter(|alarm| alarm.acknowledged_by.is_none());
+                return unseen.cloned().collect();
             }
             Key::Pause => self.paused = !self.paused,
             Key::Help => self.help = !self.help,
         }
+        Vec::new()
     }
 
     /// The case now, with the margin of survival.

@@ -1,5 +1,7 @@
 // Sources as bands below the trends and faults as upright lines through them. Each source has a pattern as well as a colour.
 
+import { shorten } from "/element.js";
+
 const PATTERNS = { direct: "plain", reconstructed: "slanted", held: "dots", "fail-safe": "filled" };
 
 export function bandPlugin(answer, color) {
@@ -18,7 +20,7 @@ export function bandPlugin(answer, color) {
           ctx.fillStyle = color("--ink");
           ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
           ctx.textAlign = "right";
-          ctx.fillText(band.name.slice(0, 18), bbox.left - 8 * devicePixelRatio, (top + bottom) / 2 + 4 * devicePixelRatio);
+          ctx.fillText(shorten(band.name, 18), bbox.left - 8 * devicePixelRatio, (top + bottom) / 2 + 4 * devicePixelRatio);
         });
         ctx.restore();
       },
@@ -28,6 +30,7 @@ export function bandPlugin(answer, color) {
         ctx.strokeStyle = color("--bad");
         ctx.fillStyle = color("--bad");
         ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
+        ctx.textAlign = "left";
         ctx.setLineDash([5, 4]);
         // Words stand in the first row that is free; where none is, the line stands alone.
         const free = [0, 0, 0];
@@ -40,7 +43,7 @@ export function bandPlugin(answer, color) {
           ctx.moveTo(at, bbox.top);
           ctx.lineTo(at, bbox.top + bbox.height);
           ctx.stroke();
-          const words = fault.words.length > 32 ? `${fault.words.slice(0, 31)}…` : fault.words;
+          const words = shorten(fault.words, Math.min(34, Math.floor(bbox.width / (7 * devicePixelRatio))));
           const width = ctx.measureText(words).width + 8 * devicePixelRatio;
           const left = Math.min(at + 4, bbox.left + bbox.width - width);
           const row = free.findIndex((end) => end <= left);

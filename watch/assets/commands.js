@@ -79,7 +79,7 @@ export function openParty(wanted, signal) {
     }
   };
   const button = ([name, words, meaning, why]) => {
-    const reasonWhy = because ?? why;
+    const reasonWhy = because ?? run.commands.impossible[name] ?? why;
     return el("li", {},
       el("button", { type: "button", disabled: Boolean(reasonWhy), "data-command": name, click: () => give({ command: name }) }, words),
       " ", el("span", { class: "soft" }, reasonWhy ? `cannot: ${reasonWhy}` : meaning));

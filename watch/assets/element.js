@@ -23,6 +23,15 @@ function fill(element, attributes, children) {
   return element;
 }
 
+// A name of at most so many letters: names of one plant often begin alike, and many end alike, so the middle goes.
+export function shorten(name, most) {
+  if (name.length <= most) {
+    return name;
+  }
+  const end = Math.floor((most - 1) / 2);
+  return `${name.slice(0, most - 1 - end)}…${name.slice(-end)}`;
+}
+
 // Sets only what differs, so that focus, selection and scrolling stay.
 export function setText(element, text) {
   if (element.textContent !== text) {

@@ -30,7 +30,7 @@ export function show(state, live) {
     const by = alarm.acknowledged;
     line.dataset.open = String(!by);
     setText(line.querySelector(".alarm-words"), `cycle ${alarm.cycle}: ${alarm.who}: ${alarm.what}${alarm.lasts ? "" : " (over)"}`);
-    setText(line.querySelector(".alarm-by"), by ? `acknowledged by ${by}` : "");
+    setText(line.querySelector(".alarm-by"), by ? `acknowledged by ${by} in cycle ${alarm.acknowledged_in}` : "");
     line.querySelector("button").hidden = Boolean(by);
   });
   const now = live ? `${state.event_count}/${filter}` : `until ${state.cycle}/${filter}`;

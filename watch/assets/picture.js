@@ -2,7 +2,7 @@
 //
 // What a shape means is said by its words and its sign as well as by its colour.
 
-import { setAttribute, setText, svg } from "/element.js";
+import { setAttribute, setText, shorten, svg } from "/element.js";
 import { SOURCES } from "/cluster.js";
 
 export const STATES = {
@@ -23,12 +23,19 @@ export const STATES = {
   moving: { sign: "●", words: "moving" },
 };
 
-const WIDTH = 168;
+// A box is as wide as the longest name wants, within these.
+const NARROWEST = 168;
+const WIDEST = 236;
+const LETTER = 8.6;
 const GAP = 22;
-const BOX = { width: WIDTH, height: 62 };
+const BOX = { height: 62 };
 const ROWS = { station: 14, bus: 112, remote: 152, plant: 262 };
 
 export function makePicture(run, pick) {
+  const names = [...run.stations.map((station) => station.name), ...run.programs.flatMap((program) => [program.remote_io, program.plant ?? ""])];
+  const longest = Math.max(...names.map((name) => name.length));
+  const WIDTH = Math.round(Math.min(WIDEST, Math.max(NARROWEST, longest * LETTER + 24)));
+  const letters = Math.floor((WIDTH - 24) / LETTER);
   const columns = Math.max(run.stations.length, run.programs.length);
   const width = columns * (WIDTH + GAP) + GAP;
   const height = ROWS.plant + BOX.height + 14;
@@ -36,7 +43,7 @@ export function makePicture(run, pick) {
   const lines = svg("g", { class: "flows" });
   const boxes = new Map();
   const box = (name, kind, column, top, party) => {
-    const made = makeBox(name, kind, left(column), top, () => pick(party));
+    const made = makeBox(name, kind, left(column), top, WIDTH, letters, () => pick(party));
     boxes.set(name, made);
     return made.element;
   };
@@ -52,13 +59,13 @@ export function makePicture(run, pick) {
   const drops = run.stations.map((station) => drop(left(station.rank) + WIDTH / 2, ROWS.station + BOX.height, ROWS.bus));
   const element = svg("svg", { class: "picture", viewBox: `0 0 ${width} ${height}`, width, height, role: "group", "aria-label": "Stations, remote I/Os and plants" },
     bus, drops, lines, stations, remotes, plants);
-  const flows = run.programs.map((program, index) => makeFlow(lines, left(index) + WIDTH / 2, Boolean(program.plant)));
+  const flows = run.programs.map((program, index) => makeFlow(lines, left(index) + WIDTH / 2, Math.floor(letters * 0.7), Boolean(program.plant)));
   return { element, show: (state) => showAll(run, boxes, flows, state) };
 }
 
 const drop = (x, from, to) => svg("line", { class: "drop", x1: x, x2: x, y1: from, y2: to });
 
-function makeBox(name, kind, x, y, pick) {
+function makeBox(name, kind, x, y, width, letters, pick) {
   const state = svg("text", { class: "state", x: x + 12, y: y + 38 });
   const note = svg("text", { class: "note", x: x + 12, y: y + 54 });
   const element = svg("g", {
@@ -70,22 +77,24 @@ function makeBox(name, kind, x, y, pick) {
       }
     },
   },
-    svg("rect", { x, y, width: BOX.width, height: BOX.height, rx: kind === "plant" ? 22 : 5 }),
-    svg("text", { class: "name", x: x + 12, y: y + 20 }, name.length > 18 ? `${name.slice(0, 17)}…` : name),
+    svg("title", {}, name),
+    svg("rect", { x, y, width, height: BOX.height, rx: kind === "plant" ? 22 : 5 }),
+    svg("text", { class: "name", x: x + 12, y: y + 20 }, shorten(name, letters)),
     state, note);
   return { element, state, note, kind };
 }
 
-function makeFlow(parent, x, hasPlant) {
+function makeFlow(parent, x, letters, hasPlant) {
   const down = svg("line", { class: "flow", x1: x, x2: x, y1: ROWS.bus, y2: ROWS.remote });
-  const words = svg("text", { class: "flow-words", x: x + 8, y: ROWS.bus + 24 });
+  const words = svg("text", { class: "flow-words", x: x + 8, y: ROWS.bus + 18 });
+  const whose = svg("text", { class: "flow-words", x: x + 8, y: ROWS.bus + 33 });
   const out = svg("line", { class: "flow", x1: x, x2: x, y1: ROWS.remote + BOX.height, y2: ROWS.plant });
   const outWords = svg("text", { class: "flow-words", x: x + 8, y: ROWS.plant - 18 });
-  parent.append(down, words);
+  parent.append(down, words, whose);
   if (hasPlant) {
     parent.append(out, outWords);
   }
-  return { down, words, out, outWords };
+  return { down, words, whose, letters, out, outWords };
 }
 
 function showAll(run, boxes, flows, state) {
@@ -96,13 +105,14 @@ function showAll(run, boxes, flows, state) {
     }
   }
   state.programs.forEach((program, index) => {
-    const { down, words, out, outWords } = flows[index];
+    const { down, words, whose, letters, out, outWords } = flows[index];
     const source = SOURCES[program.source] ?? SOURCES.unknown;
     for (const line of [down, out]) {
       setAttribute(line, "data-source", program.source);
     }
-    const from = program.source === "reconstructed" ? `${source.words} by ${program.word_of}` : source.words;
-    setText(words, `${source.sign} ${from}`);
+    const by = program.source === "reconstructed" && program.word_of;
+    setText(words, `${source.sign} ${source.words}${by ? " by" : ""}`);
+    setText(whose, by ? shorten(by, letters * 2) : "");
     setText(outWords, program.forced.some((force) => force.kind === "output") ? "⚠ forced" : "");
   });
 }

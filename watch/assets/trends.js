@@ -1,7 +1,7 @@
 // Trends of chosen signals over the cycles, with sources and faults as bands behind them.
 
 import { act, ask } from "/ask.js";
-import { el, setText } from "/element.js";
+import { el, setText, shorten } from "/element.js";
 import { goTo, state } from "/time.js";
 import { bandPlugin } from "/bands.js";
 
@@ -111,7 +111,7 @@ function draw(answer) {
     scales: { x: { time: false }, y: { range: [-0.3 - bandRows * 0.7, Math.max(lanes, 1)] } },
     axes: [
       { ...axis, values: (_, values) => values.map((value) => (Number.isInteger(value) ? String(value) : "")) },
-      { ...axis, size: 130, splits: () => answer.signals.map((_, index) => lanes - 1 - index + 0.35), values: () => answer.signals.map((signal) => signal.name.slice(0, 18)), grid: { show: false } },
+      { ...axis, size: 130, splits: () => answer.signals.map((_, index) => lanes - 1 - index + 0.35), values: () => answer.signals.map((signal) => shorten(signal.name, 18)), grid: { show: false } },
     ],
     series: [{ label: "cycle", value: (_, value) => (value === null ? "" : String(value)) }, ...series],
     plugins: [bandPlugin(answer, color)],

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError, RwLock, RwLockReadGuard};
 
 use tokio::sync::{Semaphore, watch};
 use understudy_scenarios::Commander;
-use understudy_view::Run;
+use understudy_view::{Alarm, Run};
 
 use crate::api::not_remembered;
 use crate::error::Problem;
@@ -15,13 +15,15 @@ use crate::model::{Known, Model};
 /// Viewers at once that are told what is newest.
 pub(crate) const MAXIMUM_VIEWERS: usize = 100;
 
-/// Whether the page may command, and whom.
+/// What the page may do to the run besides looking.
 #[derive(Debug, Clone)]
-pub enum Commanding {
-    /// It may: the laboratory runs in this process.
-    Allowed(Commander),
-    /// It may not, for this reason.
-    Forbidden(&'static str),
+pub struct Commanding {
+    /// Reaches whoever writes the run: for commands, and for alarms that somebody has seen.
+    pub commander: Commander,
+    /// Why nothing can be commanded; alarms can be acknowledged all the same.
+    pub forbidden: Option<String>,
+    /// Commands that cannot be given in this run, each with the reason.
+    pub impossible: Vec<(&'static str, String)>,
 }
 
 #[derive(Debug)]
@@ -69,14 +71,14 @@ impl App {
     }
 
     /// Why somebody may not command; nothing where they may.
-    pub(crate) fn why_not(&self, person: &Person) -> Option<&'static str> {
-        match &self.commanding {
-            Commanding::Forbidden(why) => Some(why),
-            Commanding::Allowed(_) if person.role == Role::Viewer => {
-                Some("whoever is logged in may only look")
-            }
-            Commanding::Allowed(_) => None,
-        }
+    pub(crate) fn why_not(&self, person: &Person) -> Option<&str> {
+        let forbidden = self.commanding.forbidden.as_deref();
+        forbidden.or_else(|| Self::why_not_act(person))
+    }
+
+    /// Why somebody may do nothing but look.
+    pub(crate) fn why_not_act(person: &Person) -> Option<&'static str> {
+        (person.role == Role::Viewer).then_some("whoever is logged in may only look")
     }
 
     /// What the journal says of a cycle that is not remembered any more. To be called where nobody else waits for the thread.
@@ -89,7 +91,7 @@ impl App {
         if let Some(known) = older.as_ref().filter(|known| remembers(known)) {
             return Ok(Arc::clone(known));
         }
-        let run = Run::open(&self.run).map_err(|error| Problem::unrecorded(error.to_string()))?;
+        let run = Run::open(&self.run).map_err(|error| Problem::of_view(&error))?;
         let known = Arc::new(Known::of_journal(&run, cycle));
         if !remembers(&known) {
             return Err(not_remembered(cycle));
@@ -98,11 +100,10 @@ impl App {
         Ok(known)
     }
 
-    /// False where the run has no such alarm.
-    pub(crate) fn acknowledge(&self, alarm: u64, by: String) -> bool {
-        self.model
-            .write()
-            .unwrap_or_else(PoisonError::into_inner)
-            .acknowledge(alarm, &by)
+    /// The alarm of a number.
+    pub(crate) fn alarm(&self, number: u64) -> Option<Alarm> {
+        let model = self.model();
+        let mut alarms = model.known()?.run.alarms();
+        alarms.find(|alarm| alarm.number == number).cloned()
     }
 }

@@ -28,6 +28,8 @@ pub(crate) struct Standing {
     processes: BTreeMap<Party, Process>,
     cuts: BTreeSet<(Party, Party)>,
     pub(crate) paces: Option<StationId>,
+    /// Parties of a cluster elsewhere whose journal is not told here.
+    detached: BTreeSet<Party>,
     forced: BTreeMap<(ProgramId, SignalPlace), Force>,
     excluded: BTreeMap<ProgramId, StationSet>,
 }
@@ -41,6 +43,11 @@ impl Standing {
     /// Whether something that it says reaches somebody no more.
     pub(crate) fn is_cut(&self, party: Party) -> bool {
         self.cuts.iter().any(|(from, _)| *from == party)
+    }
+
+    /// Whether its own journal is told here no more, so that only others say how it is.
+    pub(crate) fn is_detached(&self, party: Party) -> bool {
+        self.detached.contains(&party)
     }
 
     pub(crate) fn forced(&self, program: ProgramId) -> impl Iterator<Item = &Force> {
@@ -76,6 +83,12 @@ impl Standing {
             Change::Healed(from, to) => {
                 self.cuts.remove(&(*from, *to));
             }
+            Change::Attached(party) => {
+                self.detached.remove(party);
+            }
+            Change::Detached(party) => {
+                self.detached.insert(*party);
+            }
             Change::Paces(station) => self.paces = Some(*station),
             Change::Forced(program, force) => {
                 self.forced.insert((*program, force.signal), force.clone());
@@ -100,6 +113,8 @@ enum Change {
     GoesOn(Party),
     Cut(Party, Party),
     Healed(Party, Party),
+    Attached(Party),
+    Detached(Party),
     Paces(StationId),
     Forced(ProgramId, Force),
     Unforced(ProgramId, SignalPlace),
@@ -158,6 +173,8 @@ fn change_of(record: &Record) -> Option<Change> {
 
 fn of_run(event: &RunEvent) -> Option<Change> {
     match event {
+        RunEvent::Attached { party } => Some(Change::Attached(*party)),
+        RunEvent::Detached { party, .. } => Some(Change::Detached(*party)),
         RunEvent::Started { party } => Some(Change::Process(*party, Process::Running)),
         RunEvent::Ended { party, .. } => Some(Change::Process(*party, Process::Ended)),
         RunEvent::Fault { action, party, .. } => match action {

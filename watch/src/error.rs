@@ -8,6 +8,7 @@ use axum::Json;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use serde_json::json;
+use understudy_view::ViewError;
 
 /// Why the page cannot be served. The codes are stable.
 #[derive(Debug, thiserror::Error)]
@@ -94,6 +95,11 @@ impl Problem {
     /// The run has no record of it, or not any more.
     pub(crate) fn unrecorded(message: impl Into<String>) -> Self {
         Self::new(StatusCode::NOT_FOUND, "U0683", message)
+    }
+
+    /// The run cannot answer the question.
+    pub(crate) fn of_view(error: &ViewError) -> Self {
+        Self::new(StatusCode::NOT_FOUND, error.code(), error.words())
     }
 
     /// This page, or who asks, may not.

@@ -36,7 +36,7 @@ pub(crate) fn follow(
                 let source = lock(model, |model| model.begin(&run));
                 break (run, source);
             }
-            Err(error) => lock(model, |model| model.waits_for = error.to_string()),
+            Err(error) => lock(model, |model| model.waits_for = error.words()),
         }
         std::thread::sleep(WAIT);
     };

@@ -75,12 +75,6 @@ impl Model {
         }
     }
 
-    /// False where the run has no such alarm.
-    pub(crate) fn acknowledge(&mut self, alarm: u64, by: &str) -> bool {
-        let known = self.known.as_mut();
-        known.is_some_and(|known| known.run.acknowledge(alarm, by))
-    }
-
     pub(crate) fn party(&self, name: &str) -> Option<Party> {
         self.known.as_ref()?.run.parties().find(name)
     }

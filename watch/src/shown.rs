@@ -116,14 +116,18 @@ struct ShownAlarm {
     what: String,
     lasts: bool,
     acknowledged: Option<String>,
+    acknowledged_in: Option<i64>,
 }
 
-/// The newest state as JSON; `null` where nothing is known yet.
+/// The newest state while nothing is known.
+pub(crate) const NOTHING: &str = "null";
+
+/// The newest state as JSON; [`NOTHING`] where nothing is known yet.
 pub(crate) fn newest_state(model: &Model) -> String {
     let state = model
         .known()
         .and_then(|known| state(known, known.newest()?));
-    serde_json::to_string(&state).unwrap_or_else(|_| "null".to_owned())
+    serde_json::to_string(&state).unwrap_or_else(|_| NOTHING.to_owned())
 }
 
 /// The state of a cycle; nothing where it is not remembered.
@@ -218,6 +222,7 @@ fn shown_station(known: &Known, standing: &Standing, station: StationId, cycle: 
         note: note([
             (!excluded.is_empty()).then(|| format!("excluded for {}", excluded.join(", "))),
             standing.is_cut(party).then(|| "cut off".to_owned()),
+            not_told(standing, party),
         ]),
         program: (!understudy).then_some(station.0),
         words: words_of(known, station, cycle),
@@ -240,6 +245,11 @@ fn station_word(state: StationState, process: Option<Process>) -> &'static str {
         (_, StationState::Shadow) => "shadow",
         (_, StationState::Refused) => "refused",
     }
+}
+
+fn not_told(standing: &Standing, party: Party) -> Option<String> {
+    let told = "what it says of itself does not come here";
+    standing.is_detached(party).then(|| told.to_owned())
 }
 
 fn note<const N: usize>(parts: [Option<String>; N]) -> String {
@@ -303,6 +313,7 @@ fn shown_remote_io(
         note: note([
             (forced > 0).then(|| format!("{forced} forced")),
             standing.is_cut(party).then(|| "cut off".to_owned()),
+            not_told(standing, party),
         ]),
         program: Some(program.0),
         words: Vec::new(),
@@ -320,7 +331,7 @@ fn shown_plant(known: &Known, standing: &Standing, program: ProgramId) -> Option
         down: matches!(process, Some(Process::Killed | Process::Ended)),
         paces: false,
         cut: false,
-        note: String::new(),
+        note: note([not_told(standing, party)]),
         program: Some(program.0),
         words: Vec::new(),
     })
@@ -381,7 +392,9 @@ fn counts(known: &Known, program: ProgramId, cycle: i64) -> Counts {
     let Some(sources) = known.run.series().sources(program) else {
         return counts;
     };
-    for span in sources.spans(i64::MIN, cycle + 1) {
+    // As the report counts: not before everybody was in step.
+    let first = if known.run.has_origin() { 0 } else { i64::MIN };
+    for span in sources.spans(first, cycle + 1) {
         let cycles = u64::try_from(span.to - span.from).unwrap_or(0);
         match span.value {
             Source::Direct => counts.direct += cycles,
@@ -476,5 +489,6 @@ fn shown_alarm(alarm: &Alarm) -> ShownAlarm {
         what: alarm.text.clone(),
         lasts: alarm.over.is_none(),
         acknowledged: alarm.acknowledged_by.clone(),
+        acknowledged_in: alarm.acknowledged_in,
     }
 }

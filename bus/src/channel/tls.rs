@@ -30,6 +30,11 @@ pub(crate) fn prefix(cluster: ClusterHash, name: &str) -> String {
     format!("understudy/{cluster}/{name}")
 }
 
+/// Where a party says the hash of its configuration to whoever does not know it.
+pub(crate) fn hash_key(name: &str) -> String {
+    format!("understudy/cluster/{name}")
+}
+
 /// Nothing but mutual TLS to and from named addresses.
 pub(crate) fn tls_config(mode: &str, keys: &TlsKeys) -> zenoh::Result<zenoh::Config> {
     let mut config = zenoh::Config::default();
@@ -66,10 +71,9 @@ pub(crate) fn insert(
 }
 
 /// The table above as Zenoh's rules; what no rule allows is denied.
-pub(super) fn access_control(prefix: &str, admitted: &Admitted) -> serde_json::Value {
-    let asked: Vec<String> = ["configuration", "status"]
-        .map(|what| format!("{prefix}/{what}"))
-        .into();
+pub(super) fn access_control(prefix: &str, hash: &str, admitted: &Admitted) -> serde_json::Value {
+    let asked = ["configuration", "status"].map(|what| format!("{prefix}/{what}"));
+    let asked: Vec<String> = asked.into_iter().chain([hash.to_owned()]).collect();
     let commands = vec![format!("{prefix}/command/*")];
     let journal = vec![format!("{prefix}/journal")];
     let rule = |id: &str, messages: &[&str], flow: &str, keys: &[String]| {
@@ -136,7 +140,11 @@ mod tests {
 
     #[test]
     fn nobody_is_not_everybody() {
-        let rules = access_control("understudy/1/robot", &Admitted::default());
+        let rules = access_control(
+            "understudy/1/robot",
+            &hash_key("robot"),
+            &Admitted::default(),
+        );
         assert_eq!(rules["default_permission"], "deny");
         assert_eq!(rules["subjects"], json!([]));
         assert_eq!(rules["policies"], json!([]));
@@ -144,7 +152,7 @@ mod tests {
             operators: vec!["operator.1".into()],
             members: vec!["press.1".into()],
         };
-        let rules = access_control("understudy/1/robot", &admitted);
+        let rules = access_control("understudy/1/robot", &hash_key("robot"), &admitted);
         assert_eq!(rules["policies"][1]["rules"], json!(["ask", "ask-answer"]));
         zenoh::Config::default()
             .insert_json5("access_control", &rules.to_string())

@@ -1,5 +1,7 @@
 //! The token: whose turns were heard, and when this station takes its own.
 
+use std::time::Duration;
+
 use smallvec::SmallVec;
 use understudy_wire::{
     Body, Holding, Moment, Output, ProgramId, ProgramSet, StationId, StationSet, Time, Turn,
@@ -9,6 +11,9 @@ use super::{Said, Station};
 use crate::event::Event;
 use crate::replica::{Replica, Standing};
 use crate::words;
+
+/// How often a station says which states it holds.
+const STATES_EVERY: Duration = Duration::from_secs(2);
 
 impl Station {
     pub(super) fn hear_turn(&mut self, station: StationId, turn: &Turn) {
@@ -117,6 +122,27 @@ impl Station {
             .all(|replica| replica.is_current(moment))
     }
 
+    /// Says what it holds, every [`STATES_EVERY`].
+    fn report_states(&mut self, moment: Moment) {
+        let period = self.settings.agreement.schedule.period();
+        let cycles = STATES_EVERY.as_nanos() / period.as_nanos().max(1);
+        if u128::from(moment.cycle.0) % cycles.max(1) + 1 < cycles {
+            return;
+        }
+        for place in 0..self.replicas.len() {
+            let replica = &self.replicas[place];
+            if let Some((lineage, state)) = replica.state().filter(|_| replica.may_speak(moment)) {
+                let event = Event::Holds {
+                    moment,
+                    program: replica.id(),
+                    lineage,
+                    state: state.clone(),
+                };
+                self.report(event);
+            }
+        }
+    }
+
     pub(super) fn speak(&mut self, now: Time, moment: Moment) {
         self.cycle.spoken = true;
         let may_speak = |replica: &&Replica| replica.may_speak(moment);
@@ -142,6 +168,7 @@ impl Station {
             moment,
             words: words.clone(),
         });
+        self.report_states(moment);
         let turn = Turn {
             heard: self.attendance.spoke(),
             holdings: self.holdings(),

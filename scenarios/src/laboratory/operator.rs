@@ -1,161 +1,39 @@
-//! What a person commands while a laboratory runs.
-//!
-//! A command that cannot be done says why and changes nothing; the run goes on. Every command is in the journal, with who gave it and for
-//! what reason, also one that was refused.
+//! What the laboratory does when somebody commands.
 
-use serde::{Deserialize, Serialize};
-use tokio::sync::{mpsc, oneshot};
 use understudy_simulator::{Action, Fault};
-use understudy_wire::{Force, Party, ProgramId, SignalPlace};
+use understudy_wire::{Force, Party, ProgramId};
 
 use super::Laboratory;
+use crate::operator::{Command, Commanded, OperatorAction, Refusal};
 use crate::record::RunEvent;
 
-/// Commands that wait, at most; whoever gives another is told so.
-const WAITING: usize = 16;
+impl Laboratory<'_> {
+    pub(super) async fn obey(&mut self, commanded: Commanded) {
+        let done = match commanded.action.clone() {
+            OperatorAction::Acknowledge(seen) => {
+                self.note(RunEvent::Acknowledged(seen));
+                self.show_journal();
+                Ok(())
+            }
+            OperatorAction::Command {
+                party,
+                command,
+                owner,
+                reason,
+            } => self.obey_command(party, command, owner, reason).await,
+        };
+        commanded.answer(done);
+    }
 
-/// What is to be done to a party.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(tag = "command", rename_all = "kebab-case")]
-pub enum Command {
-    /// End its process as `kill -9` does.
-    Kill,
-    /// Start it again.
-    Restart,
-    /// Make it stand still.
-    Stop,
-    /// Let it go on.
-    Continue,
-    /// Release the outputs of a remote I/O, and the stations that it has excluded.
-    Release,
-    /// Cut it off from all others; a plant stays with its remote I/O.
-    Isolate,
-    /// Connect it again.
-    Rejoin,
-    /// Put a value in the place of a signal of a remote I/O.
-    Force(Force),
-    /// Take it back.
-    Unforce {
-        /// Which signal.
-        signal: SignalPlace,
-    },
-}
-
-/// Why a command was not done.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum Refusal {
-    /// It needs a process.
-    #[error("U0551: {0} is down: restart it first")]
-    Down(String),
-    /// It needs that there is none.
-    #[error("U0552: {0} is running: there is nothing to restart")]
-    Running(String),
-    /// It stands still, or does not, already.
-    #[error("U0553: {name} {is} already")]
-    Already {
-        /// Which party.
-        name: String,
-        /// How it is.
-        is: &'static str,
-    },
-    /// Only a remote I/O, or a party of another kind, can do that.
-    #[error("U0554: {name} cannot do that: {needs}")]
-    WrongParty {
-        /// Which party.
-        name: String,
-        /// What is needed.
-        needs: &'static str,
-    },
-    /// There is nothing between the parties that could cut.
-    #[error("U0555: the links of this run cannot be cut: nothing lies between its processes")]
-    NoProxy,
-    /// The program has no such signal, or the force is not complete.
-    #[error("U0556: {0}")]
-    Force(String),
-    /// The run is not there any more, or too many commands wait.
-    #[error("U0557: the run takes no command now")]
-    Busy,
-    /// The system refused it.
-    #[error("U0558: {name}: {reason}")]
-    System {
-        /// Which party.
-        name: String,
-        /// What the system said.
-        reason: String,
-    },
-}
-
-/// One command on its way.
-#[derive(Debug)]
-pub(super) struct Commanded {
-    party: Party,
-    command: Command,
-    owner: String,
-    reason: String,
-    answer: oneshot::Sender<Result<(), Refusal>>,
-}
-
-/// The end of whoever commands; may be cloned, and used from any thread.
-#[derive(Debug, Clone)]
-pub struct Commander(mpsc::Sender<Commanded>);
-
-/// The laboratory's end.
-#[derive(Debug)]
-pub struct Commands(mpsc::Receiver<Commanded>);
-
-/// Both ends.
-pub fn commands() -> (Commander, Commands) {
-    let (sender, receiver) = mpsc::channel(WAITING);
-    (Commander(sender), Commands(receiver))
-}
-
-impl Commander {
-    /// Gives a command, and waits until it is done or refused.
-    ///
-    /// # Errors
-    /// [`Refusal`].
-    pub async fn give(
-        &self,
+    async fn obey_command(
+        &mut self,
         party: Party,
         command: Command,
         owner: String,
         reason: String,
     ) -> Result<(), Refusal> {
-        let (answer, answered) = oneshot::channel();
-        let commanded = Commanded {
-            party,
-            command,
-            owner,
-            reason,
-            answer,
-        };
-        self.0.try_send(commanded).map_err(|_| Refusal::Busy)?;
-        answered.await.unwrap_or(Err(Refusal::Busy))
-    }
-}
-
-impl Commands {
-    /// The next command; waits for ever where nobody can give one.
-    pub(super) async fn next(commands: &mut Option<Self>) -> Commanded {
-        if let Some(Self(receiver)) = commands
-            && let Some(commanded) = receiver.recv().await
-        {
-            return commanded;
-        }
-        // Whoever commanded is gone for good.
-        std::future::pending().await
-    }
-}
-
-impl Laboratory<'_> {
-    pub(super) async fn obey(&mut self, commanded: Commanded) {
-        let Commanded {
-            party,
-            command,
-            owner,
-            reason,
-            answer,
-        } = commanded;
+        // Whoever commands may make everybody stand still for as long as he wants.
+        self.commanded = true;
         let done = match self.refusal(party, &command) {
             Some(refusal) => Err(refusal),
             None => self.command(party, &command).await,
@@ -167,8 +45,7 @@ impl Laboratory<'_> {
             reason,
             refused: done.as_ref().err().map(ToString::to_string),
         });
-        // Nobody waits for the answer where its page was closed.
-        let _ = answer.send(done);
+        done
     }
 
     /// Why a command cannot be done now.
@@ -202,22 +79,13 @@ impl Laboratory<'_> {
         }
     }
 
-    fn force_refusal(&self, party: Party, force: &understudy_wire::Force) -> Option<Refusal> {
-        if let Err(error) = force.check() {
-            return Some(Refusal::Force(error.to_string()));
-        }
+    fn force_refusal(&self, party: Party, force: &Force) -> Option<Refusal> {
         let Party::RemoteIo(ProgramId(program)) = party else {
             return None;
         };
         let signals = self.account.terms.signals.get(usize::from(program))?;
-        let (place, count, kind) = match force.signal {
-            SignalPlace::Input(place) => (place, signals.inputs.len(), "inputs"),
-            SignalPlace::Output(place) => (place, signals.outputs.len(), "outputs"),
-        };
-        (usize::from(place) >= count).then(|| {
-            let name = self.name(party);
-            Refusal::Force(format!("{name} has {count} {kind}, and no number {place}"))
-        })
+        let (inputs, outputs) = (signals.inputs.len(), signals.outputs.len());
+        Refusal::of_force(&self.name(party), force, inputs, outputs)
     }
 
     async fn command(&mut self, party: Party, command: &Command) -> Result<(), Refusal> {

@@ -1,6 +1,6 @@
 //! States, sources, events and alarms as they stand in the scenario.
 
-use understudy_scenarios::Scenario;
+use understudy_scenarios::{Record, RunEvent, Scenario};
 use understudy_view::{RunState, Snapshot, StationState};
 use understudy_wire::{ProgramId, Source, StationId};
 
@@ -86,9 +86,12 @@ fn a_value_fault_is_an_alarm() {
     assert!(alarms.contains(&"value-fault"), "{alarms:?}");
     assert!(alarms.contains(&"word-differs"), "{alarms:?}");
     let mut model = model;
-    let numbers: Vec<u64> = model.alarms().map(|alarm| alarm.number).collect();
-    for number in numbers {
-        assert!(model.acknowledge(number, "anna"));
+    let seen: Vec<_> = model
+        .alarms()
+        .map(|alarm| alarm.acknowledgement("anna".to_owned(), 0))
+        .collect();
+    for seen in seen {
+        model.note(&Record::of_run(0, RunEvent::Acknowledged(seen)));
     }
     assert!(
         model

@@ -20,11 +20,11 @@ fn a_run_fits_a_terminal_of_eighty_columns() {
     let mut model = model(&cell, &scenario(&cell, KILL_EACH).shortened(Some(140)), 1);
     let mut screen = Screen::default();
     insta::assert_snapshot!("events", shown(&mut screen, &model, 80, 24));
-    screen.press(Key::Next, &mut model);
-    screen.press(Key::Next, &mut model);
+    screen.press(Key::Next, &model);
+    screen.press(Key::Next, &model);
     insta::assert_snapshot!("failures", shown(&mut screen, &model, 80, 24));
-    screen.press(Key::Help, &mut model);
-    screen.press(Key::Pause, &mut model);
+    screen.press(Key::Help, &model);
+    screen.press(Key::Pause, &model);
     assert!(screen.is_paused());
     let help = shown(&mut screen, &model, 80, 24);
     assert!(

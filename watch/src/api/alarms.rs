@@ -1,6 +1,7 @@
 //! Somebody has seen an alarm.
 
 use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use axum::Json;
 use axum::extract::rejection::{JsonRejection, PathRejection};
@@ -27,8 +28,22 @@ pub(super) async fn acknowledge(
     let Path(number) = number?;
     let Json(Acknowledged { owner }) = body?;
     let owner = named(&person, owner)?;
-    if !app.acknowledge(number, owner) {
-        return Err(Problem::unknown(format!("the run has no alarm {number}")));
+    let alarm = app
+        .alarm(number)
+        .ok_or_else(|| Problem::unknown(format!("the run has no alarm {number}")))?;
+    if let Some(why) = App::why_not_act(&person) {
+        return Err(Problem::forbidden(why));
     }
+    let seen = alarm.acknowledgement(owner, unix_seconds());
+    // It is shown as seen when it has been read in the journal.
+    let done = app.commanding.commander.acknowledge(seen).await;
+    done.map_err(|refusal| Problem::refused(&refusal.to_string()))?;
     Ok(Json(json!({})))
+}
+
+/// For the journal.
+#[allow(clippy::disallowed_methods, reason = "people live by the calendar")]
+fn unix_seconds() -> u64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.map_or(0, |since| since.as_secs())
 }

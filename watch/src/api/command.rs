@@ -11,7 +11,7 @@ use understudy_scenarios::Command;
 use understudy_wire::{Force, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH, SignalPlace};
 
 use super::Answered;
-use crate::app::{App, Commanding};
+use crate::app::App;
 use crate::error::Problem;
 use crate::login::Person;
 
@@ -55,9 +55,6 @@ pub(super) async fn command(
     if let Some(why) = app.why_not(&person) {
         return Err(Problem::forbidden(why));
     }
-    let Commanding::Allowed(commander) = &app.commanding else {
-        return Err(Problem::forbidden("this page may not command"));
-    };
     let owner = named(&person, asked.owner)?;
     let reason = readable(asked.reason, MAXIMUM_REASON_LENGTH, "the reason")?;
     let party = app.model().party(&asked.party);
@@ -84,6 +81,7 @@ pub(super) async fn command(
             reason: reason.clone(),
         }),
     };
+    let commander = &app.commanding.commander;
     let done = commander.give(party, command, owner, reason).await;
     done.map_err(|refusal| Problem::refused(&refusal.to_string()))?;
     Ok(Json(json!({})))

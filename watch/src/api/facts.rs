@@ -1,10 +1,13 @@
 //! What is run, how it stands in a cycle, and what happened.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::rejection::QueryRejection;
 use axum::extract::{Extension, Query, State};
+use axum::http::header::CONTENT_TYPE;
+use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use understudy_ladder::Signal;
 use understudy_view::Event;
@@ -16,7 +19,7 @@ use crate::app::App;
 use crate::error::Problem;
 use crate::login::Person;
 use crate::model::Known;
-use crate::shown;
+use crate::shown::{self, NOTHING};
 
 /// Events in one answer, at most.
 const MAXIMUM_EVENTS: usize = 1000;
@@ -65,6 +68,8 @@ struct SignalFacts {
 struct CommandFacts {
     /// Why nothing can be commanded.
     why: Option<String>,
+    /// Commands that cannot be given in this run, each with the reason.
+    impossible: BTreeMap<&'static str, String>,
 }
 
 pub(super) async fn run(
@@ -99,6 +104,7 @@ pub(super) async fn run(
         programs: programs.collect(),
         commands: CommandFacts {
             why: app.why_not(&person).map(str::to_owned),
+            impossible: app.commanding.impossible.iter().cloned().collect(),
         },
         person: Some(person.name).filter(|name| !name.is_empty()),
         others: others(&app.run),
@@ -137,12 +143,17 @@ pub(super) struct When {
 pub(super) async fn state(
     State(app): State<Arc<App>>,
     when: Result<Query<When>, QueryRejection>,
-) -> Answered<Json<shown::State>> {
+) -> Answered<Response> {
     let Query(when) = when?;
-    at_cycle(&app, when.cycle, |known, cycle| {
+    let newest = app.newest.borrow().to_string();
+    if when.cycle.is_none() && newest != NOTHING {
+        // Written once for everybody who asks, as for the viewers who are told.
+        return Ok(([(CONTENT_TYPE, "application/json")], newest).into_response());
+    }
+    let state = at_cycle(&app, when.cycle, |known, cycle| {
         shown::state(known, cycle).ok_or_else(|| not_remembered(cycle))
-    })
-    .map(Json)
+    });
+    Ok(Json(state?).into_response())
 }
 
 /// Answers from what is remembered of a cycle; of one that is older, from the journal.

@@ -89,7 +89,7 @@ fn draw(known: &Known, program: ProgramId, cycle: i64, wanted: &Wanted) -> Answe
             let moment = step.map(|step| step.moment.to_string()).unwrap_or_default();
             words += &format!(" ({moment}): as evaluated, lineage {}", sampled.before);
         }
-        (Err(error), _) => words += &format!(": without power flow, for {error}"),
+        (Err(error), _) => words += &format!(": without power flow, for {}", error.words()),
         (Ok(_), None) => {}
     }
     if shown.len() < ladder.rungs.len() {

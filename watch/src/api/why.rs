@@ -30,7 +30,7 @@ pub(super) async fn why(
         })?;
         let name = format!("{}.{}", controller.name, &*signal.name);
         let why = known.run.why(&name, Some(cycle));
-        why.map_err(|error| Problem::unrecorded(error.to_string()))
+        why.map_err(|error| Problem::of_view(&error))
     })
     .map(Json)
 }

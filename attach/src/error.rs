@@ -1,0 +1,86 @@
+//! Why nothing can be attached to.
+
+use std::io;
+use std::net::SocketAddr;
+
+use understudy_wire::ClusterHash;
+
+/// Why a cluster elsewhere cannot be looked at.
+#[derive(Debug, thiserror::Error)]
+pub enum AttachError {
+    /// Nobody listens at any of its addresses.
+    #[error("U0561: nobody of the cluster answers: {}", list(.tried))]
+    Nobody {
+        /// Who was called where, and what came of it.
+        tried: Vec<Unheard>,
+    },
+    /// Somebody listens, and does not take calls from the holder of these keys; or is nobody whom these keys trust.
+    #[error("U0562: no party takes a call from the holder of these keys: {}", list(.tried))]
+    NotAdmitted {
+        /// Who was called where, and what came of it.
+        tried: Vec<Unheard>,
+    },
+    /// The cluster that runs there has another file.
+    #[error(
+        "U0563: {name} at {address} runs configuration {theirs}, and the cluster file is configuration {ours}: take the file that it runs"
+    )]
+    OtherConfiguration {
+        /// Who said so first.
+        name: String,
+        /// Where it listens.
+        address: SocketAddr,
+        /// What it runs.
+        theirs: String,
+        /// What the file says.
+        ours: ClusterHash,
+    },
+    /// Its parties take no calls.
+    #[error(
+        "U0564: the cluster file says security = \"off\": its parties have no keys and take no calls; look at the journals that they write (--journal)"
+    )]
+    NoKeys,
+    /// The system refused something.
+    #[error("U0565: {what}: {source}")]
+    System {
+        /// What was wanted.
+        what: &'static str,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+/// A party that was called in vain.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unheard {
+    /// Its name.
+    pub name: String,
+    /// Where it should listen.
+    pub address: SocketAddr,
+    /// What came of it.
+    pub reason: String,
+}
+
+fn list(tried: &[Unheard]) -> String {
+    let each = tried.iter().map(|party| {
+        let Unheard {
+            name,
+            address,
+            reason,
+        } = party;
+        format!("{name} at {address} ({reason})")
+    });
+    each.collect::<Vec<_>>().join(", ")
+}
+
+impl AttachError {
+    /// The stable code.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Nobody { .. } => "U0561",
+            Self::NotAdmitted { .. } => "U0562",
+            Self::OtherConfiguration { .. } => "U0563",
+            Self::NoKeys => "U0564",
+            Self::System { .. } => "U0565",
+        }
+    }
+}

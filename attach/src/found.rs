@@ -1,0 +1,156 @@
+//! Who of a cluster takes a call, and why the others do not.
+
+use std::net::TcpStream;
+use std::time::Duration;
+
+use understudy_bus::{BusError, Call, Peer, Request, TlsKeys};
+use understudy_cluster::{Cluster, Security};
+use understudy_wire::ClusterHash;
+
+use crate::error::{AttachError, Unheard};
+
+/// A machine that is there says so within this time.
+const REACH: Duration = Duration::from_millis(1500);
+
+/// Parties that are called at once, at most.
+const AT_ONCE: usize = 16;
+
+/// A cluster elsewhere of which somebody takes calls.
+pub struct Found {
+    pub(crate) line: Line,
+    pub(crate) parties: Vec<(Peer, Result<Call, String>)>,
+    /// Inputs and outputs of each program.
+    pub(crate) signals: Vec<(usize, usize)>,
+}
+
+/// What every call needs.
+#[derive(Clone)]
+pub(crate) struct Line {
+    pub(crate) cluster: ClusterHash,
+    pub(crate) keys: TlsKeys,
+    /// A party says something within this time.
+    pub(crate) patience: Duration,
+}
+
+/// Why a call was in vain.
+pub(crate) enum Vain {
+    /// Nobody listens there.
+    Nobody(String),
+    /// One side does not believe the other.
+    NotAdmitted(String),
+    /// It runs something else.
+    Other(String),
+}
+
+impl Vain {
+    pub(crate) fn words(self) -> String {
+        match self {
+            Self::Nobody(reason) | Self::NotAdmitted(reason) => reason,
+            Self::Other(theirs) => format!("it runs configuration {theirs}"),
+        }
+    }
+}
+
+/// Calls all parties of a cluster at their addresses.
+///
+/// # Errors
+/// Where none of them can be followed: [`AttachError`].
+pub fn find(cluster: &Cluster, keys: TlsKeys, peers: Vec<Peer>) -> Result<Found, AttachError> {
+    if cluster.security() == Security::Off {
+        return Err(AttachError::NoKeys);
+    }
+    let agreement = cluster.agreement();
+    let line = Line {
+        cluster: agreement.cluster,
+        keys,
+        patience: (agreement.schedule.period() * 10).max(Duration::from_secs(5)),
+    };
+    let mut called = Vec::new();
+    for some in peers.chunks(AT_ONCE) {
+        std::thread::scope(|scope| {
+            let calls = some.iter().map(|peer| scope.spawn(|| line.call(peer)));
+            let calls: Vec<_> = calls.collect();
+            for (peer, call) in some.iter().zip(calls) {
+                let lost = || Vain::Nobody("the call was lost".to_owned());
+                called.push((peer.clone(), call.join().unwrap_or_else(|_| Err(lost()))));
+            }
+        });
+    }
+    if called.iter().all(|(_, call)| call.is_err()) {
+        return Err(why_nobody(called, line.cluster));
+    }
+    let parties = called.into_iter();
+    let controllers = cluster.controllers().iter();
+    Ok(Found {
+        line,
+        signals: controllers
+            .map(|own| (own.program.inputs.len(), own.program.outputs.len()))
+            .collect(),
+        parties: parties
+            .map(|(peer, call)| (peer, call.map_err(Vain::words)))
+            .collect(),
+    })
+}
+
+fn why_nobody(called: Vec<(Peer, Result<Call, Vain>)>, ours: ClusterHash) -> AttachError {
+    let (mut silent, mut strange) = (Vec::new(), Vec::new());
+    for (Peer { name, address, .. }, call) in called {
+        let unheard = |reason| Unheard {
+            name: name.clone(),
+            address,
+            reason,
+        };
+        match call {
+            Err(Vain::Other(theirs)) => {
+                return AttachError::OtherConfiguration {
+                    name,
+                    address,
+                    theirs,
+                    ours,
+                };
+            }
+            Err(Vain::Nobody(reason)) => silent.push(unheard(reason)),
+            Err(Vain::NotAdmitted(reason)) => strange.push(unheard(reason)),
+            Ok(_) => {}
+        }
+    }
+    if strange.is_empty() {
+        AttachError::Nobody { tried: silent }
+    } else {
+        AttachError::NotAdmitted { tried: strange }
+    }
+}
+
+impl Line {
+    /// Calls one party, and hears whether it runs the same.
+    pub(crate) fn call(&self, peer: &Peer) -> Result<Call, Vain> {
+        // Asked of the system first: Zenoh says the same of a machine that is not there and of a key that is not believed.
+        TcpStream::connect_timeout(&peer.address, REACH)
+            .map_err(|error| Vain::Nobody(words_of(&error)))?;
+        let not_admitted = |_: BusError| {
+            let reason = "it listens, and either side does not believe the other's certificate";
+            Vain::NotAdmitted(reason.to_owned())
+        };
+        let call = Call::to(peer.address, self.cluster, &peer.name, &self.keys);
+        let call = call.map_err(not_admitted)?;
+        let theirs = call.ask(&Request::Cluster).map_err(|_| {
+            let reason = "it believes the certificate, and does not answer its holder";
+            Vain::NotAdmitted(reason.to_owned())
+        })?;
+        if theirs == self.cluster.to_string() {
+            Ok(call)
+        } else {
+            Err(Vain::Other(theirs))
+        }
+    }
+}
+
+fn words_of(error: &std::io::Error) -> String {
+    match error.kind() {
+        std::io::ErrorKind::ConnectionRefused => "nothing listens there".to_owned(),
+        std::io::ErrorKind::TimedOut | std::io::ErrorKind::WouldBlock => {
+            "no answer from that address".to_owned()
+        }
+        _ => error.to_string(),
+    }
+}

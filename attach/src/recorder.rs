@@ -1,0 +1,277 @@
+//! Writes what the parties say into the journal of a run, and passes commands on to them.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use tokio::sync::mpsc::{Receiver, channel};
+use tokio::sync::oneshot;
+use understudy_bus::{DONE, Request};
+use understudy_remote_io::Event as RemoteIoEvent;
+use understudy_scenarios::{
+    Command, Commanded, Commander, Commands, Happening, Journal, OperatorAction, Record, Refusal,
+    RunDirectory, RunEvent, RunSocket, commands, monotonic_ns,
+};
+use understudy_wire::Party;
+
+use crate::error::AttachError;
+use crate::follower::{Calls, Follower, Told};
+use crate::found::Found;
+
+/// Lines that wait to be written, at most; then their followers wait, and lose what comes meanwhile.
+const UNWRITTEN: usize = 16_384;
+
+/// How often readers of the journal see what is new.
+const SHOW: Duration = Duration::from_millis(50);
+
+const PROCESS: &str =
+    "its process runs elsewhere: end it, start it or make it stand still on its own machine";
+const LINKS: &str = "nothing stands between the parties elsewhere that could cut their links";
+
+/// The commands that cannot be given to a cluster elsewhere, each with the reason.
+pub fn impossible() -> Vec<(&'static str, String)> {
+    let processes = ["kill", "restart", "stop", "continue"].map(|word| (word, PROCESS.to_owned()));
+    let links = ["isolate", "rejoin"].map(|word| (word, LINKS.to_owned()));
+    processes.into_iter().chain(links).collect()
+}
+
+/// A cluster elsewhere whose words are written down, until this is dropped.
+pub struct Attached {
+    commander: Commander,
+    ends: Arc<AtomicBool>,
+    end: Option<oneshot::Sender<()>>,
+    recorder: Option<JoinHandle<()>>,
+}
+
+impl Attached {
+    /// Reaches it.
+    pub fn commander(&self) -> Commander {
+        self.commander.clone()
+    }
+}
+
+impl Drop for Attached {
+    fn drop(&mut self) {
+        self.ends.store(true, Ordering::Relaxed);
+        self.end = None;
+        if let Some(recorder) = self.recorder.take() {
+            // One that panicked has said so. Followers that wait for a party end with the process.
+            let _ = recorder.join();
+        }
+    }
+}
+
+impl Found {
+    /// Who of its parties is heard, and who is not, by their names.
+    pub fn names(&self) -> (Vec<&str>, Vec<&str>) {
+        let names = |heard| {
+            let parties = self.parties.iter();
+            let those = parties.filter(move |(_, call)| call.is_ok() == heard);
+            those.map(|(peer, _)| peer.name.as_str()).collect()
+        };
+        (names(true), names(false))
+    }
+
+    /// Writes what they say to `journal.jsonl` of a run directory, of so many bytes at most.
+    ///
+    /// # Errors
+    /// [`AttachError::System`].
+    pub fn record(
+        self,
+        directory: &RunDirectory,
+        journal_limit_bytes: u64,
+    ) -> Result<Attached, AttachError> {
+        let system = |what| move |source| AttachError::System { what, source };
+        let journal = Journal::create(&directory.file("journal.jsonl"), journal_limit_bytes)
+            .map_err(system("to write journal.jsonl"))?;
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()
+            .map_err(system("a runtime"))?;
+        let (told, lines) = channel(UNWRITTEN);
+        let (commander, commands) = commands();
+        let (end, ended) = oneshot::channel();
+        let ends = Arc::new(AtomicBool::new(false));
+        let calls = Calls::default();
+        let mut names = BTreeMap::new();
+        for (peer, call) in self.parties {
+            names.insert(peer.party, peer.name.clone());
+            let follower = Follower {
+                peer,
+                line: self.line.clone(),
+                told: told.clone(),
+                calls: calls.clone(),
+                ends: Arc::clone(&ends),
+            };
+            std::thread::Builder::new()
+                .name("attach".to_owned())
+                .spawn(move || follower.run(call))
+                .map_err(system("a thread for a party"))?;
+        }
+        let recorder = Recorder {
+            journal,
+            calls,
+            names,
+            signals: self.signals,
+            has_origin: false,
+        };
+        let directory = directory.clone();
+        let recorder = std::thread::Builder::new()
+            .name("attach-recorder".to_owned())
+            .spawn(move || {
+                runtime.block_on(async {
+                    // Without it nobody can act from another process.
+                    let _socket = RunSocket::open(directory.path(), commands.commander());
+                    recorder.run(lines, commands, ended).await;
+                });
+            })
+            .map_err(system("a thread that writes the journal"))?;
+        Ok(Attached {
+            commander,
+            ends,
+            end: Some(end),
+            recorder: Some(recorder),
+        })
+    }
+}
+
+struct Recorder {
+    journal: Journal,
+    calls: Calls,
+    names: BTreeMap<Party, String>,
+    /// Inputs and outputs of each program.
+    signals: Vec<(usize, usize)>,
+    has_origin: bool,
+}
+
+impl Recorder {
+    async fn run(
+        mut self,
+        mut lines: Receiver<Told>,
+        mut commands: Commands,
+        mut ended: oneshot::Receiver<()>,
+    ) {
+        let mut show = tokio::time::interval(SHOW);
+        loop {
+            tokio::select! {
+                biased;
+                _ = &mut ended => break,
+                commanded = commands.next() => self.obey(commanded).await,
+                told = lines.recv() => match told {
+                    Some(told) => self.note(told),
+                    None => break,
+                },
+                _ = show.tick() => self.journal.flush(),
+            }
+        }
+        self.own(RunEvent::Finished);
+        self.journal.finish();
+    }
+
+    fn own(&mut self, event: RunEvent) {
+        self.journal.write(&Record::of_run(monotonic_ns(), event));
+    }
+
+    fn note(&mut self, told: Told) {
+        let (party, line) = match told {
+            Told::Line(party, line) => (party, line),
+            Told::Attached(party) => return self.own(RunEvent::Attached { party }),
+            Told::Detached(party, reason) => {
+                return self.own(RunEvent::Detached { party, reason });
+            }
+        };
+        // Whoever says something else than a record of its own is not worth believing.
+        let Ok(record) = serde_json::from_str::<Record>(&line) else {
+            return;
+        };
+        if record.party != Some(party) {
+            return;
+        }
+        self.journal.write(&record);
+        if let (false, Happening::RemoteIo(RemoteIoEvent::Applied { moment, .. })) =
+            (self.has_origin, &record.event)
+        {
+            self.has_origin = true;
+            let (moment, cycle) = (*moment, moment.cycle.0);
+            self.own(RunEvent::Origin { moment, cycle });
+        }
+    }
+
+    async fn obey(&mut self, commanded: Commanded) {
+        let done = match commanded.action.clone() {
+            OperatorAction::Acknowledge(seen) => {
+                self.own(RunEvent::Acknowledged(seen));
+                Ok(())
+            }
+            OperatorAction::Command {
+                party,
+                command,
+                owner,
+                reason,
+            } => {
+                let done = self.command(party, &command).await;
+                self.own(RunEvent::Commanded {
+                    party,
+                    command,
+                    owner,
+                    reason,
+                    refused: done.as_ref().err().map(ToString::to_string),
+                });
+                done
+            }
+        };
+        self.journal.flush();
+        commanded.answer(done);
+    }
+
+    async fn command(&self, party: Party, command: &Command) -> Result<(), Refusal> {
+        let name = self.names.get(&party).cloned().unwrap_or_default();
+        let elsewhere = |reason: &str| Refusal::Elsewhere {
+            name: name.clone(),
+            reason: reason.to_owned(),
+        };
+        let request = match command {
+            Command::Release => Request::Release,
+            Command::Force(force) => Request::Force(force.clone()),
+            Command::Unforce { signal } => Request::Unforce(*signal),
+            Command::Isolate | Command::Rejoin => return Err(elsewhere(LINKS)),
+            Command::Kill | Command::Restart | Command::Stop | Command::Continue => {
+                return Err(elsewhere(PROCESS));
+            }
+        };
+        let Party::RemoteIo(program) = party else {
+            return Err(Refusal::WrongParty {
+                name,
+                needs: "it is for remote I/Os",
+            });
+        };
+        if let (Command::Force(force), Some((inputs, outputs))) =
+            (command, self.signals.get(program.index()))
+            && let Some(refusal) = Refusal::of_force(&name, force, *inputs, *outputs)
+        {
+            return Err(refusal);
+        }
+        let Some(call) = self.calls.to(party) else {
+            return Err(elsewhere("it takes no call now"));
+        };
+        // Zenoh waits in threads of its own only.
+        let (tell, told) = oneshot::channel();
+        let asking = std::thread::Builder::new().spawn(move || {
+            // Nobody listens any more where the program ends.
+            let _ = tell.send(call.ask(&request));
+        });
+        let system = |reason: String| Refusal::System {
+            name: name.clone(),
+            reason,
+        };
+        asking.map_err(|error| system(error.to_string()))?;
+        match told.await {
+            Ok(Ok(answer)) if answer == DONE => Ok(()),
+            Ok(Ok(why)) => Err(Refusal::Force(why)),
+            Ok(Err(error)) => Err(system(error.to_string())),
+            Err(_) => Err(Refusal::Busy),
+        }
+    }
+}

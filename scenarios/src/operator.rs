@@ -1,0 +1,264 @@
+//! What a person does while a run is written: commands to its parties, and alarms that he has seen.
+//!
+//! ```text
+//!   page, terminal ──► Commander ──┬─ a queue in this process ──┬─► Commands ──► whoever writes the run: does it, and notes it
+//!                                  └─ the socket of the run ────┘
+//! ```
+//!
+//! A command that cannot be done says why and changes nothing; the run goes on. Every command is in the journal, with who gave it and for
+//! what reason, also one that was refused.
+
+mod acknowledgement;
+mod socket;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use tokio::sync::{mpsc, oneshot};
+use understudy_wire::{Force, Party, SignalPlace};
+
+pub use acknowledgement::Acknowledgement;
+pub use socket::RunSocket;
+
+/// Commands that wait, at most; whoever gives another is told so.
+const WAITING: usize = 16;
+
+/// What is to be done to a party.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "command", rename_all = "kebab-case")]
+pub enum Command {
+    /// End its process as `kill -9` does.
+    Kill,
+    /// Start it again.
+    Restart,
+    /// Make it stand still.
+    Stop,
+    /// Let it go on.
+    Continue,
+    /// Release the outputs of a remote I/O, and the stations that it has excluded.
+    Release,
+    /// Cut it off from all others; a plant stays with its remote I/O.
+    Isolate,
+    /// Connect it again.
+    Rejoin,
+    /// Put a value in the place of a signal of a remote I/O.
+    Force(Force),
+    /// Take it back.
+    Unforce {
+        /// Which signal.
+        signal: SignalPlace,
+    },
+}
+
+/// Why a command was not done.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Refusal {
+    /// It needs a process.
+    #[error("U0551: {0} is down: restart it first")]
+    Down(String),
+    /// It needs that there is none.
+    #[error("U0552: {0} is running: there is nothing to restart")]
+    Running(String),
+    /// It stands still, or does not, already.
+    #[error("U0553: {name} {is} already")]
+    Already {
+        /// Which party.
+        name: String,
+        /// How it is.
+        is: &'static str,
+    },
+    /// Only a remote I/O, or a party of another kind, can do that.
+    #[error("U0554: {name} cannot do that: {needs}")]
+    WrongParty {
+        /// Which party.
+        name: String,
+        /// What is needed.
+        needs: &'static str,
+    },
+    /// There is nothing between the parties that could cut.
+    #[error("U0555: the links of this run cannot be cut: nothing lies between its processes")]
+    NoProxy,
+    /// The program has no such signal, or the force is not complete.
+    #[error("U0556: {0}")]
+    Force(String),
+    /// The run is not there any more, or too many commands wait.
+    #[error("U0557: the run takes no command now")]
+    Busy,
+    /// The system refused it.
+    #[error("U0558: {name}: {reason}")]
+    System {
+        /// Which party.
+        name: String,
+        /// What the system said.
+        reason: String,
+    },
+    /// Its process is not one of this laboratory.
+    #[error("U0559: {name}: {reason}")]
+    Elsewhere {
+        /// Which party.
+        name: String,
+        /// What can be done there in its place.
+        reason: String,
+    },
+    /// Another process writes the run, and says why.
+    #[error("{0}")]
+    Said(String),
+}
+
+impl Refusal {
+    /// Why a force is none for a remote I/O with so many inputs and outputs, where it is none.
+    pub fn of_force(name: &str, force: &Force, inputs: usize, outputs: usize) -> Option<Self> {
+        if let Err(error) = force.check() {
+            return Some(Self::Force(error.to_string()));
+        }
+        let (place, count, kind) = match force.signal {
+            SignalPlace::Input(place) => (place, inputs, "inputs"),
+            SignalPlace::Output(place) => (place, outputs, "outputs"),
+        };
+        (usize::from(place) >= count)
+            .then(|| Self::Force(format!("{name} has {count} {kind}, and no number {place}")))
+    }
+}
+
+/// What somebody does.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "action", rename_all = "kebab-case")]
+pub enum OperatorAction {
+    /// A command to a party.
+    Command {
+        /// To whom.
+        party: Party,
+        /// What.
+        command: Command,
+        /// Who gives it.
+        owner: String,
+        /// Why.
+        reason: String,
+    },
+    /// An alarm was seen.
+    Acknowledge(Acknowledgement),
+}
+
+/// An action that waits for its answer.
+#[derive(Debug)]
+pub struct Commanded {
+    /// What.
+    pub action: OperatorAction,
+    answer: oneshot::Sender<Result<(), Refusal>>,
+}
+
+impl Commanded {
+    /// Says how it went.
+    pub fn answer(self, done: Result<(), Refusal>) {
+        // Nobody waits for it where the page was closed.
+        let _ = self.answer.send(done);
+    }
+}
+
+/// The end of whoever acts; may be cloned, and used from any thread.
+#[derive(Debug, Clone)]
+pub struct Commander(Way);
+
+#[derive(Debug, Clone)]
+enum Way {
+    Queue(mpsc::Sender<Commanded>),
+    /// The directory of a run.
+    Run(Arc<Path>),
+}
+
+/// The end of whoever writes the run.
+#[derive(Debug)]
+pub struct Commands {
+    receiver: mpsc::Receiver<Commanded>,
+    /// So that there is always somebody who might act.
+    sender: mpsc::Sender<Commanded>,
+}
+
+/// Both ends, in one process.
+pub fn commands() -> (Commander, Commands) {
+    let (sender, receiver) = mpsc::channel(WAITING);
+    let commands = Commands {
+        receiver,
+        sender: sender.clone(),
+    };
+    (Commander(Way::Queue(sender)), commands)
+}
+
+impl Commander {
+    /// For a run that another process writes, or wrote.
+    pub fn of_run(run: PathBuf) -> Self {
+        Self(Way::Run(run.into()))
+    }
+
+    /// Gives a command, and waits until it is done or refused.
+    ///
+    /// # Errors
+    /// [`Refusal`].
+    pub async fn give(
+        &self,
+        party: Party,
+        command: Command,
+        owner: String,
+        reason: String,
+    ) -> Result<(), Refusal> {
+        self.act(OperatorAction::Command {
+            party,
+            command,
+            owner,
+            reason,
+        })
+        .await
+    }
+
+    /// Says that an alarm was seen, and waits until that is in the journal.
+    ///
+    /// # Errors
+    /// [`Refusal`].
+    pub async fn acknowledge(&self, acknowledgement: Acknowledgement) -> Result<(), Refusal> {
+        self.act(OperatorAction::Acknowledge(acknowledgement)).await
+    }
+
+    /// The same from a thread that has nothing else to do.
+    ///
+    /// # Errors
+    /// [`Refusal`].
+    pub fn acknowledge_and_wait(&self, acknowledgement: Acknowledgement) -> Result<(), Refusal> {
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build();
+        let runtime = runtime.map_err(|error| Refusal::System {
+            name: "a runtime".to_owned(),
+            reason: error.to_string(),
+        })?;
+        runtime.block_on(self.acknowledge(acknowledgement))
+    }
+
+    async fn act(&self, action: OperatorAction) -> Result<(), Refusal> {
+        match &self.0 {
+            Way::Run(run) => socket::ask(run, &action).await,
+            Way::Queue(queue) => {
+                let (answer, answered) = oneshot::channel();
+                let commanded = Commanded { action, answer };
+                queue.try_send(commanded).map_err(|_| Refusal::Busy)?;
+                answered.await.unwrap_or(Err(Refusal::Busy))
+            }
+        }
+    }
+}
+
+impl Commands {
+    /// The next action; waits until there is one.
+    pub async fn next(&mut self) -> Commanded {
+        match self.receiver.recv().await {
+            Some(commanded) => commanded,
+            // A sender is held here.
+            None => std::future::pending().await,
+        }
+    }
+
+    /// Another end for whoever acts.
+    pub fn commander(&self) -> Commander {
+        Commander(Way::Queue(self.sender.clone()))
+    }
+}

@@ -1,0 +1,246 @@
+//! A page that looks at a cluster which runs already: a laboratory of another process, and parties with addresses and keys of their own.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use crate::shared::DEADLINE;
+use crate::shared::deployed::{Running, addressed_cell, text};
+use crate::{Page, answer, empty_folder, one_at_a_time, party, understudy};
+
+const CELL: &str = "examples/press-cell/cluster.toml";
+const COMMON: [&str; 4] = ["--link", "udp", "--period", "50ms"];
+
+fn page(cluster: &str, runs: &Path, more: &[&str]) -> Page {
+    let mut command = understudy(&["watch", cluster, "--address", "127.0.0.1:0"]);
+    command.args(more).arg("--out").arg(runs);
+    Page::start(command)
+}
+
+fn in_step(page: &Page) {
+    page.wait_for("a cluster in step", |state| {
+        let speaking = |name| party(state, name)["state"] == "speaking";
+        ["robot", "press", "understudy"].into_iter().all(speaking)
+    });
+}
+
+fn give(page: &Page, name: &str, command: &Value) -> (u16, String) {
+    let body = json!({ "party": name, "command": command, "owner": "anna", "reason": "a test" });
+    let answer = page.post("/api/command", &body.to_string());
+    let code = match answer.status {
+        200 => String::new(),
+        _ => answer.code(),
+    };
+    (answer.status, code)
+}
+
+fn journal(runs: &Path) -> Vec<Value> {
+    let text = fs::read_to_string(runs.join("latest/journal.jsonl")).expect("a journal");
+    let events = text.lines().map(|line| {
+        let record: Value = serde_json::from_str(line).expect("a record");
+        record["event"].clone()
+    });
+    events.collect()
+}
+
+/// An alarm that nobody has seen.
+fn unseen(state: &Value) -> Option<u64> {
+    let alarms = state["alarms"].as_array()?;
+    let unseen = alarms
+        .iter()
+        .find(|alarm| alarm["acknowledged"].is_null())?;
+    unseen["id"].as_u64()
+}
+
+fn acknowledge(page: &Page, alarm: u64) {
+    let path = format!("/api/alarms/{alarm}/acknowledge");
+    assert_eq!(page.post(&path, r#"{"owner":"anna"}"#).status, 200);
+    page.wait_for("a seen alarm", |state| {
+        let alarms = state["alarms"].as_array().expect("alarms");
+        let mut alarms = alarms.iter();
+        alarms.any(|found| found["id"] == alarm && found["acknowledged"] == "anna")
+    });
+}
+
+#[test]
+fn a_laboratory_of_another_process_is_looked_at_and_commanded() {
+    let _turn = one_at_a_time();
+    let runs = empty_folder("attach-laboratory");
+    let nothing = [
+        "watch",
+        CELL,
+        "--attach",
+        "--address",
+        "127.0.0.1:0",
+        "--out",
+        text(&runs),
+    ];
+    let (status, document, _) = answer(&nothing);
+    assert_eq!(status, 2, "{document:#}");
+    assert_eq!(document["failures"][0]["code"], "U0614");
+
+    let first = page(CELL, &runs, &COMMON);
+    in_step(&first);
+    let second = page(CELL, &runs, &[&COMMON[..], &["--allow-commands"]].concat());
+    assert!(second.said.contains("it runs already"), "{}", second.said);
+    in_step(&second);
+    assert_eq!(give(&first, "robot", &json!({ "command": "kill" })).0, 403);
+    let kill = |name| give(&second, name, &json!({ "command": "kill" }));
+    assert_eq!(kill("robot"), (200, String::new()));
+    assert_eq!(kill("robot"), (409, "U0551".to_owned()));
+    assert_eq!(kill("understudy"), (200, String::new()));
+    let lost = first.wait_for("an alarm", |state| unseen(state).is_some());
+    // Seen at the one page, it is seen at the other.
+    let alarm = unseen(&lost).expect("an alarm");
+    acknowledge(&second, alarm);
+    first.wait_for("the same at the first page", |state| {
+        let alarms = state["alarms"].as_array().expect("alarms");
+        let mut alarms = alarms.iter();
+        alarms.any(|found| found["id"] == alarm && found["acknowledged"] == "anna")
+    });
+    assert_eq!(second.end(), 0);
+    assert_eq!(first.end(), 0);
+    let events = journal(&runs);
+    let count = |word| events.iter().filter(|event| event["event"] == word).count();
+    assert_eq!(count("commanded"), 3);
+    assert_eq!(count("acknowledged"), 1);
+
+    // A run that is over can be looked at, and its alarms too, and that is written down behind its end.
+    let over = Page::of_run(&runs.join("latest"));
+    let state = over.wait_for("all of it", |state| unseen(state).is_some());
+    acknowledge(&over, unseen(&state).expect("an alarm"));
+    assert_eq!(over.end(), 0);
+    let run = runs.join("latest");
+    let list = ["journal", text(&run), "--event", "acknowledged"];
+    let (_, document, _) = answer(&list);
+    let lines = document["result"]["lines"].as_array().expect("lines");
+    assert_eq!(lines.len(), 2, "{document:#}");
+    assert!(
+        lines[0]["text"]
+            .as_str()
+            .is_some_and(|text| text.contains("anna has seen"))
+    );
+}
+
+/// Every party of the press cell as a process with an address and keys of its own.
+struct Deployed {
+    cluster: PathBuf,
+    keys: PathBuf,
+    _parties: Vec<Running>,
+}
+
+fn deployed(folder: &Path) -> Deployed {
+    let cluster = addressed_cell(folder);
+    let file = fs::read_to_string(&cluster).expect("it is ours");
+    let times = "period = \"50ms\"\nlink = \"udp\"";
+    assert!(file.contains("period = \"10ms\"") && !file.contains("\nlink"));
+    fs::write(&cluster, file.replace("period = \"10ms\"", times)).expect("it is ours");
+    let keys = folder.join("keys");
+    let (status, made, _) = answer(&["keys", "init", text(&cluster), "--folder", text(&keys)]);
+    assert_eq!(status, 0, "{made:#}");
+    let parties = [
+        ("node", "robot"),
+        ("node", "press"),
+        ("node", "understudy"),
+        ("remote-io", "robot-io"),
+        ("remote-io", "press-io"),
+        ("plant", "arm"),
+        ("plant", "ram"),
+    ];
+    let start = |(what, name): (&str, &str)| {
+        let own = keys.join("parties").join(name);
+        let party = [what, text(&cluster), "--name", name, "--keys", text(&own)];
+        Running::start(&[&party[..], &["--no-real-time"]].concat())
+    };
+    let parties = parties.into_iter().map(start).collect();
+    Deployed {
+        cluster,
+        keys,
+        _parties: parties,
+    }
+}
+
+#[test]
+fn parties_elsewhere_are_looked_at_with_an_operators_keys() {
+    let _turn = one_at_a_time();
+    let folder = empty_folder("attach-elsewhere");
+    let runs = folder.join("runs");
+    let running = deployed(&folder);
+    let cluster = text(&running.cluster);
+    let operator = running.keys.join("parties/operator");
+
+    let top = |keys: &Path, cluster: &str| {
+        let runs = text(&runs);
+        answer(&[
+            "top",
+            cluster,
+            "--once",
+            "--keys",
+            text(keys),
+            "--out",
+            runs,
+        ])
+    };
+    // They are up when one of them takes a call; before that the command says who does not.
+    let started = std::time::Instant::now();
+    loop {
+        let (status, document, _) = top(&operator, cluster);
+        if status == 0 {
+            break;
+        }
+        let code = document["failures"][0]["code"].as_str().expect("a code");
+        assert!(["U0561", "U0562"].contains(&code), "{document:#}");
+        assert!(started.elapsed() < DEADLINE, "{document:#}");
+    }
+
+    let elsewhere = page(
+        cluster,
+        &runs,
+        &["--keys", text(&operator), "--allow-commands"],
+    );
+    in_step(&elsewhere);
+    // The program is followed from a state that a station has told.
+    elsewhere.wait_for("power flow", |_| {
+        let picture = elsewhere.get("/api/ladder/0");
+        picture.status == 200 && picture.body.contains("as evaluated")
+    });
+    let facts = elsewhere.get("/api/run").json();
+    assert!(facts["commands"]["why"].is_null(), "{facts:#}");
+    assert!(facts["commands"]["impossible"]["kill"].is_string());
+    let kill = give(&elsewhere, "robot", &json!({ "command": "kill" }));
+    assert_eq!(kill, (409, "U0559".to_owned()));
+    let force =
+        json!({ "command": "force", "signal": { "output": 0 }, "value": true, "seconds": 3600 });
+    assert_eq!(give(&elsewhere, "robot-io", &force), (200, String::new()));
+    elsewhere.wait_for("a forced output", |state| {
+        state["programs"][0]["forced"][0]["owner"] == "anna"
+    });
+    let unforce = json!({ "command": "unforce", "signal": { "output": 0 } });
+    assert_eq!(give(&elsewhere, "robot-io", &unforce), (200, String::new()));
+    elsewhere.wait_for("a free output", |state| {
+        state["programs"][0]["forced"] == json!([])
+    });
+    assert_eq!(elsewhere.end(), 0);
+    let events = journal(&runs);
+    let commanded = events.iter().filter(|event| event["event"] == "commanded");
+    assert_eq!(commanded.count(), 3);
+    assert_eq!(
+        events.last().map(|event| &event["event"]),
+        Some(&json!("finished"))
+    );
+
+    // Keys of another authority, and the file of another cluster.
+    let strange = folder.join("strange");
+    let (status, made, _) = answer(&["keys", "init", cluster, "--folder", text(&strange)]);
+    assert_eq!(status, 0, "{made:#}");
+    let (status, document, _) = top(&strange.join("parties/operator"), cluster);
+    assert_eq!(status, 1, "{document:#}");
+    assert_eq!(document["failures"][0]["code"], "U0562", "{document:#}");
+    let other = running.cluster.with_file_name("other.toml");
+    let file = fs::read_to_string(&running.cluster).expect("it is ours");
+    fs::write(&other, file.replace("\"50ms\"", "\"60ms\"")).expect("written");
+    let (status, document, _) = top(&operator, text(&other));
+    assert_eq!(status, 1, "{document:#}");
+    assert_eq!(document["failures"][0]["code"], "U0563", "{document:#}");
+}

@@ -1,0 +1,300 @@
+//! What stations, remote I/Os and plants say of themselves.
+
+use understudy_node::Event as StationEvent;
+use understudy_remote_io::Event as RemoteIoEvent;
+use understudy_scenarios::{Parties, source_word};
+use understudy_wire::{Party, SignalPlace, StationId};
+
+use super::{Words, list, missing_text, program_name, programs, stations};
+use crate::event::Level;
+
+pub(super) fn station(event: &StationEvent, parties: &Parties) -> Words {
+    use Level::{Alarm, Info, Notice, Warning};
+    match event {
+        StationEvent::Spoke { words, .. } => {
+            let words: Vec<String> = words
+                .iter()
+                .map(|word| format!("{} {}", programs(word.members, parties), word.sum))
+                .collect();
+            ("spoke", Info, format!("says {}", list(&words)))
+        }
+        StationEvent::Holds {
+            program, lineage, ..
+        } => {
+            let whose = program_name(*program, parties);
+            (
+                "holds",
+                Info,
+                format!("holds the state of {whose} at lineage {lineage}"),
+            )
+        }
+        StationEvent::Paces { .. } => ("paces", Notice, "starts the cycles from now on".to_owned()),
+        StationEvent::Flagged { station, .. } => flagged(*station, parties),
+        StationEvent::Cleared { station, .. } => cleared(*station, parties),
+        StationEvent::Joins { wants, .. } => {
+            let text = if wants.is_empty() {
+                "listens".to_owned()
+            } else {
+                format!(
+                    "listens, and asks for the state of {}",
+                    programs(*wants, parties)
+                )
+            };
+            ("joins", Notice, text)
+        }
+        StationEvent::Adopted {
+            program,
+            from,
+            lineage,
+            ..
+        } => {
+            let whose = program_name(*program, parties);
+            let text = match from {
+                Some(from) => {
+                    let from = parties.name(Party::Station(*from));
+                    format!("has the state of {whose} from {from}, at lineage {lineage}")
+                }
+                None => format!("starts {whose} from its initial state"),
+            };
+            ("adopted", Notice, text)
+        }
+        StationEvent::InStep { program, .. } => {
+            let whose = program_name(*program, parties);
+            (
+                "in-step",
+                Notice,
+                format!("is in step with {whose}, and speaks for it"),
+            )
+        }
+        StationEvent::DigestDiffers {
+            program, station, ..
+        } => {
+            let other = parties.name(Party::Station(*station));
+            let whose = program_name(*program, parties);
+            (
+                "digest-differs",
+                Warning,
+                format!("has another state of {whose} than {other}, after the same inputs"),
+            )
+        }
+        StationEvent::Excluded { program, .. } => {
+            let whose = program_name(*program, parties);
+            (
+                "excluded",
+                Alarm,
+                format!("says nothing of {whose}: its state was found faulty"),
+            )
+        }
+        StationEvent::Readmitted { program, .. } => {
+            let whose = program_name(*program, parties);
+            ("readmitted", Notice, format!("begins again with {whose}"))
+        }
+        StationEvent::Refused {
+            party,
+            theirs,
+            ours,
+        } => refused(*party, theirs.to_string(), ours.to_string(), parties),
+        StationEvent::Stalled { late, .. } => stalled(*late),
+    }
+}
+
+pub(super) fn remote_io(event: &RemoteIoEvent, parties: &Parties) -> Words {
+    use Level::{Alarm, Info, Notice, Warning};
+    match event {
+        RemoteIoEvent::Sampled { inputs, .. } => ("sampled", Info, format!("samples {inputs}")),
+        RemoteIoEvent::Applied {
+            outputs,
+            source,
+            word_of,
+            missing,
+            ..
+        } => {
+            let mut text = format!("drives {outputs}, {}", source_word(*source));
+            if let Some(station) = word_of {
+                text += &format!(" from a word of {}", parties.name(Party::Station(*station)));
+            }
+            if let Some(missing) = missing {
+                text += &format!(": {}", missing_text(*missing));
+            }
+            ("applied", Info, text)
+        }
+        RemoteIoEvent::StartedCold { awaits_release, .. } => {
+            let release = if *awaits_release {
+                "; an operator has to release its outputs"
+            } else {
+                ""
+            };
+            (
+                "started-cold",
+                Notice,
+                format!("starts its program from the initial state{release}"),
+            )
+        }
+        RemoteIoEvent::AdoptedLineage { lineage, from, .. } => {
+            let from = parties.name(Party::Station(*from));
+            (
+                "adopted-lineage",
+                Notice,
+                format!("goes on from the state that {from} has, at lineage {lineage}"),
+            )
+        }
+        RemoteIoEvent::Disputed { stations: who, .. } => {
+            let who = stations(*who, parties);
+            (
+                "disputed",
+                Alarm,
+                format!(
+                    "{who} hold different states of one cycle: an operator has to decide by releasing its outputs"
+                ),
+            )
+        }
+        RemoteIoEvent::Voided {
+            samples, lineage, ..
+        } => (
+            "voided",
+            Warning,
+            format!(
+                "{samples} samples that nobody heard are void; it goes on from lineage {lineage}"
+            ),
+        ),
+        RemoteIoEvent::Released { .. } => (
+            "released",
+            Notice,
+            "an operator has released its outputs and whom it had accused".to_owned(),
+        ),
+        RemoteIoEvent::RecalledExclusion { stations: who, .. } => {
+            let who = stations(*who, parties);
+            let text = format!(
+                "{who} stays excluded, as other stations recall, until an operator releases it"
+            );
+            ("recalled-exclusion", Alarm, text)
+        }
+        RemoteIoEvent::Diagnosed { failed, .. } => {
+            let text = format!("its diagnosis finds these channels failed: {failed}");
+            ("diagnosed", Warning, text)
+        }
+        RemoteIoEvent::Flagged { station, .. } => flagged(*station, parties),
+        RemoteIoEvent::Cleared { station, .. } => cleared(*station, parties),
+        RemoteIoEvent::Syndrome {
+            syndrome, accused, ..
+        } => {
+            let who = stations(*accused, parties);
+            (
+                "syndrome",
+                Warning,
+                format!("the words do not add up, syndrome {syndrome}: one of {who} is wrong"),
+            )
+        }
+        RemoteIoEvent::ValueFault {
+            accused,
+            located,
+            answer,
+            ..
+        } => {
+            let who = stations(*accused, parties);
+            let text = if *located {
+                format!("{who} is wrong by majority, and excluded until an operator releases it")
+            } else {
+                format!("one of {who} is wrong, and nobody can say who; the answer is {answer:?}")
+            };
+            ("value-fault", Alarm, text)
+        }
+        RemoteIoEvent::DigestDiffers {
+            program, accused, ..
+        } => {
+            let who = stations(*accused, parties);
+            let whose = program_name(*program, parties);
+            (
+                "digest-differs",
+                Warning,
+                format!("{who} have different states of {whose} after the same inputs"),
+            )
+        }
+        RemoteIoEvent::Refused {
+            party,
+            theirs,
+            ours,
+        } => refused(*party, theirs.to_string(), ours.to_string(), parties),
+        RemoteIoEvent::Stalled { late, .. } => stalled(*late),
+        RemoteIoEvent::Forced { force, .. } => {
+            let text = format!(
+                "{} is forced to {} for {} s by {}: {}",
+                place(force.signal),
+                u8::from(force.value),
+                force.seconds,
+                force.owner,
+                force.reason
+            );
+            ("forced", Alarm, text)
+        }
+        RemoteIoEvent::Unforced {
+            signal, expired, ..
+        } => {
+            let why = if *expired {
+                "its time is over"
+            } else {
+                "taken back"
+            };
+            (
+                "unforced",
+                Notice,
+                format!("{} is its own again: {why}", place(*signal)),
+            )
+        }
+    }
+}
+
+fn place(signal: SignalPlace) -> String {
+    match signal {
+        SignalPlace::Input(place) => format!("input {}", place + 1),
+        SignalPlace::Output(place) => format!("output {}", place + 1),
+    }
+}
+
+pub(super) fn plant(event: &understudy_plant::Event, parties: &Parties) -> Words {
+    match event {
+        understudy_plant::Event::Stepped { field, .. } => {
+            let text = format!(
+                "its sensors see {}, {} finished",
+                field.sensors, field.finished
+            );
+            ("stepped", Level::Info, text)
+        }
+        understudy_plant::Event::Refused {
+            party,
+            theirs,
+            ours,
+        } => refused(*party, theirs.to_string(), ours.to_string(), parties),
+    }
+}
+
+fn flagged(station: StationId, parties: &Parties) -> Words {
+    let name = parties.name(Party::Station(station));
+    (
+        "flagged",
+        Level::Warning,
+        format!("{name} has been silent for too long, and its slot is closed"),
+    )
+}
+
+fn cleared(station: StationId, parties: &Parties) -> Words {
+    let name = parties.name(Party::Station(station));
+    ("cleared", Level::Notice, format!("{name} speaks again"))
+}
+
+fn refused(party: Party, theirs: String, ours: String, parties: &Parties) -> Words {
+    let name = parties.name(party);
+    (
+        "refused",
+        Level::Warning,
+        format!("{name} runs configuration {theirs}, not {ours}; its frames are dropped"),
+    )
+}
+
+fn stalled(late: std::time::Duration) -> Words {
+    (
+        "stalled",
+        Level::Notice,
+        format!("the host woke it {late:.1?} late"),
+    )
+}

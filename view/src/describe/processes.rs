@@ -1,0 +1,156 @@
+//! What the processes of the parties say, and whoever runs them.
+
+use understudy_bus::HostEvent;
+use understudy_scenarios::{Action, Parties, RunEvent};
+use understudy_wire::Party;
+
+use super::Words;
+use crate::event::Level;
+
+pub(super) fn host(event: &HostEvent) -> Words {
+    use Level::{Alarm, Info, Notice, Warning};
+    match event {
+        HostEvent::Ready {
+            process, address, ..
+        } => (
+            "ready",
+            Info,
+            format!("listens as process {process} at {address}"),
+        ),
+        HostEvent::RefusedBytes { datagrams, reason } => (
+            "refused-bytes",
+            Warning,
+            format!("{datagrams} datagrams were no frames: {reason}"),
+        ),
+        HostEvent::RefusedFrames {
+            datagrams, reason, ..
+        } => (
+            "refused-frames",
+            Warning,
+            format!("{datagrams} frames did not count: {reason}"),
+        ),
+        HostEvent::ChannelOpened { address, .. } => (
+            "channel-opened",
+            Info,
+            format!("operators can call at {address}"),
+        ),
+        HostEvent::ChannelFailed { reason } => (
+            "channel-failed",
+            Warning,
+            format!("operators cannot call: {reason}"),
+        ),
+        HostEvent::UnsendableFrames { frames, reason } => (
+            "unsendable-frames",
+            Warning,
+            format!("{frames} frames could not be sent: {reason}"),
+        ),
+        HostEvent::FieldLost { reason } => (
+            "field-lost",
+            Alarm,
+            format!("its equipment cannot be seen: {reason}"),
+        ),
+        HostEvent::FieldRegained => (
+            "field-regained",
+            Notice,
+            "its equipment can be seen again".to_owned(),
+        ),
+        HostEvent::JournalLost { records } => (
+            "journal-lost",
+            Warning,
+            format!("{records} records are lost"),
+        ),
+        HostEvent::UnknownCommand { line } => (
+            "unknown-command",
+            Warning,
+            format!("was told what is no command: {line}"),
+        ),
+        HostEvent::Exchange(exchange) => (
+            "exchange",
+            Info,
+            format!("{} complete cycles", exchange.complete_cycles),
+        ),
+        HostEvent::Stopped(_) => ("stopped", Info, "ended as it was told to".to_owned()),
+    }
+}
+
+pub(super) fn run(event: &RunEvent, parties: &Parties) -> Words {
+    use Level::{Info, Notice, Warning};
+    match event {
+        RunEvent::Started { party } => (
+            "started",
+            Notice,
+            format!("{} is started", parties.name(*party)),
+        ),
+        RunEvent::Fault { action, party, .. } => {
+            ("fault", Notice, fault_text(*action, *party, parties))
+        }
+        RunEvent::Commanded {
+            party,
+            command,
+            owner,
+            reason,
+            refused,
+        } => {
+            let what = serde_json::to_value(command).unwrap_or_default();
+            let what = what["command"].as_str().unwrap_or("command").to_owned();
+            let refused = refused
+                .as_ref()
+                .map_or(String::new(), |why| format!("; not done: {why}"));
+            let text = format!(
+                "{owner} commands {what} of {}: {reason}{refused}",
+                parties.name(*party)
+            );
+            ("commanded", Notice, text)
+        }
+        RunEvent::Acknowledged(seen) => (
+            "acknowledged",
+            Notice,
+            format!(
+                "{} has seen the alarm {} of {}, of cycle {}",
+                seen.owner, seen.alarm, seen.name, seen.cycle
+            ),
+        ),
+        RunEvent::Attached { party } => (
+            "attached",
+            Notice,
+            format!("{} tells its journal here", parties.name(*party)),
+        ),
+        RunEvent::Detached { party, reason } => (
+            "detached",
+            Warning,
+            format!("{} is not heard here: {reason}", parties.name(*party)),
+        ),
+        RunEvent::Ended { party, how } => (
+            "ended",
+            Warning,
+            format!("{} has ended by itself: {how}", parties.name(*party)),
+        ),
+        RunEvent::Origin { .. } => (
+            "origin",
+            Info,
+            "everybody is in step: cycles are counted from here".to_owned(),
+        ),
+        RunEvent::Interrupted => (
+            "interrupted",
+            Notice,
+            "the run was asked to end early".to_owned(),
+        ),
+        RunEvent::Finished => ("finished", Info, "the run is over".to_owned()),
+    }
+}
+
+/// What was done to a party.
+pub(crate) fn fault_text(action: Action, party: Party, parties: &Parties) -> String {
+    let name = parties.name(party);
+    match action {
+        Action::Crash => format!("{name} is killed"),
+        Action::Restart => format!("{name} is started again"),
+        Action::Stop => format!("{name} is stopped"),
+        Action::Continue => format!("{name} goes on"),
+        Action::Cut { to } => format!("{name} is cut off from {}", parties.name(to)),
+        Action::Heal { to } => format!("{name} is connected to {} again", parties.name(to)),
+        Action::Delay { to, by } => format!("{} hears {name} {by:?} later", parties.name(to)),
+        Action::Release => format!("{name} is released"),
+        other => format!("{} is done to {name}", other.word()),
+    }
+}
