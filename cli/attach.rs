@@ -30,6 +30,9 @@ pub(crate) struct AttachArguments {
 /// A machine of this network says within this time that somebody listens there.
 const REACH: Duration = Duration::from_millis(300);
 
+/// Parties that are looked for before a laboratory starts, at most: where they are on other machines, each may take its time.
+const ASKED: usize = 8;
+
 impl AttachArguments {
     pub(crate) fn is_wanted(&self) -> bool {
         self.keys.is_some()
@@ -78,7 +81,7 @@ impl AttachArguments {
 
 /// A party of the cluster file that takes calls at its own address now: the cluster runs already.
 pub(crate) fn who_runs_already(cluster: &Cluster) -> Option<String> {
-    cluster.parties().find_map(|party| {
+    cluster.parties().take(ASKED).find_map(|party| {
         let address = cluster.address(party)?;
         TcpStream::connect_timeout(&address, REACH).ok()?;
         let name = cluster.party_name(party)?;

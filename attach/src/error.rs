@@ -3,7 +3,7 @@
 use std::io;
 use std::net::SocketAddr;
 
-use understudy_wire::ClusterHash;
+use understudy_wire::ConfigurationHash;
 
 /// Why a cluster elsewhere cannot be looked at.
 #[derive(Debug, thiserror::Error)]
@@ -32,7 +32,7 @@ pub enum AttachError {
         /// What it runs.
         theirs: String,
         /// What the file says.
-        ours: ClusterHash,
+        ours: ConfigurationHash,
     },
     /// Its parties take no calls.
     #[error(

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use understudy_bus::{BusError, Call, Peer, Request, TlsKeys};
 use understudy_cluster::{Cluster, Security};
-use understudy_wire::ClusterHash;
+use understudy_wire::{ClusterHash, ConfigurationHash};
 
 use crate::error::{AttachError, Unheard};
 
@@ -27,6 +27,7 @@ pub struct Found {
 #[derive(Clone)]
 pub(crate) struct Line {
     pub(crate) cluster: ClusterHash,
+    pub(crate) configuration: ConfigurationHash,
     pub(crate) keys: TlsKeys,
     /// A party says something within this time.
     pub(crate) patience: Duration,
@@ -62,6 +63,7 @@ pub fn find(cluster: &Cluster, keys: TlsKeys, peers: Vec<Peer>) -> Result<Found,
     let agreement = cluster.agreement();
     let line = Line {
         cluster: agreement.cluster,
+        configuration: agreement.configuration,
         keys,
         patience: (agreement.schedule.period() * 10).max(Duration::from_secs(5)),
     };
@@ -77,7 +79,7 @@ pub fn find(cluster: &Cluster, keys: TlsKeys, peers: Vec<Peer>) -> Result<Found,
         });
     }
     if called.iter().all(|(_, call)| call.is_err()) {
-        return Err(why_nobody(called, line.cluster));
+        return Err(why_nobody(called, line.configuration));
     }
     let parties = called.into_iter();
     let controllers = cluster.controllers().iter();
@@ -92,7 +94,7 @@ pub fn find(cluster: &Cluster, keys: TlsKeys, peers: Vec<Peer>) -> Result<Found,
     })
 }
 
-fn why_nobody(called: Vec<(Peer, Result<Call, Vain>)>, ours: ClusterHash) -> AttachError {
+fn why_nobody(called: Vec<(Peer, Result<Call, Vain>)>, ours: ConfigurationHash) -> AttachError {
     let (mut silent, mut strange) = (Vec::new(), Vec::new());
     for (Peer { name, address, .. }, call) in called {
         let unheard = |reason| Unheard {
@@ -137,7 +139,7 @@ impl Line {
             let reason = "it believes the certificate, and does not answer its holder";
             Vain::NotAdmitted(reason.to_owned())
         })?;
-        if theirs == self.cluster.to_string() {
+        if theirs == self.configuration.to_string() {
             Ok(call)
         } else {
             Err(Vain::Other(theirs))

@@ -11,7 +11,7 @@
 //! | `command/force`, `command/unforce` | asked with a force or a signal as JSON: done, or why not | yes | no |
 //! | `journal` | told: the lines of its journal, those of a moment at once | yes | no |
 //!
-//! and under `understudy/cluster/<party>`, for callers whose cluster file may be another one: asked, the hash of its configuration.
+//! and under `understudy/cluster/<party>`, for callers whose cluster file may be another one: asked, the hash of the configuration.
 //!
 //! Invariants: the cycle never waits for the channel, which has a thread and a bounded queue of its own; a channel that cannot be
 //! opened is tried again, and the party runs without it; who is revoked is cut off as soon as the list of the admitted changes.
@@ -26,7 +26,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, channel};
 use std::time::Duration;
 
 use serde_json::json;
-use understudy_wire::{ClusterHash, Time};
+use understudy_wire::{ConfigurationHash, Time};
 use zenoh::Wait;
 use zenoh::pubsub::Publisher;
 use zenoh::qos::CongestionControl;
@@ -105,7 +105,6 @@ impl Drop for RunningChannel {
 pub(crate) struct Channel<E> {
     settings: ChannelSettings,
     prefix: String,
-    cluster: ClusterHash,
     name: String,
     address: SocketAddr,
     /// What it said when it was ready.
@@ -144,7 +143,6 @@ impl<E: Send + 'static> Channel<E> {
         let party = Self {
             settings,
             prefix: prefix(endpoints.cluster(), &own.name),
-            cluster: endpoints.cluster(),
             name: own.name.clone(),
             address: own.address,
             status,
@@ -277,7 +275,7 @@ impl<E: Send + 'static> Channel<E> {
             let key = format!("{}/{what}", self.prefix);
             answers.push(answer(&session, key, move |_| text.clone())?);
         }
-        let hash = self.cluster.to_string();
+        let hash = ConfigurationHash::of(self.settings.configuration.as_bytes()).to_string();
         let key = hash_key(&self.name);
         answers.push(answer(&session, key, move |_| hash.clone())?);
         let control = self.control.clone();

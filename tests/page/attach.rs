@@ -86,13 +86,21 @@ fn a_laboratory_of_another_process_is_looked_at_and_commanded() {
     assert!(second.said.contains("it runs already"), "{}", second.said);
     in_step(&second);
     assert_eq!(give(&first, "robot", &json!({ "command": "kill" })).0, 403);
+    let force =
+        json!({ "command": "force", "signal": { "output": 0 }, "value": true, "seconds": 3600 });
+    assert_eq!(give(&second, "press-io", &force), (200, String::new()));
+    let forced = first.wait_for("an alarm", |state| unseen(state).is_some());
     let kill = |name| give(&second, name, &json!({ "command": "kill" }));
     assert_eq!(kill("robot"), (200, String::new()));
     assert_eq!(kill("robot"), (409, "U0551".to_owned()));
     assert_eq!(kill("understudy"), (200, String::new()));
-    let lost = first.wait_for("an alarm", |state| unseen(state).is_some());
+    first.wait_for("another alarm", |state| {
+        state["alarms"]
+            .as_array()
+            .is_some_and(|alarms| alarms.len() > 1)
+    });
     // Seen at the one page, it is seen at the other.
-    let alarm = unseen(&lost).expect("an alarm");
+    let alarm = unseen(&forced).expect("an alarm");
     acknowledge(&second, alarm);
     first.wait_for("the same at the first page", |state| {
         let alarms = state["alarms"].as_array().expect("alarms");
@@ -103,7 +111,7 @@ fn a_laboratory_of_another_process_is_looked_at_and_commanded() {
     assert_eq!(first.end(), 0);
     let events = journal(&runs);
     let count = |word| events.iter().filter(|event| event["event"] == word).count();
-    assert_eq!(count("commanded"), 3);
+    assert_eq!(count("commanded"), 4);
     assert_eq!(count("acknowledged"), 1);
 
     // A run that is over can be looked at, and its alarms too, and that is written down behind its end.

@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -118,24 +118,31 @@ impl Page {
         ))
     }
 
-    /// Asks for the state until it is as it is wanted.
+    /// Is told of each new state until it is as it is wanted.
     pub(crate) fn wait_for(&self, what: &str, wanted: impl Fn(&Value) -> bool) -> Value {
         let started = Instant::now();
-        loop {
-            let answer = self.get("/api/state");
-            if answer.status == 200 {
-                let state = answer.json();
-                if wanted(&state) {
-                    return state;
+        let mut stream = TcpStream::connect(&self.address).expect("it listens");
+        stream.set_read_timeout(Some(DEADLINE)).expect("a timeout");
+        let host = &self.address;
+        // In this version of HTTP a stream has no pieces of its own.
+        let asked = format!("GET /api/live HTTP/1.0\r\nHost: {host}\r\n\r\n");
+        stream.write_all(asked.as_bytes()).expect("sent");
+        let mut last = Value::Null;
+        for line in BufReader::new(stream).lines() {
+            let line = line.expect("it tells of states, or that there is nothing new");
+            if let Some(state) = line.strip_prefix("data: ") {
+                last = serde_json::from_str(state).expect("JSON");
+                if !last.is_null() && wanted(&last) {
+                    return last;
                 }
             }
+            let last = last.to_string();
             assert!(
                 started.elapsed() < DEADLINE,
-                "{what} did not come: {}",
-                answer.body.chars().take(2000).collect::<String>()
+                "{what} did not come: {last:.2000}"
             );
-            std::thread::sleep(Duration::from_millis(50));
         }
+        panic!("the page ended before {what} came");
     }
 
     pub(crate) fn ask_to_end(&self) {

@@ -25,8 +25,8 @@ export const STATES = {
 
 // A box is as wide as the longest name wants, within these.
 const NARROWEST = 168;
-const WIDEST = 236;
-const LETTER = 8.6;
+const WIDEST = 208;
+const LETTER = 8;
 const GAP = 22;
 const BOX = { height: 62 };
 const ROWS = { station: 14, bus: 112, remote: 152, plant: 262 };

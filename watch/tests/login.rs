@@ -10,10 +10,19 @@ use std::time::Duration;
 
 use rustls::pki_types::ServerName;
 use rustls::{ClientConfig, ClientConnection, RootCertStore, StreamOwned};
+use understudy_scenarios::Commander;
 use understudy_watch::{Certificate, Commanding, Logins, Served, Settings, WatchError, serve};
 
 const OPERATOR: &str = "0123456789abcdef0123456789abcdef";
 const VIEWER: &str = "fedcba9876543210fedcba9876543210";
+
+fn looking() -> Commanding {
+    Commanding {
+        commander: Commander::of_run("nothing".into()),
+        forbidden: Some("a test looks only".to_owned()),
+        impossible: Vec::new(),
+    }
+}
 
 fn empty_folder(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
@@ -51,7 +60,7 @@ impl Page {
         let served = serve(Settings {
             run: folder.join("nothing"),
             address: "127.0.0.1:0".parse().expect("an address"),
-            commanding: Commanding::Forbidden("a test looks only"),
+            commanding: looking(),
             logins: Some(Logins::of_file(&logins_file(folder, 0o600)).expect("logins")),
             certificate: Some(Certificate { chain, key }),
             names: Vec::new(),
@@ -131,6 +140,9 @@ fn only_who_shows_a_token_sees_the_page() {
     let run = page.ask("GET", "/api/run", &session, "");
     is(&run, "404");
     assert!(run.contains("U0683"), "{run}");
+    let seen = r#"{"owner":"anna"}"#;
+    let looks_only = page.ask("POST", "/api/alarms/1/acknowledge", &session, seen);
+    is(&looks_only, "403");
     is(&page.ask("POST", "/api/logout", &session, "{}"), "200");
     is(&page.ask("GET", "/api/run", &session, ""), "401");
 }
@@ -154,7 +166,7 @@ fn other_machines_need_logins_that_are_secret() {
     let settings = |logins| Settings {
         run: folder.join("nothing"),
         address: "0.0.0.0:0".parse().expect("an address"),
-        commanding: Commanding::Forbidden("a test looks only"),
+        commanding: looking(),
         logins,
         certificate: None,
         names: Vec::new(),

@@ -1,10 +1,13 @@
 //! The history of a program against the naive scan of its ladder.
 
+use std::sync::Arc;
+
 use understudy_ladder::Interpreter;
-use understudy_scenarios::{Network, Scenario};
+use understudy_scenarios::{Network, Scenario, moment};
+use understudy_view::{Bounds, Model};
 use understudy_wire::ProgramId;
 
-use crate::support::{KILL_EACH, cell, model, scenario};
+use crate::support::{KILL_EACH, cell, model, records, scenario};
 
 /// From the first sample on, every step is the naive interpreter's: outputs, and the power in every element.
 #[test]
@@ -77,5 +80,50 @@ fn loss_is_no_value_fault() {
                 assert_eq!(pair[0].after, pair[1].before, "seed {seed}");
             }
         }
+    }
+}
+
+/// Whoever begins to listen in the middle of a run follows each program from the first state that a station tells, as whoever heard it all.
+#[test]
+fn a_journal_that_begins_in_the_middle_is_followed_from_a_state_that_was_told() {
+    let cell = cell();
+    let text = "title = \"a kill\"\ncycles = 700\n\
+                [[step]]\nat = 500\naction = \"crash\"\nstation = \"press\"\n";
+    let scenario = scenario(&cell, text);
+    let all = records(&cell, &scenario, 1);
+    let whole = model(&cell, &scenario, 1);
+    let moment_of = |cycle| {
+        let history = whole.history(ProgramId(0)).expect("it is there");
+        history.at(cycle).expect("it is remembered").moment
+    };
+    // At several places between two of the records that tell of states.
+    for begins in [100, 199, 200, 201, 255, 390] {
+        let first = all
+            .iter()
+            .position(|record| moment(&record.event) == Some(moment_of(begins)));
+        let mut heard = Model::new(Arc::new(cell.clone()), Bounds::default());
+        for record in all.iter().skip(first.expect("it is told of")) {
+            heard.note(record);
+        }
+        for place in 0..cell.controllers().len() {
+            let program = ProgramId(place as u8);
+            let histories =
+                [&whole, &heard].map(|model| model.history(program).expect("it is there"));
+            let [complete, later] = histories;
+            let mut known = 0;
+            for step in later.steps() {
+                let Some(sampled) = &step.sampled else {
+                    assert_eq!(known, 0, "once known, it stays so");
+                    continue;
+                };
+                let mut steps = complete.steps().iter();
+                let same = steps.find(|same| same.moment == step.moment);
+                assert_eq!(Some(sampled), same.and_then(|same| same.sampled.as_ref()));
+                known += 1;
+            }
+            assert!(known >= 290, "{known} of those after {begins}");
+        }
+        let alarms: Vec<&str> = heard.alarms().map(|alarm| alarm.alarm).collect();
+        assert_eq!(alarms, [""; 0], "what was not heard is no violation");
     }
 }

@@ -28,12 +28,12 @@ pub(super) async fn acknowledge(
     let Path(number) = number?;
     let Json(Acknowledged { owner }) = body?;
     let owner = named(&person, owner)?;
-    let alarm = app
-        .alarm(number)
-        .ok_or_else(|| Problem::unknown(format!("the run has no alarm {number}")))?;
     if let Some(why) = App::why_not_act(&person) {
         return Err(Problem::forbidden(why));
     }
+    let alarm = app
+        .alarm(number)
+        .ok_or_else(|| Problem::unknown(format!("the run has no alarm {number}")))?;
     let seen = alarm.acknowledgement(owner, unix_seconds());
     // It is shown as seen when it has been read in the journal.
     let done = app.commanding.commander.acknowledge(seen).await;
