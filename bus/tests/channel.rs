@@ -18,11 +18,12 @@ use std::time::{Duration, Instant, SystemTime};
 use parties::{Chatter, endpoints, peers, station};
 use serde_json::json;
 use understudy_bus::{
-    Admitted, BusError, Call, ChannelSettings, Commands, Guard, LinkKind, NoField, NoObserver,
-    PartySettings, Request, TlsKeys, run_party,
+    Admitted, BusError, Call, ChannelSettings, Commands, DONE, Guard, LinkKind, NoField,
+    NoObserver, PartySettings, Request, TlsKeys, run_party,
 };
 use understudy_cluster::{Cluster, press_cell, read};
 use understudy_keys::{Authority, Date, Operators};
+use understudy_wire::{ConfigurationHash, Force, SignalPlace};
 use zenoh::Wait;
 
 const DEADLINE: Duration = Duration::from_secs(60);
@@ -146,6 +147,29 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
         asked(party, "shift-leader", Request::Configuration)
     });
     assert_eq!(text, "what everybody has to agree on");
+    let hash_there = asked(party, "shift-leader", Request::Cluster);
+    let expected = ConfigurationHash::of(text.as_bytes()).to_string();
+    assert_eq!(hash_there.ok(), Some(expected));
+    let force = Request::Force(Force {
+        signal: SignalPlace::Output(0),
+        value: true,
+        seconds: 0,
+        owner: "anna".to_owned(),
+        reason: "to see it".to_owned(),
+    });
+    let refused = asked(party, "shift-leader", force);
+    assert!(
+        refused.as_ref().is_ok_and(|answer| answer != DONE),
+        "no time: {refused:?}"
+    );
+    let unforce = Request::Unforce(SignalPlace::Output(0));
+    let taken = asked(party, "shift-leader", unforce.clone());
+    assert_eq!(taken.ok().as_deref(), Some(DONE));
+    let denied = asked(party, "passer-by", unforce);
+    assert!(
+        matches!(denied, Err(BusError::Unanswered { .. })),
+        "{denied:?}"
+    );
     let denied = asked(party, "passer-by", Request::Status);
     assert!(
         matches!(denied, Err(BusError::Unanswered { .. })),

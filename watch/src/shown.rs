@@ -248,7 +248,7 @@ fn station_word(state: StationState, process: Option<Process>) -> &'static str {
 }
 
 fn not_told(standing: &Standing, party: Party) -> Option<String> {
-    let told = "what it says of itself does not come here";
+    let told = "not heard here";
     standing.is_detached(party).then(|| told.to_owned())
 }
 

@@ -152,3 +152,104 @@ fn in_folder<T>(run: &Path, work: impl FnOnce(&Path) -> io::Result<T>) -> io::Re
     let short = format!("/proc/self/fd/{}/{SOCKET}", folder.as_raw_fd());
     work(Path::new(&short))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io::{BufRead, BufReader, Write};
+    use std::os::unix::net::UnixStream as Stream;
+
+    use understudy_wire::{Party, StationId};
+
+    use super::super::{Acknowledgement, Command, commands};
+    use super::*;
+    use crate::journal::records_of;
+    use crate::record::{Happening, RunEvent};
+    use crate::writer::WriterLock;
+
+    fn folder(name: &str) -> PathBuf {
+        // Longer than the address of a socket may be.
+        let name = format!("understudy-{name}-{}-{:0>100}", std::process::id(), 1);
+        let folder = std::env::temp_dir().join(name);
+        std::fs::create_dir_all(&folder).expect("a folder");
+        folder
+    }
+
+    fn seen() -> Acknowledgement {
+        Acknowledgement {
+            name: "press-io".to_owned(),
+            alarm: "fail-safe".to_owned(),
+            raised_ns: 7,
+            cycle: 3,
+            owner: "anna".to_owned(),
+            at_unix_s: 11,
+        }
+    }
+
+    fn runtime() -> tokio::runtime::Runtime {
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(2)
+            .enable_all()
+            .build();
+        runtime.expect("a runtime")
+    }
+
+    #[test]
+    fn another_process_is_answered_and_nonsense_ends_nothing() {
+        let run = folder("socket");
+        let runtime = runtime();
+        let (commander, mut commands) = commands();
+        let socket = runtime.block_on(async { RunSocket::open(&run, commander) });
+        let socket = socket.expect("a socket");
+        runtime.spawn(async move {
+            loop {
+                let commanded = commands.next().await;
+                let done = match commanded.action {
+                    OperatorAction::Acknowledge(_) => Ok(()),
+                    OperatorAction::Command { .. } => Err(Refusal::NoProxy),
+                };
+                commanded.answer(done);
+            }
+        });
+        let nonsense = ["", "\n", "{\"action\":\"kill\"}\n", &"x".repeat(20_000)];
+        for line in nonsense {
+            let mut stream = in_folder(&run, |path| Stream::connect(path)).expect("it listens");
+            // Where it has heard enough, it hears no more.
+            let _ = stream.write_all(line.as_bytes());
+            let _ = stream.shutdown(std::net::Shutdown::Write);
+            let mut answer = String::new();
+            let _ = BufReader::new(stream).read_line(&mut answer);
+            assert!(answer.is_empty() || answer.contains("U0557"), "{answer}");
+        }
+        let there = Commander::of_run(run.clone());
+        let asked = runtime.block_on(async {
+            let party = Party::Station(StationId(0));
+            let by = ("anna".to_owned(), "to see it".to_owned());
+            let cut = there.give(party, Command::Isolate, by.0, by.1).await;
+            (there.acknowledge(seen()).await, cut)
+        });
+        let refused = Refusal::Said(Refusal::NoProxy.to_string());
+        assert_eq!(asked, (Ok(()), Err(refused)));
+        drop(socket);
+        assert!(!run.join(SOCKET).exists());
+        std::fs::remove_dir_all(run).expect("it goes");
+    }
+
+    #[test]
+    fn an_alarm_of_a_run_that_is_over_is_seen_in_its_journal() {
+        let run = folder("over");
+        let journal = run.join("journal.jsonl");
+        // Its writer was killed in the middle of a line.
+        std::fs::write(&journal, "{\"at_ns\":1,\"na").expect("written");
+        let there = Commander::of_run(run.clone());
+        let writer = WriterLock::take(&run).expect("a file");
+        assert_eq!(there.acknowledge_and_wait(seen()), Err(Refusal::Busy));
+        drop(writer);
+        assert_eq!(there.acknowledge_and_wait(seen()), Ok(()));
+        assert_eq!(there.acknowledge_and_wait(seen()), Ok(()));
+        let read = records_of(&journal).expect("readable");
+        let events: Vec<_> = read.flatten().map(|record| record.event).collect();
+        let expected = Happening::Run(RunEvent::Acknowledged(seen()));
+        assert_eq!(events, [expected.clone(), expected]);
+        std::fs::remove_dir_all(run).expect("it goes");
+    }
+}

@@ -17,7 +17,7 @@ fn shown(screen: &mut Screen, model: &understudy_view::Model, width: u16, height
 #[test]
 fn a_run_fits_a_terminal_of_eighty_columns() {
     let cell = cell();
-    let mut model = model(&cell, &scenario(&cell, KILL_EACH).shortened(Some(140)), 1);
+    let model = model(&cell, &scenario(&cell, KILL_EACH).shortened(Some(140)), 1);
     let mut screen = Screen::default();
     insta::assert_snapshot!("events", shown(&mut screen, &model, 80, 24));
     screen.press(Key::Next, &model);
