@@ -5,8 +5,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::Args;
 use understudy_scenarios::{
-    JOURNAL_LIMIT_BYTES, Journal, JournalState, RunDirectory, Summary, World, keep_cluster,
-    simulate as run_simulation,
+    JOURNAL_LIMIT_BYTES, Journal, JournalState, Record, RunDirectory, RunEvent, Summary, World,
+    keep_cluster, simulate as run_simulation,
 };
 
 use crate::answer::{Answer, Status};
@@ -75,7 +75,9 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
             }
         }
     };
+    let mut last_ns = 0;
     let account = run_simulation(&cluster, &scenario, seed, &mut |record| {
+        last_ns = record.at_ns;
         if let Some(journal) = &mut journal {
             journal.write(record);
         }
@@ -87,7 +89,10 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
             return Answer::failed(Status::Failed, "U0530", message).with_reports(reports);
         }
     };
-    let journal = journal.map_or_else(JournalState::default, Journal::finish);
+    let journal = journal.map_or_else(JournalState::default, |mut journal| {
+        journal.write(&Record::of_run(last_ns, RunEvent::Finished));
+        journal.finish()
+    });
     let repeat = repeat(arguments, seed);
     let circumstances = circumstances(&cluster, World::Simulator, Some(seed), machine(), repeat);
     let (summary, account) = Summary::new(account, &scenario, circumstances, journal);

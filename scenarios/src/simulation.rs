@@ -41,9 +41,7 @@ pub fn simulate(
     }
     // What a plant shows is told just before the deadline that drives it is.
     let mut fields: Vec<Option<Field>> = vec![None; cluster.controllers().len()];
-    let mut last_ns = 0;
     let mut take = |record: &Record, origin: Option<(Moment, u64)>| {
-        last_ns = record.at_ns;
         journal(record);
         account.observe(record);
         if let Some((moment, cycle)) = origin
@@ -99,9 +97,6 @@ pub fn simulate(
         },
     );
     ran?;
-    let finished = Record::of_run(last_ns, RunEvent::Finished);
-    journal(&finished);
-    account.observe(&finished);
     Ok(account)
 }
 
