@@ -17,10 +17,14 @@ use std::ops::Range;
 use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Name;
 
+use super::plan::MAXIMUM_JUMPS;
 use super::statements::{OPERATORS, Statements};
 
 /// Operators in each other past which a result is held.
 const MAXIMUM_DEPTH: usize = 12;
+
+/// Letters of a result past which it is held.
+const MAXIMUM_LENGTH: usize = 2_000;
 
 /// Brackets that may be open at once.
 const MAXIMUM_OPEN: usize = 32;
@@ -175,10 +179,15 @@ impl List<'_, '_> {
             depth,
             kind,
         };
-        if joined.depth > MAXIMUM_DEPTH {
-            self.held(joined, span)
+        self.settled(joined, span)
+    }
+
+    /// The value, held where it is deep or long.
+    fn settled(&mut self, value: Value, span: &Range<usize>) -> Value {
+        if value.depth > MAXIMUM_DEPTH || value.text.len() > MAXIMUM_LENGTH {
+            self.held(value, span)
         } else {
-            joined
+            value
         }
     }
 
@@ -251,7 +260,8 @@ impl List<'_, '_> {
             }
             "NOT" => {
                 if let Some(value) = self.taken(span) {
-                    self.result = Some(value.negated());
+                    let negated = self.settled(value.negated(), span);
+                    self.result = Some(negated);
                 }
             }
             ")" => self.close(span),
@@ -292,6 +302,11 @@ impl List<'_, '_> {
             self.error("U1016", message, span.clone());
             return;
         }
+        if self.jumps.len() >= MAXIMUM_JUMPS {
+            let message = format!("more than {MAXIMUM_JUMPS} jumps are on their way");
+            self.error("U1016", message, span.clone());
+            return;
+        }
         let done = self.own.declare("jumped", "BOOL");
         self.own.push(&format!("{done} := FALSE;\n"), span);
         self.write(&format!("{done} := {condition};\n"), span);
@@ -323,12 +338,13 @@ impl List<'_, '_> {
                 "" => format!("{word}({})", left.text),
                 _ => format!("{word}({}, {operand})", left.text),
             };
-            self.result = Some(Value {
+            let answer = Value {
                 text,
                 operator: None,
                 depth: left.depth + 1,
                 kind,
-            });
+            };
+            self.result = Some(self.settled(answer, span));
             return;
         };
         let Some(inner) = operand.strip_prefix('(') else {

@@ -15,6 +15,7 @@ use std::ops::Range;
 use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Name;
 
+pub(crate) use self::jumps::MAXIMUM_JUMPS;
 use self::links::{Links, Source};
 use self::walk::{Trace, Walk};
 use super::document::{Graph, Kind, Language, Modifier};

@@ -2,11 +2,14 @@
 //!
 //! Each piece of the text remembers the place in the file that it came from, so that what is wrong with it is shown there.
 
+mod text;
+
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
 use understudy_ladder::Name;
 
+pub(crate) use self::text::Text;
 use super::document::{Edge, Modifier, Storage};
 use super::literal::{boolean, integer, time};
 use super::plan::{Action, Call, Input, Plan, Step};
@@ -29,51 +32,6 @@ pub(super) const OPERATORS: [(&str, &str); 14] = [
     ("GT", ">"),
     ("GE", ">="),
 ];
-
-/// A text that grows, with its places.
-#[derive(Debug, Default)]
-pub(crate) struct Text {
-    pub(crate) body: String,
-    /// Ascending: from which byte on, and where that comes from.
-    places: Vec<(usize, Range<usize>)>,
-}
-
-impl Text {
-    /// A text that stands in the file as it is.
-    pub(crate) fn verbatim(text: &Name) -> Self {
-        let mut verbatim = Self::default();
-        let mut at = text.span().start;
-        for line in text.split_inclusive('\n') {
-            verbatim.push(line, at..at + line.len());
-            at += line.len();
-        }
-        verbatim
-    }
-
-    pub(crate) fn push(&mut self, text: &str, place: Range<usize>) {
-        self.places.push((self.body.len(), place));
-        self.body.push_str(text);
-    }
-
-    /// The place in the file of a place in the text.
-    pub(crate) fn place(&self, span: &Range<usize>) -> Range<usize> {
-        let next = self
-            .places
-            .partition_point(|(start, _)| *start <= span.start);
-        match next.checked_sub(1).and_then(|last| self.places.get(last)) {
-            None => self.places.first().map_or(0..0, |(_, place)| place.clone()),
-            Some((start, place)) => {
-                let within = span.start - start;
-                // Whole lines and names were taken as they are; of the rest the whole is meant.
-                if within < place.len() && within > 0 {
-                    place.start + within..(place.start + within + span.len()).min(place.end)
-                } else {
-                    place.clone()
-                }
-            }
-        }
-    }
-}
 
 /// Writes the statements of one unit.
 pub(crate) struct Statements<'a> {
@@ -120,6 +78,8 @@ impl<'a> Statements<'a> {
                 self.push(&format!("(* {line} *)\n"), &step.span);
             }
             match &step.action {
+                // More are an error that is said where they are planned.
+                Action::Jump { .. } if jumps.len() >= super::plan::MAXIMUM_JUMPS => {}
                 Action::Jump { label, power } => {
                     let done = self.jump(&jumps, power, &step.span);
                     let label = label.as_ref().map(|label| label.to_uppercase());

@@ -8,8 +8,18 @@ use super::{Action, Plan};
 use crate::plcopen::document::Graph;
 use crate::plcopen::power::Power;
 
+/// Jumps of a body, each of which what it may skip asks.
+pub(crate) const MAXIMUM_JUMPS: usize = 64;
+
 /// Says what is wrong with the jumps and labels of a plan.
 pub(super) fn check(graph: &Graph, plan: &Plan, diagnostics: &mut Vec<Diagnostic>) {
+    let jumps = plan.steps.iter();
+    let mut jumps = jumps.filter(|step| matches!(step.action, Action::Jump { .. }));
+    if let Some(step) = jumps.nth(MAXIMUM_JUMPS) {
+        let message = format!("a body has more than {MAXIMUM_JUMPS} jumps");
+        diagnostics.push(Diagnostic::error("U1016", message, step.span.clone()));
+        return;
+    }
     let mut labels: HashMap<String, usize> = HashMap::new();
     for (place, step) in plan.steps.iter().enumerate() {
         if let Action::Label(name) = &step.action
