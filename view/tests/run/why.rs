@@ -50,7 +50,8 @@ fn what_is_not_there_is_said() {
     let check = |signal: &str, cycle: Option<i64>, code: &str, expected: &str| {
         let error = model.why(signal, cycle).expect_err("it has no answer");
         assert_eq!(error.code(), code);
-        assert_eq!(error.to_string(), expected);
+        assert_eq!(error.words(), expected);
+        assert_eq!(error.to_string(), format!("{code}: {expected}"));
     };
     check(
         "move_don",
