@@ -15,6 +15,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
+use understudy_bus::HostEvent;
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_simulator::{Action, Referee, Violation};
@@ -120,6 +121,8 @@ pub struct Account {
     pub(crate) violation_count: u64,
     pub(crate) during: Vec<(During, RangeFinding)>,
     pub(crate) refused: Vec<(String, String)>,
+    /// Records that parties could not write, because their journals were too slow.
+    pub(crate) unwritten: BTreeMap<Party, u64>,
     pub(crate) interrupted: bool,
     /// Whether everybody was in step in the last cycle of the scenario.
     pub(crate) protected: bool,
@@ -157,6 +160,7 @@ impl Account {
                 .map(|during| (during.clone(), RangeFinding::default()))
                 .collect(),
             refused: Vec::new(),
+            unwritten: BTreeMap::new(),
             interrupted: false,
             protected: false,
             records: 0,
@@ -226,6 +230,9 @@ impl Account {
                 self.remote_io(program, event);
             }
             (Happening::Plant(event), Some(Party::Plant(program))) => self.plant(program, event),
+            (Happening::Host(HostEvent::JournalLost { records }), Some(party)) => {
+                self.unwritten(party, *records);
+            }
             (Happening::Run(event), _) => self.run(event),
             _ => {}
         }
@@ -381,6 +388,15 @@ impl Account {
             | RunEvent::Detached { .. }
             | RunEvent::Ended { .. }
             | RunEvent::Finished => {}
+        }
+    }
+
+    fn unwritten(&mut self, party: Party, records: u64) {
+        *self.unwritten.entry(party).or_default() += records;
+        if let Party::RemoteIo(program) = party
+            && let Some(referee) = self.terms.referees.get_mut(program.index())
+        {
+            referee.misses_records();
         }
     }
 

@@ -279,6 +279,17 @@ fn expectations(
         summary.violation_count,
         0,
     )];
+    for (party, records) in &account.unwritten {
+        if matches!(party, Party::RemoteIo(_)) {
+            list.push(ExpectationSummary {
+                expected: format!("all that {} drove is judged", account.terms.parties.name(*party)),
+                found: format!(
+                    "its journal lost {records} records on a host that was too slow to write them; what came after was not judged"
+                ),
+                met: false,
+            });
+        }
+    }
     if let Some(held) = expect.held {
         list.push(at_most(
             "cycles held",

@@ -191,6 +191,45 @@ fn an_output_that_was_changed_is_found() {
     assert!(!lacking.passed);
 }
 
+/// A remote I/O whose journal was too slow has not driven anything wrong; it has not been judged, which is no pass.
+#[test]
+fn what_was_not_written_is_not_judged_and_is_said() {
+    use understudy_bus::HostEvent;
+    use understudy_remote_io::Event;
+    use understudy_scenarios::Happening;
+
+    let text = "title = \"Quiet\"\ncycles = 60\n[expect]\nwrong = 0\n";
+    let (bytes, summary, _) = run(Mode::Full, text, 3);
+    assert!(summary.passed);
+    let mut samples = 0;
+    let lacking = account_of(&bytes, text, |record| {
+        let sampled = record.name == "press-io"
+            && matches!(record.event, Happening::RemoteIo(Event::Sampled { .. }));
+        samples += usize::from(sampled);
+        if !(sampled && samples == 30) {
+            return Some(record);
+        }
+        Some(Record {
+            event: Happening::Host(HostEvent::JournalLost { records: 1 }),
+            ..record
+        })
+    });
+    assert_eq!(lacking.violation_count, 0, "{:?}", lacking.violations);
+    assert!(!lacking.passed);
+    let unmet: Vec<&str> = lacking
+        .expectations
+        .iter()
+        .filter(|expectation| !expectation.met)
+        .map(|expectation| expectation.found.as_str())
+        .collect();
+    assert_eq!(
+        unmet,
+        [
+            "its journal lost 1 records on a host that was too slow to write them; what came after was not judged"
+        ]
+    );
+}
+
 /// Held cycles count against the cluster, but for those in which the host under it did not run.
 #[test]
 fn what_a_stall_explains_is_apart() {

@@ -134,6 +134,14 @@ impl History {
         self.referee.saw(sensors);
     }
 
+    /// Records of its remote I/O are missing here; where the program stands is known again when a station says what it holds.
+    pub(crate) fn misses_records(&mut self) {
+        self.referee.misses_records();
+        self.cut = true;
+        self.unplaced.clear();
+        self.awaited = None;
+    }
+
     /// A station holds this state after the sample of `moment`: where a journal begins in the middle of a run, it is known from here on.
     pub(crate) fn holds(&mut self, moment: Moment, lineage: Lineage, state: &Image) {
         if self.referee.standing().is_some() {

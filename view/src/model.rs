@@ -269,10 +269,19 @@ impl Model {
                 self.alarms
                     .over(&(record.name.clone(), "field-lost"), cycle);
             }
+            (HostEvent::JournalLost { .. }, Party::RemoteIo(program)) => {
+                self.misses_records(program)
+            }
             (HostEvent::Exchange(_), _) => return,
             _ => {}
         }
         self.happened(record, cycle, None);
+    }
+
+    fn misses_records(&mut self, program: ProgramId) {
+        if let Some(history) = self.histories.get_mut(program.index()) {
+            history.misses_records();
+        }
     }
 
     fn run(&mut self, record: &Record, event: &RunEvent) {
@@ -328,6 +337,10 @@ impl Model {
                 self.alarms.over(&(name, "ended"), cycle);
             }
             RunEvent::Acknowledged(seen) => self.alarms.acknowledged(seen, cycle),
+            // What it said before it was heard again is not known here.
+            RunEvent::Attached {
+                party: Party::RemoteIo(program),
+            } => self.misses_records(*program),
             RunEvent::Commanded { .. } | RunEvent::Attached { .. } | RunEvent::Detached { .. } => {}
         }
         self.happened(record, cycle, None);

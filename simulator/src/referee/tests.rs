@@ -161,3 +161,38 @@ fn a_program_goes_on_only_from_what_its_plant_has_seen() {
     ];
     check(&[&start[..], &resumed].concat(), false);
 }
+
+#[test]
+fn what_follows_missing_records_is_not_judged_until_a_state_is_known() {
+    let mut referee = referee();
+    for event in [born(), sampled(1, true), applied(1, true, Source::Direct)] {
+        assert_eq!(referee.observe(&event), Ok(()), "{event:?}");
+    }
+    let (lineage, _) = referee.standing().expect("it was born");
+    referee.misses_records();
+    assert_eq!(referee.standing(), None);
+    // Whether these are true nobody can say, and that they are not the fail-safe values everybody can.
+    for event in [
+        applied(5, false, Source::Held),
+        sampled(6, true),
+        applied(6, true, Source::Reconstructed),
+        Event::Voided {
+            moment: moment(7),
+            samples: 1,
+            lineage: lineage
+                .after(&bit(false))
+                .after(&bit(false))
+                .after(&bit(false)),
+        },
+        applied(7, true, Source::Direct),
+    ] {
+        assert_eq!(referee.observe(&event), Ok(()), "{event:?}");
+    }
+    let wrong = referee.observe(&applied(8, true, Source::FailSafe));
+    assert!(wrong.is_err(), "{wrong:?}");
+    // From a state that is known it judges again: x = 1 and u = 1 give 0.
+    referee.goes_on_from(lineage, bit(true));
+    assert_eq!(referee.observe(&sampled(9, true)), Ok(()));
+    let wrong = referee.observe(&applied(9, true, Source::Direct));
+    assert!(wrong.is_err(), "{wrong:?}");
+}
