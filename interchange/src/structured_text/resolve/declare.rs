@@ -414,7 +414,7 @@ impl Resolver {
     }
 
     /// A bit of a block, which begins with 0.
-    fn add_bit(&mut self, name: String, role: Role, span: &Range<usize>) -> usize {
+    pub(super) fn add_bit(&mut self, name: String, role: Role, span: &Range<usize>) -> usize {
         let cell = Cell {
             name: if role == Role::Pin {
                 name

@@ -5,7 +5,7 @@ use std::ops::Range;
 use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{Name, Relation};
 
-use super::super::program::{Action, Cell, Kind, Number, Role, Truth};
+use super::super::program::{Action, Number, Role, Truth};
 use super::super::syntax::{Argument, UnitKind};
 use super::expression::Value;
 use super::types::whole_range;
@@ -167,16 +167,7 @@ impl Resolver {
         if matches!(truth, Truth::Cell(_) | Truth::Constant(_)) {
             return truth;
         }
-        let cell = Cell {
-            name: self.unique("chosen"),
-            kind: Kind::Truth,
-            role: Role::Memory,
-            initial: 0,
-            is_given: false,
-            address: None,
-            description: None,
-        };
-        let cell = self.add_cell(cell, span.clone());
+        let cell = self.add_bit("chosen".to_owned(), Role::Memory, span);
         if self.is_full {
             return Truth::Constant(false);
         }

@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use super::super::program::{Action, Cell, Kind, Role, Truth};
+use super::super::program::{Action, Role, Truth};
 use super::super::syntax::{Leave, Statement, StatementKind, Unit};
 use super::Resolver;
 
@@ -121,16 +121,7 @@ impl Resolver {
 
     /// A bit that is 0 from here.
     fn flag(&mut self, wanted: &str, span: Range<usize>) -> usize {
-        let cell = Cell {
-            name: self.unique(wanted),
-            kind: Kind::Truth,
-            role: Role::Memory,
-            initial: 0,
-            is_given: false,
-            address: None,
-            description: None,
-        };
-        let cell = self.add_cell(cell, span.clone());
+        let cell = self.add_bit(wanted.to_owned(), Role::Memory, &span);
         let action = Action::SetTruth(cell, Truth::Constant(false));
         self.push(action, span, Vec::new());
         cell
