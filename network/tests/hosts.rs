@@ -11,7 +11,7 @@ use std::time::Duration;
 use understudy_network::{Hosts, NetworkError, Share};
 
 /// For what comes at once or never.
-const PATIENCE: Duration = Duration::from_millis(500);
+const PATIENCE: Duration = Duration::from_secs(2);
 
 fn hosts(count: usize) -> Option<Hosts> {
     let names: Vec<String> = (0..count).map(|number| format!("host-{number}")).collect();

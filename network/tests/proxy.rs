@@ -9,7 +9,7 @@ use understudy_network::{
 };
 
 /// Past it a test has failed.
-const DEADLINE: Duration = Duration::from_secs(20);
+const DEADLINE: Duration = Duration::from_secs(60);
 /// For what must not come at all.
 const MOMENT: Duration = Duration::from_millis(200);
 
