@@ -334,7 +334,7 @@ impl Diagrams {
             .with_manager_shared(|manager| manager.workers().install(work))
     }
 
-    /// What `operation` makes; where it finds no free node and the order may change, once more in a better one.
+    /// What `operation` makes; where it finds no free node, once more without the dead ones, or in a better order if it may change.
     fn made(
         &self,
         operation: impl Fn() -> AllocResult<BDDFunction> + Sync,
@@ -348,13 +348,29 @@ impl Diagrams {
             } else if need.make_room(&self.manager) {
                 made = self.deep(&operation);
             }
+        } else if made.is_err() && self.makes_room() {
+            made = self.deep(&operation);
         }
         made.map(Diagram)
             .map_err(|_| BddError::TooManyNodes { limit: self.limit })
     }
 
+    /// Removes dead nodes; whether they were an eighth of all, so that another try is worth while.
+    fn makes_room(&self) -> bool {
+        if self.variables.len() > SHALLOW {
+            // Somebody may be at work on the deep stack, and who waited here for being alone would wait for ever.
+            return false;
+        }
+        self.collect_garbage();
+        let nodes = self
+            .manager
+            .with_manager_shared(|manager| manager.num_inner_nodes());
+        nodes < self.limit / 8 * 7
+    }
+
+    /// Alone with the diagrams: where the library's own collection is still at work, it is waited for.
     fn collect_garbage(&self) {
-        self.manager.with_manager_shared(|manager| manager.gc());
+        self.manager.with_manager_exclusive(|manager| manager.gc());
     }
 }
 
@@ -389,7 +405,7 @@ impl Builder<'_> {
     /// Too many nodes even for this one alone, or a variable that is not declared.
     pub fn diagram(&mut self, root: Expression) -> Result<Diagram, BddError> {
         let diagrams = self.diagrams;
-        let mut make = || match self.make(root) {
+        match self.make(root) {
             Err(BddError::TooManyNodes { .. }) => {
                 // What is remembered for sharing may be what fills the memory.
                 self.made.clear();
@@ -397,12 +413,6 @@ impl Builder<'_> {
                 self.make(root)
             }
             result => result,
-        };
-        // A new order wants the diagrams for itself; with one, each operation goes to the deep stack by itself.
-        if diagrams.need.is_some() {
-            make()
-        } else {
-            diagrams.deep(make)
         }
     }
 

@@ -52,6 +52,10 @@ pub(crate) struct Seen<'a> {
 /// Operations, each on 64 scans, before anybody is asked whether to go on: so a small program is listed whole on any machine.
 const AT_LEAST: usize = 20_000_000;
 
+/// Operations of a list that takes about half a second, and what finding one state among those that are known is worth.
+const FEW: usize = 500_000_000;
+const LOOKING_UP: usize = 16;
+
 /// Where a state was first entered from: registers, and the inputs of the scan.
 #[derive(Debug, Clone, Copy)]
 struct Origin {
@@ -102,6 +106,14 @@ impl Explicit {
         error.map_or(Ok(listed), Err)
     }
 
+    /// So many states, with inputs, that listing them takes about half a second: a large program has fewer.
+    pub(crate) fn few(circuit: &Circuit) -> usize {
+        let ways = 1 << circuit.inputs().len().min(MAXIMUM_INPUTS);
+        let registers = circuit.registers().len().next_multiple_of(64);
+        let scan = Scan::new(circuit).instruction_count() + 2 * registers;
+        FEW / (blocks(ways) * scan + ways * LOOKING_UP) * ways
+    }
+
     /// Lists states, the nearest first, and shows every scan from them to `see`. With an error the list is not complete.
     pub(crate) fn explore(
         circuit: &Circuit,
@@ -125,7 +137,7 @@ impl Explicit {
         if inputs > MAXIMUM_INPUTS {
             return (listed, Some(ExplicitError::Inputs { inputs }));
         }
-        let work = listed.scan.instruction_count() * listed.ways.div_ceil(64);
+        let work = listed.scan.instruction_count() * blocks(listed.ways);
         let at_least = AT_LEAST / work.max(1);
         let hasher = FxBuildHasher;
         let mut known: HashTable<u32> = HashTable::new();
@@ -140,7 +152,7 @@ impl Explicit {
             if from >= at_least && from.is_multiple_of(64) && !go_on(Work::States(from)) {
                 return (listed, Some(ExplicitError::Time { states: from }));
             }
-            for block in 0..listed.ways.div_ceil(64) {
+            for block in 0..blocks(listed.ways) {
                 lanes.scan(&listed, from, block);
                 see(Seen {
                     from,
@@ -209,6 +221,11 @@ impl Explicit {
         run.reverse();
         run
     }
+}
+
+/// Scans of 64 ways on at once.
+fn blocks(ways: usize) -> usize {
+    ways.div_ceil(64)
 }
 
 /// 64 scans from one x.

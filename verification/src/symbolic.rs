@@ -82,7 +82,8 @@ pub struct Checker<'c> {
     nodes: usize,
     go_on: GoOn<'c>,
     reorders: bool,
-    models: Vec<model::Model<'c>>,
+    /// That of the last property, for the next one that depends on the same part of the circuit.
+    model: Option<model::Model<'c>>,
     /// The part of the circuit that was too large, and why: it is not tried again.
     too_large: Option<(Cone, Stopped)>,
 }
@@ -106,7 +107,7 @@ impl<'c> Checker<'c> {
             nodes,
             go_on: ALWAYS,
             reorders: true,
-            models: Vec::new(),
+            model: None,
             too_large: None,
         }
     }
@@ -138,34 +139,32 @@ impl<'c> Checker<'c> {
         }) {
             return Err(*error);
         }
-        let known = self.models.iter().position(|model| model.cone == cone);
-        let model = match known {
-            Some(place) => &mut self.models[place],
-            None => {
-                // What other properties need is dropped: the bound is on what is alive at once.
-                self.models.clear();
-                let (nodes, reorders) = (self.nodes, self.reorders);
-                let model = model::Model::new(
-                    self.circuit,
-                    cone.clone(),
-                    &self.fair,
-                    |order| {
-                        let diagrams = Diagrams::new(order, nodes);
-                        if reorders {
-                            diagrams.reordered_by_need()
-                        } else {
-                            diagrams
-                        }
-                    },
-                    self.go_on,
-                );
-                if let Err(error) = &model {
-                    self.too_large = Some((cone, *error));
-                }
-                self.models.push(model?);
-                &mut self.models[0]
+        let known = self.model.take();
+        let known = known.filter(|model| model.cone.variables == cone.variables);
+        let mut model = match known {
+            Some(model) => model,
+            // What other properties need is dropped: the bound is on what is alive at once.
+            None => self.model_of(&cone).inspect_err(|&error| {
+                self.too_large = Some((cone.clone(), error));
+            })?,
+        };
+        model.show(cone)?;
+        let verdict = check::check(&model, property);
+        self.model = Some(model);
+        verdict
+    }
+
+    fn model_of(&self, cone: &Cone) -> Result<model::Model<'c>, Stopped> {
+        let (nodes, reorders) = (self.nodes, self.reorders);
+        let diagrams = |order| {
+            let diagrams = Diagrams::new(order, nodes);
+            if reorders {
+                diagrams.reordered_by_need()
+            } else {
+                diagrams
             }
         };
-        check::check(model, property)
+        let (cone, fair) = (cone.clone(), &self.fair);
+        model::Model::new(self.circuit, cone, fair, diagrams, self.go_on)
     }
 }

@@ -94,7 +94,7 @@ impl Need {
 
 /// Living nodes, after dead ones have been removed.
 fn alive(manager: &BDDManagerRef) -> usize {
-    manager.with_manager_shared(|manager| manager.gc());
+    manager.with_manager_exclusive(|manager| manager.gc());
     alive_now(manager)
 }
 

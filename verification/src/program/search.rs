@@ -12,8 +12,6 @@ use crate::symbolic::{Checker, Resolved, Signal, Verdict};
 
 /// Nodes for one question: these are many, and none of them was asked for.
 const NODES: usize = 200_000;
-/// States of the first list, with inputs.
-const FEW_STATES: usize = 1 << 23;
 /// Questions for which diagrams may grow too large before they are given up.
 const REFUSED: u32 = 3;
 /// Questions that clauses are tried on, the scans of their runs, and the steps of each search.
@@ -52,7 +50,7 @@ impl<'a> Search<'a> {
     pub(super) fn new(circuit: &'a Circuit, bounds: Bounds<'a>) -> Self {
         let count = circuit.outputs().len();
         let questions: Vec<Resolved> = (0..count).map(asked).collect();
-        let few = FEW_STATES.min(bounds.states);
+        let few = Explicit::few(circuit).min(bounds.states);
         let (listed, seen, error) = list(circuit, few, bounds);
         Self {
             circuit,

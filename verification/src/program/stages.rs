@@ -22,8 +22,6 @@ use crate::symbolic::{Checker, Cone, Resolved, Verdict, rows};
 
 /// Nodes of the first and the second try.
 const NODES: [usize; 2] = [1 << 17, 1 << 20];
-/// States, with inputs, of the first list: less than a second.
-const FEW_STATES: usize = 1 << 23;
 /// Parts of a program that may be too large before diagrams of that many nodes are given up.
 const REFUSED: u32 = 3;
 /// The first induction: its scans, and the steps of each search.
@@ -103,11 +101,12 @@ impl<'s, 'b> Stages<'s, 'b> {
         let all = self.bounds.nodes;
         self.diagrams(few.min(all));
         self.induction(FEW_SCANS.min(self.bounds.scans), FEW_STEPS);
-        let listed = self.list(FEW_STATES.min(self.bounds.states));
+        let few_states = Explicit::few(&self.subject.circuit).min(self.bounds.states);
+        let listed = self.list(few_states);
         if all > few {
             self.diagrams(more.min(all));
         }
-        if matches!(listed, Some(ExplicitError::States { .. })) && self.bounds.states > FEW_STATES {
+        if matches!(listed, Some(ExplicitError::States { .. })) && self.bounds.states > few_states {
             self.list(self.bounds.states);
         }
         if all > more {

@@ -41,7 +41,7 @@ impl Model<'_> {
             Core::Next(inner) => self.before(&self.fair_only(&self.states(inner)?)?)?,
             Core::Until(hold, end) => {
                 let (hold, end) = (self.states(hold)?, self.fair_only(&self.states(end)?)?);
-                self.rings(&hold, &end)?.pop().unwrap_or(end)
+                self.until(&hold, end)?
             }
             Core::Always(inner) => self.always(&self.states(inner)?)?,
             Core::Reaches(scans, inner) => {
@@ -65,6 +65,20 @@ impl Model<'_> {
         }
     }
 
+    /// E[hold U end]. Each step goes back from all that was found, not only from what came last: that is mostly the simpler set, and most of the step is
+    /// remembered from the one before.
+    fn until(&self, hold: &Diagram, end: Diagram) -> Result<Diagram, Stopped> {
+        let mut found = end;
+        loop {
+            let entering = self.diagrams.and(hold, &self.before(&found)?)?;
+            let next = self.diagrams.or(&found, &entering)?;
+            if next == found {
+                return Ok(found);
+            }
+            found = next;
+        }
+    }
+
     /// E[hold U end] by the number of steps: ring k holds the states that need at most k; the last ring is the fixed point.
     pub(super) fn rings(&self, hold: &Diagram, end: &Diagram) -> Result<Vec<Diagram>, Stopped> {
         self.within(u32::MAX, hold, end)
@@ -78,16 +92,13 @@ impl Model<'_> {
         end: &Diagram,
     ) -> Result<Vec<Diagram>, Stopped> {
         let mut rings = vec![end.clone()];
-        let mut newest = end.clone();
         for _ in 0..scans {
             let last = &rings[rings.len() - 1];
-            // Only what came last can lead to something new.
-            let entering = self.diagrams.and(hold, &self.before(&newest)?)?;
+            let entering = self.diagrams.and(hold, &self.before(last)?)?;
             let next = self.diagrams.or(last, &entering)?;
             if next == *last {
                 break;
             }
-            newest = self.diagrams.and(&next, &self.diagrams.not(last)?)?;
             rings.push(next);
         }
         Ok(rings)
@@ -118,7 +129,7 @@ impl Model<'_> {
             }
             for condition in &self.fair {
                 let end = diagrams.and(&next, condition)?;
-                let to_end = self.rings(set, &end)?.pop().unwrap_or(end);
+                let to_end = self.until(set, end)?;
                 next = diagrams.and(&next, &self.before(&to_end)?)?;
             }
             if next == kept {

@@ -112,14 +112,6 @@ impl<'c> Model<'c> {
             let next = builder.diagram(circuit.registers()[register as usize].next)?;
             pairs.push((Variable::Register(register), next));
         }
-        let mut signals = Vec::new();
-        for &signal in &cone.signals {
-            let diagram = match signal {
-                Signal::Output(output) => builder.diagram(circuit.outputs()[output].value)?,
-                Signal::Input(input) => diagrams.variable(Variable::Input(input as u32))?,
-            };
-            signals.push((signal, diagram));
-        }
         drop(builder);
         let step = diagrams.substitution(pairs)?;
         let mut model = Self {
@@ -130,10 +122,11 @@ impl<'c> Model<'c> {
             diagrams,
             inputs,
             step,
-            signals,
+            signals: Vec::new(),
             fair: Vec::new(),
             fair_states: None,
         };
+        model.show_signals()?;
         for condition in fair {
             let condition = model.states(&Core::of(condition))?;
             model.fair.push(condition);
@@ -143,6 +136,29 @@ impl<'c> Model<'c> {
             model.fair_states = Some(model.always(&everywhere)?);
         }
         Ok(model)
+    }
+
+    /// The same part of the circuit for a property with the signals of `cone`.
+    pub(super) fn show(&mut self, cone: Cone) -> Result<(), Stopped> {
+        debug_assert_eq!(self.cone.variables, cone.variables);
+        self.cone = cone;
+        self.show_signals()
+    }
+
+    /// Makes the diagrams of the signals, and drops those of others.
+    fn show_signals(&mut self) -> Result<(), Stopped> {
+        self.signals.clear();
+        let mut builder = self
+            .diagrams
+            .builder(self.circuit.graph(), |variable| variable);
+        for &signal in &self.cone.signals {
+            let diagram = match signal {
+                Signal::Output(output) => builder.diagram(self.circuit.outputs()[output].value)?,
+                Signal::Input(input) => self.diagrams.variable(Variable::Input(input as u32))?,
+            };
+            self.signals.push((signal, diagram));
+        }
+        Ok(())
     }
 
     pub(super) fn signal(&self, signal: Signal) -> &Diagram {
