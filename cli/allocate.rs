@@ -172,7 +172,7 @@ fn plan(arguments: &Arguments) -> Result<Answer, Answer> {
         Status::Failed
     };
     let answer = Answer::done(answer_text, json!(found)).with_status(status);
-    Ok(answer.with_reports(programs.reports))
+    Ok(answer.with_used(programs.reports))
 }
 
 /// The text of an error behind its code.

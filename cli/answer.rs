@@ -47,6 +47,8 @@ pub(crate) struct Answer {
     pub(crate) numbers: Box<Map<String, Value>>,
     /// Files that were read, with what was found in them.
     pub(crate) reports: Vec<Report>,
+    /// Nobody asked about the files: people are told how many warnings there are, and where to see them.
+    pub(crate) counts_warnings: bool,
     pub(crate) failures: Vec<Failure>,
 }
 
@@ -58,6 +60,7 @@ impl Answer {
             result: serde_json::to_value(result).unwrap_or(Value::Null),
             numbers: Box::default(),
             reports: Vec::new(),
+            counts_warnings: false,
             failures: Vec::new(),
         }
     }
@@ -76,6 +79,14 @@ impl Answer {
     pub(crate) fn with_reports(mut self, reports: Vec<Report>) -> Self {
         self.reports = reports;
         self
+    }
+
+    /// Files that the command used: their warnings are counted for people, and told whole to machines.
+    pub(crate) fn with_used(self, reports: Vec<Report>) -> Self {
+        Self {
+            counts_warnings: true,
+            ..self.with_reports(reports)
+        }
     }
 
     pub(crate) fn with_numbers(mut self, numbers: Map<String, Value>) -> Self {

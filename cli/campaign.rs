@@ -161,7 +161,7 @@ fn campaign(
         .map_err(|error| Answer::failed(Status::Failed, "U0530", error.to_string()))?;
     let took = start.elapsed();
     bar.finish_and_clear();
-    let mut answer = kept(&findings, arguments.out.as_deref())?.with_reports(reports);
+    let mut answer = kept(&findings, arguments.out.as_deref())?.with_used(reports);
     if interrupted.load(Ordering::Relaxed) {
         answer.text.push_str(&format!(
             "interrupted: these are partial findings, of {} of {} runs\n",

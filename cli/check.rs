@@ -13,15 +13,15 @@ use understudy_cluster::{Cluster, Overrides};
 use understudy_diagnostic::{Diagnostic, Report, Severity, has_errors};
 use understudy_interchange::parse_program;
 use understudy_ladder::parse_time;
-use understudy_reconfiguration::project::looks_like_a_project;
-use understudy_scenarios::{Parties, looks_like_a_scenario, read};
+use understudy_scenarios::{Parties, read};
 use understudy_supervisor::ladder::read_map;
 use understudy_supervisor::petri::read_net;
-use understudy_supervisor::{FileKind, read_ads};
+use understudy_supervisor::read_ads;
 
 use crate::answer::{Answer, Failure, Status};
 use crate::automata;
-use crate::files::read_cluster;
+use crate::files::{read_cluster, unreadable};
+use crate::kind::Kind;
 use crate::reconfigure::read_project;
 use remarks::Looking;
 
@@ -73,7 +73,7 @@ struct CheckedFile {
 #[derive(Default)]
 struct Found {
     cut_short: Vec<String>,
-    reports: Vec<(&'static str, Report)>,
+    reports: Vec<(Kind, Report)>,
     failures: Vec<Failure>,
     unreadable: Vec<String>,
 }
@@ -87,38 +87,42 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         let Some(text) = found.text(path) else {
             continue;
         };
-        let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
-        let is_toml = ending == "toml";
-        let kind = FileKind::of(&text).filter(|_| is_toml);
-        if ending == "ads" {
-            let diagnostics = read_ads(&text).diagnostics;
-            found.add_file("ADS", path, text, diagnostics);
-        } else if let Some(kind) = kind {
-            found.add_kind(kind, path, text);
-        } else if !is_toml {
-            let parsed = parse_program(&path.display().to_string(), &text);
-            let mut diagnostics = parsed.diagnostics;
-            if !has_errors(&diagnostics)
-                && looking.at_rungs(&parsed.program, PERIOD, &mut diagnostics)
-            {
-                found.cut_short.push(path.display().to_string());
+        match Kind::of(path, &text) {
+            Kind::Ads => {
+                let diagnostics = read_ads(&text).diagnostics;
+                found.add_file(Kind::Ads, path, text, diagnostics);
             }
-            found.add_file("ladder", path, text, diagnostics);
-        } else if looks_like_a_scenario(&text) {
-            scenarios.push((path, text));
-        } else if looks_like_a_project(&text) {
-            for (index, report) in read_project(path, &text).reports.into_iter().enumerate() {
-                found.add(if index == 0 { "project" } else { "ladder" }, report);
+            Kind::Net => {
+                let diagnostics = read_net(&text).diagnostics;
+                found.add_file(Kind::Net, path, text, diagnostics);
             }
-        } else {
-            let mut loaded = read_cluster(path, &text, Overrides::default());
-            if let Some(cluster) = &loaded.cluster {
-                found.look(&looking, cluster, &mut loaded.reports);
+            Kind::Map => {
+                let diagnostics = read_map(&text).diagnostics;
+                found.add_file(Kind::Map, path, text, diagnostics);
             }
-            for (index, report) in loaded.reports.into_iter().enumerate() {
-                found.add(if index == 0 { "cluster" } else { "ladder" }, report);
+            Kind::Model => found.add_model(path),
+            Kind::Ladder => {
+                let parsed = parse_program(&path.display().to_string(), &text);
+                let mut diagnostics = parsed.diagnostics;
+                if !has_errors(&diagnostics)
+                    && looking.at_rungs(&parsed.program, PERIOD, &mut diagnostics)
+                {
+                    found.cut_short.push(path.display().to_string());
+                }
+                found.add_file(Kind::Ladder, path, text, diagnostics);
             }
-            clusters.extend(loaded.cluster.as_ref().map(Parties::of));
+            Kind::Scenario => scenarios.push((path, text)),
+            Kind::Project => {
+                found.add_with_ladders(Kind::Project, read_project(path, &text).reports);
+            }
+            Kind::Cluster => {
+                let mut loaded = read_cluster(path, &text, Overrides::default());
+                if let Some(cluster) = &loaded.cluster {
+                    found.look(&looking, cluster, &mut loaded.reports);
+                }
+                found.add_with_ladders(Kind::Cluster, loaded.reports);
+                clusters.extend(loaded.cluster.as_ref().map(Parties::of));
+            }
         }
     }
     for (path, text) in scenarios {
@@ -127,7 +131,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
             _ => parties_beside(path),
         };
         let scenario = read(&path.display().to_string(), &text, parties.as_ref());
-        found.add("scenario", scenario.report);
+        found.add(Kind::Scenario, scenario.report);
     }
     found.answer()
 }
@@ -171,20 +175,14 @@ impl Found {
                 self.unreadable.push(path.display().to_string());
                 self.failures.push(Failure {
                     code: "U0601".to_owned(),
-                    message: format!("{} cannot be read: {error}", path.display()),
+                    message: unreadable(path, &error),
                 });
                 None
             }
         }
     }
 
-    fn add_file(
-        &mut self,
-        kind: &'static str,
-        path: &Path,
-        text: String,
-        diagnostics: Vec<Diagnostic>,
-    ) {
+    fn add_file(&mut self, kind: Kind, path: &Path, text: String, diagnostics: Vec<Diagnostic>) {
         let report = Report {
             name: path.display().to_string(),
             text,
@@ -193,35 +191,31 @@ impl Found {
         self.add(kind, report);
     }
 
-    fn add_kind(&mut self, kind: FileKind, path: &Path, text: String) {
-        match kind {
-            FileKind::Net => {
-                let diagnostics = read_net(&text).diagnostics;
-                self.add_file("net", path, text, diagnostics);
-            }
-            FileKind::SignalMap => {
-                let diagnostics = read_map(&text).diagnostics;
-                self.add_file("map", path, text, diagnostics);
-            }
-            FileKind::Model => {
-                let reports = match automata::model(path) {
-                    Ok(sources) => sources.reports,
-                    Err(answer) => answer.reports,
-                };
-                for (index, report) in reports.into_iter().enumerate() {
-                    let kind = match index {
-                        0 => "model",
-                        _ if report.name.ends_with(".toml") => "net",
-                        _ => "ADS",
-                    };
-                    self.add(kind, report);
-                }
-            }
+    /// A model, and the nets and automata that it names.
+    fn add_model(&mut self, path: &Path) {
+        let reports = match automata::model(path) {
+            Ok(sources) => sources.reports,
+            Err(answer) => answer.reports,
+        };
+        for (index, report) in reports.into_iter().enumerate() {
+            let kind = match index {
+                0 => Kind::Model,
+                _ if report.name.ends_with(".toml") => Kind::Net,
+                _ => Kind::Ads,
+            };
+            self.add(kind, report);
+        }
+    }
+
+    /// A file, and the ladders that it names.
+    fn add_with_ladders(&mut self, kind: Kind, reports: Vec<Report>) {
+        for (index, report) in reports.into_iter().enumerate() {
+            self.add(if index == 0 { kind } else { Kind::Ladder }, report);
         }
     }
 
     /// A ladder that two clusters name, or that is also given by itself, is reported once.
-    fn add(&mut self, kind: &'static str, report: Report) {
+    fn add(&mut self, kind: Kind, report: Report) {
         if !self
             .reports
             .iter()
@@ -240,7 +234,7 @@ impl Found {
         };
         let checked = self.reports.iter().map(|(kind, report)| CheckedFile {
             name: report.name.clone(),
-            kind: Some(kind),
+            kind: Some(kind.word()),
             errors: count(report, Severity::Error),
             warnings: count(report, Severity::Warning),
             cut_short: self.cut_short.contains(&report.name),

@@ -140,8 +140,13 @@ fn print_json(command: &str, answer: &Answer) -> io::Result<()> {
 }
 
 fn print_text(answer: &Answer) -> io::Result<()> {
-    for report in &answer.reports {
-        print_report(report)?;
+    let has_errors = answer.reports.iter().any(Report::has_errors);
+    if answer.counts_warnings && !has_errors {
+        print_count(&answer.reports)?;
+    } else {
+        for report in &answer.reports {
+            print_report(report)?;
+        }
     }
     let mut output = io::stdout().lock();
     output.write_all(answer.text.as_bytes())?;
@@ -152,14 +157,53 @@ fn print_text(answer: &Answer) -> io::Result<()> {
     let mut errors = io::stderr().lock();
     for failure in &answer.failures {
         // Errors of the crates below begin with their code for those who only see the text.
-        let prefix = format!("{}: ", failure.code);
-        let message = failure
-            .message
-            .strip_prefix(&prefix)
-            .unwrap_or(&failure.message);
+        let message = without_code(&failure.message);
         writeln!(errors, "error[{}]: {message}", failure.code)?;
     }
+    if let Some(failure) = answer.failures.first()
+        && errors.is_terminal()
+    {
+        writeln!(errors, "`understudy explain {}` says more", failure.code)?;
+    }
     Ok(())
+}
+
+/// A message without the code that it begins with.
+fn without_code(message: &str) -> &str {
+    let Some((code, rest)) = message.split_once(": ") else {
+        return message;
+    };
+    let digits = code.strip_prefix('U').unwrap_or_default();
+    if digits.len() == 4 && digits.bytes().all(|byte| byte.is_ascii_digit()) {
+        rest
+    } else {
+        message
+    }
+}
+
+/// How many warnings there are, and where they can be seen: a file that names the others shows theirs too.
+fn print_count(reports: &[Report]) -> io::Result<()> {
+    let count: usize = reports.iter().map(|report| report.diagnostics.len()).sum();
+    let (warnings, them) = match count {
+        0 => return Ok(()),
+        1 => ("1 warning".to_owned(), "it"),
+        _ => (format!("{count} warnings"), "them"),
+    };
+    let names = |report: &Report| report.name.ends_with(".toml");
+    let files: Vec<&str> = match reports.first() {
+        Some(first) if names(first) => vec![&first.name],
+        _ => {
+            let warned = reports
+                .iter()
+                .filter(|report| !report.diagnostics.is_empty());
+            warned.map(|report| report.name.as_str()).collect()
+        }
+    };
+    let files = files.join(" ");
+    writeln!(
+        io::stderr(),
+        "{warnings}; `understudy check {files}` shows {them}"
+    )
 }
 
 /// There may be thousands of diagnostics of one file: its lines are counted once, and all goes out together.

@@ -1,20 +1,66 @@
 //! Reading the files that a command is given.
 
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use understudy_cluster::{Cluster, Loaded, Overrides, TemplateFile};
 use understudy_diagnostic::Report;
+use understudy_diagnostic::spelling::nearest;
 use understudy_scenarios::{Parties, Scenario, read as read_scenario};
 
 use crate::answer::{Answer, Status};
+use crate::kind::{self, Kind};
 
 /// The text of a file; a failure names it and says why not.
 pub(crate) fn text(path: &Path) -> Result<String, Answer> {
-    fs::read_to_string(path).map_err(|error| {
-        let message = format!("{} cannot be read: {error}", path.display());
-        Answer::failed(Status::BadInput, "U0601", message)
-    })
+    fs::read_to_string(path)
+        .map_err(|error| Answer::failed(Status::BadInput, "U0601", unreadable(path, &error)))
+}
+
+/// Files that folders of the project begin with.
+const FIRST_FILES: [&str; 3] = ["cluster.toml", "model.toml", "reconfiguration.toml"];
+
+/// Why a file cannot be read, and which one was probably meant.
+pub(crate) fn unreadable(path: &Path, error: &io::Error) -> String {
+    let (reason, meant) = if path.is_dir() {
+        let first = FIRST_FILES.iter().map(|name| path.join(name));
+        (
+            "it is a folder".to_owned(),
+            first.into_iter().find(|file| file.exists()),
+        )
+    } else {
+        (error.to_string(), nearest_file(path))
+    };
+    let meant = meant.map(|file| format!("; did you mean {}?", file.display()));
+    format!(
+        "{} cannot be read: {reason}{}",
+        path.display(),
+        meant.unwrap_or_default()
+    )
+}
+
+/// The file beside it whose name is nearest.
+fn nearest_file(path: &Path) -> Option<PathBuf> {
+    let folder = path.parent()?;
+    let place = if folder == Path::new("") {
+        Path::new(".")
+    } else {
+        folder
+    };
+    let entries = fs::read_dir(place).ok()?.filter_map(Result::ok);
+    let names: Vec<String> = entries
+        .filter_map(|entry| entry.file_name().into_string().ok())
+        .collect();
+    let name = path.file_name()?.to_str()?;
+    let nearest = nearest(
+        name,
+        names
+            .iter()
+            .map(String::as_str)
+            .filter(|known| *known != name),
+    )?;
+    Some(folder.join(nearest))
 }
 
 /// Writes a file; a failure names it and says why not.
@@ -41,7 +87,9 @@ pub(crate) fn read_cluster(path: &Path, text: &str, overrides: Overrides) -> Loa
 
 /// A cluster without errors, and the files that it came from with their warnings.
 pub(crate) fn cluster(path: &Path, overrides: Overrides) -> Result<(Cluster, Vec<Report>), Answer> {
-    let Loaded { cluster, reports } = read_cluster(path, &text(path)?, overrides);
+    let text = text(path)?;
+    kind::expect(Kind::Cluster, path, &text)?;
+    let Loaded { cluster, reports } = read_cluster(path, &text, overrides);
     match cluster {
         Some(cluster) => Ok((cluster, reports)),
         None => Err(Answer::bad_files(reports)),
@@ -51,6 +99,7 @@ pub(crate) fn cluster(path: &Path, overrides: Overrides) -> Result<(Cluster, Vec
 /// A scenario for a cluster, without errors.
 pub(crate) fn scenario(path: &Path, cluster: &Cluster) -> Result<Scenario, Answer> {
     let text = text(path)?;
+    kind::expect(Kind::Scenario, path, &text)?;
     let found = read_scenario(
         &path.display().to_string(),
         &text,

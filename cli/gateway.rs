@@ -12,6 +12,7 @@ use understudy_gateway::{
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
+use crate::overrides::parse_address;
 
 /// Show a run to other systems: Prometheus, Modbus TCP, JSON over Zenoh; nothing can be written
 #[derive(Debug, Args)]
@@ -36,7 +37,7 @@ enum What {
         #[command(flatten)]
         run: RunArgument,
         /// Where it listens; port 0 for any that is free
-        #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:9464")]
+        #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:9464", value_parser = parse_address)]
         listen: SocketAddr,
         /// Print the metrics of what is in the journal now, and end
         #[arg(long)]
@@ -47,7 +48,7 @@ enum What {
         #[command(flatten)]
         run: RunArgument,
         /// Where it listens; port 0 for any that is free
-        #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:1502")]
+        #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:1502", value_parser = parse_address)]
         listen: SocketAddr,
     },
     /// Print which bit and which register of that server says what
@@ -60,7 +61,7 @@ enum What {
         #[command(flatten)]
         run: RunArgument,
         /// Where it listens, over TCP
-        #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:7447")]
+        #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:7447", value_parser = parse_address)]
         listen: SocketAddr,
         /// How often each document is said, at most, if it changed: 1/s to 50/s
         #[arg(long = "mirror", value_name = "RATE", default_value = "5/s")]

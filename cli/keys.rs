@@ -21,8 +21,8 @@ use crate::files;
 Example:
   understudy keys init cell/cluster.toml --folder cell/keys
   understudy keys list --folder cell/keys
-  understudy keys revoke press --folder cell/keys
-  understudy keys issue cell/cluster.toml press --folder cell/keys
+  understudy keys revoke tank --folder cell/keys
+  understudy keys issue cell/cluster.toml tank --folder cell/keys
 
 `init` issues keys to every party and to one operator. The folder parties/NAME goes to the machine of NAME, and to nobody else
 (docs/deployment.md); the folder authority stays where keys are made.")]

@@ -136,7 +136,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
         arguments.beside.page().as_ref(),
         console,
     )
-    .with_reports(reports)
+    .with_used(reports)
 }
 
 pub(crate) fn scenario_or_undisturbed(
@@ -231,7 +231,13 @@ pub(crate) fn judged(
         ..laboratory_settings(cluster, cluster_file, &arguments.overrides, network)?
     };
     let served = page.map(|page| page.beside(directory.path(), console));
-    let (_served, commands) = served.transpose()?.unzip();
+    let (_served, commands) = match served.transpose() {
+        Ok(served) => served.unzip(),
+        Err(answer) => {
+            directory.clone().take_back();
+            return Err(answer);
+        }
+    };
     let mut watch = |progress| console.show(&progress);
     let run = run_commanded(cluster, scenario, settings, directory, commands, &mut watch)
         .map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))?;

@@ -26,9 +26,11 @@ mod failover;
 mod field;
 mod files;
 mod gateway;
+mod help;
 mod init;
 mod journal;
 mod keys;
+mod kind;
 mod lab;
 mod measure;
 mod memory;
@@ -58,7 +60,7 @@ mod why;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use answer::Answer;
 use console::Console;
@@ -221,7 +223,9 @@ impl Command {
 }
 
 fn main() -> ExitCode {
-    let Arguments { json, command } = Arguments::parse();
+    let matches = help::flowing(Arguments::command()).get_matches();
+    let Arguments { json, command } =
+        Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let mut console = Console::new(json);
     let name = command.name();
     let answer = command.run(&mut console);

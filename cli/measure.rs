@@ -135,7 +135,7 @@ fn measured(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answ
         Status::Failed
     };
     let mut answer = Answer::done(found.to_text(), &found)
-        .with_reports(reports)
+        .with_used(reports)
         .with_status(status);
     if let Some((directory, failure)) = run {
         let _ = writeln!(answer.text, "journals: {}", directory.display());

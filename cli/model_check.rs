@@ -93,13 +93,12 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     };
     let start = match start(arguments, &cluster) {
         Ok(start) => start,
-        Err(answer) => return answer.with_reports(reports),
+        Err(answer) => return answer.with_used(reports),
     };
     let model = match Model::new(parts(&cluster), start, budget(arguments), &ALL) {
         Ok(model) => model,
         Err(error) => {
-            return Answer::failed(Status::Failed, "U0530", error.to_string())
-                .with_reports(reports);
+            return Answer::failed(Status::Failed, "U0530", error.to_string()).with_used(reports);
         }
     };
     let processors = available_parallelism().map_or(1, usize::from);
@@ -122,7 +121,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         && let Err(error) = std::fs::write(path, text)
     {
         let message = format!("{}: {error}", path.display());
-        return Answer::failed(Status::Failed, "U0602", message).with_reports(reports);
+        return Answer::failed(Status::Failed, "U0602", message).with_used(reports);
     }
     let holds = broken.is_none();
     let found = Found {
@@ -130,7 +129,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         depth: verdict.depth,
         properties,
     };
-    let mut answer = Answer::done(text(&found), found).with_reports(reports);
+    let mut answer = Answer::done(text(&found), found).with_used(reports);
     if !holds {
         answer.status = Status::Failed;
     }

@@ -1,5 +1,6 @@
 //! What the command line says instead of the cluster file, and passes on to every process.
 
+use std::net::SocketAddr;
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
@@ -137,6 +138,15 @@ pub(crate) fn parse_size(text: &str) -> Result<u64, String> {
             "{text:?} is no size of at least 100kB with its unit, such as 200MB or 1GB"
         )),
     }
+}
+
+/// `127.0.0.1:7480`.
+pub(crate) fn parse_address(text: &str) -> Result<SocketAddr, String> {
+    text.parse().map_err(|_| {
+        format!(
+            "{text:?} is no address with its port, the host as a number, such as 127.0.0.1:7480"
+        )
+    })
 }
 
 /// `10ms`, `500us`, `2s`, `100ns`.

@@ -58,7 +58,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
             Err(answer) => answer,
         },
     };
-    answer.with_reports(reports)
+    answer.with_used(reports)
 }
 
 /// For people, and for machines.

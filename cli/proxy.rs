@@ -8,6 +8,7 @@ use understudy_network::{Impairment, ProxyCounters, Rate, Route, Share, Transpor
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
+use crate::overrides::parse_address;
 
 /// Pass datagrams or streams on, and lose, delay, double, reorder, change or slow down what passes
 #[derive(Debug, Args)]
@@ -19,10 +20,10 @@ It runs until SIGINT or SIGTERM, and says then what passed. Answers find back to
 200 ms, as the system's own repetition does; `--duplicate` and `--reorder` mean nothing there.")]
 pub(crate) struct Arguments {
     /// Where it listens; port 0 for any that is free
-    #[arg(long, value_name = "ADDRESS")]
+    #[arg(long, value_name = "ADDRESS", value_parser = parse_address)]
     listen: SocketAddr,
     /// Where it passes on to
-    #[arg(long, value_name = "ADDRESS")]
+    #[arg(long, value_name = "ADDRESS", value_parser = parse_address)]
     to: SocketAddr,
     /// What it carries
     #[arg(long, value_enum, default_value_t = TransportArgument::Udp)]

@@ -65,7 +65,7 @@ fn counted(programs: &Programs, with_instructions: bool) -> Answer {
         result.push(value);
     }
     let result = json!({ "programs": Value::Array(result) });
-    Answer::done(text, result).with_reports(programs.reports.clone())
+    Answer::done(text, result).with_used(programs.reports.clone())
 }
 
 /// A column a program, a line a count.

@@ -86,7 +86,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         Ok(account) => account,
         Err(error) => {
             let message = format!("{error}; repeat it with: {}", repeat(arguments, seed));
-            return Answer::failed(Status::Failed, "U0530", message).with_reports(reports);
+            return Answer::failed(Status::Failed, "U0530", message).with_used(reports);
         }
     };
     let journal = journal.map_or_else(JournalState::default, |mut journal| {
@@ -100,7 +100,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         directory.write_results(&summary, &account)
     });
     let mut answer =
-        answer(&summary, directory.as_ref().map(RunDirectory::path)).with_reports(reports);
+        answer(&summary, directory.as_ref().map(RunDirectory::path)).with_used(reports);
     answer.text = format!("seed {seed}\n{}", answer.text);
     match written {
         Ok(()) => answer,

@@ -212,7 +212,7 @@ fn severity(finding: &Finding) -> &'static str {
 pub(crate) fn notes(found: &[Finding]) -> String {
     let lines = found.iter().map(|finding| {
         let (code, message) = (finding.code(), &finding.message);
-        format!("{} {code}: {message}\n", severity(finding))
+        format!("{}[{code}]: {message}\n", severity(finding))
     });
     lines.collect()
 }

@@ -145,7 +145,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
             )
         }
     };
-    answer.with_reports(vec![report])
+    answer.with_used(vec![report])
 }
 
 fn bounds<'a>(arguments: &Arguments, go_on: GoOn<'a>) -> Bounds<'a> {
@@ -330,7 +330,7 @@ fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Answer {
         };
         programs.push(ProgramAnswer::of(&subject, bounds, &remarks));
     }
-    answer::of_programs(programs, Some(parity(&cluster)), None).with_reports(reports)
+    answer::of_programs(programs, Some(parity(&cluster)), None).with_used(reports)
 }
 
 /// What the proof of the understudy says.

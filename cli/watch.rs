@@ -18,6 +18,7 @@ use crate::attach::{AttachArguments, who_runs_already};
 use crate::console::Console;
 use crate::files;
 use crate::lab::{RunArguments, judged};
+use crate::overrides::parse_address;
 
 /// Where the page is served where nobody says otherwise.
 pub(crate) const ADDRESS: SocketAddr =
@@ -39,7 +40,7 @@ pub(crate) struct Arguments {
     #[arg(value_name = "CLUSTER.toml|RUN")]
     target: PathBuf,
     /// Where the page is served
-    #[arg(long, value_name = "ADDRESS", default_value_t = ADDRESS)]
+    #[arg(long, value_name = "ADDRESS", default_value_t = ADDRESS, value_parser = parse_address)]
     address: SocketAddr,
     /// Only look at what runs already, and start nothing
     #[arg(long)]
@@ -81,7 +82,7 @@ pub(crate) struct PageArguments {
 #[command(next_help_heading = "Page")]
 pub(crate) struct BesideArguments {
     /// Show the run in a browser while it lasts
-    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:7480")]
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:7480", value_parser = parse_address)]
     watch: Option<SocketAddr>,
     #[command(flatten)]
     page: PageArguments,
@@ -192,7 +193,7 @@ fn watch_cluster(arguments: &Arguments, page: &Page, console: &mut Console) -> A
         Err(answer) => return answer,
     };
     if arguments.elsewhere.is_wanted() {
-        return watch_elsewhere(arguments, &cluster, page, console).with_reports(reports);
+        return watch_elsewhere(arguments, &cluster, page, console).with_used(reports);
     }
     let running = (!arguments.start).then(|| find_running(&run.out, &cluster));
     if let Some(running) = running.flatten() {
@@ -201,7 +202,7 @@ fn watch_cluster(arguments: &Arguments, page: &Page, console: &mut Console) -> A
             "it runs already, and is looked at: {}",
             path.display()
         ));
-        return watch_run(&path, page, console).with_reports(reports);
+        return watch_run(&path, page, console).with_used(reports);
     }
     if arguments.attach {
         let out = run.out.display();
@@ -217,7 +218,7 @@ fn watch_cluster(arguments: &Arguments, page: &Page, console: &mut Console) -> A
         );
         return Answer::failed(Status::BadInput, "U0615", message);
     }
-    run_and_watch(&cluster, arguments, page, console).with_reports(reports)
+    run_and_watch(&cluster, arguments, page, console).with_used(reports)
 }
 
 fn watch_elsewhere(

@@ -1,5 +1,6 @@
 //! What one party runs with.
 
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -255,6 +256,14 @@ fn read(
     role: Role,
     now: Date,
 ) -> Result<(KeysFile, RevokedFile), Vec<KeysError>> {
+    // Without the folder nothing else needs to be said.
+    if !folder.exists() {
+        let reason = "there is no such folder; `understudy keys` makes one for each party and each operator, parties/NAME";
+        return Err(vec![KeysError::Read {
+            path: folder.to_owned(),
+            source: io::Error::new(io::ErrorKind::NotFound, reason),
+        }]);
+    }
     let mut errors = Vec::new();
     let keys = folder.join("keys.toml");
     let private_key = folder.join("private-key.pem");

@@ -98,6 +98,25 @@ impl RunDirectory {
         })
     }
 
+    /// Takes back a run that never began: its directory goes, and `latest` points to the newest that is left.
+    pub fn take_back(self) {
+        // What cannot be removed stays, and is a run without records.
+        let _ = fs::remove_dir_all(&self.path);
+        let Some(runs) = self.path.parent() else {
+            return;
+        };
+        let entries = fs::read_dir(runs)
+            .into_iter()
+            .flatten()
+            .filter_map(Result::ok);
+        let directories = entries.filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_dir()));
+        let left = directories.filter_map(|entry| entry.file_name().into_string().ok());
+        let _ = match left.max() {
+            Some(newest) => point_latest(runs, &newest),
+            None => fs::remove_file(runs.join("latest")),
+        };
+    }
+
     /// Where it is.
     pub fn path(&self) -> &Path {
         &self.path
@@ -184,6 +203,24 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
+
+    #[test]
+    fn a_run_that_never_began_is_taken_back() {
+        let runs =
+            std::env::temp_dir().join(format!("understudy-taken-back-{}", std::process::id()));
+        let second = |seconds| SystemTime::UNIX_EPOCH + Duration::from_secs(seconds);
+        let latest = || fs::read_link(runs.join("latest")).ok();
+        let first = RunDirectory::create(&runs, second(1)).expect("a directory");
+        let name = first.path().file_name().map(PathBuf::from);
+        let other = RunDirectory::create(&runs, second(2)).expect("a directory");
+        assert_ne!(latest(), name);
+        other.take_back();
+        assert_eq!(latest(), name);
+        first.take_back();
+        assert_eq!(latest(), None);
+        assert_eq!(fs::read_dir(&runs).expect("a folder").count(), 0);
+        fs::remove_dir(&runs).expect("empty");
+    }
 
     #[test]
     fn names_are_times() {

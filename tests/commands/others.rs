@@ -210,3 +210,53 @@ fn shells_and_manuals_are_served() {
     );
     assert!(understudy(&["man"]).output.contains(".TH understudy"));
 }
+
+#[test]
+fn a_file_in_the_wrong_place_is_named_with_the_way_out() {
+    let check = |arguments: &[&str], code: &str, way_out: &str| {
+        let answer = understudy(arguments);
+        assert_eq!(answer.status, 2, "{arguments:?}");
+        let errors = &answer.errors;
+        assert!(
+            errors.starts_with(&format!("error[{code}]")) && errors.contains(way_out),
+            "{errors}"
+        );
+    };
+    let cell = "examples/press-cell/cluster.toml";
+    let scenario = "scenarios/table-two.toml";
+    check(&["simulate", scenario], "U0616", "--scenario");
+    check(&["verify", scenario], "U0616", "--scenario");
+    check(
+        &["simulate", cell, "--scenario", cell],
+        "U0616",
+        "a cluster file",
+    );
+    check(
+        &["parity", "examples/press-cell/robot.ladder"],
+        "U0616",
+        "understudy init",
+    );
+    check(&["simulate", "examples/press-cell"], "U0601", cell);
+    check(
+        &["simulate", "examples/press-cell/clutser.toml"],
+        "U0601",
+        cell,
+    );
+    check(
+        &["simulate", "examples/none/cluster.toml"],
+        "U0601",
+        "cannot be read",
+    );
+}
+
+#[test]
+fn what_was_only_used_has_its_warnings_counted() {
+    let cell = "examples/assembly-cell/cluster.toml";
+    let run = ["simulate", cell, "--cycles", "10"];
+    let answer = understudy(&run);
+    assert_eq!(answer.status, 0, "{}", answer.errors);
+    let expected = format!("3 warnings; `understudy check {cell}` shows them\n");
+    assert_eq!(answer.errors, expected);
+    let json = understudy(&[&run[..], &["--json"]].concat()).json();
+    assert_eq!(json["diagnostics"].as_array().map(Vec::len), Some(3));
+}

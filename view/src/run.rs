@@ -52,7 +52,7 @@ pub fn find_run(path: &Path) -> Result<PathBuf, ViewError> {
     let hint = if replica.is_dir() {
         format!(": each replica is one, such as {}", replica.display())
     } else if !path.exists() {
-        ": there is nothing".to_owned()
+        ": there is nothing; `understudy demo` and `lab` leave runs below runs/".to_owned()
     } else {
         ": it has no journal.jsonl".to_owned()
     };

@@ -1,0 +1,128 @@
+//! What a file is, so that one in the wrong place is told from one that is wrong.
+
+use std::path::Path;
+
+use understudy_reconfiguration::project::looks_like_a_project;
+use understudy_scenarios::looks_like_a_scenario;
+use understudy_supervisor::FileKind;
+
+use crate::answer::{Answer, Status};
+
+/// The files that people write.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Cluster,
+    Scenario,
+    Project,
+    Model,
+    Net,
+    Map,
+    Ads,
+    Ladder,
+}
+
+impl Kind {
+    /// By the ending, and for TOML by keys that only one kind has. What could be anything is taken for a cluster file where it ends in
+    /// `.toml`, and else for a ladder.
+    pub(crate) fn of(path: &Path, text: &str) -> Self {
+        let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+        if ending == "ads" {
+            return Self::Ads;
+        }
+        if ending != "toml" {
+            return Self::Ladder;
+        }
+        match FileKind::of(text) {
+            Some(FileKind::Net) => Self::Net,
+            Some(FileKind::SignalMap) => Self::Map,
+            Some(FileKind::Model) => Self::Model,
+            None if looks_like_a_scenario(text) => Self::Scenario,
+            None if looks_like_a_project(text) => Self::Project,
+            None => Self::Cluster,
+        }
+    }
+
+    /// As `check` and its answers for machines call it.
+    pub(crate) fn word(self) -> &'static str {
+        match self {
+            Self::Cluster => "cluster",
+            Self::Scenario => "scenario",
+            Self::Project => "project",
+            Self::Model => "model",
+            Self::Net => "net",
+            Self::Map => "map",
+            Self::Ads => "ADS",
+            Self::Ladder => "ladder",
+        }
+    }
+
+    fn in_a_sentence(self) -> &'static str {
+        match self {
+            Self::Cluster => "a cluster file",
+            Self::Scenario => "a scenario",
+            Self::Project => "a project of reconfiguration",
+            Self::Model => "a model of plants and specifications",
+            Self::Net => "a Petri net",
+            Self::Map => "a map of signals",
+            Self::Ads => "an automaton of TCT",
+            Self::Ladder => "a ladder",
+        }
+    }
+}
+
+/// A failure where a file is of another kind than `wanted`. Files whose ending says nothing pass: their own reader says what is wrong.
+pub(crate) fn expect(wanted: Kind, path: &Path, text: &str) -> Result<(), Answer> {
+    let found = Kind::of(path, text);
+    let ladders = ["ladder", "st", "xml", "ld"];
+    let is_sure = match found {
+        Kind::Cluster => text.lines().any(|line| line.trim() == "[cluster]"),
+        Kind::Ladder => path
+            .extension()
+            .is_some_and(|ending| ladders.iter().any(|known| ending == *known)),
+        _ => true,
+    };
+    if found == wanted || !is_sure {
+        return Ok(());
+    }
+    let way_out = match (wanted, found) {
+        (Kind::Cluster, Kind::Scenario) => {
+            "name the cluster file first, and this one with --scenario"
+        }
+        (Kind::Cluster, Kind::Ladder) => {
+            "a cluster file names ladders as `ladder = \"FILE\"`, and `understudy init` writes one to begin with"
+        }
+        (Kind::Cluster, _) => "`understudy init` writes one to begin with",
+        _ => "`understudy check` says what a file is, and what is wrong with it",
+    };
+    let message = format!(
+        "{} is {}, and {} is wanted here: {way_out}",
+        path.display(),
+        found.in_a_sentence(),
+        wanted.in_a_sentence()
+    );
+    Err(Answer::failed(Status::BadInput, "U0616", message))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_in_the_wrong_place_is_told_by_what_it_is() {
+        let check = |wanted, path: &str, text: &str, passes: bool| {
+            let said = expect(wanted, Path::new(path), text);
+            assert_eq!(said.is_ok(), passes, "{path}");
+        };
+        let cluster = "[cluster]\nname = \"cell\"\n";
+        let scenario = "title = \"one\"\ncycles = 10\n";
+        check(Kind::Cluster, "a.toml", cluster, true);
+        check(Kind::Cluster, "a.toml", scenario, false);
+        check(Kind::Cluster, "a.ladder", "program a\n", false);
+        check(Kind::Cluster, "SUPER.ADS", "SUPER\n", false);
+        check(Kind::Cluster, "cluster.txt", cluster, true);
+        check(Kind::Cluster, "empty.toml", "", true);
+        check(Kind::Scenario, "a.toml", scenario, true);
+        check(Kind::Scenario, "a.toml", cluster, false);
+        check(Kind::Scenario, "empty.toml", "", true);
+    }
+}
