@@ -4,6 +4,7 @@
 //! one other share an arrow. In the picture a state stands in the column of its distance from the initial one, and within it
 //! near the states that lead to it.
 
+mod labels;
 mod layout;
 mod picture;
 
@@ -121,6 +122,9 @@ pub fn draw_automaton_svg(automaton: &Automaton) -> Result<String, TooLargeToDra
     }
     let layout = lay_out(&graph);
     let mut picture = Picture::default();
+    for (place, shape) in layout.nodes.iter().zip(&shapes) {
+        picture.keep_free(*place, *shape);
+    }
     let mut loops = vec![0.0; states];
     for (number, ((source, target, controllable), label)) in arrows.keys().zip(&labels).enumerate()
     {

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::labels::{Area, Label, free_place};
 use super::layout::Point;
 
 /// Pixels that a letter and a line of text take.
@@ -49,6 +50,10 @@ impl Shape {
 /// What has been drawn, and how far it reaches.
 pub(crate) struct Picture {
     shapes: String,
+    /// What stands on arrows, to be placed when all of them are known.
+    labels: Vec<Label>,
+    /// Where no label may stand.
+    taken: Vec<Area>,
     low: Point,
     high: Point,
 }
@@ -57,6 +62,8 @@ impl Default for Picture {
     fn default() -> Self {
         Self {
             shapes: String::new(),
+            labels: Vec::new(),
+            taken: Vec::new(),
             low: (-40.0, -40.0),
             high: (40.0, 40.0),
         }
@@ -67,6 +74,11 @@ impl Picture {
     fn reach(&mut self, (x, y): Point, (dx, dy): Point) {
         self.low = (self.low.0.min(x - dx), self.low.1.min(y - dy));
         self.high = (self.high.0.max(x + dx), self.high.1.max(y + dy));
+    }
+
+    /// No label is to stand within so much of a point.
+    pub(crate) fn keep_free(&mut self, centre: Point, half: Point) {
+        self.taken.push(Area { centre, half });
     }
 
     pub(crate) fn shape(&mut self, (x, y): Point, shape: Shape, fill: &str) {
@@ -99,7 +111,7 @@ impl Picture {
         self.reach((x, y), (width / 2.0 + 6.0, height / 2.0 + 6.0));
     }
 
-    /// A smooth arrow from one shape by some points to another, with its label at the middle of it.
+    /// A smooth arrow from one shape by some points to another, with its label at the middle of it, or near where that is free.
     pub(crate) fn arrow(
         &mut self,
         (from, from_shape): (Point, Shape),
@@ -114,28 +126,21 @@ impl Picture {
         let end = to_shape.edge(to, last);
         let mut path = format!("M {}", point(start));
         // Through the middles between the bends, each bend a control point; a lone bend is passed by half.
+        let mut pieces = Vec::new();
+        let mut at = start;
         for (number, &bend) in bends.iter().enumerate() {
             let next = bends.get(number + 1);
             let stop = next.map_or(end, |next| middle(bend, *next));
             let _ = write!(path, " Q {} {}", point(bend), point(stop));
+            pieces.push((at, bend, stop));
+            at = stop;
         }
         if bends.is_empty() {
             let _ = write!(path, " L {}", point(end));
+            pieces.push((start, middle(start, end), end));
         }
         self.line(&path, style);
-        let at = match bends {
-            [] => middle(start, end),
-            [bend] => middle(*bend, middle(start, end)),
-            _ if bends.len().is_multiple_of(2) => {
-                middle(bends[bends.len() / 2 - 1], bends[bends.len() / 2])
-            }
-            _ => {
-                let number = bends.len() / 2;
-                let sides = middle(bends[number - 1], bends[number + 1]);
-                middle(bends[number], middle(bends[number], sides))
-            }
-        };
-        self.text(at, label);
+        self.labels.push(Label::along(&pieces, label));
         for bend in bends {
             self.reach(*bend, (8.0, 8.0));
         }
@@ -161,7 +166,8 @@ impl Picture {
         );
         self.line(&path, style);
         let (_, height) = text_size(label);
-        self.text((x, bottom - rise - height / 2.0 + 4.0), label);
+        let place = (x, bottom - rise - height / 2.0 + 4.0);
+        self.labels.push(Label::at(place, label));
     }
 
     fn line(&mut self, path: &str, style: Style) {
@@ -177,7 +183,29 @@ impl Picture {
         );
     }
 
-    pub(crate) fn finish(self) -> String {
+    /// Labels come last, so that no line goes through them: first those that can stand in one place only.
+    fn place_labels(&mut self) {
+        let mut labels = std::mem::take(&mut self.labels);
+        labels.sort_by_key(|label| label.places.len() > 1);
+        for label in labels {
+            let (width, height) = text_size(&label.lines);
+            let place = free_place(&label.places, (width / 2.0, height / 2.0), &self.taken);
+            self.keep_free(place, (width / 2.0, height / 2.0));
+            if !label.lines.is_empty() {
+                // A letter is narrower on average than the room that is kept for it.
+                let (width, height) = (0.85 * width, height - 3.0);
+                let (left, top) = (place.0 - width / 2.0, place.1 - height / 2.0);
+                let _ = writeln!(
+                    self.shapes,
+                    "<path d=\"M {left:.1} {top:.1} h {width:.1} v {height:.1} h -{width:.1} z\" fill=\"white\"/>"
+                );
+            }
+            self.text(place, &label.lines);
+        }
+    }
+
+    pub(crate) fn finish(mut self) -> String {
+        self.place_labels();
         let (width, height) = (self.high.0 - self.low.0, self.high.1 - self.low.1);
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" viewBox=\"{:.1} {:.1} {width:.1} {height:.1}\">\n\

@@ -111,6 +111,9 @@ pub fn draw_net_svg(net: &Net) -> Result<String, TooLargeToDraw> {
         }
     };
     let mut picture = Picture::default();
+    for (place, half) in layout.nodes.iter().zip(&graph.nodes) {
+        picture.keep_free(*place, *half);
+    }
     let pairs: Vec<(usize, usize)> = graph
         .arrows
         .iter()
