@@ -1,12 +1,12 @@
 //! The book: its links lead somewhere, its summary has every page, and the commands of its tutorials run.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::{Component, Path, PathBuf};
 use std::process::Command;
 
-use crate::empty_folder;
+use crate::{empty_folder, understudy};
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -126,56 +126,187 @@ fn the_summary_has_every_page_once() {
     assert_eq!(listed, there, "docs/SUMMARY.md and the pages in docs");
 }
 
-/// Writes the named blocks of a page and runs its `sh` blocks, in their order.
-fn walk_through(page: &Path) {
+/// The blocks of a page: what stands behind the fence, and the lines.
+fn blocks(text: &str) -> Vec<(String, String)> {
+    let mut lines = text.lines();
+    let mut blocks = Vec::new();
+    while let Some(line) = lines.next() {
+        if let Some(words) = line.strip_prefix("```") {
+            let body = lines.by_ref().take_while(|line| *line != "```");
+            blocks.push((
+                words.to_owned(),
+                body.flat_map(|line| [line, "\n"]).collect(),
+            ));
+        }
+    }
+    blocks
+}
+
+/// The commands of a block, for the binary that was built. Real processes have tests of their own.
+fn commands(body: &str) -> String {
+    let body = body.replace("cargo run --release -- ", "understudy ");
+    let apart = [
+        "understudy demo",
+        "understudy lab ",
+        "understudy watch ",
+        "cargo ",
+    ];
+    let kept = body
+        .lines()
+        .filter(|line| !apart.iter().any(|command| line.starts_with(command)));
+    kept.flat_map(|line| [line, "\n"]).collect()
+}
+
+/// Writes the named blocks of a page and runs its `sh` blocks, in their order; says in which folder. Blocks of a `console` take another
+/// machine, a reader or minutes, or end with another status.
+fn walk_through(page: &Path) -> PathBuf {
     let text = fs::read_to_string(page).expect("a page");
-    let name = page.file_stem().expect("a name").to_string_lossy();
+    let name = page.strip_prefix(root()).expect("a page of the project");
+    let name = name.display().to_string().replace('/', "_");
     let folder = empty_folder(&format!("book_{name}"));
-    symlink(root().join("examples"), folder.join("examples")).expect("a link");
+    for shared in ["examples", "scenarios"] {
+        symlink(root().join(shared), folder.join(shared)).expect("a link");
+    }
     let programs = Path::new(env!("CARGO_BIN_EXE_understudy"))
         .parent()
         .expect("a folder");
     let path = std::env::var("PATH").unwrap_or_default();
-    let mut lines = text.lines();
-    while let Some(line) = lines.next() {
-        let Some(words) = line.strip_prefix("```") else {
-            continue;
-        };
-        let body: String = lines
-            .by_ref()
-            .take_while(|line| *line != "```")
-            .flat_map(|line| [line, "\n"])
-            .collect();
+    let blocks = blocks(&text);
+    for (words, body) in &blocks {
         if let Some((_, file)) = words.split_once(' ') {
-            fs::write(folder.join(file), body).expect("written");
-        } else if words == "sh" {
-            let output = Command::new("timeout")
-                .args(["300", "sh", "-e", "-c", &body])
-                .current_dir(&folder)
-                .env("PATH", format!("{}:{path}", programs.display()))
-                .output()
-                .expect("a shell");
-            let said: String = String::from_utf8_lossy(&output.stderr)
-                .chars()
-                .take(1000)
-                .collect();
-            assert!(
-                output.status.success(),
-                "{}:\n{body}\n{said}",
-                page.display()
-            );
+            let file = folder.join(file);
+            fs::create_dir_all(file.parent().expect("a folder")).expect("made");
+            fs::write(file, body).expect("written");
         }
+    }
+    for (_, body) in blocks.iter().filter(|(words, _)| words == "sh") {
+        let output = Command::new("timeout")
+            .args(["300", "sh", "-e", "-c", &commands(body)])
+            .current_dir(&folder)
+            .env("PATH", format!("{}:{path}", programs.display()))
+            .output()
+            .expect("a shell");
+        let said: String = String::from_utf8_lossy(&output.stderr)
+            .chars()
+            .take(1000)
+            .collect();
+        assert!(
+            output.status.success(),
+            "{}:\n{body}\n{said}",
+            page.display()
+        );
+    }
+    folder
+}
+
+#[test]
+fn what_the_pages_say_works() {
+    let mut pages = vec![root().join("README.md")];
+    pages_below(&root().join("docs"), &mut pages);
+    pages_below(&root().join("examples"), &mut pages);
+    // The pages of the codes are run with what each of them has to answer, and the gallery with its pictures.
+    pages.retain(|page| {
+        !page.starts_with(root().join("docs/errors")) && !page.ends_with("docs/examples.md")
+    });
+    assert!(pages.len() > 45, "{pages:?}");
+    for page in pages {
+        walk_through(&page);
     }
 }
 
 #[test]
-fn what_tutorials_and_guides_say_works() {
-    let mut pages = Vec::new();
-    for folder in ["docs/tutorials", "docs/how-to", "docs/reference"] {
+fn the_gallery_shows_what_its_commands_draw() {
+    let page = root().join("docs/examples.md");
+    let folder = walk_through(&page);
+    let mut other = Vec::new();
+    for link in links(&fs::read_to_string(&page).expect("a page")) {
+        let Some(name) = link.strip_prefix("pictures/examples/") else {
+            continue;
+        };
+        let (made, shown) = (folder.join(name), root().join("docs").join(&link));
+        if fs::read(&made).ok() != fs::read(&shown).ok() {
+            other.push(format!("cp {} {}", made.display(), shown.display()));
+        }
+    }
+    assert!(
+        other.is_empty(),
+        "pictures are others now; renew them:\n{}",
+        other.join("\n")
+    );
+}
+
+/// Commands of this program as a page has them: in blocks of a shell, in indented lines, and between backticks.
+fn spoken(text: &str) -> Vec<String> {
+    let text = text.replace("\\\n", " ");
+    let shells = blocks(&text)
+        .into_iter()
+        .filter(|(words, _)| words == "sh" || words == "console");
+    let prose = prose(&text);
+    let indented = prose.lines().filter_map(|line| line.strip_prefix("    "));
+    let between = prose.split('`').skip(1).step_by(2);
+    let written: Vec<String> = shells.map(|(_, body)| body).collect();
+    let written = written.iter().flat_map(|body| body.lines());
+    let all = written.chain(indented).chain(between).map(str::trim_start);
+    let ours = all.map(|line| line.replace("cargo run --release -- ", "understudy "));
+    ours.filter(|command| command.starts_with("understudy ") && !command.contains('\n'))
+        .collect()
+}
+
+#[test]
+fn every_command_and_option_that_is_named_exists() {
+    let mut pages = vec![root().join("README.md"), root().join("ARCHITECTURE.md")];
+    for folder in ["docs", "examples", "deployment", "clients"] {
         pages_below(&root().join(folder), &mut pages);
     }
-    assert!(pages.len() > 4, "{pages:?}");
-    for page in pages {
-        walk_through(&page);
+    let mut helps: BTreeMap<Vec<String>, Option<String>> = BTreeMap::new();
+    let mut wrong = Vec::new();
+    for page in &pages {
+        let text = fs::read_to_string(page).expect("a page");
+        for command in spoken(&text) {
+            let command = command.split(" #").next().unwrap_or_default();
+            let words: Vec<&str> = command.split_whitespace().skip(1).collect();
+            let is_name = |word: &&&str| {
+                let mut letters = word.chars();
+                letters.all(|letter| letter.is_ascii_lowercase() || letter == '-')
+            };
+            let path = words.iter().take(2).take_while(is_name);
+            let mut path: Vec<String> = path.map(ToString::to_string).collect();
+            // The second word of a command may be its operand.
+            let help = loop {
+                let arguments = path.iter().map(String::as_str).chain(["--help"]);
+                let arguments: Vec<&str> = arguments.collect();
+                let help = helps.entry(path.clone()).or_insert_with(|| {
+                    let answer = understudy(&arguments);
+                    (answer.status == 0).then_some(answer.output)
+                });
+                if help.is_some() || path.len() < 2 {
+                    break help.clone();
+                }
+                path.pop();
+            };
+            let options = words.iter().filter_map(|word| {
+                let name = word.trim_matches(|letter| "()[],.;".contains(letter));
+                let name = name.split('=').next()?;
+                name.starts_with("--").then_some(name)
+            });
+            let unknown: Vec<&str> = match &help {
+                None => vec!["the command"],
+                Some(help) => {
+                    let known =
+                        |option: &&str| help.split([' ', '\n', ',']).any(|word| word == *option);
+                    options
+                        .filter(|option| *option != "--" && !known(option))
+                        .collect()
+                }
+            };
+            if !unknown.is_empty() {
+                wrong.push(format!(
+                    "{}: {command}: {}",
+                    page.display(),
+                    unknown.join(" ")
+                ));
+            }
+        }
     }
+    assert!(helps.len() > 30 && wrong.is_empty(), "{wrong:#?}");
 }

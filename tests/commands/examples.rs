@@ -16,7 +16,9 @@ fn entries(folder: &Path) -> Vec<PathBuf> {
 }
 
 fn folders() -> Vec<PathBuf> {
-    entries(&Path::new(env!("CARGO_MANIFEST_DIR")).join("examples"))
+    let mut folders = entries(&Path::new(env!("CARGO_MANIFEST_DIR")).join("examples"));
+    folders.retain(|path| path.is_dir());
+    folders
 }
 
 fn name(path: &Path) -> String {
@@ -136,16 +138,19 @@ fn the_complete_controller_lights_burns_and_shuts_down() {
 }
 
 #[test]
-fn the_gallery_has_every_example_that_is_explained() {
+fn every_example_is_explained_and_in_the_gallery() {
     let gallery = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/examples.md");
     let gallery = fs::read_to_string(gallery).expect("a page");
     for folder in folders() {
-        let row = format!("| [{0}](../examples/{0}) |", name(&folder));
-        let explained = folder.join("README.md").exists();
-        assert!(
-            !explained || gallery.contains(&row),
-            "docs/examples.md lacks {row}"
-        );
+        let name = name(&folder);
+        assert!(folder.join("README.md").exists(), "{name} has no README.md");
+        for part in [
+            format!("| [{name}](#{name}) |"),
+            format!("](../examples/{name})"),
+            format!("](pictures/examples/{name}.svg)"),
+        ] {
+            assert!(gallery.contains(&part), "docs/examples.md lacks {part}");
+        }
     }
 }
 
