@@ -1,8 +1,10 @@
-//! A circuit compiled to straight-line instructions over 64-bit words: one state, or 64 states at once.
+//! A circuit compiled to straight-line instructions over 64-bit words: one state, or 64 states at once, or several times 64.
 //!
 //! Images are packed words, bit k of word k / 64 being element k (so the low bit of the first word is the first
 //! element). For lanes, the word k is element k of 64 independent runs, bit l being the run l.
 //! Both read the whole old state before any of the new one is written, as (1)-(2) demand.
+
+use std::array;
 
 use crate::circuit::Circuit;
 use crate::expression::{Expression, Operation, Variable};
@@ -22,8 +24,10 @@ impl Operand {
         Self(self.0 ^ 1)
     }
 
-    fn value(self, values: &[u64]) -> u64 {
-        values[(self.0 >> 1) as usize] ^ u64::from(self.0 & 1).wrapping_neg()
+    #[inline]
+    fn value<const W: usize>(self, values: &[[u64; W]]) -> [u64; W] {
+        let negated = u64::from(self.0 & 1).wrapping_neg();
+        values[(self.0 >> 1) as usize].map(|word| word ^ negated)
     }
 }
 
@@ -56,12 +60,12 @@ impl Instruction {
     }
 
     #[inline]
-    fn value(self, values: &[u64]) -> u64 {
+    fn value<const W: usize>(self, values: &[[u64; W]]) -> [u64; W] {
         let left = Operand(self.left & !SUM).value(values);
         let right = self.right.value(values);
         // a ⊕ b = (a ∧ b) ⊕ (a ∨ b).
         let sum = u64::from(self.left >> 31).wrapping_neg();
-        left & right ^ (left | right) & sum
+        array::from_fn(|word| left[word] & right[word] ^ (left[word] | right[word]) & sum)
     }
 }
 
@@ -172,7 +176,7 @@ impl Scan {
         inputs: &[u64],
         outputs: &mut [u64],
     ) {
-        let values = self.prepare(scratch);
+        let values = self.prepare::<1>(scratch);
         unpack(inputs, &mut values[..self.inputs]);
         unpack(state, &mut values[self.inputs..][..self.registers]);
         self.execute(values);
@@ -191,28 +195,45 @@ impl Scan {
         inputs: &[u64],
         outputs: &mut [u64],
     ) {
-        let values = self.prepare(scratch);
+        let (state, _) = state.as_chunks_mut();
+        let (inputs, _) = inputs.as_chunks();
+        let (outputs, _) = outputs.as_chunks_mut();
+        self.step_wide::<1>(scratch, state, inputs, outputs);
+    }
+
+    /// One step of 64 · `W` runs: the words k of each slice are element k of all of them.
+    ///
+    /// # Panics
+    /// If a slice is shorter than the width; widths are the caller's promise.
+    pub fn step_wide<const W: usize>(
+        &self,
+        scratch: &mut Scratch,
+        state: &mut [[u64; W]],
+        inputs: &[[u64; W]],
+        outputs: &mut [[u64; W]],
+    ) {
+        let values = self.prepare::<W>(scratch);
         values[..self.inputs].copy_from_slice(&inputs[..self.inputs]);
         values[self.inputs..][..self.registers].copy_from_slice(&state[..self.registers]);
         self.execute(values);
-        for (word, operand) in state.iter_mut().zip(&self.next) {
-            *word = operand.value(values);
+        for (words, operand) in state.iter_mut().zip(&self.next) {
+            *words = operand.value(values);
         }
-        for (word, operand) in outputs.iter_mut().zip(&self.values) {
-            *word = operand.value(values);
+        for (words, operand) in outputs.iter_mut().zip(&self.values) {
+            *words = operand.value(values);
         }
     }
 
-    fn prepare<'a>(&self, scratch: &'a mut Scratch) -> &'a mut [u64] {
+    fn prepare<'a, const W: usize>(&self, scratch: &'a mut Scratch) -> &'a mut [[u64; W]] {
         let zero = self.inputs + self.registers;
         let places = zero + 1 + self.instructions.len();
-        scratch.0.resize(places.max(scratch.0.len()), 0);
-        let values = &mut scratch.0[..places];
-        values[zero] = 0;
+        scratch.0.resize((W * places).max(scratch.0.len()), 0);
+        let (values, _) = scratch.0[..W * places].as_chunks_mut();
+        values[zero] = [0; W];
         values
     }
 
-    fn execute(&self, values: &mut [u64]) {
+    fn execute<const W: usize>(&self, values: &mut [[u64; W]]) {
         let first = self.inputs + self.registers + 1;
         for (place, instruction) in (first..).zip(&self.instructions) {
             values[place] = instruction.value(values);
@@ -221,19 +242,19 @@ impl Scan {
 }
 
 /// One bit of `image` for each of `values`; what is above the low bit is of no account.
-fn unpack(image: &[u64], values: &mut [u64]) {
+fn unpack(image: &[u64], values: &mut [[u64; 1]]) {
     for (&word, values) in image.iter().zip(values.chunks_mut(64)) {
         for (bit, value) in values.iter_mut().enumerate() {
-            *value = word >> bit;
+            *value = [word >> bit];
         }
     }
 }
 
 /// Packs the low bit of each operand into words; bits past the last are 0.
-fn pack(values: &[u64], operands: &[Operand], image: &mut [u64]) {
+fn pack(values: &[[u64; 1]], operands: &[Operand], image: &mut [u64]) {
     for (word, operands) in image.iter_mut().zip(operands.chunks(64)) {
         *word = operands.iter().enumerate().fold(0, |word, (bit, operand)| {
-            word | (operand.value(values) & 1) << bit
+            word | (operand.value(values)[0] & 1) << bit
         });
     }
 }

@@ -37,7 +37,7 @@ fn packed(bits: &[bool]) -> Vec<u64> {
         .collect()
 }
 
-/// Steps through `samples` in one state; and in 64, each with the samples rotated by its lane.
+/// Steps through `samples` in one state; and in 64, each with the samples rotated by its lane; and in twice 64, of which the second half is one sample ahead.
 fn check(circuit: &Circuit, samples: &[Vec<u64>]) {
     let scan = Scan::new(circuit);
     let initial: Vec<bool> = circuit
@@ -52,17 +52,41 @@ fn check(circuit: &Circuit, samples: &[Vec<u64>]) {
         .map(|&bit| u64::from(bit).wrapping_neg())
         .collect();
     let mut lane_outputs = vec![0; scan.output_count()];
+    let mut halves = [lane_states.clone(), lane_states.clone()];
+    let mut wide_states: Vec<[u64; 2]> = lane_states.iter().map(|&word| [word; 2]).collect();
+    let mut wide_outputs = vec![[0; 2]; scan.output_count()];
     let mut states = vec![scan.initial().to_vec(); 64];
     let mut outputs = vec![0; scan.output_count().div_ceil(64)];
     for cycle in 0..samples.len() {
         let sample = |lane: usize| &samples[(cycle + lane) % samples.len()];
-        let lane_inputs: Vec<u64> = (0..scan.input_count())
-            .map(|place| {
-                (0..64).fold(0, |word, lane| {
-                    word | u64::from(bit(sample(lane), place)) << lane
-                })
-            })
+        let lanes_from = |first: usize| -> Vec<u64> {
+            let of_lane = |lane, place| u64::from(bit(sample(first + lane), place)) << lane;
+            let places = 0..scan.input_count();
+            places
+                .map(|place| (0..64).fold(0, |word, lane| word | of_lane(lane, place)))
+                .collect()
+        };
+        let lane_inputs = lanes_from(0);
+        let ahead = lanes_from(1);
+        let wide_inputs: Vec<[u64; 2]> = lane_inputs
+            .iter()
+            .zip(&ahead)
+            .map(|(&now, &ahead)| [now, ahead])
             .collect();
+        scan.step_wide(
+            &mut scratch,
+            &mut wide_states,
+            &wide_inputs,
+            &mut wide_outputs,
+        );
+        for (half, inputs) in [&lane_inputs, &ahead].into_iter().enumerate() {
+            scan.step_lanes(&mut scratch, &mut halves[half], inputs, &mut lane_outputs);
+            let of_half = |words: &[[u64; 2]]| -> Vec<u64> {
+                words.iter().map(|words| words[half]).collect()
+            };
+            assert_eq!(of_half(&wide_states), halves[half]);
+            assert_eq!(of_half(&wide_outputs), lane_outputs);
+        }
         scan.step_lanes(
             &mut scratch,
             &mut lane_states,

@@ -22,7 +22,7 @@ use crate::property::{Named, Property};
 use crate::symbolic::{Resolved, Signal, Trace, resolve};
 
 pub use remarks::{Remark, Remarks};
-pub(crate) use sampled::word;
+pub(crate) use sampled::words;
 use stages::Stages;
 pub use stages::Undecided;
 pub use unasked::{Lamp, OutputFinding};

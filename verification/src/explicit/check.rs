@@ -1,7 +1,10 @@
 //! Formulas as sets of listed states.
 
-use super::{Explicit, Lanes, Set};
-use crate::program::word;
+use std::ops::Range;
+
+use super::lanes::{LANES, Lanes, first_of};
+use super::{Explicit, Set};
+use crate::program::words;
 use crate::property::{Formula, Path};
 use crate::symbolic::{Core, Resolved, Signal};
 
@@ -31,15 +34,12 @@ impl Explicit {
     pub(crate) fn broken(&self, kept: &[Resolved]) -> Vec<Option<Vec<Vec<bool>>>> {
         let mut broken = vec![None; kept.len()];
         let mut lanes = Lanes::default();
-        for from in 0..self.ended() {
-            for block in 0..self.ways.div_ceil(64) {
-                lanes.scan(self, from, block);
-                for (formula, broken) in kept.iter().zip(&mut broken) {
-                    let word = !word(formula, &lanes.outputs, &lanes.inputs);
-                    if broken.is_none() && word != 0 {
-                        *broken =
-                            Some(self.run_to_scan(from, block, word.trailing_zeros() as usize));
-                    }
+        for states in batches(self.ended() * self.ways) {
+            lanes.scan(self, states.clone());
+            for (formula, broken) in kept.iter().zip(&mut broken) {
+                if broken.is_none() {
+                    let lost = words(formula, &lanes.outputs, &lanes.inputs).map(|word| !word);
+                    *broken = first_of(&lost, &states).map(|state| self.run_to(state));
                 }
             }
         }
@@ -59,24 +59,26 @@ impl Explicit {
     fn values(&self, signals: &[Signal]) -> Vec<Set> {
         let mut values = vec![self.empty(); signals.len()];
         let mut lanes = Lanes::default();
-        for from in 0..self.origins.len() {
-            for block in 0..self.ways.div_ceil(64) {
-                lanes.scan(self, from, block);
-                for (signal, value) in signals.iter().zip(&mut values) {
-                    let word = match signal {
-                        Signal::Output(output) => lanes.outputs[*output],
-                        Signal::Input(input) => lanes.inputs[*input],
-                    };
-                    for lane in 0..self.ways.min(64) {
-                        if word >> lane & 1 == 1 {
-                            value.insert(from * self.ways + block * 64 + lane);
-                        }
-                    }
-                }
+        for states in batches(self.states()) {
+            lanes.scan(self, states.clone());
+            for (signal, value) in signals.iter().zip(&mut values) {
+                let words = match signal {
+                    Signal::Output(output) => lanes.outputs[*output],
+                    Signal::Input(input) => lanes.inputs[*input],
+                };
+                // What is past the last state is in the list of none.
+                let places = value.0[states.start / 64..].iter_mut();
+                places.zip(words).for_each(|(place, word)| *place = word);
             }
         }
         values
     }
+}
+
+/// The states below `end`, as many at once as are scanned.
+fn batches(end: usize) -> impl Iterator<Item = Range<usize>> {
+    let starts = (0..end).step_by(LANES);
+    starts.map(move |start| start..end.min(start + LANES))
 }
 
 /// For each x the x from which some scan leads to it, each once.

@@ -1,5 +1,7 @@
 //! Many runs at random, before anything is proved: what is seen there can happen, and needs no proof that it can.
 
+use std::array;
+
 use understudy_logic::{Circuit, Scan, Scratch};
 
 use crate::property::Formula;
@@ -17,7 +19,7 @@ pub(super) struct Seen {
 
 /// 64 runs from the start.
 pub(super) struct Sampled {
-    inputs: Vec<Vec<u64>>,
+    inputs: Vec<Vec<[u64; 1]>>,
     /// For each question the first scan in which it was so.
     seen: Vec<Option<Seen>>,
 }
@@ -28,23 +30,23 @@ impl Sampled {
         let scan = Scan::new(circuit);
         let mut scratch = Scratch::default();
         let initial = circuit.registers().iter();
-        let mut state: Vec<u64> = initial
-            .map(|register| u64::from(register.initial).wrapping_neg())
+        let mut state: Vec<[u64; 1]> = initial
+            .map(|register| [u64::from(register.initial).wrapping_neg()])
             .collect();
-        let mut outputs = vec![0; scan.output_count()];
-        let mut inputs = vec![0; scan.input_count()];
+        let mut outputs = vec![[0]; scan.output_count()];
+        let mut inputs = vec![[0]; scan.input_count()];
         let mut seen = vec![None; questions.len()];
         let mut rows = Vec::with_capacity(SCANS);
         let mut mixed = 1_u64;
         for number in 0..SCANS {
-            for input in &mut inputs {
+            for [input] in &mut inputs {
                 *input ^= flips(&mut mixed);
             }
-            scan.step_lanes(&mut scratch, &mut state, &inputs, &mut outputs);
+            scan.step_wide(&mut scratch, &mut state, &inputs, &mut outputs);
             rows.push(inputs.clone());
             for (question, seen) in questions.iter().zip(&mut seen) {
                 if seen.is_none() {
-                    let runs = word(question, &outputs, &inputs);
+                    let [runs] = words(question, &outputs, &inputs);
                     *seen = (runs != 0).then(|| Seen {
                         scan: number,
                         run: runs.trailing_zeros() as usize,
@@ -63,7 +65,7 @@ impl Sampled {
     /// The inputs of the run, from its start to that scan.
     pub(super) fn inputs(&self, seen: Seen) -> Vec<Vec<bool>> {
         let rows = self.inputs[..=seen.scan].iter();
-        let bit = |word: &u64| word >> seen.run & 1 == 1;
+        let bit = |[word]: &[u64; 1]| word >> seen.run & 1 == 1;
         rows.map(|row| row.iter().map(bit).collect()).collect()
     }
 }
@@ -85,17 +87,25 @@ fn flips(mixed: &mut u64) -> u64 {
 }
 
 /// In which runs the formula holds; what speaks of more than one scan holds in none.
-pub(crate) fn word(formula: &Resolved, outputs: &[u64], inputs: &[u64]) -> u64 {
-    let of = |formula: &Resolved| word(formula, outputs, inputs);
+pub(crate) fn words<const W: usize>(
+    formula: &Resolved,
+    outputs: &[[u64; W]],
+    inputs: &[[u64; W]],
+) -> [u64; W] {
+    let of = |formula: &Resolved| words(formula, outputs, inputs);
+    let joined = |left: &Resolved, right: &Resolved, join: fn(u64, u64) -> u64| {
+        let (left, right) = (of(left), of(right));
+        array::from_fn(|word| join(left[word], right[word]))
+    };
     match formula {
-        Formula::Constant(value) => u64::from(*value).wrapping_neg(),
+        Formula::Constant(value) => [u64::from(*value).wrapping_neg(); W],
         Formula::Signal(Signal::Output(output)) => outputs[*output],
         Formula::Signal(Signal::Input(input)) => inputs[*input],
-        Formula::Not(inner) => !of(inner),
-        Formula::And(left, right) => of(left) & of(right),
-        Formula::Or(left, right) => of(left) | of(right),
-        Formula::Implies(left, right) => !of(left) | of(right),
-        Formula::Same(left, right) => !(of(left) ^ of(right)),
-        _ => 0,
+        Formula::Not(inner) => of(inner).map(|word| !word),
+        Formula::And(left, right) => joined(left, right, |left, right| left & right),
+        Formula::Or(left, right) => joined(left, right, |left, right| left | right),
+        Formula::Implies(left, right) => joined(left, right, |left, right| !left | right),
+        Formula::Same(left, right) => joined(left, right, |left, right| !(left ^ right)),
+        _ => [0; W],
     }
 }

@@ -27,17 +27,14 @@ pub(super) enum Found {
     Unknown,
 }
 
-/// A scan of the list.
-type Place = (usize, usize, usize);
-
 /// Answers questions about one circuit, whose outputs they are.
 pub(super) struct Search<'a> {
     circuit: &'a Circuit,
     bounds: Bounds<'a>,
     sampled: Sampled,
     listed: Explicit,
-    /// The first scan of the list in which each question is so.
-    seen: Vec<Option<Place>>,
+    /// The first state of the list in which each question is so.
+    seen: Vec<Option<usize>>,
     error: Option<ExplicitError>,
     /// Whether as many states were listed as allowed.
     all_listed: bool,
@@ -103,9 +100,7 @@ impl<'a> Search<'a> {
 
     fn in_list(&self, question: usize) -> Option<Found> {
         match self.seen[question] {
-            Some((from, block, lane)) => {
-                Some(Found::Yes(self.listed.run_to_scan(from, block, lane)))
-            }
+            Some(state) => Some(Found::Yes(self.listed.run_to(state))),
             None if self.error.is_none() => Some(Found::Never),
             None => None,
         }
@@ -159,20 +154,16 @@ fn asked(question: usize) -> Resolved {
     Formula::Signal(Signal::Output(question))
 }
 
-type List = (Explicit, Vec<Option<Place>>, Option<ExplicitError>);
+type List = (Explicit, Vec<Option<usize>>, Option<ExplicitError>);
 
 /// Lists states and notes where each question is so for the first time.
 fn list(circuit: &Circuit, bound: usize, bounds: Bounds<'_>) -> List {
-    let mut seen: Vec<Option<Place>> = vec![None; circuit.outputs().len()];
+    let mut seen: Vec<Option<usize>> = vec![None; circuit.outputs().len()];
     let mut open: Vec<usize> = (0..seen.len()).collect();
     let (listed, error) = Explicit::explore(circuit, bound, bounds.go_on, &mut |scan| {
         open.retain(|&question| {
-            let lanes = scan.outputs[question];
-            if lanes != 0 {
-                let lane = lanes.trailing_zeros() as usize;
-                seen[question] = Some((scan.from, scan.block, lane));
-            }
-            lanes == 0
+            seen[question] = scan.first(question);
+            seen[question].is_none()
         });
     });
     (listed, seen, error)

@@ -16,11 +16,23 @@ const OUTPUTS: usize = 2;
 
 /// A circuit whose functions are made by taking operations and operands from a list of numbers.
 fn circuit(recipe: &[(u8, u8, u8)], initial: u8) -> Circuit {
+    of_sums(recipe, initial, 1)
+}
+
+/// The same, with the sum of so many inputs in the place of each; the sums are outputs too, where they are no inputs.
+fn of_sums(recipe: &[(u8, u8, u8)], initial: u8, inputs_each: usize) -> Circuit {
     let mut builder = CircuitBuilder::new("random");
     let mut pool: Vec<Expression> = Vec::new();
     for input in 0..INPUTS {
-        pool.push(builder.input(format!("u{input}")));
+        let names = (0..inputs_each).map(|place| format!("u{}", input + place * INPUTS));
+        let inputs: Vec<Expression> = names.map(|name| builder.input(name)).collect();
+        let graph = builder.graph();
+        let sum = inputs
+            .into_iter()
+            .reduce(|sum, input| graph.xor(sum, input));
+        pool.push(sum.expect("at least one"));
     }
+    let sums = pool.clone();
     let mut registers = Vec::new();
     for register in 0..REGISTERS {
         let (id, value) = builder.register(format!("x{register}"), initial >> register & 1 == 1);
@@ -44,6 +56,11 @@ fn circuit(recipe: &[(u8, u8, u8)], initial: u8) -> Circuit {
     }
     for output in 0..OUTPUTS {
         builder.output(format!("y{output}"), pool[last - REGISTERS - output]);
+    }
+    if inputs_each > 1 {
+        for (input, sum) in sums.into_iter().enumerate() {
+            builder.output(format!("sum{input}"), sum);
+        }
     }
     builder.finish().expect("the names differ")
 }
@@ -175,6 +192,37 @@ proptest! {
             prop_assert!(trace.scans[from..].iter().all(|scan| !scan.inputs[second]));
             prop_assert!(trace.scans.iter().any(|scan| scan.outputs[first]));
             prop_assert!(replays(&circuit, &trace));
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    /// With the sums of inputs in the place of inputs nothing else is so, whether the states of one x are fewer or more than are scanned at once.
+    #[test]
+    fn listed_states_of_many_inputs(
+        recipe in prop::collection::vec(any::<(u8, u8, u8)>(), 6..16),
+        initial in any::<u8>(),
+        property in formula(),
+        inputs_each in 2..6_usize,
+    ) {
+        let few = circuit(&recipe, initial);
+        let naive = Naive::new(&few, &[]);
+        let list = |circuit| Explicit::new(circuit, 1 << 14).expect("no more states than there are");
+        let (few, many) = (list(&few), list(&of_sums(&recipe, initial, inputs_each)));
+        let of_sums = |property: &Resolved| {
+            let mapped = property.map(&|signal: &Signal| Some(match signal {
+                Signal::Input(input) => Signal::Output(OUTPUTS + input),
+                Signal::Output(output) => Signal::Output(*output),
+            }));
+            mapped.expect("every signal has one")
+        };
+        for property in [property.clone(), property.always()] {
+            let (holds, run) = many.check(&[of_sums(&property)]).remove(0);
+            prop_assert_eq!(holds, naive.holds(&property));
+            let (_, shortest) = few.check(&[property]).remove(0);
+            prop_assert_eq!(run.map(|run| run.len()), shortest.map(|run| run.len()));
         }
     }
 }
