@@ -10,6 +10,7 @@ use understudy_supervisor::{
 
 use crate::answer::{Answer, Status};
 use crate::files;
+use crate::kind::Kind;
 
 /// What was read, with the warnings about it.
 pub(crate) struct Sources<T> {
@@ -81,7 +82,7 @@ fn all_of(path: &Path) -> Result<Sources<Vec<Automaton>>, Answer> {
             reports,
         });
     }
-    let text = files::text(path)?;
+    let text = files::text_of(Kind::Ads, path)?;
     let read = read_ads(&text);
     let report = Report {
         name: path.display().to_string(),
@@ -115,7 +116,7 @@ pub(crate) fn is_model(path: &Path) -> bool {
 
 /// A model, and the files that it names, which stand beside it.
 pub(crate) fn model(path: &Path) -> Result<Sources<Model>, Answer> {
-    let text = files::text(path)?;
+    let text = files::text_of(Kind::Model, path)?;
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
     let read = read_model(&text, |file| {
         std::fs::read_to_string(folder.join(file)).map_err(|error| error.to_string())

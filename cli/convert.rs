@@ -13,6 +13,7 @@ use understudy_ladder::{Program, parse_time, print, structured_text};
 
 use crate::answer::{Answer, Status};
 use crate::files;
+use crate::kind::Kind;
 
 /// Convert a program from one form into another
 #[derive(Debug, Args)]
@@ -80,7 +81,11 @@ fn time(text: &str) -> Result<Duration, String> {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Answer {
-    let source = match files::text(&arguments.from_file) {
+    let read_file = match arguments.from {
+        Some(_) => files::text(&arguments.from_file),
+        None => files::text_of(Kind::Ladder, &arguments.from_file),
+    };
+    let source = match read_file {
         Ok(source) => source,
         Err(answer) => return answer,
     };
@@ -133,27 +138,35 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
 }
 
 fn converted(program: &Program, arguments: &Arguments, period: Duration) -> Result<String, String> {
-    let form = arguments
-        .to
-        .or_else(|| arguments.to_file.as_deref().and_then(form_of));
+    let form = match (arguments.to, &arguments.to_file) {
+        (Some(form), _) => form,
+        (None, Some(path)) => form_of(path)?,
+        (None, None) => Form::Ladder,
+    };
     match form {
-        None | Some(Form::Ladder) => Ok(print(program)),
-        Some(Form::Plcopen) => Ok(write(program, period)),
-        Some(Form::Digraph) => Ok(digraph::write(program)),
-        Some(Form::Ldmicro) => Err("LDmicro's files are read only".to_owned()),
-        Some(Form::St) => {
+        Form::Ladder => Ok(print(program)),
+        Form::Plcopen => Ok(write(program, period)),
+        Form::Digraph => Ok(digraph::write(program)),
+        Form::Ldmicro => Err("LDmicro's files are read only".to_owned()),
+        Form::St => {
             let circuit = program.lower(period).map_err(|error| error.to_string())?;
             Ok(structured_text(&circuit, &program.addresses()))
         }
     }
 }
 
-fn form_of(path: &Path) -> Option<Form> {
-    match path.extension()?.to_ascii_lowercase().to_str()? {
-        "xml" => Some(Form::Plcopen),
-        "st" => Some(Form::St),
-        "ld" => Some(Form::Ldmicro),
-        _ => None,
+/// By the ending of the file.
+fn form_of(path: &Path) -> Result<Form, String> {
+    let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+    match ending.to_str() {
+        Some("ladder") => Ok(Form::Ladder),
+        Some("xml") => Ok(Form::Plcopen),
+        Some("st") => Ok(Form::St),
+        Some("ld") => Ok(Form::Ldmicro),
+        _ => Err(format!(
+            "{}: a program is written as .ladder, .xml or .st; --to says the form of a file with another ending",
+            path.display()
+        )),
     }
 }
 

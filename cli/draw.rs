@@ -10,6 +10,7 @@ use understudy_ladder::{draw_svg, draw_text};
 
 use crate::answer::Answer;
 use crate::files;
+use crate::kind::Kind;
 
 /// Draw a ladder program as text or SVG
 #[derive(Debug, Args)]
@@ -41,7 +42,7 @@ enum Form {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Answer {
-    let source = match files::text(&arguments.ladder) {
+    let source = match files::text_of(Kind::Ladder, &arguments.ladder) {
         Ok(source) => source,
         Err(answer) => return answer,
     };

@@ -18,6 +18,13 @@ pub(crate) fn text(path: &Path) -> Result<String, Answer> {
         .map_err(|error| Answer::failed(Status::BadInput, "U0601", unreadable(path, &error)))
 }
 
+/// The text of a file that has to be of one kind.
+pub(crate) fn text_of(wanted: Kind, path: &Path) -> Result<String, Answer> {
+    let text = text(path)?;
+    kind::expect(wanted, path, &text)?;
+    Ok(text)
+}
+
 /// Files that folders of the project begin with.
 const FIRST_FILES: [&str; 3] = ["cluster.toml", "model.toml", "reconfiguration.toml"];
 
@@ -87,8 +94,7 @@ pub(crate) fn read_cluster(path: &Path, text: &str, overrides: Overrides) -> Loa
 
 /// A cluster without errors, and the files that it came from with their warnings.
 pub(crate) fn cluster(path: &Path, overrides: Overrides) -> Result<(Cluster, Vec<Report>), Answer> {
-    let text = text(path)?;
-    kind::expect(Kind::Cluster, path, &text)?;
+    let text = text_of(Kind::Cluster, path)?;
     let Loaded { cluster, reports } = read_cluster(path, &text, overrides);
     match cluster {
         Some(cluster) => Ok((cluster, reports)),
@@ -98,8 +104,7 @@ pub(crate) fn cluster(path: &Path, overrides: Overrides) -> Result<(Cluster, Vec
 
 /// A scenario for a cluster, without errors.
 pub(crate) fn scenario(path: &Path, cluster: &Cluster) -> Result<Scenario, Answer> {
-    let text = text(path)?;
-    kind::expect(Kind::Scenario, path, &text)?;
+    let text = text_of(Kind::Scenario, path)?;
     let found = read_scenario(
         &path.display().to_string(),
         &text,

@@ -86,11 +86,12 @@ pub(crate) fn expect(wanted: Kind, path: &Path, text: &str) -> Result<(), Answer
     }
     let way_out = match (wanted, found) {
         (Kind::Cluster, Kind::Scenario) => {
-            "name the cluster file first, and this one with --scenario"
+            "`lab` and `simulate` take a scenario by --scenario, behind its cluster file"
         }
         (Kind::Cluster, Kind::Ladder) => {
             "a cluster file names ladders as `ladder = \"FILE\"`, and `understudy init` writes one to begin with"
         }
+        (Kind::Ladder, Kind::Cluster) => "name one of the ladders that stand in it",
         (Kind::Cluster, _) => "`understudy init` writes one to begin with",
         _ => "`understudy check` says what a file is, and what is wrong with it",
     };

@@ -18,6 +18,7 @@ use understudy_supervisor::{Automaton, Model, write_model};
 use crate::answer::{Answer, Status};
 use crate::automata::{self, Sources, description, summary};
 use crate::files;
+use crate::kind::Kind;
 use crate::supervisor_to_ladder::{listed, notes};
 
 /// Work with automation Petri nets: their bounds, automata and drawings, and proved ladders of nets with supervisors
@@ -103,7 +104,7 @@ impl Operation {
 
 pub(crate) fn run(arguments: &Arguments) -> Answer {
     let path = arguments.operation.net();
-    let text = match files::text(path) {
+    let text = match files::text_of(Kind::Net, path) {
         Ok(text) => text,
         Err(answer) => return answer,
     };

@@ -12,6 +12,7 @@ use understudy_supervisor::{draw_automaton_svg, draw_dot};
 
 use crate::answer::{Answer, Status};
 use crate::files;
+use crate::kind::Kind;
 
 /// Find out what a ladder can still do while input channels are failed, and write the second module that does it
 #[derive(Debug, Args)]
@@ -83,7 +84,7 @@ fn reconfigure(arguments: &Arguments) -> Result<Answer, Answer> {
 }
 
 fn read(path: &Path) -> Result<(Project, Vec<Report>), Answer> {
-    let Loaded { project, reports } = read_project(path, &files::text(path)?);
+    let Loaded { project, reports } = read_project(path, &files::text_of(Kind::Project, path)?);
     match project {
         Some(project) => Ok((project, reports)),
         None => Err(Answer::bad_files(reports)),

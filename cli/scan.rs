@@ -13,6 +13,7 @@ use understudy_native::{Frame, Machine, sample};
 
 use crate::answer::{Answer, Status};
 use crate::files;
+use crate::kind::Kind;
 
 /// From one scan to the next where a program has timers; the speed does not depend on it.
 const PERIOD: Duration = Duration::from_millis(10);
@@ -118,7 +119,7 @@ fn program(arguments: &Arguments) -> Result<(usize, Circuit), Answer> {
         let rungs = sample::rungs(arguments.rungs as usize, arguments.seed);
         return Ok((rungs.len(), sample::program(&rungs)));
     };
-    let source = files::text(path)?;
+    let source = files::text_of(Kind::Ladder, path)?;
     let name = path.display().to_string();
     let parsed = parse_program(&name, &source);
     let report = understudy_diagnostic::Report {

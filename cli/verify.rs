@@ -21,6 +21,7 @@ use understudy_verification::{GoOn, draw_runs, prove_parity, smv};
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
+use crate::kind::Kind;
 use answer::{Finding, ProgramAnswer};
 use patience::Patience;
 
@@ -99,7 +100,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
     if is_cluster {
         return cluster(arguments, &patience);
     }
-    let source = match files::text(&arguments.file) {
+    let source = match files::text_of(Kind::Ladder, &arguments.file) {
         Ok(source) => source,
         Err(answer) => return answer,
     };

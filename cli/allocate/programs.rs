@@ -12,6 +12,7 @@ use understudy_parity::{ParityController, generate};
 
 use crate::answer::{Answer, Status};
 use crate::files;
+use crate::kind::Kind;
 
 /// A period that is longer than nothing.
 pub(crate) fn period(text: &str) -> Result<Duration, String> {
@@ -116,7 +117,7 @@ impl Programs {
 }
 
 fn ladder(path: &Path, period: Duration) -> Result<(Member, Report), Answer> {
-    let text = files::text(path)?;
+    let text = files::text_of(Kind::Ladder, path)?;
     let name = path.display().to_string();
     let parsed = parse_program(&name, &text);
     let report = Report {

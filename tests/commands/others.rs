@@ -236,6 +236,20 @@ fn a_file_in_the_wrong_place_is_named_with_the_way_out() {
         "U0616",
         "understudy init",
     );
+    check(&["draw", cell], "U0616", "one of the ladders");
+    check(&["synth", cell], "U0616", "a model of plants");
+    check(&["petri", "bounds", cell], "U0616", "a Petri net");
+    check(&["reconfigure", cell], "U0616", "a project");
+    check(
+        &["des", "trim", "examples/vents/vents.ladder"],
+        "U0616",
+        "an automaton",
+    );
+    check(
+        &["convert", "examples/vents/vents.ladder", "vents.pdf"],
+        "U1014",
+        "--to",
+    );
     check(&["simulate", "examples/press-cell"], "U0601", cell);
     check(
         &["simulate", "examples/press-cell/clutser.toml"],
