@@ -234,8 +234,8 @@ fn findings_come_before_the_ladder() {
         .map(|finding| format!("{} {}", finding.code(), finding.message))
         .collect();
     insta::assert_snapshot!(said.join("\n"), @r#"
-U0885 a PLC that generates every command at once never rests in a marked state after 30 of 30 states, 0 the first
-U0886 in `keeper` placed stand on successive transitions; their bits are reset by the rungs that use them
+U0885 a PLC that generates every command at once never comes to rest in a marked state from 30 of 30 states on, such as 0
+U0886 in `keeper` `placed` stands on successive transitions; its bit is reset by the rung that uses it
 "#);
     assert_eq!(hybrid_findings(&cell.net, &[], 1_000), Ok(Vec::new()));
 }

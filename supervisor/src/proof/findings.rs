@@ -96,12 +96,16 @@ fn avalanche(modules: &Modules) -> Vec<Finding> {
             return None;
         }
         let names: Vec<String> =
-            events.iter().map(|&label| automaton.alphabet().name(label)).collect();
+            events.iter().map(|&label| format!("`{}`", automaton.alphabet().name(label))).collect();
+        let (stand, bits) = match names.len() {
+            1 => ("stands", "its bit is"),
+            _ => ("stand", "each bit is"),
+        };
         Some(Finding {
             kind: FindingKind::Avalanche,
             severity: FindingSeverity::Warning,
             message: format!(
-                "in `{}` {} stand on successive transitions; their bits are reset by the rungs that use them",
+                "in `{}` {} {stand} on successive transitions; {bits} reset by the rung that uses it",
                 automaton.name(),
                 names.join(", ")
             ),

@@ -120,7 +120,7 @@ impl ClosedLoop {
         let states = self.unreached(&reaching);
         let first = *states.first()?;
         let message = format!(
-            "a PLC that generates every command at once never rests in a marked state after {} of {} states, {first} the first",
+            "a PLC that generates every command at once never comes to rest in a marked state from {} of {} states on, such as {first}",
             states.len(),
             self.automaton.state_count()
         );
