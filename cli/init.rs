@@ -32,7 +32,8 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
             let folder = arguments.folder.display();
             let text = format!(
                 "{}\n\nnext:\n  understudy check {folder}/cluster.toml {folder}/kill.toml\n  \
-                 understudy lab {folder}/cluster.toml --scenario {folder}/kill.toml\n",
+                 understudy lab {folder}/cluster.toml --scenario {folder}/kill.toml\n  \
+                 understudy watch {folder}/cluster.toml --allow-commands\n",
                 names.join("\n")
             );
             Answer::done(text, json!({ "files": names }))
