@@ -15,7 +15,9 @@ use understudy_allocation::{
 use understudy_scenarios::time_name;
 
 use crate::answer::{Answer, Status};
+use crate::console::Console;
 use crate::run::command_line;
+use crate::verify::patience::Patience;
 use crate::{catalogue, files};
 use programs::{Programs, period};
 
@@ -26,6 +28,7 @@ Example:
   understudy allocate examples/press-cell/cluster.toml
   understudy allocate examples/press-cell/cluster.toml --reserve 20% --prefer speed --report plan
   understudy allocate a.ladder b.ladder c.ladder --io local --stock \"CPU 224=2\" --assume program_bytes_per_instruction=8
+  understudy allocate examples/boiler/complete.ladder --budget 20s
   understudy allocate pump.ladder --require \"vendor=Siemens\" --require \"inputs>=12\"
 
 A controller fits, does not fit, or is not known: a figure that the catalogue does not have never counts as enough. Nothing is placed whose
@@ -69,6 +72,9 @@ pub(crate) struct Arguments {
     /// What a program is to keep, to be proved before it is placed; may be given more than once
     #[arg(long, value_name = "PROGRAM=FILE", value_parser = properties)]
     properties: Vec<(String, PathBuf)>,
+    /// For proving; a program of which not everything was decided by then is not placed
+    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = period)]
+    budget: Duration,
     /// Place programs that have not passed verification
     #[arg(long)]
     unverified: bool,
@@ -143,17 +149,18 @@ fn properties(text: &str) -> Result<(String, PathBuf), String> {
     Ok((name.trim().to_owned(), PathBuf::from(file.trim())))
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
-    match plan(arguments) {
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
+    match plan(arguments, console) {
         Ok(answer) | Err(answer) => answer,
     }
 }
 
-fn plan(arguments: &Arguments) -> Result<Answer, Answer> {
+fn plan(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let options = options(arguments)?;
     let programs = Programs::read(&arguments.programs, arguments.period)?;
     let (catalogue, about) = catalogue::read(arguments.catalogue.as_deref())?;
-    let items = items(arguments, &programs)?;
+    let patience = Patience::new(Some(arguments.budget), console);
+    let items = items(arguments, &programs, &patience)?;
     let found = allocate(&catalogue, &items, &options).map_err(|errors| {
         errors
             .iter()
@@ -216,7 +223,11 @@ fn options(arguments: &Arguments) -> Result<Options, Answer> {
 }
 
 /// The boxes that the programs want, with what was proved about each.
-fn items(arguments: &Arguments, programs: &Programs) -> Result<Vec<Item>, Answer> {
+fn items(
+    arguments: &Arguments,
+    programs: &Programs,
+    patience: &Patience<'_>,
+) -> Result<Vec<Item>, Answer> {
     let alone = programs.groups.len() == 1
         && programs.groups[0].cluster.is_none()
         && programs.groups[0].members.len() == 1;
@@ -226,11 +237,11 @@ fn items(arguments: &Arguments, programs: &Programs) -> Result<Vec<Item>, Answer
     let asked = verified::asked(&arguments.properties, programs)?;
     let mut items = Vec::new();
     for (number, group) in programs.groups.iter().enumerate() {
-        let members = verified::members(group, &asked)?;
+        let members = verified::members(group, &asked, patience)?;
         if io == Io::Local {
             items.extend(members.iter().map(understudy_allocation::alone));
         } else {
-            let group = verified::group(group, members, arguments.understudies)?;
+            let group = verified::group(group, members, arguments.understudies, patience)?;
             items.extend(group.items(number));
         }
     }

@@ -195,7 +195,7 @@ impl Command {
             Self::Reconfigure(arguments) => reconfigure::run(&arguments),
             Self::Reliability(arguments) => reliability::run(&arguments),
             Self::Resources(arguments) => resources::run(&arguments),
-            Self::Allocate(arguments) => allocate::run(&arguments),
+            Self::Allocate(arguments) => allocate::run(&arguments, console),
             Self::Catalogue(arguments) => catalogue::run(&arguments),
             Self::Measure(arguments) => measure::run(&arguments, console),
             Self::Outlook(arguments) => outlook::run(&arguments),

@@ -1,7 +1,7 @@
 //! `understudy verify`: ladders against their properties, and against what everybody wants of a ladder.
 
 mod answer;
-mod patience;
+pub(crate) mod patience;
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;

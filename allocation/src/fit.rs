@@ -15,6 +15,7 @@ use crate::ethernet::{Ethernet, ethernet};
 use crate::figures::{FamilyQuantity, Quantity, Statement};
 use crate::memory::{Bytes, Memory, memory};
 use crate::need::{Need, Terms};
+use crate::requirement::Asked;
 use judge::Judge;
 
 /// Three-valued; the better is the smaller.
@@ -169,7 +170,9 @@ pub fn fit(controller: &Controller, family: Option<&Family>, need: &Need, terms:
         network(&mut judge);
     }
     for requirement in &terms.requirements {
-        if requirement.is_of(need.role) {
+        // The network of a plant asks for Ethernet by itself; once is enough.
+        let is_asked = need.ethernet && requirement.asked == Asked::Ethernet;
+        if requirement.is_of(need.role) && !is_asked {
             asked::judge(&mut judge, requirement, need);
         }
     }

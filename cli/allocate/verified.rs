@@ -7,14 +7,16 @@ use understudy_allocation::{Group as Wanted, Member, Resources, Verification};
 use understudy_diagnostic::{Report, has_errors};
 use understudy_ladder::from_circuit;
 use understudy_logic::Circuit;
+use understudy_logic::bdd::Diagrams;
 use understudy_parity::generate;
 use understudy_verification::program::{Answer as Proof, Bounds, Lamp, OutputFinding, Subject};
 use understudy_verification::property::{Properties, not_of_one_scan, read};
-use understudy_verification::prove_parity;
+use understudy_verification::prove_parity_while;
 
 use super::programs::{Group, Programs};
 use crate::answer::{Answer, Status};
 use crate::files;
+use crate::verify::patience::Patience;
 
 /// Properties by the name of their program, with the file that they came from.
 pub(super) type Asked = BTreeMap<String, Vec<(Report, Properties)>>;
@@ -51,11 +53,16 @@ pub(super) fn asked(files: &[(String, PathBuf)], programs: &Programs) -> Result<
 }
 
 /// The programs of a group, each with what was proved about it.
-pub(super) fn members(group: &Group, asked: &Asked) -> Result<Vec<Member>, Answer> {
+pub(super) fn members(
+    group: &Group,
+    asked: &Asked,
+    patience: &Patience<'_>,
+) -> Result<Vec<Member>, Answer> {
     let members = group.members.iter().enumerate().map(|(place, member)| {
         let subject = Subject::new(&member.ladder, group.period)
             .map_err(|error| Answer::failed(Status::BadInput, "U0436", error.to_string()))?;
         let name = group.name(&member.name);
+        patience.turn_to(format!("`{name}`"));
         let properties = asked.get(&name).map_or(&[][..], Vec::as_slice);
         let remote_io = match &group.cluster {
             Some(cluster) => group.name(&cluster.remote_ios()[place].name),
@@ -63,7 +70,7 @@ pub(super) fn members(group: &Group, asked: &Asked) -> Result<Vec<Member>, Answe
         };
         Ok(Member {
             program: Resources::of(&member.ladder),
-            verification: verification(&subject, properties)?,
+            verification: verification(&subject, properties, patience)?,
             name,
             remote_io,
         })
@@ -71,10 +78,19 @@ pub(super) fn members(group: &Group, asked: &Asked) -> Result<Vec<Member>, Answe
     members.collect()
 }
 
-fn verification(subject: &Subject, asked: &[(Report, Properties)]) -> Result<Verification, Answer> {
-    let bounds = Bounds::default();
+fn verification(
+    subject: &Subject,
+    asked: &[(Report, Properties)],
+    patience: &Patience<'_>,
+) -> Result<Verification, Answer> {
+    let go_on = |work| patience.goes_on(work);
+    let bounds = Bounds {
+        go_on: &go_on,
+        ..Bounds::default()
+    };
     let circuit = subject.circuit();
     let mut wrong = Vec::new();
+    let mut undecided = Undecided::default();
     let switches = subject.switches(bounds);
     for (signal, finding) in &switches {
         let name = signal.name(circuit);
@@ -88,7 +104,7 @@ fn verification(subject: &Subject, asked: &[(Report, Properties)]) -> Result<Ver
                     lamp(which)
                 ));
             }
-            OutputFinding::Undecided(why) => wrong.push(format!("{name}: undecided, {why}")),
+            OutputFinding::Undecided(why) => undecided.add(name.to_owned(), why),
         }
     }
     let mut proved = format!(
@@ -121,13 +137,17 @@ fn verification(subject: &Subject, asked: &[(Report, Properties)]) -> Result<Ver
                 Proof::Holds(_) => {}
                 Proof::Fails(_) => wrong.push(format!("`{}` does not hold", property.text)),
                 Proof::Undecided(why) => {
-                    wrong.push(format!("`{}` is undecided: {why}", property.text));
+                    undecided.add(format!("`{}`", property.text), &why.to_string());
                 }
             }
         }
     }
     if count > 0 {
         proved.push_str(&format!("; {count} properties hold"));
+    }
+    wrong.extend(undecided.told());
+    if patience.is_over() {
+        wrong.push("a larger --budget gives the proof more time".to_owned());
     }
     Ok(if wrong.is_empty() {
         Verification::Passed(format!("verified: {proved}"))
@@ -136,11 +156,40 @@ fn verification(subject: &Subject, asked: &[(Report, Properties)]) -> Result<Ver
     })
 }
 
+/// What was not decided, together where it is for one reason.
+#[derive(Default)]
+struct Undecided(Vec<(String, Vec<String>)>);
+
+/// Names of one reason that are told.
+const TOLD: usize = 3;
+
+impl Undecided {
+    fn add(&mut self, name: String, why: &str) {
+        match self.0.iter_mut().find(|(known, _)| known == why) {
+            Some((_, names)) => names.push(name),
+            None => self.0.push((why.to_owned(), vec![name])),
+        }
+    }
+
+    fn told(self) -> impl Iterator<Item = String> {
+        self.0.into_iter().map(|(why, names)| {
+            let more = match names.len().saturating_sub(TOLD) {
+                0 => String::new(),
+                more => format!(" and {more} more"),
+            };
+            let told = names.iter().take(TOLD).map(String::as_str);
+            let told = told.collect::<Vec<_>>().join(", ");
+            format!("undecided about {told}{more}: {why}")
+        })
+    }
+}
+
 /// The group with its understudy, which is proved to be the sum of its members.
 pub(super) fn group(
     group: &Group,
     members: Vec<Member>,
     understudies: u8,
+    patience: &Patience<'_>,
 ) -> Result<Wanted, Answer> {
     let circuits: Vec<Circuit> = group
         .members
@@ -153,7 +202,10 @@ pub(super) fn group(
             Answer::failed(Status::BadInput, error.code(), super::message(&error))
         })?,
     };
-    let proof = match prove_parity(&circuits, parity.circuit()) {
+    patience.turn_to("the understudy".to_owned());
+    let go_on = |work| patience.goes_on(work);
+    let nodes = Diagrams::DEFAULT_LIMIT;
+    let proof = match prove_parity_while(&circuits, parity.circuit(), nodes, &go_on) {
         Ok(proof) => Verification::Passed(format!(
             "verified: it equals the sum of its members, {} registers and {} outputs compared",
             proof.registers, proof.outputs

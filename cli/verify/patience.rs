@@ -11,7 +11,7 @@ use crate::console::Console;
 const BETWEEN: Duration = Duration::from_secs(3);
 
 /// The budget of a command.
-pub(super) struct Patience<'c> {
+pub(crate) struct Patience<'c> {
     begin: Instant,
     told: Cell<Instant>,
     budget: Option<Duration>,
@@ -21,7 +21,7 @@ pub(super) struct Patience<'c> {
 
 impl<'c> Patience<'c> {
     /// From now on, for `budget`, or as long as it takes.
-    pub(super) fn new(budget: Option<Duration>, console: &'c mut Console) -> Self {
+    pub(crate) fn new(budget: Option<Duration>, console: &'c mut Console) -> Self {
         let now = Instant::now();
         Self {
             begin: now,
@@ -33,12 +33,12 @@ impl<'c> Patience<'c> {
     }
 
     /// What the work is about from here on.
-    pub(super) fn turn_to(&self, about: String) {
+    pub(crate) fn turn_to(&self, about: String) {
         self.about.replace(about);
     }
 
     /// Whether there is time left; says what is being done, every few seconds.
-    pub(super) fn goes_on(&self, work: Work) -> bool {
+    pub(crate) fn goes_on(&self, work: Work) -> bool {
         let now = Instant::now();
         if now - self.told.get() >= BETWEEN {
             self.told.set(now);
@@ -47,5 +47,11 @@ impl<'c> Patience<'c> {
             self.console.borrow_mut().note(&line);
         }
         self.budget.is_none_or(|budget| now - self.begin < budget)
+    }
+
+    /// Whether the budget is used up.
+    pub(crate) fn is_over(&self) -> bool {
+        self.budget
+            .is_some_and(|budget| self.begin.elapsed() >= budget)
     }
 }

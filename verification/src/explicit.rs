@@ -86,6 +86,14 @@ impl Set {
         self.0[state / 64] >> (state % 64) & 1 == 1
     }
 
+    /// The first state below `end` that is in it, or is not.
+    fn first(&self, wanted: bool, end: usize) -> Option<usize> {
+        let flip = u64::from(wanted).wrapping_sub(1);
+        let mut words = self.0.iter().map(|word| word ^ flip).enumerate();
+        let (place, word) = words.find(|&(_, word)| word != 0)?;
+        Some(64 * place + word.trailing_zeros() as usize).filter(|&state| state < end)
+    }
+
     fn insert(&mut self, state: usize) {
         self.0[state / 64] |= 1 << (state % 64);
     }

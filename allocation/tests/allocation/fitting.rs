@@ -208,6 +208,12 @@ fn an_ethernet_port_is_needed_to_speak_with_a_remote_io() {
     let check = |controller: &Controller, expected| {
         let found = fit(controller, Some(&known_family()), &need, &Terms::default());
         assert_eq!(found.verdict, expected, "{:?}", messages(&found));
+        let asked_too = Terms {
+            requirements: vec![Requirement::parse("ethernet").expect("a requirement")],
+            ..Terms::default()
+        };
+        let once = fit(controller, Some(&known_family()), &need, &asked_too);
+        assert_eq!(messages(&once), messages(&found));
     };
     check(&controller("A", &ALL), Verdict::Unknown);
     check(

@@ -133,9 +133,7 @@ struct Model<'e> {
 impl Model<'_> {
     fn check(&self, property: &Resolved) -> (bool, Option<Vec<Vec<bool>>>) {
         let ways = self.listed.ways;
-        let first_in = |set: &Set, wanted: bool| {
-            (0..self.listed.states()).find(|&state| set.contains(state) == wanted)
-        };
+        let first_in = |set: &Set, wanted| set.first(wanted, self.listed.states());
         match property {
             // All states that are listed can be reached, so this needs no fixed point.
             Formula::Always(Path::All, inner) => {
@@ -199,9 +197,15 @@ impl Model<'_> {
     fn some(&self, set: &Set) -> Vec<bool> {
         let ways = self.listed.ways;
         let registers = 0..self.listed.origins.len();
-        registers
-            .map(|from| (from * ways..(from + 1) * ways).any(|state| set.contains(state)))
-            .collect()
+        if ways < 64 {
+            let all = (1 << ways) - 1;
+            return registers
+                .map(|from| set.0[from * ways / 64] >> (from * ways % 64) & all != 0)
+                .collect();
+        }
+        let words = set.0.chunks(ways / 64);
+        let some = words.map(|words| words.iter().any(|&word| word != 0));
+        some.collect()
     }
 
     /// EX
@@ -229,6 +233,10 @@ impl Model<'_> {
             }
         }
         let mut set = end;
+        if some.iter().all(|&some| some) {
+            set.0.fill(u64::MAX);
+            return set;
+        }
         for (state, &next) in self.listed.next.iter().enumerate() {
             if some[next as usize] {
                 set.insert(state);
