@@ -10,13 +10,15 @@ use understudy_wire::Image;
 use crate::account::{Account, Interval, Presence, Service, TRACED_CYCLES, Trace};
 use crate::summary::Summary;
 
-/// Names of a program's signals.
+/// Names of a program's signals, and of what moves in its plant.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Signals {
     /// u, in order.
     pub inputs: Vec<String>,
     /// y, in order.
     pub outputs: Vec<String>,
+    /// Moving parts of its simulated plant, in order.
+    pub positions: Vec<String>,
 }
 
 const WIDTH: u32 = 1100;
@@ -199,15 +201,18 @@ fn panels(account: &Account, summary: &Summary) -> Vec<Panel> {
     let mut letter = || letters.next().unwrap_or_default();
     for (program, plant_name) in terms.parties.plants() {
         let trace = &account.traces.plants[program.index()];
-        let names = terms
-            .signals
-            .get(program.index())
-            .map(|signals| &signals.inputs[..]);
-        let mut lanes = position_lanes(&trace.positions);
-        lanes.extend(bit_lanes(&trace.sensors, names.unwrap_or_default()));
+        let mut lanes = Vec::new();
+        let mut shown = "sensors";
+        if let Some(signals) = terms.signals.get(program.index()) {
+            if !signals.positions.is_empty() {
+                shown = "positions and sensors";
+            }
+            lanes.extend(position_lanes(&trace.positions, &signals.positions));
+            lanes.extend(bit_lanes(&trace.sensors, &signals.inputs));
+        }
         let summary = summary.plants.iter().find(|plant| plant.name == plant_name);
         panels.push(Panel {
-            title: format!("({}) plant {plant_name}: positions and sensors", letter()),
+            title: format!("({}) plant {plant_name}: {shown}", letter()),
             lanes: bounded(lanes),
             shades: summary.map_or_else(Vec::new, |plant| service_shades(&plant.intervals)),
         });
@@ -284,11 +289,12 @@ fn bit_lanes(trace: &Trace<Image>, names: &[String]) -> Vec<Lane> {
         .collect()
 }
 
-fn position_lanes(trace: &Trace<Vec<u16>>) -> Vec<Lane> {
-    let count = trace.spans().map(|(_, _, positions)| positions.len()).max();
-    (0..count.unwrap_or(0))
-        .map(|index| Lane {
-            name: format!("position {}", index + 1),
+fn position_lanes(trace: &Trace<Vec<u16>>, names: &[String]) -> Vec<Lane> {
+    names
+        .iter()
+        .enumerate()
+        .map(|(index, name)| Lane {
+            name: name.clone(),
             colour: POSITION,
             steps: joined(trace.spans().map(|(from, to, positions)| {
                 let position = positions.get(index).copied().unwrap_or_default();

@@ -26,7 +26,12 @@ impl Terms {
             let scan = cluster.programs()[program.index()].scan.clone();
             Some(Referee::new(&settings, scan))
         });
-        let signals = cluster.controllers().iter().map(|controller| Signals {
+        let signals = cluster.controllers().iter().enumerate();
+        let signals = signals.map(|(index, controller)| Signals {
+            positions: cluster
+                .plant_settings(ProgramId(index as u8))
+                .map(|settings| settings.plant.position_names().to_vec())
+                .unwrap_or_default(),
             inputs: controller.circuit.inputs().to_vec(),
             outputs: controller
                 .circuit
