@@ -1,8 +1,9 @@
 //! What a run came to, from its records alone, as they come.
 //!
 //! One account for both worlds: it numbers the cycles, finds the origin, asks a [`Referee`] for each remote I/O whether what was
-//! applied is true, and keeps what the summary, the table and the figure show. Its memory is bounded: cycles are
-//! closed in order, [`LAG_CYCLES`] behind the newest, when every party has surely said what it had to say about them.
+//! applied is true, and keeps what the summary, the table and the figure show. Cycles are closed in order, [`LAG_CYCLES`] behind the
+//! newest and when every remote I/O has told of a later one. The records of each party come on a way of their own, and a busy machine may
+//! read one of them long before another: only [`MAXIMUM_OPEN_CYCLES`], which bound its memory, end the wait for a remote I/O that is gone.
 
 mod closing;
 mod numbering;
@@ -38,8 +39,11 @@ use presence::Presences;
 use service::{Outcome, ServiceTrack};
 use stalls::Stalls;
 
-/// How far behind the newest cycle one is closed.
+/// How far behind the newest cycle one is closed at the earliest.
 const LAG_CYCLES: usize = 64;
+
+/// Cycles that are open at once, at most.
+const MAXIMUM_OPEN_CYCLES: usize = 2048;
 
 /// Violations that are listed, at most; all are counted.
 const MAXIMUM_VIOLATIONS: usize = 100;
@@ -331,7 +335,7 @@ impl Account {
             }
         }
         self.look_for_origin(number, *moment);
-        while self.open.len() > LAG_CYCLES {
+        while self.open.len() > LAG_CYCLES && self.oldest_is_told() {
             self.close_oldest();
         }
     }
@@ -443,6 +447,13 @@ impl Account {
         if everybody && self.starting_plants.is_empty() {
             self.origin = Some((moment, number));
         }
+    }
+
+    /// Whether nobody has anything more to say of the oldest open cycle, or too many wait for it.
+    fn oldest_is_told(&self) -> bool {
+        let oldest = self.open.first_key_value().map(|(number, _)| *number);
+        self.open.len() > MAXIMUM_OPEN_CYCLES
+            || oldest.is_some_and(|oldest| self.numbering.all_are_past(oldest))
     }
 
     /// Closes the oldest open cycle, and those before it that no record had.

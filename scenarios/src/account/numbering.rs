@@ -61,6 +61,12 @@ impl Numbering {
             .max()
     }
 
+    /// Whether every remote I/O that was ever there has told of a later deadline.
+    pub(crate) fn all_are_past(&self, number: i64) -> bool {
+        let mut lasts = self.remote_ios.values();
+        lasts.all(|last| last.number.saturating_add(last.idle) > number)
+    }
+
     fn start(&mut self, remote_io: ProgramId, moment: Moment) -> i64 {
         let Some((newest, newest_number)) = self.newest else {
             self.offsets.insert(moment.epoch, 0);
