@@ -234,13 +234,17 @@ pub(crate) fn judged(
     let (_served, commands) = match served.transpose() {
         Ok(served) => served.unzip(),
         Err(answer) => {
-            directory.clone().take_back();
+            directory.take_back();
             return Err(answer);
         }
     };
     let mut watch = |progress| console.show(&progress);
-    let run = run_commanded(cluster, scenario, settings, directory, commands, &mut watch)
-        .map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))?;
+    let run = run_commanded(cluster, scenario, settings, directory, commands, &mut watch).map_err(
+        |error| {
+            directory.take_back();
+            Answer::failed(Status::Failed, error.code(), error.to_string())
+        },
+    )?;
     let machine = machine().into_iter().chain(run.machine).collect();
     let circumstances = circumstances(cluster, World::Laboratory, None, machine, command_line());
     let (mut summary, account) = Summary::new(run.account, scenario, circumstances, run.journal);

@@ -212,6 +212,7 @@ fn may_have_been_late(summary: &Summary) -> bool {
     let lacking = counts().map(|counts| counts.held + counts.fail_safe + counts.unserved);
     summary.circumstances.world == World::Laboratory
         && !summary.passed
+        && !summary.interrupted
         && counts().all(|counts| counts.wrong == 0)
         && lacking.sum::<u64>() > 0
 }

@@ -98,8 +98,12 @@ impl RunDirectory {
         })
     }
 
-    /// Takes back a run that never began: its directory goes, and `latest` points to the newest that is left.
-    pub fn take_back(self) {
+    /// Takes back a run that never began, of which there is no journal: its directory goes, and `latest` points to the newest that is
+    /// left.
+    pub fn take_back(&self) {
+        if self.file("journal.jsonl").exists() {
+            return;
+        }
         // What cannot be removed stays, and is a run without records.
         let _ = fs::remove_dir_all(&self.path);
         let Some(runs) = self.path.parent() else {
