@@ -3,10 +3,10 @@
 //! Products are contacts in series, sums are branches, an exclusive or is two branches, and what is used more than once is a
 //! memory bit of its own. The order of the rungs is that of [`crate::plan`], so the scan equals the synchronous circuit.
 
-use understudy_logic::{Circuit, Expression, Operation, Variable};
+use understudy_logic::{Circuit, Expression, Operation};
 
 use crate::names::{Language, Namer};
-use crate::plan::{Operand, Plan, Target};
+use crate::plan::{Named, Operand, Plan, Target};
 use crate::program::{
     Coil, CoilKind, Contact, ContactKind, Element, Name, Program, Rung, Series, Signal,
 };
@@ -18,59 +18,33 @@ use crate::program::{
 pub fn from_circuit(circuit: &Circuit) -> Program {
     let plan = Plan::new(circuit, true);
     let mut namer = Namer::new(Language::Ladder);
-    let mut name = |wanted: &str| namer.name(wanted);
-    let inputs: Vec<String> = circuit.inputs().iter().map(|input| name(input)).collect();
-    let outputs = circuit.outputs().iter();
-    let outputs: Vec<String> = outputs.map(|output| name(&output.name)).collect();
-    let registers = circuit.registers().iter();
-    let registers: Vec<String> = registers.map(|register| name(&register.name)).collect();
-    let shared = 0..plan.shared_count;
-    let shared: Vec<String> = shared.map(|k| name(&format!("shared_{}", k + 1))).collect();
-    let mut next = vec![String::new(); registers.len()];
-    let mut memory: Vec<Signal> = circuit
-        .registers()
-        .iter()
-        .zip(&registers)
+    let names = Named::new(circuit, &plan, &mut namer, ".next");
+    let registers = circuit.registers().iter().zip(&names.registers);
+    let mut memory: Vec<Signal> = registers
         .map(|(register, name)| Signal {
             initial: Some(register.initial),
             ..Signal::new(name.as_str())
         })
         .collect();
-    memory.extend(shared.iter().map(|name| Signal::new(name.as_str())));
-    for assignment in &plan.assignments {
-        if let Target::Next(index) = assignment.target {
-            next[index] = name(&format!("{}.next", registers[index]));
-            memory.push(Signal::new(next[index].as_str()));
-        }
-    }
+    let helpers = names.shared.iter().map(String::as_str).chain(names.held());
+    memory.extend(helpers.map(Signal::new));
     let writer = Writer {
         plan: &plan,
-        inputs: &inputs,
-        registers: &registers,
-        shared: &shared,
+        names: &names,
     };
     let mut rungs = Vec::with_capacity(plan.assignments.len());
     let mut section = "";
     for assignment in &plan.assignments {
-        let (heading, target) = match assignment.target {
-            Target::Shared(k) => (
-                "Expressions that are used more than once, or long.",
-                &shared[k],
-            ),
-            Target::Output(k) => ("Outputs.", &outputs[k]),
-            Target::Register(k) => (
-                "The new state; nobody reads the old value of these any more.",
-                &registers[k],
-            ),
-            Target::Next(k) => ("The new state, held until all of it is known.", &next[k]),
-            Target::Takeover(k) => ("The new state is taken over.", &registers[k]),
-        };
+        let target = names.target(assignment.target);
         let mut rung = match assignment.target {
-            Target::Takeover(k) => rung(vec![contact(&next[k], true)], CoilKind::Plain, target),
+            Target::Takeover(k) => {
+                rung(vec![contact(names.next(k), true)], CoilKind::Plain, target)
+            }
             _ => writer.rung(assignment.expression, target),
         };
+        let heading = assignment.target.heading();
         if section != heading {
-            rung.comments.push(heading.into());
+            rung.comments.push(sentence(heading));
             section = heading;
         }
         rungs.push(rung);
@@ -83,12 +57,18 @@ pub fn from_circuit(circuit: &Circuit) -> Program {
     };
     Program {
         name: Name::from(Namer::new(Language::Ladder).name(circuit.name())),
-        inputs: signals(&inputs),
-        outputs: signals(&outputs),
+        inputs: signals(&names.inputs),
+        outputs: signals(&names.outputs),
         memory,
         rungs,
         ..Program::default()
     }
+}
+
+/// With a capital at its begin and a full stop at its end.
+fn sentence(heading: &str) -> String {
+    let (first, rest) = heading.split_at(1);
+    format!("{}{rest}.", first.to_uppercase())
 }
 
 fn rung(network: Series, kind: CoilKind, target: &str) -> Rung {
@@ -115,17 +95,15 @@ fn contact(operand: &str, positive: bool) -> Element {
 
 struct Writer<'a> {
     plan: &'a Plan<'a>,
-    inputs: &'a [String],
-    registers: &'a [String],
-    shared: &'a [String],
+    names: &'a Named,
 }
 
 impl Writer<'_> {
     /// The rung that gives `expression` to `target`, whether it is shared or not.
     fn rung(&self, expression: Expression, target: &str) -> Rung {
         match self.plan.operand(expression) {
-            Operand::Shared(number) if self.shared[number] != target => rung(
-                vec![contact(&self.shared[number], true)],
+            Operand::Shared(number) if self.names.shared[number] != target => rung(
+                vec![contact(&self.names.shared[number], true)],
                 CoilKind::Plain,
                 target,
             ),
@@ -143,13 +121,8 @@ impl Writer<'_> {
     /// A series that passes power while `expression` is `positive`.
     fn series(&self, expression: Expression, positive: bool) -> Series {
         match self.plan.operand(expression) {
-            Operand::Shared(number) => vec![contact(&self.shared[number], positive)],
-            Operand::Variable(Variable::Input(index)) => {
-                vec![contact(&self.inputs[index as usize], positive)]
-            }
-            Operand::Variable(Variable::Register(index)) => {
-                vec![contact(&self.registers[index as usize], positive)]
-            }
+            Operand::Shared(number) => vec![contact(&self.names.shared[number], positive)],
+            Operand::Variable(variable) => vec![contact(self.names.variable(variable), positive)],
             Operand::Operation(operation) => self.operation(operation, positive),
         }
     }

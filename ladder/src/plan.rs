@@ -4,9 +4,13 @@
 //! registers; a register is written at once where nobody else reads its old value any more, and otherwise its new value is
 //! held until all have been computed. So the sequence of assignments equals the synchronous equations (1)-(2).
 
+mod named;
+
 use std::collections::BTreeSet;
 
 use understudy_logic::{Circuit, Expression, Operation, Variable};
+
+pub(crate) use named::Named;
 
 /// Contacts or operands of one assignment past which a part gets an assignment of its own.
 const MAXIMUM_OPERANDS: usize = 24;

@@ -218,6 +218,31 @@ impl Relation {
         }
     }
 
+    /// The relation that holds where this one does not.
+    #[must_use]
+    pub fn opposite(self) -> Self {
+        match self {
+            Self::Equal => Self::NotEqual,
+            Self::NotEqual => Self::Equal,
+            Self::Less => Self::GreaterOrEqual,
+            Self::LessOrEqual => Self::Greater,
+            Self::Greater => Self::LessOrEqual,
+            Self::GreaterOrEqual => Self::Less,
+        }
+    }
+
+    /// The same with its sides exchanged.
+    #[must_use]
+    pub fn mirrored(self) -> Self {
+        match self {
+            Self::Less => Self::Greater,
+            Self::LessOrEqual => Self::GreaterOrEqual,
+            Self::Greater => Self::Less,
+            Self::GreaterOrEqual => Self::LessOrEqual,
+            same => same,
+        }
+    }
+
     /// Whether it holds.
     pub fn holds(self, left: u16, right: u16) -> bool {
         match self {
@@ -290,6 +315,25 @@ impl Program {
     /// Outputs and memory bits, what coils may write.
     pub fn writable(&self) -> impl Iterator<Item = &Signal> {
         self.memory.iter().chain(&self.outputs)
+    }
+
+    /// One more rung behind the last.
+    pub fn push_rung(&mut self, network: Series, coils: Vec<Coil>) {
+        self.rungs.push(Rung {
+            network,
+            coils,
+            ..Rung::default()
+        });
+    }
+
+    /// One more rung behind the last, with what it is for.
+    pub fn push_titled(&mut self, title: &str, network: Series, coils: Vec<Coil>) {
+        self.rungs.push(Rung {
+            title: Some(title.to_owned()),
+            network,
+            coils,
+            ..Rung::default()
+        });
     }
 
     /// All blocks, in the order of the scan.

@@ -6,10 +6,10 @@
 use std::collections::HashMap;
 use std::fmt::Write;
 
-use understudy_logic::{Circuit, Expression, Operation, Variable};
+use understudy_logic::{Circuit, Expression, Operation};
 
 use crate::names::{Language, Namer};
-use crate::plan::{Operand, Plan, Target};
+use crate::plan::{Named, Operand, Plan, Target};
 use crate::program::{Address, Program};
 
 /// Characters of a line past which an assignment is broken before an operator.
@@ -34,40 +34,31 @@ impl Program {
 pub fn structured_text(circuit: &Circuit, addresses: &HashMap<String, Address>) -> String {
     let plan = Plan::new(circuit, false);
     let mut namer = Namer::new(Language::StructuredText);
-    let mut name = |wanted: &str| namer.name(wanted);
-    let program = name(circuit.name());
-    let inputs: Vec<String> = circuit.inputs().iter().map(|input| name(input)).collect();
-    let outputs = circuit.outputs().iter();
-    let outputs: Vec<String> = outputs.map(|output| name(&output.name)).collect();
-    let registers = circuit.registers().iter();
-    let registers: Vec<String> = registers.map(|register| name(&register.name)).collect();
-    let shared = 0..plan.shared_count;
-    let shared: Vec<String> = shared.map(|k| name(&format!("shared_{}", k + 1))).collect();
-    let mut next = vec![String::new(); registers.len()];
-    let mut held = Vec::new();
-    for assignment in &plan.assignments {
-        if let Target::Next(index) = assignment.target {
-            next[index] = name(&format!("{}_next", registers[index]));
-            held.push(index);
-        }
-    }
+    let program = namer.name(circuit.name());
+    let names = Named::new(circuit, &plan, &mut namer, "_next");
 
     let mut text = format!("PROGRAM {program}\n");
     let wanted_inputs: Vec<&str> = circuit.inputs().iter().map(String::as_str).collect();
     let wanted_outputs = circuit.outputs().iter().map(|output| output.name.as_str());
     let wanted_outputs: Vec<&str> = wanted_outputs.collect();
-    located(&mut text, "VAR_INPUT", &wanted_inputs, &inputs, addresses);
+    located(
+        &mut text,
+        "VAR_INPUT",
+        &wanted_inputs,
+        &names.inputs,
+        addresses,
+    );
     located(
         &mut text,
         "VAR_OUTPUT",
         &wanted_outputs,
-        &outputs,
+        &names.outputs,
         addresses,
     );
     let state = circuit
         .registers()
         .iter()
-        .zip(&registers)
+        .zip(&names.registers)
         .map(|(register, name)| {
             let initial = if register.initial { "TRUE" } else { "FALSE" };
             format!(
@@ -76,7 +67,7 @@ pub fn structured_text(circuit: &Circuit, addresses: &HashMap<String, Address>) 
             )
         });
     section(&mut text, "VAR", state.collect());
-    let helpers = shared.iter().chain(held.iter().map(|&index| &next[index]));
+    let helpers = names.shared.iter().map(String::as_str).chain(names.held());
     section(
         &mut text,
         "VAR",
@@ -85,32 +76,19 @@ pub fn structured_text(circuit: &Circuit, addresses: &HashMap<String, Address>) 
 
     let writer = Writer {
         plan: &plan,
-        inputs: &inputs,
-        registers: &registers,
-        shared: &shared,
+        names: &names,
     };
-    let mut heading = "";
+    let mut section = "";
     for assignment in &plan.assignments {
-        let (comment, target) = match assignment.target {
-            Target::Shared(k) => (
-                "expressions that are used more than once, or long",
-                &shared[k],
-            ),
-            Target::Output(k) => ("outputs", &outputs[k]),
-            Target::Register(k) => (
-                "new state; nobody reads the old value of these any more",
-                &registers[k],
-            ),
-            Target::Next(k) => ("new state, held until all of it is known", &next[k]),
-            Target::Takeover(k) => ("the new state is taken over", &registers[k]),
-        };
-        if heading != comment {
-            let _ = writeln!(text, "\n  (* {comment} *)");
-            heading = comment;
+        let heading = assignment.target.heading();
+        if section != heading {
+            let _ = writeln!(text, "\n  (* {heading} *)");
+            section = heading;
         }
-        let mut words = vec![target.clone(), ":=".into()];
+        let target = names.target(assignment.target);
+        let mut words = vec![target.to_owned(), ":=".into()];
         match assignment.target {
-            Target::Takeover(k) => words.push(next[k].clone()),
+            Target::Takeover(k) => words.push(names.next(k).to_owned()),
             _ => writer.assignment(assignment.expression, target, &mut words),
         }
         statement(&mut text, &words);
@@ -202,15 +180,13 @@ fn binding(operation: Operation) -> u8 {
 
 struct Writer<'a> {
     plan: &'a Plan<'a>,
-    inputs: &'a [String],
-    registers: &'a [String],
-    shared: &'a [String],
+    names: &'a Named,
 }
 
 impl Writer<'_> {
     fn assignment(&self, expression: Expression, target: &str, words: &mut Vec<String>) {
         match self.plan.operand(expression) {
-            Operand::Shared(number) if self.shared[number] == target => {
+            Operand::Shared(number) if self.names.shared[number] == target => {
                 self.operation(self.plan.operation(expression), words);
             }
             _ => self.expression(expression, 0, words),
@@ -220,13 +196,8 @@ impl Writer<'_> {
     /// Writes an expression that stands where only `least` or a tighter binding needs no brackets.
     fn expression(&self, expression: Expression, least: u8, words: &mut Vec<String>) {
         match self.plan.operand(expression) {
-            Operand::Shared(number) => words.push(self.shared[number].clone()),
-            Operand::Variable(Variable::Input(index)) => {
-                words.push(self.inputs[index as usize].clone());
-            }
-            Operand::Variable(Variable::Register(index)) => {
-                words.push(self.registers[index as usize].clone());
-            }
+            Operand::Shared(number) => words.push(self.names.shared[number].clone()),
+            Operand::Variable(variable) => words.push(self.names.variable(variable).to_owned()),
             Operand::Operation(operation) if binding(operation) < least => {
                 words.push("(".into());
                 self.operation(operation, words);

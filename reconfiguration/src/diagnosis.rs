@@ -20,7 +20,7 @@ mod rungs;
 use std::time::Duration;
 
 use understudy_ladder::{
-    Block, BlockKind, Coil, CoilKind, Contact, ContactKind, Element, Name, Program, Rung, Signal,
+    Block, BlockKind, Coil, CoilKind, Contact, ContactKind, Element, Name, Program, Signal,
 };
 
 use crate::controller::Controller;
@@ -303,20 +303,5 @@ impl<'a> Writer<'a> {
 
     fn states(&self) -> std::ops::Range<usize> {
         0..self.ground.controller.states().len()
-    }
-
-    fn rung(&mut self, network: Vec<Element>, coils: Vec<Coil>) {
-        self.program.rungs.push(Rung {
-            network,
-            coils,
-            ..Rung::default()
-        });
-    }
-
-    fn titled(&mut self, title: &str, network: Vec<Element>, coils: Vec<Coil>) {
-        self.rung(network, coils);
-        if let Some(rung) = self.program.rungs.last_mut() {
-            rung.title = Some(title.to_owned());
-        }
     }
 }

@@ -22,9 +22,7 @@ mod phases;
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
-use understudy_ladder::{
-    Coil, CoilKind, Contact, ContactKind, Element, Name, Program, Rung, Signal,
-};
+use understudy_ladder::{Coil, CoilKind, Contact, ContactKind, Element, Name, Program, Signal};
 
 use crate::controller::Controller;
 use crate::mega::{MegaController, Question, failed_channels};
@@ -298,21 +296,6 @@ impl<'a> Writer<'a> {
         }
     }
 
-    fn rung(&mut self, network: Vec<Element>, coils: Vec<Coil>) {
-        self.program.rungs.push(Rung {
-            network,
-            coils,
-            ..Rung::default()
-        });
-    }
-
-    fn titled(&mut self, title: &str, network: Vec<Element>, coils: Vec<Coil>) {
-        self.rung(network, coils);
-        if let Some(rung) = self.program.rungs.last_mut() {
-            rung.title = Some(title.to_owned());
-        }
-    }
-
     /// In which state of S the ladder is, and whether a channel has just failed.
     fn see(&mut self) {
         let inputs = &self.controller.signals.inputs;
@@ -338,12 +321,13 @@ impl<'a> Writer<'a> {
             rungs.push((network, name.clone()));
         }
         for (network, name) in rungs {
-            self.rung(network, vec![coil(CoilKind::Plain, &name)]);
+            self.program
+                .push_rung(network, vec![coil(CoilKind::Plain, &name)]);
         }
         let states = self.at.values().map(|name| vec![on(name)]).collect();
         if let Some(network) = any(states) {
             let known = coil(CoilKind::Plain, &self.names.known);
-            self.titled(
+            self.program.push_titled(
                 "module 2: is the ladder in a state of the model?",
                 network,
                 vec![known],
@@ -355,7 +339,8 @@ impl<'a> Writer<'a> {
             .collect();
         if let Some(network) = any(newly) {
             let fresh = coil(CoilKind::Plain, &self.names.fresh);
-            self.titled("module 2: has a channel just failed?", network, vec![fresh]);
+            self.program
+                .push_titled("module 2: has a channel just failed?", network, vec![fresh]);
         }
     }
 }

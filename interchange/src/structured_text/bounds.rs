@@ -388,7 +388,7 @@ fn refine(truth: &Truth, holds: bool, present: &mut Present) {
             let relation = if holds {
                 *relation
             } else {
-                opposite(*relation)
+                relation.opposite()
             };
             if let Number::Cell(cell) = **left {
                 let bound = evaluate(right, present);
@@ -396,7 +396,7 @@ fn refine(truth: &Truth, holds: bool, present: &mut Present) {
             }
             if let Number::Cell(cell) = **right {
                 let bound = evaluate(left, present);
-                narrow(&mut present[cell], mirrored(relation), bound);
+                narrow(&mut present[cell], relation.mirrored(), bound);
             }
         }
         _ => {}
@@ -423,29 +423,6 @@ fn narrow(interval: &mut Interval, relation: Relation, bound: Interval) {
     }
     if next.low <= next.high {
         *interval = next;
-    }
-}
-
-/// The relation that holds where this one does not.
-pub(super) fn opposite(relation: Relation) -> Relation {
-    match relation {
-        Relation::Equal => Relation::NotEqual,
-        Relation::NotEqual => Relation::Equal,
-        Relation::Less => Relation::GreaterOrEqual,
-        Relation::LessOrEqual => Relation::Greater,
-        Relation::Greater => Relation::LessOrEqual,
-        Relation::GreaterOrEqual => Relation::Less,
-    }
-}
-
-/// The relation with its sides exchanged.
-pub(super) fn mirrored(relation: Relation) -> Relation {
-    match relation {
-        Relation::Less => Relation::Greater,
-        Relation::LessOrEqual => Relation::GreaterOrEqual,
-        Relation::Greater => Relation::Less,
-        Relation::GreaterOrEqual => Relation::LessOrEqual,
-        same => same,
     }
 }
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 use proptest::prelude::*;
 use understudy_ladder::{
     Block, BlockKind, Coil, CoilKind, Contact, ContactKind, Element, Feed, Interpreter, LowerError,
-    Program, Rung, Series, Signal, print,
+    Program, Relation, Rung, Series, Signal, print,
 };
 
 use crate::random::{Dice, random_program};
@@ -337,4 +337,15 @@ fn presets_are_rounded_up_to_the_period_with_a_warning() {
     );
     let scans = std::iter::repeat_n(vec![true], 8);
     check(&program, Duration::from_millis(100), scans);
+}
+
+#[test]
+fn relations_are_turned_round() {
+    for relation in Relation::ALL {
+        for (left, right) in (0..3).flat_map(|left| (0..3).map(move |right| (left, right))) {
+            let holds = relation.holds(left, right);
+            assert_eq!(relation.opposite().holds(left, right), !holds);
+            assert_eq!(relation.mirrored().holds(right, left), holds);
+        }
+    }
 }

@@ -20,9 +20,12 @@ impl Writer<'_> {
             let differs = vec![vec![on(&raw), off(&last)], vec![off(&raw), on(&last)]];
             let mut network = vec![on(&started)];
             network.extend(any(differs));
-            self.titled(&title, network, vec![coil(Plain, &moves)]);
-            self.rung(vec![on(&raw)], vec![coil(Plain, &last)]);
-            self.rung(vec![on(&moves), on(&diagnosed)], vec![coil(Set, &moved)]);
+            self.program
+                .push_titled(&title, network, vec![coil(Plain, &moves)]);
+            self.program
+                .push_rung(vec![on(&raw)], vec![coil(Plain, &last)]);
+            self.program
+                .push_rung(vec![on(&moves), on(&diagnosed)], vec![coil(Set, &moved)]);
             let title =
                 format!("{channel}: repaired, when it is quiet and shows what the plant may show");
             let quiet = BlockKind::Ton(self.ground.patience.quiet);
@@ -36,11 +39,13 @@ impl Writer<'_> {
                 block(of(&channel, "quiet"), quiet),
             ];
             let mended = of(&channel, "mended");
-            self.titled(&title, network, vec![coil(Plain, &mended)]);
+            self.program
+                .push_titled(&title, network, vec![coil(Plain, &mended)]);
             let network = any(vec![vec![on(&mended)], vec![on(&release)]]);
-            self.rung(network, vec![coil(Reset, &diagnosed)]);
+            self.program
+                .push_rung(network, vec![coil(Reset, &diagnosed)]);
             let network = vec![off(&started), on(&recalled)];
-            self.rung(network, vec![coil(Set, &diagnosed)]);
+            self.program.push_rung(network, vec![coil(Set, &diagnosed)]);
         }
         let anywhere = Name::from("diagnosis.anywhere");
         let lost = Name::from("diagnosis.lost");
@@ -49,7 +54,7 @@ impl Writer<'_> {
             vec![on(&release)],
             vec![on(&lost)],
         ]);
-        self.titled(
+        self.program.push_titled(
             "may the plant be anywhere?",
             network,
             vec![coil(Plain, &anywhere)],
@@ -62,13 +67,15 @@ impl Writer<'_> {
                 .collect();
             let name = Name::from(format!("lets.{}", number + 1));
             network.push(block(name, BlockKind::Tof(self.ground.patience.grace)));
-            self.rung(network, vec![coil(Plain, &self.row(number))]);
+            self.program
+                .push_rung(network, vec![coil(Plain, &self.row(number))]);
         }
         for state in self.states() {
             let own = &self.ground.controller.states()[state].outputs.0;
             let network = outputs.iter().zip(own);
             let network = network.map(|(name, &value)| contact(&Name::from(name.clone()), value));
-            self.rung(network.collect(), vec![coil(Plain, &self.bit("at", state))]);
+            self.program
+                .push_rung(network.collect(), vec![coil(Plain, &self.bit("at", state))]);
         }
     }
 
@@ -84,33 +91,38 @@ impl Writer<'_> {
                     .map(|what| of(&channel, what));
             let failed = ["failed", "diagnosed"].map(|what| vec![on(&of(&channel, what))]);
             let title = format!("{channel}: what it shows, once it has lasted");
-            self.titled(&title, any(failed.into()), vec![coil(Plain, &out)]);
+            self.program
+                .push_titled(&title, any(failed.into()), vec![coil(Plain, &out)]);
             // A failed channel, and one that is looked at for the first time, is taken as it is.
             let as_it_is = any(vec![vec![off(&started)], vec![on(&out)]]);
             for value in [true, false] {
                 let mut network = as_it_is.clone();
                 network.push(contact(&raw, value));
-                self.rung(network, vec![coil(if value { Set } else { Reset }, &seen)]);
+                self.program
+                    .push_rung(network, vec![coil(if value { Set } else { Reset }, &seen)]);
             }
             let other = vec![vec![on(&raw), off(&seen)], vec![off(&raw), on(&seen)]];
-            self.rung(any(other), vec![coil(Plain, &differs)]);
+            self.program
+                .push_rung(any(other), vec![coil(Plain, &differs)]);
             let mut network = vec![on(&differs)];
             if self.is_filtered(&channel) {
                 let steady = BlockKind::Ton(self.ground.patience.steady);
                 network.push(block(of(&channel, "lasts"), steady));
             }
-            self.rung(network, vec![coil(Plain, &accepted)]);
-            self.rung(
+            self.program
+                .push_rung(network, vec![coil(Plain, &accepted)]);
+            self.program.push_rung(
                 vec![on(&waits), off(&differs), off(&out)],
                 vec![coil(Plain, &gone)],
             );
-            self.rung(
+            self.program.push_rung(
                 vec![on(&differs), off(&accepted)],
                 vec![coil(Plain, &waits), coil(Plain, &of(&channel, "unsteady"))],
             );
             for value in [true, false] {
                 let network = vec![on(&accepted), contact(&raw, value)];
-                self.rung(network, vec![coil(if value { Set } else { Reset }, &seen)]);
+                self.program
+                    .push_rung(network, vec![coil(if value { Set } else { Reset }, &seen)]);
             }
             outs.push(vec![on(&out)]);
             changes.push(vec![on(&accepted)]);
@@ -121,16 +133,18 @@ impl Writer<'_> {
             changes.extend(other);
         }
         let out = Name::from("diagnosis.out");
-        self.titled("is a channel failed?", any(outs), vec![coil(Plain, &out)]);
+        self.program
+            .push_titled("is a channel failed?", any(outs), vec![coil(Plain, &out)]);
         let change = Name::from("diagnosis.change");
-        self.titled(
+        self.program.push_titled(
             "has anything changed?",
             any(changes),
             vec![coil(Plain, &change)],
         );
         for name in self.unwatched() {
             let network = vec![on(&Name::from(name.clone()))];
-            self.rung(network, vec![coil(Plain, &of(&name, "last"))]);
+            self.program
+                .push_rung(network, vec![coil(Plain, &of(&name, "last"))]);
         }
     }
 
@@ -159,12 +173,12 @@ impl Writer<'_> {
                 let time = self.ground.period * scans + self.ground.patience.late;
                 let timer = block(self.bit("stay", state), BlockKind::Ton(time));
                 let network = vec![on(&followed), off(&two), stays.clone(), on(&at), timer];
-                self.rung(network, vec![coil(Plain, &old)]);
+                self.program.push_rung(network, vec![coil(Plain, &old)]);
             }
             let timer = BlockKind::Ton(self.ground.patience.grace);
             let timer = block(self.bit("other", state), timer);
             let network = vec![on(&followed), stays, off(&at), timer];
-            self.rung(network, vec![coil(Plain, &left)]);
+            self.program.push_rung(network, vec![coil(Plain, &left)]);
         }
         let mut into: Vec<Vec<Vec<Element>>> = self
             .states()
@@ -185,7 +199,7 @@ impl Writer<'_> {
         }
         for (state, branches) in into.into_iter().enumerate() {
             let target = coil(Plain, &self.bit("n", state));
-            self.rung(any(branches), vec![target]);
+            self.program.push_rung(any(branches), vec![target]);
         }
     }
 
@@ -252,7 +266,7 @@ impl Writer<'_> {
             network.extend(self.shows(state, None, false));
             network
         });
-        self.titled(
+        self.program.push_titled(
             "is there a state that explains it?",
             any(branches.collect()),
             vec![coil(Plain, &possible)],
@@ -271,7 +285,8 @@ impl Writer<'_> {
             network.extend(any(vec![vec![on(&own)], vec![off(&change), on(&followed)]]));
             network.extend(any(branches.collect()));
             let title = format!("{channel}: if it is failed, is there one?");
-            self.titled(&title, network, vec![coil(Plain, &explains)]);
+            self.program
+                .push_titled(&title, network, vec![coil(Plain, &explains)]);
         }
         for channel in self.channels() {
             let [explains, gone, accused, diagnosed, moved] =
@@ -279,8 +294,10 @@ impl Writer<'_> {
                     .map(|what| of(&channel, what));
             let network = any(vec![vec![on(&explains)], vec![on(&gone)]]);
             let title = format!("{channel}: failed");
-            self.titled(&title, network, vec![coil(Plain, &accused)]);
-            self.rung(vec![on(&accused)], vec![coil(Set, &diagnosed)]);
+            self.program
+                .push_titled(&title, network, vec![coil(Plain, &accused)]);
+            self.program
+                .push_rung(vec![on(&accused)], vec![coil(Set, &diagnosed)]);
             let release = vec![on(&Name::from("diagnosis.release"))];
             let counter = Element::Block(understudy_ladder::Block {
                 name: of(&channel, "count"),
@@ -291,10 +308,13 @@ impl Writer<'_> {
                 }],
             });
             let spent = coil(Plain, &of(&channel, "spent"));
-            self.rung(vec![on(&accused), counter], vec![spent]);
+            self.program
+                .push_rung(vec![on(&accused), counter], vec![spent]);
             // It has moved where it came back by itself; a value that it was accused of has to change once more.
-            self.rung(vec![on(&accused), off(&gone)], vec![coil(Reset, &moved)]);
-            self.rung(vec![on(&accused), on(&gone)], vec![coil(Set, &moved)]);
+            self.program
+                .push_rung(vec![on(&accused), off(&gone)], vec![coil(Reset, &moved)]);
+            self.program
+                .push_rung(vec![on(&accused), on(&gone)], vec![coil(Set, &moved)]);
         }
     }
 
@@ -310,13 +330,14 @@ impl Writer<'_> {
                 vec![on(&may), off(&possible)],
             ]);
             network.extend(self.shows(state, None, true));
-            self.rung(network, vec![coil(Plain, &may)]);
+            self.program.push_rung(network, vec![coil(Plain, &may)]);
         }
         self.count(&one, &two);
         let tracked = Name::from("diagnosis.tracked");
-        self.rung(vec![on(&one)], vec![coil(Plain, &tracked)]);
+        self.program
+            .push_rung(vec![on(&one)], vec![coil(Plain, &tracked)]);
         let lost = Name::from("diagnosis.lost");
-        self.titled(
+        self.program.push_titled(
             "nothing explains it: the plant may be anywhere",
             vec![off(&one)],
             vec![coil(Plain, &lost)],
@@ -327,14 +348,15 @@ impl Writer<'_> {
             vec![off(&driven)],
             vec![on(&out)],
         ]);
-        self.rung(network, vec![coil(Reset, &followed)]);
+        self.program
+            .push_rung(network, vec![coil(Reset, &followed)]);
         let own = self.states().map(|state| {
             let [may, at] = ["m", "at"].map(|what| self.bit(what, state));
             vec![on(&may), on(&at)]
         });
         let mut network = vec![on(&one), off(&two), on(&driven), off(&out)];
         network.extend(any(own.collect()));
-        self.titled(
+        self.program.push_titled(
             "is the plant in one state, under its own outputs?",
             network,
             vec![coil(Set, &followed)],
@@ -351,23 +373,26 @@ impl Writer<'_> {
                 vec![on(&self.bit("m", state)), contact(&raw, value)]
             });
             let network = any(branches.collect());
-            self.rung(network, vec![coil(Plain, &of(&channel, "fits"))]);
+            self.program
+                .push_rung(network, vec![coil(Plain, &of(&channel, "fits"))]);
         }
         let started = Name::from("diagnosis.started");
-        self.rung(Vec::new(), vec![coil(Set, &started)]);
+        self.program
+            .push_rung(Vec::new(), vec![coil(Set, &started)]);
     }
 
     /// Whether the plant may be in one state, and in two.
     fn count(&mut self, one: &Name, two: &Name) {
-        self.titled(
+        self.program.push_titled(
             "in how many states may the plant be?",
             Vec::new(),
             vec![coil(Reset, one), coil(Reset, two)],
         );
         for state in self.states() {
             let may = self.bit("m", state);
-            self.rung(vec![on(&may), on(one)], vec![coil(Set, two)]);
-            self.rung(vec![on(&may)], vec![coil(Set, one)]);
+            self.program
+                .push_rung(vec![on(&may), on(one)], vec![coil(Set, two)]);
+            self.program.push_rung(vec![on(&may)], vec![coil(Set, one)]);
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::signals::Bits;
 impl Writer<'_> {
     fn open_phase(&mut self, title: &str) {
         let moved = coil(CoilKind::Reset, &self.names.moved);
-        self.titled(title, Vec::new(), vec![moved]);
+        self.program.push_titled(title, Vec::new(), vec![moved]);
     }
 
     /// From a latched state to another one, or out of the model.
@@ -25,7 +25,7 @@ impl Writer<'_> {
             coils.insert(0, coil(CoilKind::Reset, &source));
             coils.insert(1, coil(CoilKind::Set, &target));
         }
-        self.rung(network, coils);
+        self.program.push_rung(network, coils);
     }
 
     fn latched_places(&self) -> Vec<usize> {
@@ -108,7 +108,8 @@ impl Writer<'_> {
             };
             let latch = self.latched[&place].clone();
             let network = vec![on(&latch), on(at)];
-            self.rung(network, vec![coil(CoilKind::Reset, &latch), held.clone()]);
+            self.program
+                .push_rung(network, vec![coil(CoilKind::Reset, &latch), held.clone()]);
         }
         let mut network = vec![on(&self.names.release)];
         network.extend(self.names.failed.iter().map(off));
@@ -119,7 +120,8 @@ impl Writer<'_> {
             .collect();
         coils.push(coil(CoilKind::Reset, &self.names.lost));
         coils.push(held);
-        self.titled("module 2: the operator gives back", network, coils);
+        self.program
+            .push_titled("module 2: the operator gives back", network, coils);
     }
 
     /// From transparent into Θ.
@@ -176,10 +178,12 @@ impl Writer<'_> {
                 coil(CoilKind::Set, &self.names.lost),
                 coil(CoilKind::Set, &self.names.held),
             ];
-            self.titled("module 2: outside of the model", network, coils);
+            self.program
+                .push_titled("module 2: outside of the model", network, coils);
         }
         for (was, failed) in self.names.was.clone().iter().zip(self.names.failed.clone()) {
-            self.rung(vec![on(&failed)], vec![coil(CoilKind::Plain, was)]);
+            self.program
+                .push_rung(vec![on(&failed)], vec![coil(CoilKind::Plain, was)]);
         }
     }
 
@@ -190,7 +194,8 @@ impl Writer<'_> {
         }
         let latch = self.latched[&target].clone();
         let held = coil(CoilKind::Set, &self.names.held);
-        self.rung(network, vec![coil(CoilKind::Set, &latch), held]);
+        self.program
+            .push_rung(network, vec![coil(CoilKind::Set, &latch), held]);
     }
 
     /// Writes the commands over the outputs, and where Θ is down to one state, that state's memory into the ladder's.
@@ -245,7 +250,8 @@ impl Writer<'_> {
             };
             let title = format!("module 2: {target} {}", if value { "on" } else { "off" });
             if let Some(network) = any(latches) {
-                self.titled(&title, network, vec![coil(kind, &target)]);
+                self.program
+                    .push_titled(&title, network, vec![coil(kind, &target)]);
             }
         }
     }

@@ -1,6 +1,6 @@
 //! 64 scans of one circuit at once: packed states and inputs become words of which each bit is a run, and come back packed.
 
-use understudy_logic::{Scan, Scratch};
+use understudy_logic::{Scan, Scratch, transpose};
 
 /// Scans in one pass.
 pub(super) const LANES: usize = 64;
@@ -76,45 +76,6 @@ fn gather(lanes: &[u64], runs: &mut [Run], image: impl Fn(&mut Run) -> &mut Vec<
         transpose(&mut block);
         for (word, run) in block.iter().zip(runs.iter_mut()) {
             image(run)[place] = *word;
-        }
-    }
-}
-
-/// Exchanges bit j of word k for bit k of word j: halves, then quarters, down to single bits.
-fn transpose(block: &mut [u64; 64]) {
-    let mut width = 32;
-    let mut mask = u64::MAX >> 32;
-    while width != 0 {
-        let mut row = 0;
-        while row < 64 {
-            let moved = (block[row] >> width ^ block[row | width]) & mask;
-            block[row] ^= moved << width;
-            block[row | width] ^= moved;
-            row = ((row | width) + 1) & !width;
-        }
-        width >>= 1;
-        mask ^= mask << width;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_block_is_transposed_bit_by_bit() {
-        let mut seed = 1_u64;
-        let mut next = || {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            seed ^ seed >> 29
-        };
-        let block: [u64; 64] = std::array::from_fn(|_| next());
-        let mut turned = block;
-        transpose(&mut turned);
-        for (row, word) in block.iter().enumerate() {
-            for (column, other) in turned.iter().enumerate() {
-                assert_eq!(word >> column & 1, other >> row & 1);
-            }
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use understudy_logic::Scratch;
+use understudy_logic::{Scratch, transpose};
 
 use super::Explicit;
 
@@ -130,21 +130,4 @@ fn lanes_of_input(input: usize, first: usize) -> [u64; WORDS] {
         5 => 0xffff_ffff_0000_0000,
         _ => ((first / 64 + word) as u64 >> (input - 6) & 1).wrapping_neg(),
     })
-}
-
-/// Bit i of word k becomes bit k of word i.
-fn transpose(square: &mut [u64; 64]) {
-    let mut half = 32;
-    let mut mask = 0x0000_0000_ffff_ffff_u64;
-    while half != 0 {
-        let mut row = 0;
-        while row < 64 {
-            let swapped = (square[row] >> half ^ square[row + half]) & mask;
-            square[row] ^= swapped << half;
-            square[row + half] ^= swapped;
-            row = (row + half + 1) & !half;
-        }
-        half >>= 1;
-        mask ^= mask << half;
-    }
 }

@@ -228,7 +228,7 @@ impl Drawing<'_> {
         negated: bool,
     ) -> Series {
         let relation = if negated {
-            opposite(relation)
+            relation.opposite()
         } else {
             relation
         };
@@ -236,7 +236,7 @@ impl Drawing<'_> {
             [(_, left), (_, right)] => match (self.counter(left), self.number(right)) {
                 (Some(counter), Some(value)) => Some((counter, relation, value)),
                 _ => match (self.counter(right), self.number(left)) {
-                    (Some(counter), Some(value)) => Some((counter, mirrored(relation), value)),
+                    (Some(counter), Some(value)) => Some((counter, relation.mirrored(), value)),
                     _ => None,
                 },
             },
@@ -324,26 +324,4 @@ fn relation(word: &str) -> Option<Relation> {
         "GE" => Relation::GreaterOrEqual,
         _ => return None,
     })
-}
-
-fn opposite(relation: Relation) -> Relation {
-    match relation {
-        Relation::Equal => Relation::NotEqual,
-        Relation::NotEqual => Relation::Equal,
-        Relation::Less => Relation::GreaterOrEqual,
-        Relation::LessOrEqual => Relation::Greater,
-        Relation::Greater => Relation::LessOrEqual,
-        Relation::GreaterOrEqual => Relation::Less,
-    }
-}
-
-/// The same with its sides changed.
-fn mirrored(relation: Relation) -> Relation {
-    match relation {
-        Relation::Less => Relation::Greater,
-        Relation::LessOrEqual => Relation::GreaterOrEqual,
-        Relation::Greater => Relation::Less,
-        Relation::GreaterOrEqual => Relation::LessOrEqual,
-        same => same,
-    }
 }

@@ -9,7 +9,7 @@ use understudy_ladder::{
 };
 use understudy_logic::{CircuitBuilder, Expression, Graph, Operation, Variable};
 
-use super::super::bounds::{Interval, opposite};
+use super::super::bounds::Interval;
 use super::super::program::{Cell, Resolved, Role};
 use super::{Leaf, signals};
 
@@ -400,7 +400,7 @@ fn rename(series: &mut Series, meanings: &HashMap<String, Leaf>) {
                     *element = Element::Comparison(Comparison {
                         counter: Name::from(counter.as_str()),
                         relation: if closed {
-                            opposite(*relation)
+                            relation.opposite()
                         } else {
                             *relation
                         },

@@ -6,7 +6,6 @@ use std::time::Duration;
 use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{Name, Relation};
 
-use super::super::bounds::mirrored;
 use super::super::program::{Action, Cell, Kind, Number, Role, Truth};
 use super::super::syntax::{Expression, ExpressionKind, Operator, Path};
 use super::{Entity, Resolver};
@@ -161,7 +160,7 @@ impl Resolver {
                 (path, *value, relation)
             }
             (ExpressionKind::Integer(value), ExpressionKind::Variable(path)) => {
-                (path, *value, mirrored(relation))
+                (path, *value, relation.mirrored())
             }
             _ => return None,
         };
@@ -349,10 +348,11 @@ impl Resolver {
             let word = native.unwrap_or_default();
             let message = format!("`{name}` of a {word} cannot be read");
             let finding = Diagnostic::error("U1040", message, name.span());
-            self.say(
-                finding
-                    .with_help("a circuit holds the block's outputs, and counts its time in scans"),
-            );
+            self.say(finding.with_help(if name.eq_ignore_ascii_case("ET") {
+                "a circuit counts a block's time in scans; one more timer with the same IN, and the time that is compared with as its PT, says by its Q when that has passed"
+            } else {
+                "a circuit holds the block's outputs, and counts its time in scans"
+            }));
             return None;
         }
         let finding = Diagnostic::error("U1041", format!("`{name}` is not declared"), name.span());
