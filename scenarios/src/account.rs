@@ -383,7 +383,13 @@ impl Account {
                     measured,
                 });
             }
-            RunEvent::Interrupted => self.interrupted = true,
+            RunEvent::Interrupted => {
+                self.interrupted = true;
+                // The newest cycle may be cut off for some: it is none of the run any more.
+                let newest = self.numbering.latest();
+                let told = newest.and_then(|newest| self.since_origin(newest));
+                self.cycles = self.cycles.min(told.unwrap_or(0));
+            }
             RunEvent::Started { .. }
             | RunEvent::Origin { .. }
             | RunEvent::Commanded { .. }

@@ -314,6 +314,37 @@ fn what_is_read_long_after_the_rest_is_counted_all_the_same() {
     assert_eq!(late.stations, summary.stations);
 }
 
+/// Whoever tells last has not told of the cycle in which everybody is asked to end.
+#[test]
+fn the_cycle_in_which_a_run_is_interrupted_is_none_of_it() {
+    use understudy_remote_io::Event as RemoteIoEvent;
+    use understudy_scenarios::Happening;
+
+    let text = include_str!("../kill-each.toml");
+    let (bytes, _, _) = run(Mode::Full, text, 1);
+    for teller in ["robot-io", "press-io"] {
+        let mut told = 0;
+        let summary = account_of(&bytes, text, |record| {
+            let tells = matches!(
+                record.event,
+                Happening::RemoteIo(RemoteIoEvent::Applied { .. })
+            );
+            told += u32::from(tells && record.name == teller);
+            match told {
+                0..=150 => vec![record],
+                151 if tells && record.name == teller => {
+                    vec![record, Record::of_run(0, RunEvent::Interrupted)]
+                }
+                _ => Vec::new(),
+            }
+        });
+        assert!(summary.interrupted && summary.cycles_run > 100, "{teller}");
+        assert!(summary.plants.iter().all(|plant| plant.functional));
+        let unserved = summary.remote_ios.iter().map(|one| one.counts.unserved);
+        assert_eq!(unserved.sum::<u64>(), 0, "{teller}");
+    }
+}
+
 /// The summary of a journal whose records went through `change`.
 fn account_of<Changed: IntoIterator<Item = Record>>(
     bytes: &[u8],
