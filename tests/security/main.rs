@@ -17,7 +17,6 @@ mod systemd;
 use serde_json::Value;
 
 use shared::deployed::{Running, addressed_cell, text};
-use shared::one_at_a_time as alone;
 use shared::{DEADLINE, answer, empty_folder, one_at_a_time, understudy};
 
 fn codes(document: &Value) -> Vec<&str> {

@@ -9,7 +9,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use super::{DEADLINE, addressed_cell, alone, answer, empty_folder, text};
+use super::{DEADLINE, addressed_cell, answer, empty_folder, one_at_a_time, text};
 
 /// A machine with systemd, whose processes end with it.
 struct Machine {
@@ -177,7 +177,7 @@ const UNITS: [&str; 7] = [
 
 #[test]
 fn systemd_starts_watches_and_restarts_the_parties() {
-    let _one = alone();
+    let _one = one_at_a_time();
     let folder = empty_folder("systemd");
     for part in ["cell", "units"] {
         fs::create_dir(folder.join(part)).expect("it is ours");
