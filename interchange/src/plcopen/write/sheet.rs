@@ -1,51 +1,18 @@
 //! Rungs as objects on a sheet, from left to right, each row below the one before it.
 
+mod object;
 mod place;
 
-use understudy_ladder::{
-    Block, Coil, CoilKind, Contact, ContactKind, Element, Relation, Rung, Series, time_text,
-};
+use understudy_ladder::{Block, Coil, Contact, Element, Relation, Rung, Series, time_text};
 
-use self::place::{Place, position};
+use self::object::{Object, Source, WIRE, What};
+use self::place::Place;
 use super::names::Names;
 use super::tree::Tree;
 
 const LEFT: i64 = 40;
 const COLUMN: i64 = 100;
 const ROW: i64 = 40;
-/// Between the upper edge of a row and its wire.
-const WIRE: i64 = 10;
-
-/// An object with its place and what feeds it.
-struct Object {
-    place: Place,
-    what: What,
-}
-
-enum What {
-    LeftRail,
-    RightRail(Vec<Source>),
-    Contact(ContactKind, String, Vec<Source>),
-    Coil(CoilKind, String, Vec<Source>),
-    /// Type, instance, inputs and outputs.
-    Block(
-        &'static str,
-        Option<String>,
-        Vec<(&'static str, Vec<Source>)>,
-        Vec<&'static str>,
-    ),
-    InVariable(String),
-    Comment(String),
-}
-
-/// An output of an object, by the object's number, and where it is.
-#[derive(Clone)]
-struct Source {
-    id: usize,
-    pin: Option<&'static str>,
-    x: i64,
-    y: i64,
-}
 
 /// Where a series has come to.
 struct Reached {
@@ -377,123 +344,5 @@ fn pin_of_value(block: &Block) -> Option<&'static str> {
         Some("CV")
     } else {
         None
-    }
-}
-
-impl Object {
-    fn write(&self, number: usize, tree: &mut Tree) {
-        let id = number.to_string();
-        let width = self.place.width.to_string();
-        let height = self.place.height.to_string();
-        let common = [
-            ("localId", id.as_str()),
-            ("height", height.as_str()),
-            ("width", width.as_str()),
-        ];
-        match &self.what {
-            What::LeftRail => {
-                tree.open("leftPowerRail", &common);
-                position(tree, "position", self.place.x, self.place.y);
-                tree.open("connectionPointOut", &[("formalParameter", "")]);
-                position(tree, "relPosition", self.place.width, WIRE);
-                tree.close("connectionPointOut");
-                tree.close("leftPowerRail");
-            }
-            What::RightRail(ends) => {
-                tree.open("rightPowerRail", &common);
-                position(tree, "position", self.place.x, self.place.y);
-                for end in ends {
-                    self.place
-                        .input(tree, end.y - self.place.y, std::slice::from_ref(end));
-                }
-                tree.close("rightPowerRail");
-            }
-            What::Contact(kind, variable, sources) => {
-                let (negated, edge) = match kind {
-                    ContactKind::NormallyOpen => ("false", None),
-                    ContactKind::NormallyClosed => ("true", None),
-                    ContactKind::Rising => ("false", Some(("edge", "rising"))),
-                    ContactKind::Falling => ("false", Some(("edge", "falling"))),
-                };
-                self.element(tree, "contact", &common, negated, edge, sources, variable);
-            }
-            What::Coil(kind, variable, sources) => {
-                let (negated, more) = match kind {
-                    CoilKind::Plain => ("false", None),
-                    CoilKind::Negated => ("true", None),
-                    CoilKind::Set => ("false", Some(("storage", "set"))),
-                    CoilKind::Reset => ("false", Some(("storage", "reset"))),
-                    CoilKind::Rising => ("false", Some(("edge", "rising"))),
-                    CoilKind::Falling => ("false", Some(("edge", "falling"))),
-                };
-                self.element(tree, "coil", &common, negated, more, sources, variable);
-            }
-            What::Block(word, instance, inputs, outputs) => {
-                let mut attributes = common.to_vec();
-                attributes.push(("typeName", word));
-                if let Some(instance) = instance {
-                    attributes.push(("instanceName", instance));
-                }
-                tree.open("block", &attributes);
-                position(tree, "position", self.place.x, self.place.y);
-                tree.open("inputVariables", &[]);
-                let mut y = 30;
-                for (pin, sources) in inputs {
-                    tree.open("variable", &[("formalParameter", pin)]);
-                    self.place.input(tree, y, sources);
-                    tree.close("variable");
-                    y += 20;
-                }
-                tree.close("inputVariables");
-                tree.empty("inOutVariables", &[]);
-                tree.open("outputVariables", &[]);
-                let mut y = 30;
-                for pin in outputs {
-                    tree.open("variable", &[("formalParameter", pin)]);
-                    self.place.output(tree, y);
-                    tree.close("variable");
-                    y += 20;
-                }
-                tree.close("outputVariables");
-                tree.close("block");
-            }
-            What::InVariable(text) => {
-                let mut attributes = common.to_vec();
-                attributes.push(("negated", "false"));
-                tree.open("inVariable", &attributes);
-                position(tree, "position", self.place.x, self.place.y);
-                self.place.output(tree, WIRE);
-                tree.text("expression", text);
-                tree.close("inVariable");
-            }
-            What::Comment(text) => {
-                tree.open("comment", &common);
-                position(tree, "position", self.place.x, self.place.y);
-                tree.formatted("content", text);
-                tree.close("comment");
-            }
-        }
-    }
-
-    #[expect(clippy::too_many_arguments, reason = "the parts of one element")]
-    fn element(
-        &self,
-        tree: &mut Tree,
-        name: &str,
-        common: &[(&str, &str)],
-        negated: &str,
-        more: Option<(&str, &str)>,
-        sources: &[Source],
-        variable: &str,
-    ) {
-        let mut attributes = common.to_vec();
-        attributes.push(("negated", negated));
-        attributes.extend(more);
-        tree.open(name, &attributes);
-        position(tree, "position", self.place.x, self.place.y);
-        self.place.input(tree, WIRE, sources);
-        self.place.output(tree, WIRE);
-        tree.text("variable", variable);
-        tree.close(name);
     }
 }
