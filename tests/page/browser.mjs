@@ -138,7 +138,7 @@ async function drive() {
   await until("an answer", `(${asked}, new Promise((resolve) => setTimeout(resolve, 1000)).then(() => !document.getElementById("why").hidden && ${text("#why")}.includes("Lineage")))`);
   await picture("why");
   await accessible("why");
-  await click("#why > button");
+  await click("#why .drawer-head button");
 
   // A button that cannot act says why.
   await click(party("robot"));

@@ -3,19 +3,12 @@
 import { el, keyed, setText, setAttribute } from "/element.js";
 import { makePicture } from "/picture.js";
 import { openParty } from "/commands.js";
+import { SOURCES } from "/sources.js";
 import { openWhy } from "/why.js";
 
 let run = null;
 let place = null;
 let picture = null;
-
-export const SOURCES = {
-  direct: { sign: "→", words: "direct" },
-  reconstructed: { sign: "⊕", words: "restored" },
-  held: { sign: "‖", words: "held" },
-  "fail-safe": { sign: "■", words: "fail-safe" },
-  unknown: { sign: "?", words: "not known" },
-};
 
 export function prepare(facts) {
   run = facts;

@@ -141,7 +141,7 @@ async function cross() {
       el("table", {}, el("thead", {}, el("tr", {}, head.map((text) => el("th", { scope: "col" }, text)))), el("tbody", {}, answer.signals.map(row)))));
 }
 
-const count = (words) => (words === 1 ? "one word:" : `${words} words; the first is`);
+const sumOf = (word) => word.members.join(" ⊕ ");
 
 // y(N+1) is the sum of the outputs in each place: shown beside what it is the sum of.
 function sum() {
@@ -149,19 +149,18 @@ function sum() {
   const members = run.programs;
   const station = now.parties.find((party) => party.name === program);
   const width = Math.max(...members.map((item) => item.outputs.length));
-  const word = station?.words?.[0];
+  const words = station?.words ?? [];
   const column = (item, place) => {
     const output = item.outputs[place];
     const value = now.programs[item.index].said?.[place];
     return el("td", {}, output ? `${output.name} = ${value ?? "?"}` : "");
   };
   const rows = [...Array(width).keys()].map((place) =>
-    el("tr", {}, el("th", { scope: "row" }, `y${place + 1}`), members.map((item) => column(item, place)), el("td", { class: "sum" }, word?.sum?.[place] ?? "?")));
-  setText(id("ladder-stamp"), `cycle ${now.cycle}: ${program} says ${count(station?.words?.length ?? 0)} the sum of ${word?.members?.join(" ⊕ ") ?? "nothing"}`);
+    el("tr", {}, el("th", { scope: "row" }, `y${place + 1}`), members.map((item) => column(item, place)), words.map((word) => el("td", { class: "sum" }, word.sum[place] ?? ""))));
+  const said = words.length === 0 ? "nothing" : words.map((word) => `the sum of ${sumOf(word)}`).join(", and ");
+  setText(id("ladder-stamp"), `cycle ${now.cycle}: ${program} says ${said}`);
   shown = "";
+  const heads = ["place", ...members.map((item) => item.name), ...words.map((word) => `${program} says: ${sumOf(word)}`)];
   id("ladder-picture").replaceChildren(
-    el("table", {}, el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "place"), members.map((item) => el("th", { scope: "col" }, item.name)), el("th", { scope: "col" }, `${program} says`))), el("tbody", {}, rows)),
-    station?.words?.length > 1
-      ? el("ul", {}, station.words.slice(1).map((other) => el("li", {}, `for ${other.members.join(" ⊕ ")}: ${other.sum}`)))
-      : "");
+    el("table", {}, el("thead", {}, el("tr", {}, heads.map((head) => el("th", { scope: "col" }, head)))), el("tbody", {}, rows)));
 }

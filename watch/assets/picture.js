@@ -3,7 +3,7 @@
 // What a shape means is said by its words and its sign as well as by its colour.
 
 import { setAttribute, setText, shorten, svg } from "/element.js";
-import { SOURCES } from "/cluster.js";
+import { SOURCES } from "/sources.js";
 
 export const STATES = {
   speaking: { sign: "●", words: "speaking" },

@@ -101,7 +101,7 @@ function draw(answer) {
     width: 2,
     paths: uPlot.paths.stepped({ align: 1 }),
     points: { show: false },
-    value: (_, value) => (value === null ? "?" : value - (lanes - 1 - index) > 0.5 ? "1" : "0"),
+    value: (_, value, __, at) => (at === null ? "" : value === null ? "?" : value - (lanes - 1 - index) > 0.5 ? "1" : "0"),
   }));
   const bandRows = answer.sources.length;
   const axis = { stroke: color("--ink"), grid: { stroke: color("--line"), width: 1 }, ticks: { stroke: color("--line") } };

@@ -2,6 +2,7 @@
 
 import { act, ask } from "/ask.js";
 import { bit, el } from "/element.js";
+import { SOURCES } from "/sources.js";
 import { cycleParameter, goTo } from "/time.js";
 
 export function prepare() {
@@ -25,12 +26,11 @@ export async function openWhy(program, output) {
   };
   const close = el("button", { type: "button", click: hide }, "Close");
   drawer.replaceChildren(
-    el("h2", {}, `Why is ${answer.signal} ${bit(answer.value)}?`),
+    el("div", { class: "drawer-head" }, el("h2", {}, `Why is ${answer.signal} ${bit(answer.value)}?`), close),
     el("p", { class: "soft" }, `${answer.program}, cycle ${answer.cycle}; driven by ${answer.remote_io}`),
     ...source(answer).map((line) => el("p", {}, line)),
     answer.because ? el("ul", { class: "cause" }, tree(answer.because)) : el("p", {}, "No rung made it so."),
     el("p", {}, el("a", { href: `#ladder/${program}/${encodeURIComponent(answer.signal)}`, click: () => (drawer.hidden = true) }, "Show it in the ladder")),
-    close,
   );
   drawer.hidden = false;
   close.focus();
@@ -38,7 +38,7 @@ export async function openWhy(program, output) {
 
 // Where the value came from, and what proves it: equation (12) with its numbers.
 function source(answer) {
-  const lines = [`It is ${answer.source ?? "not decided yet"}${answer.missing ? `: ${answer.missing}` : ""}.`];
+  const lines = [`It is ${SOURCES[answer.source]?.words ?? "not decided yet"}${answer.missing ? `: ${answer.missing}` : ""}.`];
   if (answer.scanned !== null && answer.scanned !== answer.value) {
     lines.push(`Its own scan says ${bit(answer.scanned)}.`);
   }

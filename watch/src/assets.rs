@@ -30,6 +30,7 @@ const ASSETS: &[(&str, &str, &str)] = assets![
     "time.js": SCRIPT,
     "cluster.js": SCRIPT,
     "picture.js": SCRIPT,
+    "sources.js": SCRIPT,
     "ladder.js": SCRIPT,
     "why.js": SCRIPT,
     "trends.js": SCRIPT,

@@ -27,7 +27,8 @@ pub(crate) enum Process {
 pub(crate) struct Standing {
     processes: BTreeMap<Party, Process>,
     cuts: BTreeSet<(Party, Party)>,
-    pub(crate) paces: Option<StationId>,
+    /// Stations that have started cycles since their process began.
+    paced: BTreeSet<StationId>,
     /// Parties of a cluster elsewhere whose journal is not told here.
     detached: BTreeSet<Party>,
     forced: BTreeMap<(ProgramId, SignalPlace), Force>,
@@ -40,9 +41,17 @@ impl Standing {
         self.processes.get(&party).copied()
     }
 
-    /// Whether something that it says reaches somebody no more.
-    pub(crate) fn is_cut(&self, party: Party) -> bool {
-        self.cuts.iter().any(|(from, _)| *from == party)
+    /// Whom nothing reaches any more that it says.
+    pub(crate) fn cut_from(&self, party: Party) -> impl Iterator<Item = Party> {
+        let cuts = self.cuts.iter();
+        cuts.filter(move |(from, _)| *from == party)
+            .map(|(_, to)| *to)
+    }
+
+    /// By rank, those that have started cycles. A host that stands still makes another one start a cycle now and then, and the first of
+    /// those that live goes on without saying so again.
+    pub(crate) fn paced(&self) -> impl Iterator<Item = StationId> {
+        self.paced.iter().copied()
     }
 
     /// Whether its own journal is told here no more, so that only others say how it is.
@@ -68,6 +77,9 @@ impl Standing {
         match change {
             Change::Process(party, process) => {
                 self.processes.insert(*party, *process);
+                if let Party::Station(station) = party {
+                    self.paced.remove(station);
+                }
                 // What a remote I/O was told it forgets with its process.
                 if let (Party::RemoteIo(program), Process::Running) = (party, process) {
                     self.forced.retain(|(of, _), _| of != program);
@@ -89,7 +101,9 @@ impl Standing {
             Change::Detached(party) => {
                 self.detached.insert(*party);
             }
-            Change::Paces(station) => self.paces = Some(*station),
+            Change::Paces(station) => {
+                self.paced.insert(*station);
+            }
             Change::Forced(program, force) => {
                 self.forced.insert((*program, force.signal), force.clone());
             }
@@ -208,6 +222,8 @@ fn of_remote_io(program: ProgramId, event: &RemoteIoEvent) -> Option<Change> {
 
 #[cfg(test)]
 mod tests {
+    use understudy_wire::{Cycle, Epoch, Moment};
+
     use super::*;
 
     fn fault(action: Action) -> Record {
@@ -231,10 +247,36 @@ mod tests {
         assert_eq!(process(&changes, 5), Some(Process::Killed));
         assert_eq!(process(&changes, 8), Some(Process::Killed));
         assert_eq!(process(&changes, 9), Some(Process::Running));
-        assert!(!changes.at(11).is_cut(party));
-        assert!(changes.at(12).is_cut(party));
+        let cut_from = |changes: &Changes, cycle| -> Vec<Party> {
+            changes.at(cycle).cut_from(party).collect()
+        };
+        assert_eq!(cut_from(&changes, 11), []);
+        assert_eq!(cut_from(&changes, 12), [other]);
         changes.begin_anew();
-        assert!(changes.at(0).is_cut(party));
+        assert_eq!(cut_from(&changes, 0), [other]);
+    }
+
+    #[test]
+    fn who_is_killed_starts_no_cycles() {
+        let paces = |rank| {
+            let moment = Moment {
+                epoch: Epoch(1),
+                cycle: Cycle(0),
+            };
+            let said = Happening::Station(StationEvent::Paces { moment });
+            Record {
+                party: Some(Party::Station(StationId(rank))),
+                event: said,
+                ..fault(Action::Crash)
+            }
+        };
+        let mut changes = Changes::default();
+        changes.note(&paces(1), 1);
+        changes.note(&paces(0), 2);
+        changes.note(&fault(Action::Crash), 5);
+        let paced = |cycle| -> Vec<StationId> { changes.at(cycle).paced().collect() };
+        assert_eq!(paced(4), [StationId(0), StationId(1)]);
+        assert_eq!(paced(5), [StationId(1)]);
     }
 
     #[test]

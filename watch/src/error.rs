@@ -14,7 +14,9 @@ use understudy_view::ViewError;
 #[derive(Debug, thiserror::Error)]
 pub enum WatchError {
     /// The address cannot be listened at.
-    #[error("U0671: the page cannot be served at {address}: {source}; name another address, with port 0 for any that is free")]
+    #[error(
+        "U0671: the page cannot be served at {address}: {source}; name another address, with port 0 for any that is free"
+    )]
     Listen {
         /// The address.
         address: SocketAddr,

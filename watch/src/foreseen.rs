@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use understudy_remote_io::Missing;
-use understudy_view::{Holders, Margin};
+use understudy_view::{Holders, Margin, Step};
 use understudy_wire::{Moment, ProgramSet, StationSet};
 
 use crate::model::Known;
@@ -27,6 +27,12 @@ impl Foresight {
     }
 }
 
+/// Whether somebody started the cycle. A deadline without one has the moment of the last cycle that there was.
+pub(crate) fn began(step: &Step) -> bool {
+    let missing = step.driven.as_ref().and_then(|driven| driven.missing);
+    missing != Some(Missing::NoCycle)
+}
+
 /// Who spoke for which programs in this cycle or the one before it: a single frame may be lost.
 fn holders(known: &Known, cycle: i64, excluded: &[StationSet]) -> Holders {
     let run = &known.run;
@@ -36,6 +42,7 @@ fn holders(known: &Known, cycle: i64, excluded: &[StationSet]) -> Holders {
         .programs()
         .flat_map(|program| [step(program, cycle - 1), step(program, cycle)])
         .flatten()
+        .filter(|step| began(step))
         .map(|step| step.moment)
         .collect();
     moments.sort();

@@ -1,12 +1,15 @@
 //! What the page shows of one cycle, as JSON: who works, what is driven from which source, what could fail, what somebody has to look at.
 
+mod parties;
+
 use serde::Serialize;
 use understudy_remote_io::Missing;
 use understudy_scenarios::source_word;
-use understudy_view::{Alarm, Margin, Outcome, StationState};
+use understudy_view::{Alarm, Margin, Outcome};
 use understudy_wire::{Party, ProgramId, ProgramSet, SignalPlace, Source, StationId};
 
-use crate::changes::{Process, Standing};
+use self::parties::{ShownParty, words_of};
+use crate::changes::Standing;
 use crate::model::{Known, Model};
 
 /// Failures that are listed, at most.
@@ -26,29 +29,6 @@ pub(crate) struct State {
     survival: Survival,
     alarms: Vec<ShownAlarm>,
     event_count: u64,
-}
-
-#[derive(Debug, Serialize)]
-struct ShownParty {
-    name: String,
-    kind: &'static str,
-    /// In one word.
-    state: &'static str,
-    /// It has no process.
-    down: bool,
-    paces: bool,
-    /// Something that it says does not arrive.
-    cut: bool,
-    note: String,
-    program: Option<u8>,
-    /// What it said in this cycle.
-    words: Vec<ShownWord>,
-}
-
-#[derive(Debug, Serialize)]
-struct ShownWord {
-    members: Vec<String>,
-    sum: String,
 }
 
 #[derive(Debug, Serialize)]
@@ -143,16 +123,16 @@ pub(crate) fn state(known: &Known, cycle: i64) -> Option<State> {
         .map(|program| standing.excluded(program))
         .collect();
     let margin = known.margin(cycle, &excluded);
-    let paces = standing.paces;
+    let paces = parties::pacemaker(known, &standing, cycle);
     let stations = known
         .stations()
-        .map(|station| shown_station(known, &standing, station, cycle));
+        .map(|station| parties::station(known, &standing, station, cycle));
     let remote_ios = known
         .programs()
-        .map(|program| shown_remote_io(known, &standing, program, cycle));
+        .map(|program| parties::remote_io(known, &standing, program, cycle));
     let plants = known
         .programs()
-        .filter_map(|program| shown_plant(known, &standing, program));
+        .filter_map(|program| parties::plant(known, &standing, program));
     Some(State {
         cycle,
         oldest,
@@ -189,152 +169,6 @@ pub(crate) fn program_name(known: &Known, program: ProgramId) -> String {
 fn program_names(known: &Known, programs: ProgramSet) -> Vec<String> {
     let names = programs.iter().map(|program| program_name(known, program));
     names.collect()
-}
-
-fn shown_station(known: &Known, standing: &Standing, station: StationId, cycle: i64) -> ShownParty {
-    let run = &known.run;
-    let party = Party::Station(station);
-    let schedule = &run.cluster().agreement().schedule;
-    let understudy = schedule.is_understudy(station);
-    let recorded = run
-        .series()
-        .station(station)
-        .and_then(|series| series.at(cycle).copied());
-    let state = recorded
-        .or_else(|| run.station_state(station))
-        .unwrap_or(StationState::NotStarted);
-    let process = standing.process(party);
-    let excluded = known
-        .programs()
-        .filter(|&program| standing.excluded(program).contains(station));
-    let excluded = program_names(known, excluded.collect());
-    ShownParty {
-        name: name(known, party),
-        kind: if understudy {
-            "understudy"
-        } else {
-            "controller"
-        },
-        state: station_word(state, process),
-        down: matches!(process, Some(Process::Killed | Process::Ended)),
-        paces: standing.paces == Some(station),
-        cut: standing.is_cut(party),
-        note: note([
-            (!excluded.is_empty()).then(|| format!("excluded for {}", excluded.join(", "))),
-            standing.is_cut(party).then(|| "cut off".to_owned()),
-            not_told(standing, party),
-        ]),
-        program: (!understudy).then_some(station.0),
-        words: words_of(known, station, cycle),
-    }
-}
-
-fn station_word(state: StationState, process: Option<Process>) -> &'static str {
-    match (process, state) {
-        (Some(Process::Killed), _) => "killed",
-        (Some(Process::Ended), _) => "ended",
-        (Some(Process::StandsStill), _) => "stopped",
-        // The record of its end is older than that of its new beginning.
-        (_, StationState::Killed | StationState::Ended) => "joining",
-        (_, StationState::Stopped) => "silent",
-        (_, StationState::NotStarted) => "not-started",
-        (_, StationState::Speaking) => "speaking",
-        (_, StationState::Silent) => "silent",
-        (_, StationState::Flagged) => "flagged",
-        (_, StationState::Joining) => "joining",
-        (_, StationState::Shadow) => "shadow",
-        (_, StationState::Refused) => "refused",
-    }
-}
-
-fn not_told(standing: &Standing, party: Party) -> Option<String> {
-    let told = "not heard here";
-    standing.is_detached(party).then(|| told.to_owned())
-}
-
-fn note<const N: usize>(parts: [Option<String>; N]) -> String {
-    let parts: Vec<String> = parts.into_iter().flatten().collect();
-    parts.join(", ")
-}
-
-fn words_of(known: &Known, station: StationId, cycle: i64) -> Vec<ShownWord> {
-    let mut moments = known.programs().filter_map(|program| {
-        let step = known.run.history(program)?.at(cycle)?;
-        Some(step.moment)
-    });
-    let Some(moment) = moments.next() else {
-        return Vec::new();
-    };
-    let turns = known.run.spoken(moment).iter();
-    let words = turns
-        .filter(|turn| turn.station == station)
-        .flat_map(|turn| turn.words.iter());
-    words
-        .map(|word| ShownWord {
-            members: program_names(known, word.members),
-            sum: word.sum.to_string(),
-        })
-        .collect()
-}
-
-fn process_word(process: Option<Process>) -> Option<&'static str> {
-    match process? {
-        Process::Running => None,
-        Process::StandsStill => Some("stopped"),
-        Process::Killed => Some("killed"),
-        Process::Ended => Some("ended"),
-    }
-}
-
-fn shown_remote_io(
-    known: &Known,
-    standing: &Standing,
-    program: ProgramId,
-    cycle: i64,
-) -> ShownParty {
-    let party = Party::RemoteIo(program);
-    let step = known.run.history(program).and_then(|steps| steps.at(cycle));
-    let driven = step.and_then(|step| step.driven.as_ref());
-    let process = standing.process(party);
-    let missing = driven.and_then(|driven| driven.missing);
-    let alive = match (driven, missing) {
-        (None, _) | (_, Some(Missing::NoHistory)) => "listening",
-        (_, Some(Missing::NotReleased)) => "awaits-release",
-        _ => "serving",
-    };
-    let forced = standing.forced(program).count();
-    ShownParty {
-        name: name(known, party),
-        kind: "remote-io",
-        state: process_word(process).unwrap_or(alive),
-        down: matches!(process, Some(Process::Killed | Process::Ended)),
-        paces: false,
-        cut: standing.is_cut(party),
-        note: note([
-            (forced > 0).then(|| format!("{forced} forced")),
-            standing.is_cut(party).then(|| "cut off".to_owned()),
-            not_told(standing, party),
-        ]),
-        program: Some(program.0),
-        words: Vec::new(),
-    }
-}
-
-fn shown_plant(known: &Known, standing: &Standing, program: ProgramId) -> Option<ShownParty> {
-    let party = Party::Plant(program);
-    known.run.cluster().party_name(party)?;
-    let process = standing.process(party);
-    Some(ShownParty {
-        name: name(known, party),
-        kind: "plant",
-        state: process_word(process).unwrap_or("moving"),
-        down: matches!(process, Some(Process::Killed | Process::Ended)),
-        paces: false,
-        cut: false,
-        note: note([not_told(standing, party)]),
-        program: Some(program.0),
-        words: Vec::new(),
-    })
 }
 
 fn shown_program(

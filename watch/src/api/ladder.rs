@@ -86,8 +86,7 @@ fn draw(known: &Known, program: ProgramId, cycle: i64, wanted: &Wanted) -> Answe
     let step = known.run.history(program).and_then(|steps| steps.at(cycle));
     match (&evaluation, step.and_then(|step| step.sampled.as_ref())) {
         (Ok(_), Some(sampled)) => {
-            let moment = step.map(|step| step.moment.to_string()).unwrap_or_default();
-            words += &format!(" ({moment}): as evaluated, lineage {}", sampled.before);
+            words += &format!(": as evaluated, lineage {}", sampled.before);
         }
         (Err(error), _) => words += &format!(": without power flow, for {}", error.words()),
         (Ok(_), None) => {}

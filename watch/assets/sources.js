@@ -1,0 +1,9 @@
+// Where outputs come from, as the page says it: a sign and words for each.
+
+export const SOURCES = {
+  direct: { sign: "→", words: "direct" },
+  reconstructed: { sign: "⊕", words: "restored" },
+  held: { sign: "‖", words: "held" },
+  "fail-safe": { sign: "■", words: "fail-safe" },
+  unknown: { sign: "?", words: "not known" },
+};
