@@ -127,6 +127,16 @@ fn bad_questions_get_clear_answers_and_stop_nothing() {
         ("/api/compare?with=..%2F..", 404, "U0681"),
         ("/api/compare?with=latest", 404, "U0681"),
         ("/api/command", 405, "U0682"),
+        ("/%ff", 404, "U0681"),
+        ("/..%2f..%2fetc%2fpasswd", 404, "U0681"),
+        ("/api/state?cycle=%ff", 400, "U0682"),
+        ("/api/ladder/%ff", 400, "U0682"),
+        ("/api/cross-reference/%f0", 400, "U0682"),
+        ("/api/why/99999999999999999999/0", 400, "U0682"),
+        ("/api/events?until=99999999999999999999", 400, "U0682"),
+        ("/api/trends?signals=%00&from=0&to=5", 404, "U0681"),
+        ("/api/compare?with=%ff", 404, "U0681"),
+        ("/api/compare?with=%2Fetc%2Fpasswd", 404, "U0681"),
     ];
     for (path, status, code) in get {
         let answer = page.get(path);
@@ -136,6 +146,13 @@ fn bad_questions_get_clear_answers_and_stop_nothing() {
             "{path}: {}",
             answer.body
         );
+    }
+    for method in ["PUT", "DELETE", "PATCH", "OPTIONS", "TRACE"] {
+        let answer = page.request(&format!(
+            "{method} /api/state HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n\r\n",
+            page.address
+        ));
+        assert_eq!((answer.status, answer.code().as_str()), (403, "U0685"));
     }
     let unread = page.get(&format!("/api/events?find={long}"));
     assert_eq!(unread.status, 200);
