@@ -2,7 +2,7 @@
 //
 //   node tests/page/browser.mjs http://127.0.0.1:7480/ PICTURES [AXE.min.js]
 //
-// The page may command a laboratory of the press cell. With the file of axe-core, each view is checked for accessibility too.
+// The page may command a laboratory of the press cell. Where the browser does not start at all, the exit status is 77. With the file of axe-core, each view is checked for accessibility too.
 
 import { spawn } from "node:child_process";
 import { mkdirSync, mkdtempSync, readFileSync, writeFileSync } from "node:fs";
@@ -20,10 +20,20 @@ const chromium = spawn(
   { stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"] },
 );
 const [, , , toBrowser, fromBrowser] = chromium.stdio;
+// What it does not take is told by its end.
+toBrowser.on("error", () => {});
 const waiting = new Map();
 const problems = [];
 let session;
+let started = false;
 let number = 0;
+
+const ended = (how) => {
+  console.error(`the browser ended: ${how}`);
+  process.exit(started ? 1 : 77);
+};
+chromium.on("error", ended);
+chromium.on("exit", (code, signal) => ended(code ?? signal));
 let rest = "";
 
 fromBrowser.setEncoding("utf8");
@@ -32,6 +42,7 @@ fromBrowser.on("data", (data) => {
   rest = messages.pop();
   for (const text of messages) {
     const message = JSON.parse(text);
+    started = true;
     if (message.id) {
       const { resolve, reject } = waiting.get(message.id);
       waiting.delete(message.id);
@@ -220,6 +231,7 @@ async function drive() {
 drive()
   .catch((error) => problems.push(error.stack))
   .finally(() => {
+    chromium.removeAllListeners("exit");
     chromium.kill();
     for (const problem of problems) {
       console.error(problem);

@@ -4,6 +4,9 @@ use std::process::Command;
 
 use crate::{Page, empty_folder, one_at_a_time, party, understudy};
 
+/// The exit status of the script where no browser starts.
+const NOT_STARTED: i32 = 77;
+
 fn is_there(program: &str) -> bool {
     let output = Command::new(program).arg("--version").output();
     output.is_ok_and(|output| output.status.success())
@@ -37,5 +40,9 @@ fn a_browser_sees_a_kill_and_asks_why() {
         .expect("node runs");
     let said = String::from_utf8_lossy(&output.stdout);
     let errors = String::from_utf8_lossy(&output.stderr);
+    if output.status.code() == Some(NOT_STARTED) {
+        eprintln!("skipped: {browser} does not start here: {errors:.200}");
+        return;
+    }
     assert!(output.status.success(), "{said:.4000}{errors:.4000}");
 }
