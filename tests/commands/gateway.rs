@@ -2,7 +2,8 @@
 
 #![allow(
     clippy::disallowed_methods,
-    reason = "what is waited for has a deadline on the real clock"
+    clippy::print_stderr,
+    reason = "what is waited for has a deadline on the real clock, and who skips says so"
 )]
 
 use std::fs;
@@ -291,4 +292,26 @@ fn the_dashboard_and_the_page_name_metrics_that_there_are() {
             exposed.contains(name.as_str()) || exposed.contains(format!("{name}_count").as_str());
         assert!(is_there, "{name} is not exposed");
     }
+}
+
+#[test]
+fn grafanas_own_model_reads_the_dashboard_whole() {
+    let python = std::env::var("UNDERSTUDY_PYTHON").unwrap_or_else(|_| "python3".into());
+    let read = Command::new(&python)
+        .arg("tests/commands/dashboard.py")
+        .arg("deployment/monitoring/dashboards/understudy.json")
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output();
+    let missing = read
+        .as_ref()
+        .map_or(true, |read| read.status.code() == Some(77));
+    if missing {
+        eprintln!(
+            "skipped: {python} has no Grafana model: pip install grafana-foundation-sdk, and name it by UNDERSTUDY_PYTHON"
+        );
+        return;
+    }
+    let read = read.expect("it ran");
+    let errors = String::from_utf8_lossy(&read.stderr);
+    assert!(read.status.success(), "{errors}");
 }
