@@ -114,6 +114,14 @@ impl Station {
         }
     }
 
+    /// The state of a program that it holds, with its lineage; it may be behind the newest sample.
+    pub fn state_of(&self, program: ProgramId) -> Option<(Lineage, &Image)> {
+        self.replicas
+            .iter()
+            .find(|replica| replica.id() == program)?
+            .state()
+    }
+
     fn own(&self) -> StationId {
         self.settings.station
     }

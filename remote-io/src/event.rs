@@ -20,6 +20,10 @@ pub enum Event {
         moment: Moment,
         /// u(i).
         inputs: Image,
+        /// When the program was last started cold; its genesis lineage is a function of it.
+        born: Moment,
+        /// The lineage that this sample extends, L(i)(t).
+        before: Lineage,
     },
     /// A deadline: what was sampled in this cycle, and what is driven from now on.
     Applied {

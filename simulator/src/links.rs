@@ -113,6 +113,22 @@ impl Links {
             .map_or(0, |place| self.senders[place].frames)
     }
 
+    /// Whether frames of one party reach another one, and on time.
+    pub(crate) fn reaches(&self, from: Party, to: Party) -> bool {
+        let (Some(sender), Some(receiver)) = (self.place(from), self.place(to)) else {
+            return false;
+        };
+        let deaf = match to {
+            Party::Station(station) => self.senders[sender].deaf_stations.contains(station),
+            Party::RemoteIo(program) => self.senders[sender].deaf_remote_ios.contains(program),
+            Party::Plant(_) => true,
+        };
+        let delays = &self.senders[sender].delays;
+        let late = delays.iter().any(|(place, _)| *place == receiver);
+        let slow = |place: usize| !self.late[place].is_zero();
+        !deaf && !late && !slow(sender) && !slow(receiver)
+    }
+
     /// Counts what is sent, from here on.
     pub(crate) fn meter(&mut self) {
         self.metered = Some(Metered::default());

@@ -1,9 +1,24 @@
-//! The reference run of one program, and whether what its remote I/O drove was true to it.
+//! The reference run of one program, and whether the outputs that its remote I/O applied were true to it.
 //!
-//! The referee sees only what a remote I/O reports: its samples, its cold starts, and what it drove. From the samples it runs
-//! the program by itself, and knows so the one true h(x(t), u(t)) of every cycle. Invariant checked (*No guess*): what is driven is
-//! that, or the last true output for at most the configured cycles, or the configured fail-safe; never anything else. And
-//! (*The plant decides history*): a program goes on only from a state that its own samples led to.
+//! The referee sees what was sampled (u(i), and the lineage that the sample extends) and what was applied. It follows no report
+//! in which a member says what it decided. A lineage is a hash of an initial state and of all inputs since, so the referee
+//! checks it against its own record instead of believing it.
+//!
+//! Invariants checked:
+//!
+//! - *No guess*: an applied output is h(x(t), u(t)) of the reference run, or the last true output for at most the configured
+//!   cycles, or the configured fail-safe value.
+//! - *Never back*: an applied output fixes the history. A later sample extends the state after the newest sample whose
+//!   outputs were applied (the *floor*), or a state that later samples led to. A state before the floor is a violation,
+//!   unless the operator has chosen it.
+//!
+//! ```text
+//!   … ──u──► x ──u──► floor ──u──► x ──u──► x        a sample may extend the floor or any state behind it: what
+//!   forgotten here is wrong     └──u──► x            was not applied may be void
+//! ```
+//!
+//! A cold start is no violation by itself: the referee counts it, and [`crate::Simulation`], which knows the states of all
+//! stations, reports one that was not necessary.
 
 use std::collections::VecDeque;
 use std::hash::{Hash, Hasher};
@@ -11,17 +26,20 @@ use std::hash::{Hash, Hasher};
 use serde::{Deserialize, Serialize};
 use understudy_logic::{Scan, Scratch};
 use understudy_remote_io::{Event, Settings};
-use understudy_wire::{Image, Lineage, Moment, ProgramHash, Source};
+use understudy_wire::{Image, Lineage, Moment, ProgramHash, Source, StationId};
 
-/// States that it can go back to, at most; older ones are forgotten.
+/// States that are remembered, at most; older ones are forgotten.
 const REMEMBERED: usize = 1024;
 
 /// Different images of a plant that are remembered.
 const SEEN: usize = 16;
 
-/// Samples in a row of which a killed remote I/O has left no record, at most, and the states that they may follow.
+/// Samples in a row of which a killed remote I/O has left no record, at most, and the states that they may extend.
 const UNRECORDED_SAMPLES: usize = 2;
 const RECENT_STATES: usize = 16;
+
+/// Samples for which a choice of the operator is waited for.
+const CHOICE_SAMPLES: u32 = 256;
 
 /// Checks one remote I/O.
 #[derive(Debug, Clone)]
@@ -31,11 +49,12 @@ pub struct Referee {
     fail_safe: Image,
     hold_cycles: u32,
     scratch: Scratch,
-    /// The states that the samples led to, newest last; void ones and those before a cold start too, for a station may still
-    /// hold one, and then the program goes on from it.
-    states: VecDeque<(Lineage, Image)>,
-    /// x(t).
-    state: Option<(Lineage, Image)>,
+    /// The states that the samples led to, newest last.
+    states: VecDeque<State>,
+    /// The place of the floor in `states`; those before it may not be continued from.
+    floor: usize,
+    /// x(t+1): the place of the state after the newest sample.
+    newest: Option<usize>,
     /// h(x(t), u(t)) of the newest sample, with its cycle.
     truth: Option<(Moment, Image)>,
     last_true: Option<Image>,
@@ -44,6 +63,17 @@ pub struct Referee {
     blind: bool,
     /// What the plant showed last: any of these may have been sampled.
     seen: VecDeque<Image>,
+    /// Samples for which the program may go on from a state that the operator has chosen.
+    choice: u32,
+    cold_starts: u64,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+struct State {
+    lineage: Lineage,
+    /// The cycle of the sample that led to it.
+    stepped: Moment,
+    bits: Image,
 }
 
 /// Something that must never happen.
@@ -85,10 +115,28 @@ pub enum Violation {
         /// What is configured.
         configured: Image,
     },
-    /// The program goes on from a state that none of its samples led to.
+    /// The program goes on from a state before the newest sample whose outputs were applied.
     #[error(
-        "in cycle {moment} the program went on from lineage {lineage}, which its plant has never seen"
+        "in cycle {moment} the program continued from its state of cycle {from}, although outputs of cycle {applied} were applied"
     )]
+    WentBack {
+        /// In this cycle.
+        moment: Moment,
+        /// The cycle of the newest sample in the state that it continued from.
+        from: Moment,
+        /// The cycle of the newest sample whose outputs were applied.
+        applied: Moment,
+    },
+    /// The program started from its initial state although a living station had a state to continue from.
+    #[error("in cycle {moment} the program started cold although station {} had its state", station.0)]
+    NeedlessColdStart {
+        /// In this cycle.
+        moment: Moment,
+        /// The station.
+        station: StationId,
+    },
+    /// The program goes on from a state that none of its samples led to.
+    #[error("in cycle {moment} the program continued from lineage {lineage}, which none of its samples led to")]
     UnknownHistory {
         /// In this cycle.
         moment: Moment,
@@ -100,8 +148,11 @@ pub enum Violation {
 /// By its reference run; settings and program are given.
 impl Hash for Referee {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
-        (&self.states, &self.state, &self.truth).hash(hasher);
-        (&self.last_true, self.held, self.blind).hash(hasher);
+        // States before the floor only tell how far a program went back.
+        self.states.range(self.floor..).for_each(|state| state.hash(hasher));
+        let newest = self.newest.map(|place| place - self.floor.min(place));
+        (newest, &self.truth, &self.last_true).hash(hasher);
+        (self.held, self.blind, self.choice).hash(hasher);
     }
 }
 
@@ -121,12 +172,15 @@ impl Referee {
             hold_cycles: settings.hold_cycles,
             scratch: Scratch::default(),
             states: VecDeque::new(),
-            state: None,
+            floor: 0,
+            newest: None,
             truth: None,
             last_true: None,
             held: 0,
             blind: false,
             seen: VecDeque::new(),
+            choice: 0,
+            cold_starts: 0,
         }
     }
 
@@ -144,21 +198,42 @@ impl Referee {
         self.seen.push_back(sensors.clone());
     }
 
-    /// Records of the remote I/O are missing here: nothing that it drives is judged until its program starts, or goes on from a state that is
+    /// Records of the remote I/O are missing here: nothing that it applies is judged until its program starts, or goes on from a state that is
     /// known. What is not known is not a violation, and must be said by whoever reads the records.
     pub fn misses_records(&mut self) {
-        self.state = None;
+        self.newest = None;
         self.truth = None;
         self.last_true = None;
         self.held = 0;
         self.blind = true;
     }
 
-    /// Where the reference run stands: its lineage and x(t), as of the samples so far; nothing before a start that it has seen.
+    /// The operator chooses the state that the program continues from: an older one, one of several, or the initial state.
+    /// Allows one such step.
+    pub fn operator_chooses(&mut self) {
+        self.choice = CHOICE_SAMPLES;
+    }
+
+    /// Whether a choice of the operator is still waited for.
+    pub fn operator_may_choose(&self) -> bool {
+        self.choice > 0
+    }
+
+    /// The state after the newest sample: its lineage and x(t+1); nothing before a start that was seen.
     pub fn standing(&self) -> Option<(Lineage, &Image)> {
-        self.state
-            .as_ref()
-            .map(|(lineage, state)| (*lineage, state))
+        let state = &self.states[self.newest?];
+        Some((state.lineage, &state.bits))
+    }
+
+    /// The state of a lineage, where it is remembered.
+    pub fn state_of(&self, lineage: Lineage) -> Option<&Image> {
+        let place = self.place_of(lineage)?;
+        Some(&self.states[place].bits)
+    }
+
+    /// Whether a station that holds `lineage` could continue the program.
+    pub fn may_continue_from(&self, lineage: Lineage) -> bool {
+        self.place_of(lineage).is_some_and(|place| place >= self.floor)
     }
 
     /// h(x(t), u(t)) of the newest sample, with its cycle.
@@ -168,31 +243,26 @@ impl Referee {
             .map(|(moment, outputs)| (*moment, outputs))
     }
 
-    /// Takes one report of the remote I/O, in the order in which they were made.
+    /// Starts from the initial state, the first one included.
+    pub fn cold_starts(&self) -> u64 {
+        self.cold_starts
+    }
+
+    /// Takes one report of the remote I/O, in the order in which they were made; samples and applied outputs count.
     ///
     /// # Errors
-    /// The violation that it is, if it is one; the referee goes on with what was driven.
+    /// The violation that it is, if it is one; the referee goes on with what was sampled and applied.
     pub fn observe(&mut self, event: &Event) -> Result<(), Violation> {
         match event {
-            Event::StartedCold { born, .. } => {
-                let initial = Image::from_words(self.scan.register_count(), self.scan.initial());
-                self.truth = None;
-                self.last_true = None;
-                self.remember(
-                    Lineage::genesis(self.hash, *born),
-                    initial.expect("a circuit packs its initial state"),
-                );
-                Ok(())
-            }
-            Event::AdoptedLineage {
-                moment, lineage, ..
-            }
-            | Event::Voided {
-                moment, lineage, ..
-            } => self.go_to(*moment, *lineage),
-            Event::Sampled { moment, inputs } => {
+            Event::Sampled {
+                moment,
+                inputs,
+                born,
+                before,
+            } => {
+                let continued = self.continue_from(*moment, *born, *before);
                 self.step(*moment, inputs);
-                Ok(())
+                continued
             }
             Event::Applied {
                 moment,
@@ -205,46 +275,91 @@ impl Referee {
     }
 
     /// The reference run goes on from a state that is known from elsewhere, for want of a start that was seen.
-    pub fn goes_on_from(&mut self, lineage: Lineage, state: Image) {
+    pub fn goes_on_from(&mut self, lineage: Lineage, bits: Image) {
         self.truth = None;
-        self.remember(lineage, state);
+        self.remember(Moment::default(), lineage, bits);
+        self.floor = self.states.len() - 1;
     }
 
-    fn remember(&mut self, lineage: Lineage, state: Image) {
+    fn place_of(&self, lineage: Lineage) -> Option<usize> {
+        self.states
+            .iter()
+            .rposition(|state| state.lineage == lineage)
+    }
+
+    fn remember(&mut self, stepped: Moment, lineage: Lineage, bits: Image) {
         if self.states.len() == REMEMBERED {
             self.states.pop_front();
+            self.floor = self.floor.saturating_sub(1);
         }
-        self.states.push_back((lineage, state.clone()));
-        self.state = Some((lineage, state));
+        self.states.push_back(State {
+            lineage,
+            stepped,
+            bits,
+        });
+        self.newest = Some(self.states.len() - 1);
         self.blind = false;
     }
 
-    fn go_to(&mut self, moment: Moment, lineage: Lineage) -> Result<(), Violation> {
-        self.truth = None;
-        let known = self
-            .states
-            .iter()
-            .rev()
-            .find(|(known, _)| *known == lineage);
-        self.state = known.cloned();
-        if self.state.is_some() || self.recover(lineage) {
-            self.blind = false;
-            Ok(())
-        } else if self.blind {
-            Ok(())
-        } else {
-            Err(Violation::UnknownHistory { moment, lineage })
+    /// Finds the state that a sample extends.
+    fn continue_from(
+        &mut self,
+        moment: Moment,
+        born: Moment,
+        before: Lineage,
+    ) -> Result<(), Violation> {
+        if self.standing().is_some_and(|(newest, _)| newest == before) {
+            return Ok(());
         }
+        let chosen = self.choice > 0;
+        self.truth = None;
+        self.newest = self.place_of(before);
+        if let Some(place) = self.newest {
+            self.blind = false;
+            if place >= self.floor {
+                return Ok(());
+            }
+            let (from, applied) = (self.states[place].stepped, self.states[self.floor].stepped);
+            self.floor = place;
+            self.choice = 0;
+            return if chosen {
+                Ok(())
+            } else {
+                Err(Violation::WentBack {
+                    moment,
+                    from,
+                    applied,
+                })
+            };
+        }
+        if before == Lineage::genesis(self.hash, born) {
+            self.choice = 0;
+            self.cold_starts += 1;
+            self.last_true = None;
+            let initial = Image::from_words(self.scan.register_count(), self.scan.initial());
+            let initial = initial.expect("a circuit packs its initial state");
+            self.remember(born, before, initial);
+            self.floor = self.states.len() - 1;
+            return Ok(());
+        }
+        if self.recover(before) || self.blind {
+            return Ok(());
+        }
+        if chosen {
+            self.misses_records();
+            return Ok(());
+        }
+        Err(Violation::UnknownHistory {
+            moment,
+            lineage: before,
+        })
     }
 
-    /// Finds the samples without a record that lead to a lineage, and goes there.
+    /// Finds the samples without a record that lead to a lineage from a state that may be continued from, and goes there.
     fn recover(&mut self, lineage: Lineage) -> bool {
-        let newest = self.states.iter().rev().take(RECENT_STATES);
-        let begun: Vec<(Lineage, Image)> = newest.cloned().collect();
-        let mut ways: Vec<(usize, Lineage, Vec<usize>)> = begun
-            .iter()
-            .enumerate()
-            .map(|(from, (known, _))| (from, *known, Vec::new()))
+        let newest = (self.floor..self.states.len()).rev().take(RECENT_STATES);
+        let mut ways: Vec<(usize, Lineage, Vec<usize>)> = newest
+            .map(|from| (from, self.states[from].lineage, Vec::new()))
             .collect();
         for _ in 0..UNRECORDED_SAMPLES {
             let mut longer = Vec::new();
@@ -256,10 +371,11 @@ impl Referee {
             }
             if let Some((from, _, samples)) = longer.iter().find(|(_, found, _)| *found == lineage)
             {
-                self.state = Some(begun[*from].clone());
+                self.newest = Some(*from);
+                let stepped = self.states[*from].stepped;
                 for &place in samples {
                     let sensors = self.seen[place].clone();
-                    self.step(Moment::default(), &sensors);
+                    self.step(stepped, &sensors);
                 }
                 self.truth = None;
                 return true;
@@ -270,17 +386,21 @@ impl Referee {
     }
 
     fn step(&mut self, moment: Moment, inputs: &Image) {
-        let Some((lineage, mut state)) = self.state.take() else {
+        self.choice = self.choice.saturating_sub(1);
+        let Some(place) = self.newest else {
             return;
         };
+        let State {
+            lineage, mut bits, ..
+        } = self.states[place].clone();
         let mut outputs = Image::zero(self.scan.output_count());
         self.scan.step(
             &mut self.scratch,
-            state.words_mut(),
+            bits.words_mut(),
             inputs.words(),
             outputs.words_mut(),
         );
-        self.remember(lineage.after(inputs), state);
+        self.remember(moment, lineage.after(inputs), bits);
         self.truth = Some((moment, outputs));
     }
 
@@ -293,6 +413,7 @@ impl Referee {
                 let truth = self.truth.as_ref().filter(|(of, _)| *of == moment);
                 let truth = truth.map(|(_, outputs)| outputs);
                 if truth == Some(driven) {
+                    self.floor = self.newest.unwrap_or(self.floor);
                     return Ok(());
                 }
                 Err(Violation::Wrong {

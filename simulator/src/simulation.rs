@@ -13,7 +13,7 @@ use serde::Serialize;
 use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
 use understudy_wire::{
-    Epoch, Field, Frame, Input, Machine, Output, Party, ProgramId, ProgramSet, Source, StationId,
+    Epoch, Field, Frame, Input, Machine, Moment, Output, Party, ProgramId, ProgramSet, Source, StationId,
     Time,
 };
 
@@ -417,7 +417,16 @@ impl Simulation {
         event: &understudy_remote_io::Event,
         observe: &mut Observe<'_>,
     ) {
-        if let Err(violation) = self.referees[program.index()].observe(event) {
+        let holder = self.holder_before(program, event);
+        let referee = &mut self.referees[program.index()];
+        let (chosen, started) = (referee.operator_may_choose(), referee.cold_starts());
+        let mut found = referee.observe(event).err();
+        if let (Some((moment, station)), false) = (holder, chosen)
+            && referee.cold_starts() > started
+        {
+            found = Some(Violation::NeedlessColdStart { moment, station });
+        }
+        if let Some(violation) = found {
             let party = Party::RemoteIo(program);
             observe(
                 self.now,
@@ -435,6 +444,32 @@ impl Simulation {
             }
         }
         self.tallies[program.index()].count(event);
+    }
+
+    /// A station that runs, that the remote I/O receives and that receives it, and whose state a sample could have extended: asked
+    /// where a sample extends a state that the referee does not know.
+    fn holder_before(
+        &self,
+        program: ProgramId,
+        event: &understudy_remote_io::Event,
+    ) -> Option<(Moment, StationId)> {
+        let understudy_remote_io::Event::Sampled { moment, before, .. } = event else {
+            return None;
+        };
+        let referee = &self.referees[program.index()];
+        if referee.state_of(*before).is_some() {
+            return None;
+        }
+        let remote_io = Party::RemoteIo(program);
+        let mut stations = (0..).zip(&self.stations);
+        let holder = stations.find(|(rank, slot)| {
+            let station = Party::Station(StationId(*rank));
+            let connected = self.links.reaches(station, remote_io)
+                && self.links.reaches(remote_io, station);
+            let state = slot.running().and_then(|it| it.state_of(program));
+            connected && state.is_some_and(|(lineage, _)| referee.may_continue_from(lineage))
+        });
+        holder.map(|(rank, _)| (*moment, StationId(rank)))
     }
 
     fn send(&mut self, frame: Arc<Frame>) {

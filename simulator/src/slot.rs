@@ -53,6 +53,11 @@ impl<M: Machine> Slot<M> {
         true
     }
 
+    /// The party, where it is neither stopped nor crashed.
+    pub(crate) fn running(&self) -> Option<&M> {
+        self.machine.as_ref().filter(|_| !self.stopped)
+    }
+
     pub(crate) fn machine(&mut self) -> Option<&mut M> {
         self.machine.as_mut()
     }

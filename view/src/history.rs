@@ -1,6 +1,6 @@
 //! What one program did, cycle by cycle, made again from the samples of its remote I/O.
 //!
-//! The [`Referee`] of the simulator runs the program; what it adopts and voids is what the remote I/O adopted and voided. A step keeps
+//! The [`Referee`] of the simulator runs the program from the samples, each of which names the state that it extends. A step keeps
 //! x(t), u(t) and the lineages before and after, so that a scan can be looked at as its station evaluated it.
 
 use std::collections::VecDeque;
@@ -65,7 +65,7 @@ pub struct History {
     /// Whether steps have gone, or were never seen.
     cut: bool,
     /// The newest samples, while it is not known which state they belong to.
-    unplaced: VecDeque<(Moment, Image)>,
+    unplaced: VecDeque<Event>,
     /// The state after a sample that is still to come.
     awaited: Option<(Moment, Lineage, Image)>,
 }
@@ -147,46 +147,50 @@ impl History {
         if self.referee.standing().is_some() {
             return;
         }
-        let place = self.unplaced.iter().position(|(of, _)| *of == moment);
+        let place = self.unplaced.iter().position(|it| is_of(it, moment));
         let Some(place) = place else {
             self.awaited = Some((moment, lineage, state.clone()));
             return;
         };
         self.referee.goes_on_from(lineage, state.clone());
-        let later: Vec<(Moment, Image)> = self.unplaced.drain(..).skip(place + 1).collect();
+        let later: Vec<Event> = self.unplaced.drain(..).skip(place + 1).collect();
         self.awaited = None;
-        for (moment, inputs) in later {
-            let sampled = self.sample(moment, &inputs);
+        for event in later {
+            let (sampled, _) = self.sample(&event);
             let mut steps = self.steps.iter_mut().rev();
-            if let Some(step) = steps.find(|step| step.moment == moment) {
+            if let Some(step) = steps.find(|step| is_of(&event, step.moment)) {
                 step.sampled = sampled;
             }
         }
     }
 
-    /// Takes a sample; what it did, where the state before it is known.
-    fn sample(&mut self, moment: Moment, inputs: &Image) -> Option<Sampled> {
-        let standing = self.referee.standing();
-        let before = standing.map(|(lineage, state)| (lineage, state.clone()));
-        let event = Event::Sampled {
+    /// Takes a sample; what it did, where the state before it is known, and what is wrong with it.
+    fn sample(&mut self, event: &Event) -> (Option<Sampled>, Option<Violation>) {
+        let violation = self.referee.observe(event).err();
+        let Event::Sampled {
             moment,
-            inputs: inputs.clone(),
-        };
-        // A sample violates nothing.
-        let _ = self.referee.observe(&event);
-        let (before, state) = before?;
-        let (_, outputs) = self.referee.truth().filter(|(of, _)| *of == moment)?;
-        Some(Sampled {
-            inputs: inputs.clone(),
+            inputs,
             before,
-            state,
-            after: before.after(inputs),
-            outputs: outputs.clone(),
-        })
+            ..
+        } = event
+        else {
+            return (None, violation);
+        };
+        let truth = self.referee.truth().filter(|(of, _)| of == moment);
+        let sampled = truth.and_then(|(_, outputs)| {
+            Some(Sampled {
+                inputs: inputs.clone(),
+                before: *before,
+                state: self.referee.state_of(*before)?.clone(),
+                after: before.after(inputs),
+                outputs: outputs.clone(),
+            })
+        });
+        (sampled, violation)
     }
 
     /// Keeps a sample until it is known which state it belongs to.
-    fn place_later(&mut self, moment: Moment, inputs: &Image) {
+    fn place_later(&mut self, moment: Moment, event: &Event) {
         if self.referee.standing().is_some() {
             self.unplaced.clear();
             return;
@@ -200,7 +204,7 @@ impl History {
                 if self.unplaced.len() == NEWEST {
                     self.unplaced.pop_front();
                 }
-                self.unplaced.push_back((moment, inputs.clone()));
+                self.unplaced.push_back(event.clone());
             }
         }
     }
@@ -212,14 +216,10 @@ impl History {
             let sampled = sampled.filter(|step| step.sampled.is_some() && !step.void);
             sampled.take(*samples).for_each(|step| step.void = true);
         }
-        let violation = match event {
-            Event::Sampled { .. } => None,
-            _ => self.referee.observe(event).err(),
-        };
+        let (sampled, violation) = self.sample(event);
         match event {
-            Event::Sampled { moment, inputs } => {
-                let sampled = self.sample(*moment, inputs);
-                self.place_later(*moment, inputs);
+            Event::Sampled { moment, .. } => {
+                self.place_later(*moment, event);
                 self.push(Step {
                     cycle,
                     moment: *moment,
@@ -289,6 +289,10 @@ impl History {
             .iter_mut()
             .for_each(|step| step.cycle = step.cycle.saturating_add(by));
     }
+}
+
+fn is_of(sample: &Event, cycle: Moment) -> bool {
+    matches!(sample, Event::Sampled { moment, .. } if *moment == cycle)
 }
 
 /// Lines of different parties are so many cycles apart, at most.

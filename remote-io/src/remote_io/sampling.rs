@@ -159,10 +159,11 @@ impl RemoteIo {
         let void = history.push(&inputs, living);
         *sampled = true;
         let base = history.base();
+        let (born, before) = (history.born(), history.before());
         let body = Body::Sample(Sample {
-            born: history.born(),
+            born,
             base,
-            before: history.before(),
+            before,
             after: history.head(),
             history: history.samples(),
             applied: self.applied.clone(),
@@ -175,7 +176,12 @@ impl RemoteIo {
                 lineage: base,
             });
         }
-        self.report(Event::Sampled { moment, inputs });
+        self.report(Event::Sampled {
+            moment,
+            inputs,
+            born,
+            before,
+        });
         let frame = Arc::new(self.frame(body));
         self.outbox.push_back(Output::Send(Arc::clone(&frame)));
         self.copies

@@ -3,8 +3,7 @@
 use understudy_logic::CircuitBuilder;
 use understudy_remote_io::{Release, ValueFault};
 use understudy_wire::{
-    Agreement, ClusterHash, ConfigurationHash, Cycle, Epoch, Mode, ProgramId, Schedule, StationId,
-    StationSet,
+    Agreement, ClusterHash, ConfigurationHash, Cycle, Epoch, Mode, ProgramId, Schedule, StationSet,
 };
 
 use super::*;
@@ -55,17 +54,21 @@ fn bit(bit: bool) -> Image {
     Image::from_bits([bit])
 }
 
-fn born() -> Event {
-    Event::StartedCold {
-        born: moment(0),
-        awaits_release: false,
-    }
+/// L after these inputs, from the genesis of cycle 0.
+fn after(inputs: &[bool]) -> Lineage {
+    let genesis = Lineage::genesis(ProgramHash(5), moment(0));
+    inputs
+        .iter()
+        .fold(genesis, |lineage, &input| lineage.after(&bit(input)))
 }
 
-fn sampled(cycle: u64, input: bool) -> Event {
+/// The sample of a cycle that extends the state after the inputs `before`.
+fn sampled(cycle: u64, before: &[bool], input: bool) -> Event {
     Event::Sampled {
         moment: moment(cycle),
         inputs: bit(input),
+        born: moment(0),
+        before: after(before),
     }
 }
 
@@ -93,35 +96,34 @@ fn check(events: &[Event], violation: bool) {
 }
 
 #[test]
-fn only_the_true_output_may_be_driven_as_true() {
+fn only_the_true_output_may_be_applied_as_true() {
     for source in [Source::Direct, Source::Reconstructed] {
         for (first, second, output) in
             (0..8).map(|case| (case & 1 == 1, case & 2 == 2, case & 4 == 4))
         {
             let truth = first ^ second;
             let events = [
-                born(),
-                sampled(1, first),
-                sampled(2, second),
+                sampled(1, &[], first),
+                sampled(2, &[first], second),
                 applied(2, output, source),
             ];
             check(&events, output != truth);
         }
-        check(&[born(), sampled(1, true), applied(2, true, source)], true);
+        check(&[sampled(1, &[], true), applied(2, true, source)], true);
         check(&[applied(1, false, source)], true);
     }
 }
 
 #[test]
 fn only_the_last_true_output_may_be_held_and_not_for_long() {
-    let start = [born(), sampled(1, true), applied(1, true, Source::Direct)];
+    let start = [sampled(1, &[], true), applied(1, true, Source::Direct)];
     let then = |more: &[Event]| [&start, more].concat();
     let held = |cycle, output| applied(cycle, output, Source::Held);
     check(&then(&[held(2, true)]), false);
     check(&then(&[held(2, false)]), true);
     check(&then(&[held(2, true), held(3, true)]), false);
     check(&then(&[held(2, true), held(3, true), held(4, true)]), true);
-    check(&[born(), held(1, false)], true);
+    check(&[sampled(1, &[], true), held(1, false)], true);
 }
 
 #[test]
@@ -130,60 +132,92 @@ fn only_the_configured_values_are_safe() {
     check(&[applied(1, true, Source::FailSafe)], true);
 }
 
+/// Every history of four samples of which any were applied, and a fifth sample that extends any of its states: a state before the
+/// newest applied sample is a violation, and no other is.
 #[test]
-fn a_program_goes_on_only_from_what_its_plant_has_seen() {
-    let genesis = Lineage::genesis(ProgramHash(5), moment(0));
-    let seen = genesis.after(&bit(true));
-    let adopted = |lineage| Event::AdoptedLineage {
-        moment: moment(3),
-        lineage,
-        from: StationId(0),
-    };
-    let voided = |lineage| Event::Voided {
-        moment: moment(3),
-        samples: 1,
-        lineage,
-    };
-    let start = [born(), sampled(1, true), sampled(2, false)];
-    for (lineage, violation) in [
-        (seen, false),
-        (genesis, false),
-        (seen.after(&bit(true)), true),
-    ] {
-        check(&[&start[..], &[adopted(lineage)]].concat(), violation);
-        check(&[&start[..], &[voided(lineage)]].concat(), violation);
+fn a_program_never_goes_back_behind_an_applied_output() {
+    for (inputs, outputs) in (0..16_u32).flat_map(|a| (0..16_u32).map(move |b| (a, b))) {
+        let inputs: Vec<bool> = (0..4).map(|k| inputs >> k & 1 == 1).collect();
+        let floor = (0..4).rev().find(|k| outputs >> k & 1 == 1);
+        let floor = floor.map_or(0, |newest| newest + 1);
+        for from in 0..=4 {
+            let mut events = Vec::new();
+            for (k, &input) in inputs.iter().enumerate() {
+                events.push(sampled(k as u64 + 1, &inputs[..k], input));
+                if outputs >> k & 1 == 1 {
+                    let state = k.checked_sub(1).is_some_and(|before| inputs[before]);
+                    events.push(applied(k as u64 + 1, state ^ input, Source::Direct));
+                }
+            }
+            events.push(sampled(9, &inputs[..from], true));
+            check(&events, from < floor);
+        }
     }
+}
+
+#[test]
+fn a_program_continues_only_from_what_its_samples_led_to() {
+    let start = [sampled(1, &[], true), sampled(2, &[true], false)];
+    let unknown = sampled(3, &[true, true], false);
+    check(&[&start[..], &[unknown]].concat(), true);
     // From the state after u = 1, an input of 0 gives 1.
     let resumed = [
-        voided(seen),
-        sampled(3, false),
+        sampled(3, &[true], false),
         applied(3, true, Source::Direct),
     ];
     check(&[&start[..], &resumed].concat(), false);
 }
 
 #[test]
-fn what_follows_missing_records_is_not_judged_until_a_state_is_known() {
+fn the_operator_may_choose_an_older_state_once() {
+    let back = |cycle| sampled(cycle, &[], true);
     let mut referee = referee();
-    for event in [born(), sampled(1, true), applied(1, true, Source::Direct)] {
+    for event in [
+        sampled(1, &[], true),
+        applied(1, true, Source::Direct),
+        sampled(2, &[true], true),
+        applied(2, false, Source::Direct),
+    ] {
         assert_eq!(referee.observe(&event), Ok(()), "{event:?}");
     }
-    let (lineage, _) = referee.standing().expect("it was born");
+    referee.operator_chooses();
+    assert_eq!(referee.observe(&back(3)), Ok(()));
+    assert_eq!(referee.observe(&applied(3, true, Source::Direct)), Ok(()));
+    let again = referee.observe(&back(4));
+    assert!(matches!(again, Err(Violation::WentBack { .. })), "{again:?}");
+}
+
+#[test]
+fn a_cold_start_is_counted() {
+    let mut referee = referee();
+    let cold = |cycle| Event::Sampled {
+        moment: moment(cycle),
+        inputs: bit(true),
+        born: moment(cycle),
+        before: Lineage::genesis(ProgramHash(5), moment(cycle)),
+    };
+    for cycle in [1, 5] {
+        assert_eq!(referee.observe(&cold(cycle)), Ok(()));
+        let output = applied(cycle, true, Source::Direct);
+        assert_eq!(referee.observe(&output), Ok(()));
+    }
+    assert_eq!(referee.cold_starts(), 2);
+}
+
+#[test]
+fn what_follows_missing_records_is_not_judged_until_a_state_is_known() {
+    let mut referee = referee();
+    for event in [sampled(1, &[], true), applied(1, true, Source::Direct)] {
+        assert_eq!(referee.observe(&event), Ok(()), "{event:?}");
+    }
     referee.misses_records();
     assert_eq!(referee.standing(), None);
-    // Whether these are true nobody can say, and that they are not the fail-safe values everybody can.
+    // Whether these are true is not known; whether they are the fail-safe values is.
     for event in [
         applied(5, false, Source::Held),
-        sampled(6, true),
+        sampled(6, &[true, false, false], true),
         applied(6, true, Source::Reconstructed),
-        Event::Voided {
-            moment: moment(7),
-            samples: 1,
-            lineage: lineage
-                .after(&bit(false))
-                .after(&bit(false))
-                .after(&bit(false)),
-        },
+        sampled(7, &[true, false, false, false], true),
         applied(7, true, Source::Direct),
     ] {
         assert_eq!(referee.observe(&event), Ok(()), "{event:?}");
@@ -191,8 +225,8 @@ fn what_follows_missing_records_is_not_judged_until_a_state_is_known() {
     let wrong = referee.observe(&applied(8, true, Source::FailSafe));
     assert!(wrong.is_err(), "{wrong:?}");
     // From a state that is known it judges again: x = 1 and u = 1 give 0.
-    referee.goes_on_from(lineage, bit(true));
-    assert_eq!(referee.observe(&sampled(9, true)), Ok(()));
+    referee.goes_on_from(after(&[true]), bit(true));
+    assert_eq!(referee.observe(&sampled(9, &[true], true)), Ok(()));
     let wrong = referee.observe(&applied(9, true, Source::Direct));
     assert!(wrong.is_err(), "{wrong:?}");
 }

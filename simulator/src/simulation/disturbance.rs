@@ -35,7 +35,10 @@ impl Simulation {
                     machine.flip_state(program, usize::from(bit));
                 }
             }
-            (Party::RemoteIo(_), Action::Release) => self.give(party, Input::Release, observe),
+            (Party::RemoteIo(program), Action::Release) => {
+                self.referees[program.index()].operator_chooses();
+                self.give(party, Input::Release, observe);
+            }
             (Party::Station(station), _) => {
                 let waiting = disturb(&mut self.stations[station.index()], action);
                 self.catch_up(party, waiting, observe);
