@@ -9,6 +9,7 @@ use serde_json::json;
 use understudy_bus::{Call, Request, TlsKeys};
 use understudy_cluster::Overrides;
 use understudy_keys::{Date, OperatorKeys, TlsFiles};
+use understudy_wire::{Cycle, StateChoice};
 
 use crate::answer::{Answer, Status};
 use crate::files;
@@ -19,6 +20,7 @@ use crate::files;
 Example:
   understudy operate cell/cluster.toml --keys keys/parties/operator --name robot-io status
   understudy operate cell/cluster.toml --keys keys/parties/operator --name robot-io release
+  understudy operate cell/cluster.toml --keys keys/parties/operator --name robot-io accept-state --cycle 4711
   understudy operate cell/cluster.toml --keys keys/parties/operator --name robot journal --lines 100")]
 pub(crate) struct Arguments {
     /// The cluster file
@@ -33,6 +35,9 @@ pub(crate) struct Arguments {
     /// What is asked of it
     #[arg(value_enum)]
     what: What,
+    /// For accept-state: the cycle of the state, as the event `state-lost` names it; another newest state is refused
+    #[arg(long, value_name = "CYCLE", required_if_eq("what", "accept-state"))]
+    cycle: Option<u64>,
     /// Lines of the journal, then it ends
     #[arg(long, value_name = "N", default_value_t = u64::MAX, hide_default_value = true)]
     lines: u64,
@@ -46,6 +51,10 @@ enum What {
     Configuration,
     /// Release the outputs of a program that was started cold
     Release,
+    /// Start a program whose state is lost from its initial state
+    ColdStart,
+    /// Continue a program whose state is lost from the newest available state, which is from the cycle --cycle
+    AcceptState,
     /// End
     Stop,
     /// Each line of its journal from now on
@@ -79,6 +88,10 @@ fn asked(arguments: &Arguments) -> Result<Answer, Answer> {
         What::Status => Request::Status,
         What::Configuration => Request::Configuration,
         What::Release => Request::Release,
+        What::ColdStart => Request::Choose(StateChoice::Cold),
+        What::AcceptState => Request::Choose(StateChoice::Newest {
+            cycle: arguments.cycle.map(Cycle),
+        }),
         What::Stop => Request::Stop,
         What::Journal => {
             let mut left = arguments.lines;

@@ -234,6 +234,7 @@ impl Recorder {
         };
         let request = match command {
             Command::Release => Request::Release,
+            Command::Choose { choice } => Request::Choose(*choice),
             Command::Force(force) => Request::Force(force.clone()),
             Command::Unforce { signal } => Request::Unforce(*signal),
             Command::Isolate | Command::Rejoin => return Err(elsewhere(LINKS)),

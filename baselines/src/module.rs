@@ -83,6 +83,7 @@ impl Module {
                 history: smallvec![self.field.clone()],
                 applied: None,
                 excluded: StationSet::EMPTY,
+                gone: StationSet::EMPTY,
             }),
         });
         self.copies.sent(now, &frame, &self.agreement.schedule);

@@ -185,6 +185,8 @@ impl Partner {
                 sum: outputs,
             }],
             recalled: Vec::new(),
+            lacks: ProgramSet::EMPTY,
+            relayed: Vec::new(),
         };
         self.send(now, Body::Turn(turn));
         self.give_state(now);

@@ -292,7 +292,7 @@ impl<E: Send + 'static> Channel<E> {
         };
         let key = format!("{}/command/stop", self.prefix);
         answers.push(answer(&session, key, stop)?);
-        for word in ["force", "unforce"] {
+        for word in ["force", "unforce", "choose"] {
             let control = self.control.clone();
             let force = move |query: &Query| match forcing(word, query) {
                 Ok(order) => {
@@ -312,7 +312,7 @@ impl<E: Send + 'static> Channel<E> {
     }
 }
 
-/// What a force or its end comes with.
+/// A command that comes with a value.
 fn forcing(word: &str, query: &Query) -> Result<Order, String> {
     let bytes = query.payload().map(|payload| payload.to_bytes());
     let bytes = bytes.unwrap_or_default();
@@ -320,7 +320,7 @@ fn forcing(word: &str, query: &Query) -> Result<Order, String> {
     if line.len() > LINE_BYTES {
         return Err(format!("more than {LINE_BYTES} bytes"));
     }
-    order(&line).ok_or_else(|| format!("no signal, value, time, owner and reason: {line:.200}"))
+    order(&line).ok_or_else(|| format!("invalid command `{line:.200}`"))
 }
 
 fn close(opened: Option<Opened>) {

@@ -122,6 +122,7 @@ pub(crate) fn order(line: &str) -> Option<Order> {
             let force: Force = serde_json::from_str(force).ok()?;
             force.check().is_ok().then_some(Order::Force(force))
         }
+        ("choose", choice) => serde_json::from_str(choice).ok().map(Order::Choose),
         ("unforce", signal) => serde_json::from_str(signal).ok().map(Order::Unforce),
         _ => None,
     }
@@ -151,7 +152,7 @@ impl Lines {
 
 #[cfg(test)]
 mod tests {
-    use understudy_wire::SignalPlace;
+    use understudy_wire::{Cycle, SignalPlace, StateChoice};
 
     use super::*;
 
@@ -192,6 +193,13 @@ mod tests {
         );
         check(r#"unforce {"input":70000}"#, None);
         check("unforce", None);
+        check(r#"choose "cold""#, Some(Order::Choose(StateChoice::Cold)));
+        let cycle = Some(Cycle(7));
+        check(
+            r#"choose {"newest":{"cycle":7}}"#,
+            Some(Order::Choose(StateChoice::Newest { cycle })),
+        );
+        check("choose", None);
         check("", None);
     }
 

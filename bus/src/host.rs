@@ -152,6 +152,7 @@ impl<M: Machine> Host<'_, M> {
             let input = match &order {
                 Order::Stop => return true,
                 Order::Release => Input::Release,
+                Order::Choose(choice) => Input::Choose(*choice),
                 Order::Force(force) => Input::Force(force),
                 Order::Unforce(signal) => Input::Unforce(*signal),
             };

@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 use serde_json::json;
-use understudy_wire::{ClusterHash, Force, SignalPlace};
+use understudy_wire::{ClusterHash, Force, SignalPlace, StateChoice};
 use zenoh::Wait;
 
 use crate::channel::{TlsKeys, hash_key, insert, prefix, tls_config};
@@ -27,6 +27,8 @@ pub enum Request {
     Status,
     /// To release the outputs of a program that was started cold.
     Release,
+    /// To continue a program whose state is lost from the chosen state.
+    Choose(StateChoice),
     /// To put a value in the place of a signal of a remote I/O.
     Force(Force),
     /// To take it back.
@@ -42,6 +44,7 @@ impl Request {
             Self::Configuration => "configuration",
             Self::Status => "status",
             Self::Release => "command/release",
+            Self::Choose(_) => "command/choose",
             Self::Force(_) => "command/force",
             Self::Unforce(_) => "command/unforce",
             Self::Stop => "command/stop",
@@ -51,6 +54,7 @@ impl Request {
     /// What it comes with.
     fn payload(&self) -> String {
         let text = match self {
+            Self::Choose(choice) => serde_json::to_string(choice),
             Self::Force(force) => serde_json::to_string(force),
             Self::Unforce(signal) => serde_json::to_string(signal),
             _ => return String::new(),

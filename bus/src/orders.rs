@@ -4,7 +4,7 @@ use std::os::fd::BorrowedFd;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use understudy_wire::{Force, SignalPlace};
+use understudy_wire::{Force, SignalPlace, StateChoice};
 
 use crate::doorbell::{Inbox, Outbox, doorbell};
 use crate::error::BusError;
@@ -19,6 +19,8 @@ pub enum Order {
     Stop,
     /// The operator releases the outputs of a program that was started cold.
     Release,
+    /// The operator chooses the state that a program continues from.
+    Choose(StateChoice),
     /// The operator puts a value in the place of a signal.
     Force(Force),
     /// The operator takes it back.

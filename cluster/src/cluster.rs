@@ -11,7 +11,7 @@ use understudy_logic::Circuit;
 use understudy_node::Program;
 use understudy_parity::ParityController;
 use understudy_plant::{Followed, Plant};
-use understudy_remote_io::{Diagnosis, Release, ValueFault};
+use understudy_remote_io::{Diagnosis, Release, StaleState, ValueFault};
 use understudy_wire::{Agreement, Epoch, Image, Party, ProgramHash, ProgramId, StationId};
 
 /// What carries the frames.
@@ -99,6 +99,8 @@ pub struct RemoteIo {
     pub field: Option<FieldDevice>,
     /// What is driven while nobody can say which of two stations is right.
     pub value_fault: ValueFault,
+    /// What follows where living stations hold only states that are older than the newest applied output.
+    pub stale_state: StaleState,
     /// What finds failed channels that do not say so.
     pub diagnosis: Option<DiagnosisPlace>,
     /// Where it listens, if the file says so.
@@ -299,6 +301,7 @@ impl Cluster {
             fail_safe: remote_io.fail_safe.clone(),
             release: remote_io.release,
             value_fault: remote_io.value_fault,
+            stale_state: remote_io.stale_state,
         })
     }
 

@@ -47,6 +47,7 @@ pub(crate) fn configuration_text(cluster: &Cluster, plants: &[String]) -> String
         line(format_args!("  fail-safe {}", remote_io.fail_safe));
         line(format_args!("  release {:?}", remote_io.release));
         line(format_args!("  value fault {:?}", remote_io.value_fault));
+        line(format_args!("  stale state {:?}", remote_io.stale_state));
         if let Some(diagnosis) = &remote_io.diagnosis {
             line(format_args!("diagnosis"));
             let text = circuit_text(&diagnosis.circuit);

@@ -69,6 +69,8 @@ pub(crate) struct RemoteIoSection {
     pub(crate) release: usize,
     /// Index into [`crate::format::VALUE_FAULTS`].
     pub(crate) value_fault: usize,
+    /// Index into [`crate::format::STALE_STATES`].
+    pub(crate) stale_state: usize,
     pub(crate) diagnosis: Option<Placed<String>>,
     pub(crate) field: Option<FieldSection>,
     pub(crate) address: Option<Placed<SocketAddr>>,
@@ -151,6 +153,7 @@ pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
             fail_safe: fields.bits("fail_safe", diagnostics),
             release: fields.word("release", diagnostics),
             value_fault: fields.word("value_fault", diagnostics),
+            stale_state: fields.word("stale_state", diagnostics),
             diagnosis: fields.text("diagnosis", diagnostics),
             field: field(fields, &empty, diagnostics),
             address: fields.address("address", diagnostics),

@@ -94,6 +94,7 @@ pub(crate) const LINKS: [&str; 2] = ["zenoh", "udp"];
 pub(crate) const SECURITIES: [&str; 2] = ["keys", "off"];
 pub(crate) const RELEASES: [&str; 2] = ["automatic", "operator"];
 pub(crate) const VALUE_FAULTS: [&str; 3] = ["hold", "alarm", "fail-safe"];
+pub(crate) const STALE_STATES: [&str; 2] = ["operator", "cold"];
 pub(crate) const MODELS: [&str; 2] = ["robot", "press"];
 
 pub(crate) static CLUSTER: Section = Section {
@@ -232,6 +233,14 @@ pub(crate) static REMOTE_IO: Section = Section {
                 default: true,
             },
             "what is driven while two stations say different outputs from one history and no third one says which is right: `hold`, the last true outputs and then the fail-safe ones, until they agree or the operator releases them; `alarm`, the outputs of the controller itself; `fail-safe`, the fail-safe outputs at once, until the operator releases them",
+        ),
+        key(
+            "stale_state",
+            Kind::Word {
+                words: &STALE_STATES,
+                default: true,
+            },
+            "what follows where living stations hold only states that are older than the newest applied output: `operator`, the outputs are held, then fail-safe, until the operator chooses the older state or a cold start; `cold`, the program starts from its initial state",
         ),
         key(
             "diagnosis",

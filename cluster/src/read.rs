@@ -44,7 +44,7 @@ use understudy_diagnostic::{Diagnostic, Report};
 use understudy_ladder::Program as LadderProgram;
 use understudy_logic::{Circuit, Scan};
 use understudy_node::Program;
-use understudy_remote_io::{Release, ValueFault};
+use understudy_remote_io::{Release, StaleState, ValueFault};
 use understudy_wire::{
     Agreement, ClusterHash, ConfigurationHash, Image, MAXIMUM_PROGRAMS, Mode, Schedule,
 };
@@ -358,6 +358,7 @@ fn remote_ios(
                 .and_then(|field| devices::device(field, member, diagnostics)),
             value_fault: [ValueFault::Hold, ValueFault::Alarm, ValueFault::FailSafe]
                 [section.value_fault],
+            stale_state: [StaleState::Operator, StaleState::Cold][section.stale_state],
             diagnosis: section
                 .diagnosis
                 .as_ref()
@@ -383,6 +384,7 @@ fn remote_ios(
                 release: Release::default(),
                 field: None,
                 value_fault: ValueFault::default(),
+                stale_state: StaleState::default(),
                 diagnosis: None,
                 address: None,
             }

@@ -146,17 +146,33 @@ impl Replica {
         if inputs.width() == program.scan.input_count() {
             let recalled = Recalled {
                 program: self.id,
+                witnessed: true,
+                applied: sample.applied,
                 excluded: sample.excluded,
+                gone: sample.gone,
                 inputs: inputs.clone(),
             };
             self.recalled = Some((Some(moment), recalled));
         }
     }
 
+    /// A station claims a state: one that is newer than the newest sample received here comes from a station that is not gone.
+    pub(crate) fn hear_claim(&mut self, station: StationId, stepped: Moment) {
+        if let Some((heard, recalled)) = &mut self.recalled
+            && heard.is_none_or(|heard| stepped > heard)
+        {
+            recalled.gone.remove(station);
+        }
+    }
+
     /// Takes what another station has heard, where this one has heard nothing.
     pub(crate) fn is_told(&mut self, program: &Program, recalled: &Recalled) {
         if self.recalled.is_none() && recalled.inputs.width() == program.scan.input_count() {
-            self.recalled = Some((None, recalled.clone()));
+            let recalled = Recalled {
+                witnessed: false,
+                ..recalled.clone()
+            };
+            self.recalled = Some((None, recalled));
         }
     }
 

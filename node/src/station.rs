@@ -12,6 +12,7 @@
 //! for others: what is applied is decided by each remote I/O for itself (*No election*).
 
 mod pacing;
+mod relay;
 mod repair;
 mod turn;
 
@@ -52,6 +53,8 @@ pub struct Station {
     joining: StationSet,
     /// Whose states differed in the last cycle.
     differed: SmallVec<[(ProgramId, StationId); 1]>,
+    /// Programs whose samples any other station lacked in the last cycle.
+    lacked: ProgramSet,
 }
 
 /// What a station remembers of the current cycle only.
@@ -67,6 +70,14 @@ struct CycleNotes {
     others_have: ProgramSet,
     /// Who asked to join.
     joiners: StationSet,
+    /// The samples of this cycle, from their remote I/Os or relayed.
+    samples: SmallVec<[Arc<Frame>; 2]>,
+    /// Programs whose samples came from their remote I/Os.
+    direct: ProgramSet,
+    /// Programs whose samples other stations lack.
+    lacked: ProgramSet,
+    /// Programs whose samples a station has relayed.
+    relayed: ProgramSet,
 }
 
 /// What a controller has said of its own program.
@@ -101,6 +112,7 @@ impl Station {
             wanted: ProgramSet::EMPTY,
             joining: StationSet::EMPTY,
             differed: SmallVec::new(),
+            lacked: ProgramSet::EMPTY,
             settings,
         };
         station.waking.ask(station.next_wakeup());
@@ -140,9 +152,9 @@ impl Station {
         self.outbox.push_back(Output::Report(event));
     }
 
-    fn send(&mut self, body: Body) -> Arc<Frame> {
+    fn frame(&self, body: Body) -> Frame {
         let agreement = &self.settings.agreement;
-        let frame = Arc::new(Frame {
+        Frame {
             header: Header {
                 cluster: agreement.cluster,
                 configuration: agreement.configuration,
@@ -151,7 +163,11 @@ impl Station {
                 alone: self.clock.alone(),
             },
             body,
-        });
+        }
+    }
+
+    fn send(&mut self, body: Body) -> Arc<Frame> {
+        let frame = Arc::new(self.frame(body));
         self.outbox.push_back(Output::Send(Arc::clone(&frame)));
         frame
     }
@@ -191,8 +207,14 @@ impl Station {
             }
         }
         match (&frame.body, frame.header.sender) {
-            (Body::Sample(sample), Party::RemoteIo(program)) => self.follow(program, frame, sample),
-            (Body::Turn(turn), Party::Station(station)) => self.hear_turn(station, turn),
+            (Body::Sample(sample), Party::RemoteIo(program)) => {
+                self.cycle.direct.insert(program);
+                self.follow(program, frame, sample);
+            }
+            (Body::Turn(turn), Party::Station(station)) => {
+                self.hear_turn(station, turn);
+                self.hear_relayed(&frame.header, turn);
+            }
             (Body::Join(join), Party::Station(station)) => self.hear_join(station, join),
             (Body::Transfer(transfer), Party::Station(station)) => self.adopt(station, transfer),
             _ => {}
@@ -201,6 +223,7 @@ impl Station {
     }
 
     fn follow(&mut self, program: ProgramId, frame: &Arc<Frame>, sample: &Sample) {
+        self.keep_sample(frame);
         let excluded = sample.excluded.contains(self.own());
         let moment = frame.header.moment;
         let Some(replica) = self
@@ -297,10 +320,11 @@ impl Hash for Station {
             wanted,
             joining,
             differed,
+            lacked,
         } = self;
         (reception, clock, attendance, replicas, copies).hash(hasher);
         (cycle, started, waking, paces, wanted).hash(hasher);
-        (joining, differed).hash(hasher);
+        (joining, differed, lacked).hash(hasher);
     }
 }
 
@@ -318,6 +342,7 @@ impl Machine for Station {
             Input::Field(_)
             | Input::FieldLost
             | Input::Release
+            | Input::Choose(_)
             | Input::Force(_)
             | Input::Unforce(_) => {}
         }

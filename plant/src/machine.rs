@@ -244,6 +244,7 @@ impl Machine for PlantMachine {
             Input::Field(_)
             | Input::FieldLost
             | Input::Release
+            | Input::Choose(_)
             | Input::Force(_)
             | Input::Unforce(_) => {}
         }

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
+use smallvec::SmallVec;
 use understudy_wire::{
     ConfigurationHash, Force, Image, Lineage, Moment, Party, ProgramId, SignalPlace, Source,
     StationId, StationSet,
@@ -65,6 +66,47 @@ pub enum Event {
         moment: Moment,
         /// Who holds them.
         stations: StationSet,
+    },
+    /// No living station can prove the state that the newest applied output came from: the outputs are held, then fail-safe.
+    StateLost {
+        /// In this cycle.
+        moment: Moment,
+        /// The cycle of the newest sample whose outputs were applied; not known after a restart.
+        applied: Option<Moment>,
+        /// The cycle of the newest state that a living station holds.
+        newest: Moment,
+        /// The station that holds it.
+        holder: StationId,
+        /// Whether the operator is asked; the program starts cold otherwise.
+        asks: bool,
+    },
+    /// A station has returned that can prove the state: the program continues.
+    StateRecovered {
+        /// In this cycle.
+        moment: Moment,
+        /// The station.
+        from: StationId,
+    },
+    /// The operator chose a state that is not the newest available one, or where no choice was asked for.
+    ChoiceRefused {
+        /// In this cycle.
+        moment: Moment,
+        /// The cycle of the newest available state, where a choice is asked for.
+        newest: Option<Moment>,
+    },
+    /// The failure of one station would be masked from now on.
+    Protected {
+        /// From this cycle.
+        moment: Moment,
+    },
+    /// The failure of one station would not be masked any more.
+    Unprotected {
+        /// In this cycle.
+        moment: Moment,
+        /// The first cycle of those in a row in which it would not have been masked.
+        since: Moment,
+        /// The stations that could not prove the program's output, and why.
+        lacking: SmallVec<[Lacking; 2]>,
     },
     /// Samples that nobody heard are void: the program goes on from an older state that a station still has.
     Voided {
@@ -171,6 +213,35 @@ pub enum Event {
     },
 }
 
+/// A station that cannot stand in for a program, as its remote I/O sees it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Lacking {
+    /// The station.
+    pub station: StationId,
+    /// Why.
+    #[serde(flatten)]
+    pub reason: LackingReason,
+}
+
+/// Why a station cannot stand in for a program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(tag = "reason", rename_all = "kebab-case")]
+pub enum LackingReason {
+    /// Its turn was not received: it is down, or the link from it to this remote I/O is.
+    NotReceived,
+    /// It asks for a state.
+    Joining,
+    /// Its state is behind: it has not received the newest samples.
+    Behind {
+        /// The cycle of its newest sample.
+        stepped: Moment,
+    },
+    /// It was found faulty, and waits for the operator.
+    Excluded,
+    /// In the paper's mode: it has failed, and so no further failure is masked.
+    Failed,
+}
+
 /// Why there was nothing true to apply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -183,6 +254,8 @@ pub enum Missing {
     BadQuality,
     /// This remote I/O does not know its program's history yet.
     NoHistory,
+    /// No living station can prove the program's state.
+    StateLost,
     /// The operator has not released the outputs after a cold start, or after a value fault.
     NotReleased,
     /// Stations disagree, and nobody says who is right.

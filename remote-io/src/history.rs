@@ -8,8 +8,9 @@
 //!            └ the newest that a living station has said to hold
 //! ```
 //!
-//! When the window is full and no living station has come past the base, nobody could ever follow: the samples that
-//! nobody heard are void, and the program goes on from the base.
+//! When the window is full, samples that no station has followed and of which no output was applied become void, and the
+//! program continues from the newest state that is left. Invariant *Never back*: samples up to the newest applied one (the
+//! *floor*) never become void.
 
 use std::collections::VecDeque;
 
@@ -89,13 +90,26 @@ impl History {
 
     /// Appends this cycle's sample; answers with how many older ones became void by it.
     ///
-    /// `living` is the newest place that a living station holds, where one does.
-    pub(crate) fn push(&mut self, inputs: &Image, living: Option<usize>) -> usize {
+    /// `living` are the oldest and the newest place that living stations hold, where one does; `floor` is the lineage after the
+    /// newest applied sample.
+    pub(crate) fn push(
+        &mut self,
+        inputs: &Image,
+        living: Option<(usize, usize)>,
+        floor: Option<Lineage>,
+    ) -> usize {
         let mut void = 0;
         if self.samples.len() == self.capacity {
-            if living.unwrap_or(self.confirmed) == 0 {
-                void = self.samples.len();
-                self.samples.clear();
+            let floor = floor.and_then(|floor| self.place(floor)).unwrap_or(0);
+            let newest = living
+                .map_or(self.confirmed, |(_, newest)| newest)
+                .max(floor);
+            // Sliding on would lose the oldest living station, and nothing is lost by void samples.
+            let keeps_oldest = living.is_some_and(|(oldest, _)| oldest == 0);
+            if newest == 0 || (newest < self.samples.len() && keeps_oldest) {
+                void = self.samples.len() - newest;
+                self.samples.truncate(newest);
+                self.confirmed = self.confirmed.min(newest);
             } else if let Some((_, after)) = self.samples.pop_front() {
                 self.base = after;
                 self.confirmed = self.confirmed.saturating_sub(1);
@@ -131,9 +145,10 @@ mod tests {
         let mut history = history(3);
         let mut lineages = vec![history.head()];
         for cycle in 0..10 {
-            let living = history.place(lineages[cycle]);
-            history.confirm(living.expect("the last head is known"));
-            assert_eq!(history.push(&input(cycle as u64), living), 0);
+            let living = history.place(lineages[cycle]).expect("the last head");
+            history.confirm(living);
+            let void = history.push(&input(cycle as u64), Some((living, living)), None);
+            assert_eq!(void, 0);
             lineages.push(history.head());
             assert_eq!(history.before(), lineages[cycle]);
             assert_eq!(history.base(), lineages[(cycle + 1).saturating_sub(3)]);
@@ -147,18 +162,54 @@ mod tests {
             let mut history = history(3);
             let mut last = history.head();
             for cycle in 0..followed {
-                let living = history.place(last);
-                history.push(&input(cycle), living);
+                let living = history.place(last).map(|place| (place, place));
+                history.push(&input(cycle), living, None);
                 last = history.head();
                 history.confirm(history.place(last).expect("the head"));
             }
             for cycle in 0..20 {
-                history.push(&input(cycle), None);
+                history.push(&input(cycle), None, None);
                 assert!(
                     history.place(last).is_some(),
                     "{followed} followed, then {cycle} alone"
                 );
             }
+        }
+    }
+
+    /// Every floor, and every place of a living station from there on or behind: the history never loses the state at the floor,
+    /// or a newer one that it continues from, and a living station at its oldest state stays in it.
+    #[test]
+    fn an_applied_sample_never_becomes_void() {
+        let check = |floor: usize, living: Option<usize>| {
+            let mut history = history(4);
+            let mut lineages = vec![history.head()];
+            for cycle in 0..4 {
+                history.push(&input(cycle), Some((0, cycle as usize)), None);
+                lineages.push(history.head());
+            }
+            history.confirm(floor);
+            let mut states = lineages[..=floor].to_vec();
+            for cycle in 4..30 {
+                let place = living.and_then(|place| history.place(lineages[place]));
+                let living = place.map(|place| (place, place));
+                history.push(&input(cycle), living, Some(lineages[floor]));
+                states.push(history.head());
+                let base = history.base();
+                assert!(
+                    !lineages[..floor].contains(&base) || history.place(lineages[floor]).is_some()
+                );
+                if place == Some(0) && floor < 4 {
+                    assert!(
+                        history.place(lineages[0]).is_some(),
+                        "{floor} {living:?} {cycle}"
+                    );
+                }
+            }
+        };
+        for floor in 0..=4 {
+            check(floor, None);
+            (0..=4).for_each(|living| check(floor, Some(living)));
         }
     }
 }

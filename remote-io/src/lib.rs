@@ -17,7 +17,7 @@ mod witnesses;
 
 pub use channel::Channel;
 pub use diagnosis::Diagnosis;
-pub use event::{Event, Missing};
+pub use event::{Event, Lacking, LackingReason, Missing};
 pub use foresight::Foreseen;
 pub use remote_io::RemoteIo;
-pub use settings::{Release, Settings, ValueFault};
+pub use settings::{Release, Settings, StaleState, ValueFault};

@@ -8,14 +8,20 @@
 //! It drives at every deadline, also when no cycle was started: then it holds, and falls safe after `hold_cycles`. Its phases:
 //!
 //! ```text
-//!   Listening ── a living station holds a state ──► Running from its lineage
-//!      ▲    ├─── nobody holds one ────────────────► Running from the initial state (cold start)
-//!      │    └─── they hold different ones of one cycle ── the operator decides ── Running
-//!      └──────── living stations, none of them on this history, for `listen_cycles` ── Running
+//!   Listening ── a living station holds a state ──────────────► Running from its lineage
+//!           ├─── no living station holds one ─────────────────► Running from the initial state (cold start)
+//!           └─── different ones of one cycle, or a stale one ── the operator decides ──► Running
+//!
+//!   Running ──── living stations, none of them on this history, for `listen_cycles` ──► the state is lost:
+//!                a station returns with it, or the operator decides
 //! ```
+//!
+//! Invariant *Never back*: the history continues from a state before the [`Floor`] only if the operator says so.
 
 mod deadline;
 mod forcing;
+mod protection;
+mod recovery;
 mod sampling;
 
 use std::collections::VecDeque;
@@ -23,9 +29,9 @@ use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
 use understudy_wire::{
-    Admission, Applied, Arrival, Attendance, Body, Change, Copies, CycleClock, Frame, Header,
-    Holding, Image, Input, Machine, Moment, Output, Party, ProgramId, Recalled, Reception,
-    StationId, StationSet, Time, Waking,
+    Admission, Arrival, Attendance, Body, Change, Copies, CycleClock, Frame, Header, Holding,
+    Image, Input, Lineage, Machine, Moment, Output, Party, ProgramId, Recalled, Reception, Source,
+    StateChoice, StationId, StationSet, Time, Waking,
 };
 
 use crate::diagnosis::Diagnosing;
@@ -37,6 +43,7 @@ use crate::trust::Trust;
 use crate::witnesses::Witnesses;
 
 use forcing::Forcing;
+use protection::Protection;
 
 /// One remote I/O. See [`Machine`] for how it is driven.
 #[derive(Debug, Clone)]
@@ -54,8 +61,9 @@ pub struct RemoteIo {
     diagnosing: Diagnosing,
     /// Statuses that the diagnosis found to be 1 in the last scan.
     diagnosed: Image,
-    /// Whether it has lost its memory, so that stations know more of its past than it does.
-    forgetful: bool,
+    floor: Floor,
+    question: Option<Question>,
+    protection: Protection,
     /// Whether the operator has released everybody meanwhile.
     pardons: bool,
     /// The sensors cannot be seen: there is no u(i), and the program stands still.
@@ -80,27 +88,44 @@ pub struct RemoteIo {
     outbox: VecDeque<Output<Event>>,
 }
 
+/// The newest sample whose outputs were applied: an applied output has moved the plant, so the history never continues from a
+/// state before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Floor {
+    /// Not known after a restart: stations know more of the past than this remote I/O does.
+    Unknown,
+    /// No output of this history was applied.
+    Nothing,
+    /// Its cycle, and the lineage that it led to.
+    At { moment: Moment, lineage: Lineage },
+}
+
+/// What the operator is asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Question {
+    /// Which of several states of one cycle the program continues from.
+    Disputed,
+    /// Whether the program continues from a stale state, or cold.
+    StateLost,
+}
+
+/// What was applied at the last deadline.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+struct Applied {
+    source: Source,
+    outputs: Image,
+}
+
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 enum Phase {
     /// The history is not known: cycles listened for so far.
-    Listening {
-        cycles: u32,
-        /// Whether the operator has been asked from which state to go on.
-        disputed: bool,
-    },
+    Listening { cycles: u32 },
     /// The history, whether it has this cycle's sample, and the cycles for which no living station was on it.
     Running {
         history: History,
         sampled: bool,
         unfollowed: u32,
     },
-}
-
-impl Phase {
-    const LISTENING: Self = Self::Listening {
-        cycles: 0,
-        disputed: false,
-    };
 }
 
 impl RemoteIo {
@@ -115,18 +140,15 @@ impl RemoteIo {
             reception: Reception::new(Party::RemoteIo(settings.program), agreement),
             clock,
             attendance: Attendance::new(stations, agreement.flag_after),
-            witnesses: Witnesses::new(
-                settings.program,
-                schedule.controllers(),
-                stations,
-                agreement.flag_after,
-            ),
-            phase: Phase::LISTENING,
+            witnesses: Witnesses::new(settings.program, agreement),
+            phase: Phase::Listening { cycles: 0 },
             sensors: Image::zero(settings.inputs),
             field: Image::zero(settings.inputs),
             diagnosing: Diagnosing::new(settings.diagnosis.as_deref()),
             diagnosed: Image::zero(settings.inputs),
-            forgetful: true,
+            floor: Floor::Unknown,
+            question: None,
+            protection: Protection::default(),
             pardons: false,
             field_lost: false,
             forcing: Forcing::default(),
@@ -266,6 +288,7 @@ impl RemoteIo {
             return;
         }
         self.apply(Selection::Missing(Missing::NoCycle), None);
+        self.note_idle();
         // One that was stopped for long does not make up for every deadline that it slept through.
         let period = self.settings.agreement.schedule.period();
         let passed = now.since(self.decides_at()).as_nanos() / period.as_nanos();
@@ -288,7 +311,9 @@ impl Hash for RemoteIo {
             field,
             diagnosing,
             diagnosed,
-            forgetful,
+            floor,
+            question,
+            protection,
             pardons,
             field_lost,
             forcing,
@@ -309,7 +334,8 @@ impl Hash for RemoteIo {
             reception, clock, attendance, witnesses, phase, field, field_lost, forcing,
         )
             .hash(hasher);
-        (sensors, diagnosing, diagnosed, forgetful, pardons).hash(hasher);
+        (sensors, diagnosing, diagnosed, pardons).hash(hasher);
+        (floor, question, protection).hash(hasher);
         (released, turns, decided, idle, missed, applied).hash(hasher);
         (waking, last_true, trust, differed, copies).hash(hasher);
     }
@@ -333,17 +359,18 @@ impl Machine for RemoteIo {
                     self.field_lost = false;
                 }
             }
-            Input::Release if matches!(self.phase, Phase::Listening { disputed: true, .. }) => {
+            Input::Choose(choice) => self.choose(choice),
+            Input::Release if self.question == Some(Question::Disputed) => {
                 self.report(Event::Released {
                     moment: self.moment(),
                 });
-                self.start(self.moment());
+                self.choose(StateChoice::Newest { cycle: None });
             }
             Input::FieldLost => self.field_lost = true,
             Input::Force(force) => self.force(now, force),
             Input::Unforce(signal) => self.unforce(signal),
             Input::Release => {
-                self.pardons |= self.forgetful;
+                self.pardons |= self.floor == Floor::Unknown;
                 self.diagnosing.release();
                 if !self.released || !self.trust.is_complete() {
                     self.released = true;

@@ -280,6 +280,8 @@ mod tests {
                 holdings: holdings.iter().copied().collect(),
                 words: words.iter().cloned().collect(),
                 recalled: Vec::new(),
+                lacks: ProgramSet::EMPTY,
+                relayed: Vec::new(),
             }),
         })
     }

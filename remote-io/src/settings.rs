@@ -31,6 +31,19 @@ pub struct Settings {
     pub release: Release,
     /// What is driven while nobody can say which of two stations is right.
     pub value_fault: ValueFault,
+    /// What follows where the state of the program is lost.
+    pub stale_state: StaleState,
+}
+
+/// What follows where no living station can prove the state that the newest applied output came from, and one holds an older state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StaleState {
+    /// The outputs are held, then fail-safe, until the operator chooses the older state or a cold start.
+    #[default]
+    Operator,
+    /// The program starts cold.
+    Cold,
 }
 
 /// What is driven while two stations say different outputs from one history, and no third one says which is right.

@@ -2,13 +2,19 @@
 //!
 //! Living means heard in the last few cycles, speaking or asking to join.
 
-use understudy_wire::{Holding, Image, ProgramId, Recalled, StationId, StationSet};
+use understudy_wire::{Agreement, Holding, Image, ProgramId, Recalled, StationId, StationSet};
 
 /// One entry for each station that can hold the program's state.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) struct Witnesses {
     entries: Vec<Witness>,
     living_for: u32,
+    /// Cycles of silence after which a station cannot come back without a state from another one.
+    gone_after: u32,
+    /// Cycles since this remote I/O started.
+    listened: u32,
+    /// Stations that were gone before it started, as others recall, and not received since.
+    recalled_gone: StationSet,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -22,13 +28,11 @@ struct Witness {
 }
 
 impl Witnesses {
-    /// For `program` in a cluster of `controllers` and `stations`; one who is silent for `living_for` cycles lives no more.
-    pub(crate) fn new(
-        program: ProgramId,
-        controllers: usize,
-        stations: usize,
-        living_for: u32,
-    ) -> Self {
+    /// For `program` in a cluster of `agreement`; a station that is silent for `flag_after` cycles lives no more.
+    pub(crate) fn new(program: ProgramId, agreement: &Agreement) -> Self {
+        let schedule = &agreement.schedule;
+        let (controllers, stations) = (schedule.controllers(), schedule.stations());
+        let living_for = agreement.flag_after;
         let own = StationId(program.0);
         let understudies = (controllers as u8..stations as u8).map(StationId);
         let entries = [own]
@@ -44,6 +48,9 @@ impl Witnesses {
         Self {
             entries,
             living_for,
+            gone_after: living_for + agreement.history as u32,
+            listened: 0,
+            recalled_gone: StationSet::EMPTY,
         }
     }
 
@@ -64,14 +71,76 @@ impl Witnesses {
                 entry.recalled = recalled.cloned();
             }
             entry.silent = 0;
+            self.recalled_gone.remove(station);
         }
     }
 
     /// Ends a cycle.
     pub(crate) fn close_cycle(&mut self) {
+        self.listened = self.listened.saturating_add(1);
         for entry in &mut self.entries {
             entry.silent = entry.silent.saturating_add(1);
         }
+    }
+
+    /// Stations that cannot come back without a state from another one.
+    pub(crate) fn gone(&self) -> StationSet {
+        let silent = self
+            .entries
+            .iter()
+            .filter(|entry| self.listened > self.gone_after && entry.silent > self.gone_after);
+        silent
+            .map(|entry| entry.station)
+            .collect::<StationSet>()
+            .or(self.recalled_gone)
+    }
+
+    /// Whether no output can have been applied that came of a newer state than `holding`, as far as living stations recall: each
+    /// station that could have proved one has received samples in this life and lives, or was gone at a sample that a living
+    /// one received, and none recalls a newer applied sample.
+    ///
+    /// What remains: a remote I/O and a station that were cut off together from all others, and lost their memory together.
+    pub(crate) fn covers_all_applied(&self, holding: &Holding) -> bool {
+        let recalling = || {
+            let living = self.entries.iter().filter(|entry| self.lives(entry));
+            living.filter_map(|entry| Some((entry.station, entry.recalled.as_ref()?)))
+        };
+        let gone = recalling().fold(StationSet::EMPTY, |gone, (_, recalled)| {
+            gone.or(recalled.gone)
+        });
+        let witnesses: StationSet = recalling()
+            .filter(|(_, recalled)| recalled.witnessed)
+            .map(|(station, _)| station)
+            .collect();
+        let accounted_for = gone.or(witnesses);
+        let all = self.entries.iter();
+        let newest = recalling()
+            .filter_map(|(_, recalled)| recalled.applied)
+            .max();
+        all.map(|entry| entry.station)
+            .all(|station| accounted_for.contains(station))
+            && newest.is_none_or(|applied| applied <= holding.stepped)
+    }
+
+    /// Takes up which stations were gone before this remote I/O started.
+    pub(crate) fn recall_gone(&mut self) {
+        let living = self.entries.iter().filter(|entry| self.lives(entry));
+        let recalled = living.filter_map(|entry| entry.recalled.as_ref());
+        let gone = recalled.fold(StationSet::EMPTY, |gone, one| gone.or(one.gone));
+        let heard = self.entries.iter().filter(|entry| entry.silent < u32::MAX);
+        let heard: StationSet = heard.map(|entry| entry.station).collect();
+        self.recalled_gone = gone.without(heard);
+    }
+
+    /// Whether a station lives.
+    pub(crate) fn is_living(&self, station: StationId) -> bool {
+        let mut entries = self.entries.iter();
+        entries.any(|entry| entry.station == station && self.lives(entry))
+    }
+
+    /// The stations that can hold the program's state: its controller, then the understudies.
+    pub(crate) fn stations(&self) -> impl Iterator<Item = StationId> + '_ {
+        self.entries.iter().map(|entry| entry.station)
     }
 
     /// Whether anybody lives who could hold the state.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_remote_io::{Event, Missing, Release, RemoteIo, Settings, ValueFault};
+use understudy_remote_io::{Event, Missing, Release, RemoteIo, Settings, StaleState, ValueFault};
 use understudy_wire::{
     Agreement, Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Force, Frame, Header, Image,
     Input, Join, Lineage, Machine, Mode, Moment, Output, Party, ProgramHash, ProgramId, ProgramSet,
@@ -74,6 +74,8 @@ impl Bench {
             wants: ProgramSet::first(1),
             holdings: Default::default(),
             recalled: Vec::new(),
+            lacks: ProgramSet::EMPTY,
+            relayed: Vec::new(),
         };
         for body in [Body::Sync, Body::Join(join)] {
             let frame = Arc::new(Frame { header, body });

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_remote_io::{Event, Release, RemoteIo, Settings, ValueFault};
+use understudy_remote_io::{Event, Release, RemoteIo, Settings, StaleState, ValueFault};
 use understudy_wire::{
     Agreement, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding,
     Image, Input, Join, Lineage, Machine, Mode, Moment, Output, Party, ProgramHash, ProgramId,
@@ -49,6 +49,7 @@ fn run(held: [Held; 3], release: Release, released_at: u64, cycles: u64) -> Vec<
             fail_safe: Image::zero(1),
             release,
             value_fault: ValueFault::Hold,
+            stale_state: StaleState::Operator,
         },
     );
     let mut events = Vec::new();
@@ -74,6 +75,7 @@ fn run(held: [Held; 3], release: Release, released_at: u64, cycles: u64) -> Vec<
                     wants: ProgramSet::EMPTY,
                     holdings: holdings.into_iter().collect(),
                     recalled: Vec::new(),
+                    lacks: ProgramSet::EMPTY,
                 }),
             });
             remote_io.handle_input(start, Input::Frame(&frame));

@@ -372,6 +372,12 @@ impl Account {
                 party,
                 asked,
             } => {
+                if let (Party::RemoteIo(program), Action::Release | Action::Choose { .. }) =
+                    (*party, *action)
+                    && let Some(referee) = self.terms.referees.get_mut(program.index())
+                {
+                    referee.operator_chooses();
+                }
                 let number = self.numbering.latest().unwrap_or(0) + 1;
                 self.stalls.step(number, *party, *action);
                 let measured = self.since_origin(number).unwrap_or(0);

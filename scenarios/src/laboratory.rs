@@ -231,6 +231,7 @@ fn refuse_what_is_simulated(scenario: &Scenario) -> Result<(), LaboratoryError> 
                 | Action::Stop
                 | Action::Continue
                 | Action::Release
+                | Action::Choose { .. }
                 | Action::Cut { .. }
                 | Action::Heal { .. }
         )

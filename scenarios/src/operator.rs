@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use tokio::sync::{mpsc, oneshot};
-use understudy_wire::{Force, Party, SignalPlace};
+use understudy_wire::{Force, Party, SignalPlace, StateChoice};
 
 pub use acknowledgement::Acknowledgement;
 pub use socket::RunSocket;
@@ -38,6 +38,11 @@ pub enum Command {
     Continue,
     /// Release the outputs of a remote I/O, and the stations that it has excluded.
     Release,
+    /// Choose the state that the program of a remote I/O continues from, where it is lost.
+    Choose {
+        /// Which.
+        choice: StateChoice,
+    },
     /// Cut it off from all others; a plant stays with its remote I/O.
     Isolate,
     /// Connect it again.

@@ -155,6 +155,11 @@ pub fn moment(event: &Happening) -> Option<Moment> {
             | RemoteIo::Applied { moment, .. }
             | RemoteIo::AdoptedLineage { moment, .. }
             | RemoteIo::Voided { moment, .. }
+            | RemoteIo::StateLost { moment, .. }
+            | RemoteIo::StateRecovered { moment, .. }
+            | RemoteIo::ChoiceRefused { moment, .. }
+            | RemoteIo::Protected { moment }
+            | RemoteIo::Unprotected { moment, .. }
             | RemoteIo::RecalledExclusion { moment, .. }
             | RemoteIo::Diagnosed { moment, .. }
             | RemoteIo::Released { moment }

@@ -65,7 +65,7 @@ impl Scenario {
 }
 
 /// Every action as scenario files write it, in the order in which they are explained.
-pub const ACTIONS: [&str; 17] = [
+pub const ACTIONS: [&str; 19] = [
     "crash",
     "restart",
     "restart-misconfigured",
@@ -74,6 +74,8 @@ pub const ACTIONS: [&str; 17] = [
     "continue",
     "slow",
     "release",
+    "cold-start",
+    "accept-state",
     "cut",
     "heal",
     "delay",

@@ -48,6 +48,8 @@ fn turn() -> (Frame, Vec<u8>) {
             holdings: smallvec![holding],
             words: smallvec![word],
             recalled: Vec::new(),
+            lacks: ProgramSet::EMPTY,
+            relayed: Vec::new(),
         }),
     };
     let mut bytes = Vec::new();

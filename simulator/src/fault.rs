@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
-use understudy_wire::{Party, ProgramId};
+use understudy_wire::{Party, ProgramId, StateChoice};
 
 /// One thing done to one party.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -45,6 +45,11 @@ pub enum Action {
     /// The operator releases the outputs of a remote I/O after a cold start or a value fault, and the stations that it
     /// has excluded.
     Release,
+    /// The operator chooses the state that the program of a remote I/O continues from, where it is lost.
+    Choose {
+        /// Which.
+        choice: StateChoice,
+    },
     /// Its frames reach one other party no more. A full cut is one each way; a partition is one for each pair.
     Cut {
         /// Who hears it no more.
@@ -109,6 +114,10 @@ impl Action {
             Self::Continue => "continue",
             Self::Slow { .. } => "slow",
             Self::Release => "release",
+            Self::Choose {
+                choice: StateChoice::Cold,
+            } => "cold-start",
+            Self::Choose { .. } => "accept-state",
             Self::Cut { .. } => "cut",
             Self::Heal { .. } => "heal",
             Self::Delay { .. } => "delay",

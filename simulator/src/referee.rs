@@ -136,7 +136,9 @@ pub enum Violation {
         station: StationId,
     },
     /// The program goes on from a state that none of its samples led to.
-    #[error("in cycle {moment} the program continued from lineage {lineage}, which none of its samples led to")]
+    #[error(
+        "in cycle {moment} the program continued from lineage {lineage}, which none of its samples led to"
+    )]
     UnknownHistory {
         /// In this cycle.
         moment: Moment,
@@ -149,7 +151,9 @@ pub enum Violation {
 impl Hash for Referee {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
         // States before the floor only tell how far a program went back.
-        self.states.range(self.floor..).for_each(|state| state.hash(hasher));
+        self.states
+            .range(self.floor..)
+            .for_each(|state| state.hash(hasher));
         let newest = self.newest.map(|place| place - self.floor.min(place));
         (newest, &self.truth, &self.last_true).hash(hasher);
         (self.held, self.blind, self.choice).hash(hasher);
@@ -233,7 +237,8 @@ impl Referee {
 
     /// Whether a station that holds `lineage` could continue the program.
     pub fn may_continue_from(&self, lineage: Lineage) -> bool {
-        self.place_of(lineage).is_some_and(|place| place >= self.floor)
+        self.place_of(lineage)
+            .is_some_and(|place| place >= self.floor)
     }
 
     /// h(x(t), u(t)) of the newest sample, with its cycle.

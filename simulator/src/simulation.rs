@@ -13,8 +13,8 @@ use serde::Serialize;
 use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
 use understudy_wire::{
-    Epoch, Field, Frame, Input, Machine, Moment, Output, Party, ProgramId, ProgramSet, Source, StationId,
-    Time,
+    Epoch, Field, Frame, Input, Machine, Moment, Output, Party, ProgramId, ProgramSet, Source,
+    StationId, Time,
 };
 
 use crate::fault::Fault;
@@ -464,8 +464,8 @@ impl Simulation {
         let mut stations = (0..).zip(&self.stations);
         let holder = stations.find(|(rank, slot)| {
             let station = Party::Station(StationId(*rank));
-            let connected = self.links.reaches(station, remote_io)
-                && self.links.reaches(remote_io, station);
+            let connected =
+                self.links.reaches(station, remote_io) && self.links.reaches(remote_io, station);
             let state = slot.running().and_then(|it| it.state_of(program));
             connected && state.is_some_and(|(lineage, _)| referee.may_continue_from(lineage))
         });

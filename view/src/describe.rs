@@ -24,7 +24,7 @@ pub struct Description {
 }
 
 /// Every word that [`Description::event`] can be.
-pub(crate) const EVENTS: [&str; 50] = [
+pub(crate) const EVENTS: [&str; 55] = [
     "acknowledged",
     "adopted",
     "adopted-lineage",
@@ -32,6 +32,7 @@ pub(crate) const EVENTS: [&str; 50] = [
     "attached",
     "channel-failed",
     "channel-opened",
+    "choice-refused",
     "cleared",
     "commanded",
     "detached",
@@ -54,6 +55,7 @@ pub(crate) const EVENTS: [&str; 50] = [
     "journal-lost",
     "origin",
     "paces",
+    "protected",
     "readmitted",
     "ready",
     "recalled-exclusion",
@@ -67,11 +69,14 @@ pub(crate) const EVENTS: [&str; 50] = [
     "stalled",
     "started",
     "started-cold",
+    "state-lost",
+    "state-recovered",
     "stepped",
     "stopped",
     "syndrome",
     "unforced",
     "unknown-command",
+    "unprotected",
     "unsendable-frames",
     "value-fault",
     "voided",
@@ -103,6 +108,7 @@ pub(crate) fn missing_text(missing: Missing) -> &'static str {
         Missing::TooLate => "the host woke the remote I/O more than a period after the deadline",
         Missing::BadQuality => "the sensors cannot be seen",
         Missing::NoHistory => "the remote I/O does not know its program's history yet",
+        Missing::StateLost => "no living station can prove the program's state",
         Missing::NotReleased => "an operator has to release the outputs",
         Missing::ValueFault => "stations disagree, and nobody can say who is right",
         Missing::NobodyInStep => "nobody who is in step spoke for it",

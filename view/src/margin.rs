@@ -225,6 +225,8 @@ fn turn(station: StationId, holds: ProgramSet, words: Vec<Word>) -> Arc<Frame> {
             holdings: holdings.collect(),
             words: words.into_iter().collect(),
             recalled: Vec::new(),
+            lacks: ProgramSet::EMPTY,
+            relayed: Vec::new(),
         }),
     })
 }

@@ -3,7 +3,7 @@
 //! ```text
 //! offset  size  what
 //!      0     4  magic "UNDR"
-//!      4     1  version of this layout, 3
+//!      4     1  version of this layout, 4
 //!      5     n  header and body, bincode 2 "standard": little-endian, integers as varints, enums by their index
 //!    5+n     4  CRC-32 (IEEE) of everything before it, little-endian
 //! ```
@@ -13,7 +13,7 @@
 
 use bincode::config::{Configuration, Limit};
 
-use crate::frame::{Body, Frame, Holding, MAXIMUM_HISTORY, Recalled, Word};
+use crate::frame::{Body, Frame, Holding, MAXIMUM_HISTORY, Recalled, Relayed, Sample, Word};
 use crate::identifier::{MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, Party};
 use crate::set::ProgramSet;
 
@@ -21,7 +21,7 @@ use crate::set::ProgramSet;
 pub const MAXIMUM_FRAME_BYTES: usize = 32 * 1024;
 
 const MAGIC: [u8; 4] = *b"UNDR";
-const VERSION: u8 = 3;
+const VERSION: u8 = 4;
 const PREFIX_BYTES: usize = 5;
 const CHECKSUM_BYTES: usize = 4;
 /// Positions that a plant may show, at most.
@@ -153,20 +153,13 @@ fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
                 matches!(sender, Party::RemoteIo(_)),
                 "only a remote I/O samples",
             )?;
-            kept(
-                (1..=MAXIMUM_HISTORY).contains(&sample.history.len()),
-                "a sample carries 1 to 32 cycles",
-            )?;
-            let width = sample.history[0].width();
-            kept(
-                sample.history.iter().all(|image| image.width() == width),
-                "all samples of a program are of one width",
-            )
+            kept_sample(sample)
         }
         Body::Turn(turn) => {
             kept(station, "only a station takes turns")?;
             let held = kept_holdings(&turn.holdings)?;
             kept_recalled(&turn.recalled)?;
+            kept_relayed(&turn.relayed)?;
             kept(
                 turn.words.len() <= MAXIMUM_PROGRAMS + 1,
                 "a turn has at most 65 words",
@@ -206,6 +199,30 @@ fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
             "only a remote I/O drives",
         ),
     }
+}
+
+fn kept_sample(sample: &Sample) -> Result<(), FrameError> {
+    if !(1..=MAXIMUM_HISTORY).contains(&sample.history.len()) {
+        return Err(FrameError::Promise("a sample carries 1 to 32 cycles"));
+    }
+    let width = sample.history[0].width();
+    if sample.history.iter().all(|image| image.width() == width) {
+        Ok(())
+    } else {
+        Err(FrameError::Promise(
+            "all samples of a program are of one width",
+        ))
+    }
+}
+
+fn kept_relayed(relayed: &[Relayed]) -> Result<(), FrameError> {
+    let programs: ProgramSet = relayed.iter().map(|one| one.program).collect();
+    if programs.len() != relayed.len() {
+        return Err(FrameError::Promise(
+            "a sample is relayed once, of a program with an index below 64",
+        ));
+    }
+    relayed.iter().try_for_each(|one| kept_sample(&one.sample))
 }
 
 fn kept_recalled(recalled: &[Recalled]) -> Result<(), FrameError> {

@@ -78,21 +78,14 @@ pub struct Sample {
     pub after: Lineage,
     /// Oldest first; the last is u(i)(t). Never empty.
     pub history: SmallVec<[Image; 2]>,
-    /// What was applied last; nothing before the first deadline.
-    pub applied: Option<Applied>,
+    /// The cycle of the newest sample whose outputs were applied, direct or reconstructed: the history never continues from a
+    /// state before it. Nothing where no output of this history was applied.
+    pub applied: Option<Moment>,
     /// Stations whose state of this program is proved to be faulty: they say nothing of it until the operator releases them.
     pub excluded: StationSet,
-}
-
-/// What a remote I/O drove at a deadline.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub struct Applied {
-    /// The cycle.
-    pub moment: Moment,
-    /// Why it could.
-    pub source: Source,
-    /// y(i).
-    pub outputs: Image,
+    /// Stations that can hold this program and that were not received for so long that none of them can come back without a
+    /// state from another one.
+    pub gone: StationSet,
 }
 
 /// Where an applied output came from.
@@ -120,6 +113,19 @@ pub struct Turn {
     pub words: SmallVec<[Word; 2]>,
     /// Of programs whose remote I/Os have said nothing in this cycle; one for each at most.
     pub recalled: Vec<Recalled>,
+    /// Programs that it runs and whose samples did not come from their remote I/Os in this cycle: others relay them.
+    pub lacks: ProgramSet,
+    /// Samples of this cycle that other stations lack; one for each program at most.
+    pub relayed: Vec<Relayed>,
+}
+
+/// The sample of a program in this cycle, from a station that has received it to those that have not.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Relayed {
+    /// Whose sample.
+    pub program: ProgramId,
+    /// As its remote I/O sent it.
+    pub sample: Sample,
 }
 
 /// A copy of a program's state that a station has.
@@ -155,6 +161,8 @@ pub struct Join {
     pub holdings: SmallVec<[Holding; 2]>,
     /// As in a [`Turn`].
     pub recalled: Vec<Recalled>,
+    /// As in a [`Turn`].
+    pub lacks: ProgramSet,
 }
 
 /// What the newest sample of a program said, from a station that has heard none in this cycle: the program's remote I/O may
@@ -163,8 +171,14 @@ pub struct Join {
 pub struct Recalled {
     /// Whose sample.
     pub program: ProgramId,
+    /// Whether this station has received a sample of the program since it started; others have told it otherwise.
+    pub witnessed: bool,
+    /// The newest applied sample that it knows of, as in a [`Sample`].
+    pub applied: Option<Moment>,
     /// Stations that it excluded.
     pub excluded: StationSet,
+    /// As in a [`Sample`], without those that claimed a newer state since.
+    pub gone: StationSet,
     /// u(i), with the channels that were failed and the values that they kept.
     pub inputs: Image,
 }

@@ -18,6 +18,7 @@ mod machine;
 mod reception;
 mod schedule;
 mod set;
+mod state_choice;
 mod time;
 mod waking;
 
@@ -32,7 +33,7 @@ pub use force::{
     SignalPlace,
 };
 pub use frame::{
-    Actuation, Applied, Body, Field, Frame, Header, Holding, Join, MAXIMUM_HISTORY, Recalled,
+    Actuation, Body, Field, Frame, Header, Holding, Join, MAXIMUM_HISTORY, Recalled, Relayed,
     Sample, Source, Transfer, Turn, Word,
 };
 pub use identifier::{
@@ -45,5 +46,6 @@ pub use machine::{Input, Machine, Output};
 pub use reception::{Admission, Reception};
 pub use schedule::{Schedule, ScheduleError};
 pub use set::{Member, ProgramSet, Set, StationSet};
+pub use state_choice::StateChoice;
 pub use time::Time;
 pub use waking::Waking;

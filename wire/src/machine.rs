@@ -9,6 +9,7 @@ use std::sync::Arc;
 use crate::force::{Force, SignalPlace};
 use crate::frame::Frame;
 use crate::image::Image;
+use crate::state_choice::StateChoice;
 use crate::time::Time;
 
 /// What a party is told.
@@ -24,6 +25,8 @@ pub enum Input<'a> {
     FieldLost,
     /// The operator releases the outputs of a program that was started cold; ignored by all but its remote I/O.
     Release,
+    /// The operator chooses the state that a program continues from; ignored by all but its remote I/O.
+    Choose(StateChoice),
     /// The operator puts a value in the place of a signal; ignored by all but its remote I/O.
     Force(&'a Force),
     /// The operator takes it back.

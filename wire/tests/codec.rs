@@ -3,9 +3,9 @@
 use proptest::prelude::*;
 use smallvec::smallvec;
 use understudy_wire::{
-    Actuation, Applied, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Field, Frame,
+    Actuation, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Field, Frame,
     FrameError, Header, Holding, Image, Join, Lineage, MAXIMUM_FRAME_BYTES, Moment, Party,
-    ProgramHash, ProgramId, ProgramSet, Recalled, Sample, Source, StationId, StationSet, Transfer,
+    ProgramHash, ProgramId, ProgramSet, Recalled, Relayed, Sample, StationId, StationSet, Transfer,
     Turn, Word, decode, encode,
 };
 
@@ -46,7 +46,10 @@ fn holding(program: u8) -> Holding {
 fn recalled(program: u8) -> Recalled {
     Recalled {
         program: ProgramId(program),
+        witnessed: true,
+        applied: Some(moment(3, 3)),
         excluded: StationSet::from_bits(0b100),
+        gone: StationSet::from_bits(0b1),
         inputs: image(4, 0b1010),
     }
 }
@@ -56,19 +59,19 @@ fn every_kind() -> Vec<(&'static str, Frame)> {
     let station = Party::Station(StationId(2));
     let remote_io = Party::RemoteIo(ProgramId(1));
     let plant = Party::Plant(ProgramId(0));
-    let applied = Applied {
-        moment: moment(3, 3),
-        source: Source::Reconstructed,
-        outputs: image(2, 0b10),
-    };
     let sample = Sample {
         born: moment(1, 2),
         base: Lineage(5),
         before: Lineage(6),
         after: Lineage(7),
         history: smallvec![image(4, 0b0011), image(4, 0b1010)],
-        applied: Some(applied),
+        applied: Some(moment(3, 3)),
         excluded: StationSet::from_bits(0b10),
+        gone: StationSet::from_bits(0b100),
+    };
+    let relayed = Relayed {
+        program: ProgramId(1),
+        sample: sample.clone(),
     };
     let turn = Turn {
         heard: StationSet::from_bits(0b11),
@@ -78,11 +81,14 @@ fn every_kind() -> Vec<(&'static str, Frame)> {
             sum: image(5, 0b10101),
         }],
         recalled: vec![recalled(0)],
+        lacks: ProgramSet::from_bits(0b1),
+        relayed: vec![relayed],
     };
     let join = Join {
         wants: ProgramSet::from_bits(0b01),
         holdings: smallvec![holding(1)],
         recalled: vec![recalled(0), recalled(1)],
+        lacks: ProgramSet::from_bits(0b10),
     };
     let transfer = Transfer {
         to: StationId(0),
@@ -185,11 +191,12 @@ fn a_frame_that_breaks_a_promise_never_leaves() {
         history: smallvec![],
         applied: None,
         excluded: StationSet::EMPTY,
+        gone: StationSet::EMPTY,
     };
     check_refused(remote_io, Body::Sample(empty.clone()));
     let uneven = Sample {
         history: smallvec![image(1, 0), image(2, 0)],
-        ..empty
+        ..empty.clone()
     };
     check_refused(remote_io, Body::Sample(uneven));
     let word = |members| Word {
@@ -201,14 +208,34 @@ fn a_frame_that_breaks_a_promise_never_leaves() {
         holdings: programs.iter().map(|&program| holding(program)).collect(),
         words: smallvec![word(members)],
         recalled: Vec::new(),
+        lacks: ProgramSet::EMPTY,
+        relayed: Vec::new(),
     };
     check_refused(station, Body::Turn(turn(0, &[0])));
     check_refused(station, Body::Turn(turn(0b10, &[0])));
     check_refused(station, Body::Turn(turn(0b1, &[0, 0])));
+    let sample = Sample {
+        history: smallvec![image(1, 0)],
+        ..empty.clone()
+    };
+    let relaying = |programs: [u8; 2], sample: &Sample| {
+        let relayed = programs.map(|program| Relayed {
+            program: ProgramId(program),
+            sample: sample.clone(),
+        });
+        Body::Turn(Turn {
+            relayed: relayed.to_vec(),
+            ..turn(0b1, &[0])
+        })
+    };
+    check_refused(station, relaying([1, 1], &sample));
+    check_refused(station, relaying([1, 64], &sample));
+    check_refused(station, relaying([1, 2], &empty));
     let twice = Join {
         wants: ProgramSet::EMPTY,
         holdings: smallvec![],
         recalled: vec![recalled(1), recalled(1)],
+        lacks: ProgramSet::EMPTY,
     };
     check_refused(station, Body::Join(twice));
 }

@@ -153,6 +153,8 @@ mod tests {
                         holdings: [].into_iter().collect(),
                         words: [].into_iter().collect(),
                         recalled: Vec::new(),
+                        lacks: ProgramSet::EMPTY,
+                        relayed: Vec::new(),
                     })
                 }),
             };

@@ -153,6 +153,7 @@ fn sample() -> Body {
         history: (0..8).map(|_| Image::zero(WIDTH)).collect(),
         applied: None,
         excluded: StationSet::EMPTY,
+        gone: StationSet::EMPTY,
     })
 }
 
@@ -180,6 +181,8 @@ fn turn(own: StationId) -> Body {
         .into_iter()
         .collect(),
         recalled: Vec::new(),
+        lacks: ProgramSet::EMPTY,
+        relayed: Vec::new(),
     })
 }
 

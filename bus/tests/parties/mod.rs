@@ -103,6 +103,7 @@ impl Machine for Chatter {
             }
             Input::Field(_) => self.report_once(Chat::Sensed),
             Input::FieldLost | Input::Force(_) | Input::Unforce(_) => {}
+            Input::Choose(_) => {}
             Input::Release => self.said.push_back(Output::Report(Chat::Released)),
         }
     }
@@ -125,6 +126,7 @@ fn sample() -> Sample {
         history: [Image::zero(3)].into_iter().collect(),
         applied: None,
         excluded: StationSet::EMPTY,
+        gone: StationSet::EMPTY,
     }
 }
 

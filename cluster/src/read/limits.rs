@@ -20,9 +20,9 @@ fn image_bytes(bits: usize) -> usize {
     (bits.div_ceil(64) + 3) * INTEGER_BYTES
 }
 
-/// A sample: the inputs of each cycle of its history, and the outputs that were applied last.
-fn sample_bytes(inputs: usize, outputs: usize, history: usize) -> usize {
-    FRAME_BYTES + history * image_bytes(inputs) + image_bytes(outputs)
+/// A sample: the inputs of each cycle of its history.
+fn sample_bytes(inputs: usize, history: usize) -> usize {
+    FRAME_BYTES + history * image_bytes(inputs)
 }
 
 /// A transfer: one state.
@@ -33,7 +33,7 @@ fn transfer_bytes(registers: usize) -> usize {
 /// The turn of an understudy: a word for each program that is silent, one for the rest, all that it holds, and the last inputs of
 /// each program where every remote I/O is silent.
 fn turn_bytes(programs: usize, widest_inputs: usize, widest_outputs: usize) -> usize {
-    let recalled = image_bytes(widest_inputs) + 2 * INTEGER_BYTES;
+    let recalled = image_bytes(widest_inputs) + 6 * INTEGER_BYTES;
     FRAME_BYTES
         + (programs + 1) * image_bytes(widest_outputs)
         + programs * (HOLDING_BYTES + recalled)
@@ -67,8 +67,8 @@ pub(crate) fn check(members: &[Member], history: u32, diagnostics: &mut Vec<Diag
             diagnostics.push(Diagnostic::error("U0213", message, span).with_help(help));
         };
         report(
-            format!("{inputs} inputs, sent {history} times, and {outputs} outputs"),
-            sample_bytes(inputs, outputs, history as usize),
+            format!("{inputs} inputs, sent {history} times"),
+            sample_bytes(inputs, history as usize),
             "a smaller `history` makes samples shorter",
         );
         report(
@@ -104,9 +104,9 @@ pub(crate) fn too_wide(name: &str, circuit: &Circuit) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use understudy_wire::{
-        Applied, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header,
-        Holding, Image, Lineage, MAXIMUM_HISTORY, Moment, Party, ProgramHash, ProgramId,
-        ProgramSet, Recalled, Sample, Source, StationId, StationSet, Transfer, Turn, Word, encode,
+        Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
+        Lineage, MAXIMUM_HISTORY, Moment, Party, ProgramHash, ProgramId, ProgramSet, Recalled,
+        Sample, StationId, StationSet, Transfer, Turn, Word, encode,
     };
 
     use super::*;
@@ -144,14 +144,11 @@ mod tests {
                     before: Lineage(u64::MAX),
                     after: Lineage(u64::MAX),
                     history: std::iter::repeat_n(ones(bits), history).collect(),
-                    applied: Some(Applied {
-                        moment: LATE,
-                        source: Source::FailSafe,
-                        outputs: ones(bits),
-                    }),
+                    applied: Some(LATE),
                     excluded: StationSet::from_bits(u64::MAX),
+                    gone: StationSet::from_bits(u64::MAX),
                 };
-                let bound = sample_bytes(bits, bits, history);
+                let bound = sample_bytes(bits, history);
                 check_body(Party::RemoteIo(ProgramId(63)), Body::Sample(sample), bound);
             }
             let transfer = Transfer {
@@ -176,7 +173,10 @@ mod tests {
                 };
                 let recalled = |program| Recalled {
                     program: ProgramId(program),
+                    witnessed: true,
+                    applied: Some(LATE),
                     excluded: StationSet::from_bits(u64::MAX),
+                    gone: StationSet::from_bits(u64::MAX),
                     inputs: ones(bits),
                 };
                 let word = Word {
@@ -188,6 +188,8 @@ mod tests {
                     holdings: (0..programs as u8).map(holding).collect(),
                     words: std::iter::repeat_n(word, programs + 1).collect(),
                     recalled: (0..programs as u8).map(recalled).collect(),
+                    lacks: ProgramSet::first(64),
+                    relayed: Vec::new(),
                 };
                 check_body(station, Body::Turn(turn), turn_bytes(programs, bits, bits));
             }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use understudy_logic::{Circuit, CircuitBuilder, Scan};
 use understudy_plant::{ModelKind, Plant, Signals};
-use understudy_remote_io::{Release, ValueFault};
+use understudy_remote_io::{Release, StaleState, ValueFault};
 use understudy_simulator::Parts;
 use understudy_wire::{
     Agreement, ClusterHash, ConfigurationHash, Epoch, Image, Mode, ProgramHash, ProgramId,
@@ -78,6 +78,7 @@ pub(crate) fn parts(understudies: usize) -> Parts {
         fail_safe: Image::zero(1),
         release: Release::Automatic,
         value_fault: ValueFault::Hold,
+        stale_state: StaleState::Operator,
     });
     let plants = circuits.iter().map(|circuit| {
         let kind = ModelKind::Ladder(Box::new(plant()));

@@ -108,6 +108,7 @@ impl Truth {
                 history: self.inputs[first..].iter().cloned().collect(),
                 applied: None,
                 excluded: StationSet::EMPTY,
+                gone: StationSet::EMPTY,
             }),
         })
     }

@@ -16,6 +16,8 @@ impl Station {
         }
         self.cycle.joiners.insert(station);
         self.is_told(&join.recalled);
+        self.hear_claims(station, &join.holdings);
+        self.cycle.lacked = self.cycle.lacked.or(join.lacks);
         for program in join.wants.iter() {
             if self.cycle.others_have.contains(program) && self.own().0 != program.0 {
                 continue;
@@ -77,6 +79,7 @@ impl Station {
                 wants,
                 holdings,
                 recalled,
+                lacks: self.lacks(),
             }));
         }
     }

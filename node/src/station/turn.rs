@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use smallvec::SmallVec;
 use understudy_wire::{
-    Body, Holding, Moment, Output, ProgramId, ProgramSet, StationId, StationSet, Time, Turn,
+    Holding, Moment, Output, ProgramId, ProgramSet, StationId, StationSet, Time, Turn,
 };
 
 use super::{Said, Station};
@@ -40,6 +40,7 @@ impl Station {
             }
         }
         self.is_told(&turn.recalled);
+        self.hear_claims(station, &turn.holdings);
         self.compare(station, &turn.holdings);
     }
 
@@ -174,8 +175,11 @@ impl Station {
             holdings: self.holdings(),
             words,
             recalled: self.recalled(moment),
+            lacks: self.lacks(),
+            relayed: Vec::new(),
         };
-        self.send_cyclic(now, Body::Turn(turn));
+        let body = self.with_relayed(turn);
+        self.send_cyclic(now, body);
     }
 
     pub(super) fn speaks_at(&self) -> Option<Time> {

@@ -1,8 +1,8 @@
 //! The deadline: something is driven at every one, and only what is true, held, or fail-safe.
 
-use understudy_wire::{Applied, Image, Moment, Output, Source, Time};
+use understudy_wire::{Image, Moment, Output, Source, Time};
 
-use super::{Phase, RemoteIo};
+use super::{Applied, Floor, Phase, Question, RemoteIo};
 use crate::event::{Event, Missing};
 use crate::history::History;
 use crate::selection::{Heard, Selection};
@@ -61,6 +61,7 @@ impl RemoteIo {
             self.last_true = None;
         }
         self.apply(selection, sampled);
+        self.watch_protection();
     }
 
     fn heard(&self) -> Heard<'_> {
@@ -113,6 +114,12 @@ impl RemoteIo {
                 (outputs, Source::Reconstructed, Some(understudy), None)
             }
             Selection::Missing(missing) => {
+                let missing = match (missing, self.question) {
+                    (Missing::NobodyInStep | Missing::NoHistory, Some(Question::StateLost)) => {
+                        Missing::StateLost
+                    }
+                    _ => missing,
+                };
                 self.missed = self.missed.saturating_add(1);
                 let held = self.last_true.clone();
                 match held.filter(|_| self.missed <= self.settings.hold_cycles) {
@@ -129,13 +136,16 @@ impl RemoteIo {
                 }
             }
         };
+        let moment = self.moment();
         if missing.is_none() {
             self.missed = 0;
             self.last_true = Some(outputs.clone());
+            if let Phase::Running { history, .. } = &self.phase {
+                let lineage = history.head();
+                self.floor = Floor::At { moment, lineage };
+            }
         }
-        let moment = self.moment();
         self.applied = Some(Applied {
-            moment,
             source,
             outputs: outputs.clone(),
         });

@@ -1,110 +1,15 @@
-//! The arbiter's side: from which history the program goes on, and what is added to it in each cycle.
+//! The arbiter's side: what is added to the history of the program in each cycle.
 
 use std::sync::Arc;
 
-use understudy_wire::{Body, Moment, Output, Sample, Source, StationId, Time};
+use understudy_wire::{Body, Moment, Output, Sample, Source, Time};
 
-use super::{Phase, RemoteIo};
+use super::{Floor, Phase, RemoteIo};
 use crate::channel;
 use crate::diagnosis::Sight;
 use crate::event::Event;
-use crate::history::History;
-use crate::settings::Release;
-use crate::trust::Trust;
 
 impl RemoteIo {
-    /// Listens until it is known who holds which state; notices when nobody is on this history any more.
-    pub(super) fn find_history(&mut self, moment: Moment) {
-        let listen_cycles = self.settings.agreement.listen_cycles;
-        match &mut self.phase {
-            Phase::Running {
-                history,
-                unfollowed,
-                ..
-            } => {
-                let mut holdings = self.witnesses.holdings();
-                let followed =
-                    holdings.any(|(_, holding)| history.place(holding.lineage).is_some());
-                *unfollowed = if followed || !self.witnesses.anybody() {
-                    0
-                } else {
-                    *unfollowed + 1
-                };
-                if *unfollowed > listen_cycles {
-                    self.phase = Phase::LISTENING;
-                }
-            }
-            Phase::Listening { cycles, disputed } => {
-                *cycles += u32::from(self.witnesses.anybody());
-                // One who could hold the state and is not there gets longer: it may be the only one that does.
-                let patience = if self.witnesses.everybody() { 1 } else { 5 };
-                // A history without a sample is one that nobody can follow.
-                if *cycles < listen_cycles * patience || self.field_lost {
-                    return;
-                }
-                match self.witnesses.disputed() {
-                    None => self.start(moment),
-                    Some(stations) if !std::mem::replace(disputed, true) => {
-                        self.report(Event::Disputed { moment, stations });
-                    }
-                    Some(_) => {}
-                }
-            }
-        }
-    }
-
-    /// Starts to sample: from the newest state that lives, or cold.
-    pub(super) fn start(&mut self, moment: Moment) {
-        let capacity = self.settings.agreement.history;
-        let newest = self
-            .witnesses
-            .newest()
-            .map(|(station, holding)| (station, *holding));
-        let history = match newest {
-            Some((from, holding)) => {
-                let lineage = holding.lineage;
-                self.report(Event::AdoptedLineage {
-                    moment,
-                    lineage,
-                    from,
-                });
-                History::from(holding.born, lineage, capacity)
-            }
-            None => {
-                let awaits_release = self.settings.release == Release::Operator;
-                self.released = !awaits_release;
-                self.last_true = None;
-                self.report(Event::StartedCold {
-                    born: moment,
-                    awaits_release,
-                });
-                History::genesis(self.settings.hash, moment, capacity)
-            }
-        };
-        self.remember(moment, newest.map(|(station, _)| station));
-        self.phase = Phase::Running {
-            history,
-            sampled: false,
-            unfollowed: 0,
-        };
-    }
-
-    /// After a restart: takes up from what the stations recall.
-    fn remember(&mut self, moment: Moment, from: Option<StationId>) {
-        if !std::mem::take(&mut self.forgetful) {
-            return;
-        }
-        if let Some(inputs) = from.and_then(|station| self.witnesses.inputs(station)) {
-            self.diagnosing.recall(inputs);
-            self.field = inputs.clone();
-        }
-        let stations = self.witnesses.excluded();
-        if !self.pardons && !stations.is_empty() {
-            self.trust = Trust::excluding(stations);
-            self.report(Event::RecalledExclusion { moment, stations });
-        }
-    }
-
     /// What the program sees from now on, by what the sensors show and what the diagnosis finds of it.
     fn see(&mut self, moment: Moment) {
         let mut shown = self.sensors.clone();
@@ -151,12 +56,19 @@ impl RemoteIo {
         else {
             return;
         };
-        let living = self
+        let places = self
             .witnesses
             .holdings()
-            .filter_map(|(_, holding)| history.place(holding.lineage))
-            .max();
-        let void = history.push(&inputs, living);
+            .filter_map(|(_, holding)| history.place(holding.lineage));
+        let living = places.fold(None, |range: Option<(usize, usize)>, place| {
+            let (oldest, newest) = range.unwrap_or((place, place));
+            Some((oldest.min(place), newest.max(place)))
+        });
+        let (floor, applied) = match self.floor {
+            Floor::At { moment, lineage } => (Some(lineage), Some(moment)),
+            Floor::Unknown | Floor::Nothing => (None, None),
+        };
+        let void = history.push(&inputs, living, floor);
         *sampled = true;
         let base = history.base();
         let (born, before) = (history.born(), history.before());
@@ -166,8 +78,9 @@ impl RemoteIo {
             before,
             after: history.head(),
             history: history.samples(),
-            applied: self.applied.clone(),
+            applied,
             excluded: self.trust.excluded(),
+            gone: self.witnesses.gone(),
         });
         if void > 0 {
             self.report(Event::Voided {

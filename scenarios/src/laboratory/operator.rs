@@ -68,7 +68,12 @@ impl Laboratory<'_> {
                 Some(wrong("a plant stays with its remote I/O"))
             }
             Command::Isolate | Command::Rejoin => None,
-            Command::Release | Command::Force(_) | Command::Unforce { .. } if !remote_io => {
+            Command::Release
+            | Command::Choose { .. }
+            | Command::Force(_)
+            | Command::Unforce { .. }
+                if !remote_io =>
+            {
                 Some(wrong("it is for remote I/Os"))
             }
             _ if !running => Some(Refusal::Down(name())),
@@ -98,6 +103,7 @@ impl Laboratory<'_> {
             Command::Stop => Action::Stop,
             Command::Continue => Action::Continue,
             Command::Release => Action::Release,
+            Command::Choose { choice } => Action::Choose { choice: *choice },
             Command::Isolate => return self.cut_all(party, true).await,
             Command::Rejoin => return self.cut_all(party, false).await,
             Command::Force(force) => {

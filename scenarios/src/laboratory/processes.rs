@@ -109,6 +109,10 @@ impl Laboratory<'_> {
                 Action::Stop => process.stop(),
                 Action::Continue => process.go_on(),
                 Action::Release => process.command("release").await,
+                Action::Choose { choice } => {
+                    let line = serde_json::to_string(&choice).map(|it| format!("choose {it}"));
+                    process.command(&line.unwrap_or_default()).await
+                }
                 // Refused before the run began.
                 _ => Err(std::io::ErrorKind::Unsupported.into()),
             };

@@ -8,7 +8,7 @@ use understudy_diagnostic::Diagnostic;
 use understudy_diagnostic::spelling::suggestion;
 use understudy_form::{Fields, Placed};
 use understudy_simulator::{Action, Fault};
-use understudy_wire::{Party, ProgramId};
+use understudy_wire::{Party, ProgramId, StateChoice};
 
 use super::{ANY, MAXIMUM_NUMBER, MAXIMUM_STEPS, Reader, SHARE};
 use crate::scenario::{ACTIONS, action_word};
@@ -122,14 +122,16 @@ impl Reader<'_> {
         let of_station = |party: Party| matches!(party, Party::Station(_));
         let (fits, wanted): (fn(Party) -> bool, &str) = match word {
             "crash" | "restart" | "stop" | "continue" => (any, ""),
-            "release" => (of_remote_io, "names a remote I/O"),
+            "release" | "cold-start" | "accept-state" => (of_remote_io, "names a remote I/O"),
             "flip-state" | "flip-word" => (of_station, "names a controller or an understudy"),
             _ => (in_cluster, "names a station or a remote I/O, and no plant"),
         };
         if let Some(party) = party.filter(|&party| !fits(party)) {
             let name = station.value;
             let message = match (word, party) {
-                ("release", _) => format!("`{name}` has no outputs that could be released"),
+                ("release" | "cold-start" | "accept-state", _) => {
+                    format!("`{name}` is not a remote I/O: `{word}` concerns its outputs")
+                }
                 _ => format!("`{name}` is nobody to whom `{word}` can be done"),
             };
             self.diagnostics.push(
@@ -151,6 +153,12 @@ impl Reader<'_> {
             "stop" => one(Action::Stop),
             "continue" => one(Action::Continue),
             "release" => one(Action::Release),
+            "cold-start" => one(Action::Choose {
+                choice: StateChoice::Cold,
+            }),
+            "accept-state" => one(Action::Choose {
+                choice: StateChoice::Newest { cycle: None },
+            }),
             "slow" => one(Action::Slow {
                 by: self.slowness(fields)?,
             }),

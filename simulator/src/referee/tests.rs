@@ -1,7 +1,7 @@
 //! A referee that never blows its whistle proves nothing: every kind of violation is shown to it.
 
 use understudy_logic::CircuitBuilder;
-use understudy_remote_io::{Release, ValueFault};
+use understudy_remote_io::{Release, StaleState, ValueFault};
 use understudy_wire::{
     Agreement, ClusterHash, ConfigurationHash, Cycle, Epoch, Mode, ProgramId, Schedule, StationSet,
 };
@@ -39,6 +39,7 @@ fn referee() -> Referee {
         fail_safe: Image::zero(1),
         release: Release::Automatic,
         value_fault: ValueFault::Hold,
+        stale_state: StaleState::Operator,
     };
     Referee::new(&settings, Scan::new(&circuit))
 }
@@ -161,10 +162,7 @@ fn a_program_continues_only_from_what_its_samples_led_to() {
     let unknown = sampled(3, &[true, true], false);
     check(&[&start[..], &[unknown]].concat(), true);
     // From the state after u = 1, an input of 0 gives 1.
-    let resumed = [
-        sampled(3, &[true], false),
-        applied(3, true, Source::Direct),
-    ];
+    let resumed = [sampled(3, &[true], false), applied(3, true, Source::Direct)];
     check(&[&start[..], &resumed].concat(), false);
 }
 
@@ -184,7 +182,10 @@ fn the_operator_may_choose_an_older_state_once() {
     assert_eq!(referee.observe(&back(3)), Ok(()));
     assert_eq!(referee.observe(&applied(3, true, Source::Direct)), Ok(()));
     let again = referee.observe(&back(4));
-    assert!(matches!(again, Err(Violation::WentBack { .. })), "{again:?}");
+    assert!(
+        matches!(again, Err(Violation::WentBack { .. })),
+        "{again:?}"
+    );
 }
 
 #[test]

@@ -39,6 +39,10 @@ impl Simulation {
                 self.referees[program.index()].operator_chooses();
                 self.give(party, Input::Release, observe);
             }
+            (Party::RemoteIo(program), Action::Choose { choice }) => {
+                self.referees[program.index()].operator_chooses();
+                self.give(party, Input::Choose(choice), observe);
+            }
             (Party::Station(station), _) => {
                 let waiting = disturb(&mut self.stations[station.index()], action);
                 self.catch_up(party, waiting, observe);

@@ -69,6 +69,7 @@ pub(crate) fn line(programs: usize, mode: Mode, understudies: usize) -> Parts {
                 fail_safe: Image::zero(program.scan.output_count()),
                 release: understudy_remote_io::Release::Automatic,
                 value_fault: understudy_remote_io::ValueFault::Hold,
+                stale_state: understudy_remote_io::StaleState::Operator,
             });
     let kinds = [
         ModelKind::Robot(RobotParameters::default()),

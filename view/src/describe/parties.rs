@@ -1,7 +1,7 @@
 //! What stations, remote I/Os and plants say of themselves.
 
 use understudy_node::Event as StationEvent;
-use understudy_remote_io::Event as RemoteIoEvent;
+use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason};
 use understudy_scenarios::{Parties, source_word};
 use understudy_wire::{Party, SignalPlace, StationId};
 
@@ -147,6 +147,63 @@ pub(super) fn remote_io(event: &RemoteIoEvent, parties: &Parties) -> Words {
                     "{who} hold different states of one cycle: an operator has to decide by releasing its outputs"
                 ),
             )
+        }
+        RemoteIoEvent::StateLost {
+            applied,
+            newest,
+            holder,
+            asks,
+            ..
+        } => {
+            let holder = parties.name(Party::Station(*holder));
+            let behind = applied.map_or_else(
+                || "it cannot know whether newer outputs were applied".to_owned(),
+                |applied| format!("outputs of cycle {} were applied", applied.cycle.0),
+            );
+            let next = if *asks {
+                "the operator chooses this state (accept-state) or a cold start (cold-start)"
+            } else {
+                "the program starts cold, as configured"
+            };
+            let text = format!(
+                "the state of its program is lost: the newest available state, of {holder}, is from cycle {}, and {behind}; {next}",
+                newest.cycle.0
+            );
+            ("state-lost", Alarm, text)
+        }
+        RemoteIoEvent::StateRecovered { from, .. } => {
+            let from = parties.name(Party::Station(*from));
+            let text = format!("{from} has returned with the state of its program");
+            ("state-recovered", Notice, text)
+        }
+        RemoteIoEvent::ChoiceRefused { newest, .. } => {
+            let text = match newest {
+                Some(newest) => format!(
+                    "refuses the operator's choice: the newest available state is from cycle {}",
+                    newest.cycle.0
+                ),
+                None => {
+                    "refuses the operator's choice: the state of its program is not lost".to_owned()
+                }
+            };
+            ("choice-refused", Warning, text)
+        }
+        RemoteIoEvent::Protected { .. } => (
+            "protected",
+            Notice,
+            "its program is protected: the failure of one station would be masked".to_owned(),
+        ),
+        RemoteIoEvent::Unprotected { since, lacking, .. } => {
+            let reasons: Vec<String> = lacking
+                .iter()
+                .map(|one| lacking_text(one, parties))
+                .collect();
+            let text = format!(
+                "its program is not protected since cycle {}: {}",
+                since.cycle.0,
+                reasons.join(", ")
+            );
+            ("unprotected", Alarm, text)
         }
         RemoteIoEvent::Voided {
             samples, lineage, ..
@@ -297,4 +354,22 @@ fn stalled(late: std::time::Duration) -> Words {
         Level::Notice,
         format!("the host woke it {late:.1?} late"),
     )
+}
+
+/// Why a station cannot stand in for a program.
+fn lacking_text(lacking: &Lacking, parties: &Parties) -> String {
+    let name = parties.name(Party::Station(lacking.station));
+    match lacking.reason {
+        LackingReason::NotReceived => {
+            format!("{name} is not received (it is down, or the link from it)")
+        }
+        LackingReason::Joining => format!("{name} is joining"),
+        LackingReason::Behind { stepped } => {
+            format!("the state of {name} is too old (cycle {})", stepped.cycle.0)
+        }
+        LackingReason::Excluded => format!("{name} is excluded"),
+        LackingReason::Failed => {
+            format!("{name} has failed, and the paper's mode masks one failure")
+        }
+    }
 }

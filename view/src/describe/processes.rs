@@ -2,7 +2,7 @@
 
 use understudy_bus::HostEvent;
 use understudy_scenarios::{Action, Parties, RunEvent};
-use understudy_wire::Party;
+use understudy_wire::{Party, StateChoice};
 
 use super::Words;
 use crate::event::Level;
@@ -151,6 +151,12 @@ pub(crate) fn fault_text(action: Action, party: Party, parties: &Parties) -> Str
         Action::Heal { to } => format!("{name} is connected to {} again", parties.name(to)),
         Action::Delay { to, by } => format!("{} hears {name} {by:?} later", parties.name(to)),
         Action::Release => format!("{name} is released"),
+        Action::Choose {
+            choice: StateChoice::Cold,
+        } => format!("the operator starts the program of {name} cold"),
+        Action::Choose { .. } => {
+            format!("the operator continues the program of {name} from the newest available state")
+        }
         other => format!("{} is done to {name}", other.word()),
     }
 }

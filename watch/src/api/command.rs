@@ -8,7 +8,9 @@ use axum::extract::{Extension, State};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use understudy_scenarios::Command;
-use understudy_wire::{Force, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH, SignalPlace};
+use understudy_wire::{
+    Force, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH, SignalPlace, StateChoice,
+};
 
 use super::Answered;
 use crate::app::App;
@@ -34,6 +36,9 @@ enum AskedCommand {
     Stop,
     Continue,
     Release,
+    Choose {
+        choice: StateChoice,
+    },
     Isolate,
     Rejoin,
     Force {
@@ -66,6 +71,7 @@ pub(super) async fn command(
         AskedCommand::Stop => Command::Stop,
         AskedCommand::Continue => Command::Continue,
         AskedCommand::Release => Command::Release,
+        AskedCommand::Choose { choice } => Command::Choose { choice },
         AskedCommand::Isolate => Command::Isolate,
         AskedCommand::Rejoin => Command::Rejoin,
         AskedCommand::Unforce { signal } => Command::Unforce { signal },

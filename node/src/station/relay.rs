@@ -1,0 +1,112 @@
+//! Samples that did not reach every station: a station that has one relays it in its turn to those that lack it.
+//!
+//! ```text
+//!   cycle t      understudy: its turn says that it lacks the sample of i           (one cycle without protection, at most)
+//!   cycle t + 1  a station that has the sample of i relays it ──► the understudy, which sends last, is synchronised in t + 1
+//! ```
+//!
+//! A relayed sample is the sample itself, with its history: one that lacked several cycles replays them. Invariant: one broken link
+//! of a remote I/O costs no replica its history, as long as any station receives the samples. A sample that was changed on its way
+//! does not lead to its own lineage and is not relayed; a replica that followed a forged one could not prove itself to the remote I/O.
+
+use std::sync::Arc;
+
+use understudy_wire::{
+    Body, Frame, Header, Holding, Party, ProgramSet, Relayed, Sample, StationId, Turn, encode,
+};
+
+use super::Station;
+use crate::replica::Replica;
+
+impl Station {
+    /// Keeps a sample of this cycle for those that lack it.
+    pub(super) fn keep_sample(&mut self, frame: &Arc<Frame>) {
+        let is_new = !self.has_sample(frame.header.sender);
+        if let Body::Sample(sample) = &frame.body
+            && is_new
+            && leads_where_it_says(sample)
+        {
+            self.cycle.samples.push(Arc::clone(frame));
+        }
+    }
+
+    /// Follows the samples that another station relays, where it lacks them.
+    pub(super) fn hear_relayed(&mut self, header: &Header, turn: &Turn) {
+        self.cycle.lacked = self.cycle.lacked.or(turn.lacks);
+        for Relayed { program, sample } in &turn.relayed {
+            self.cycle.relayed.insert(*program);
+            let sender = Party::RemoteIo(*program);
+            let in_cluster = program.index() < self.settings.agreement.schedule.controllers();
+            if !in_cluster || self.has_sample(sender) {
+                continue;
+            }
+            let header = Header { sender, ..*header };
+            let frame = Arc::new(Frame {
+                header,
+                body: Body::Sample(sample.clone()),
+            });
+            self.follow(*program, &frame, sample);
+        }
+    }
+
+    /// What other stations claim to hold.
+    pub(super) fn hear_claims(&mut self, station: StationId, holdings: &[Holding]) {
+        for holding in holdings {
+            let mut replicas = self.replicas.iter_mut();
+            if let Some(replica) = replicas.find(|replica| replica.id() == holding.program) {
+                replica.hear_claim(station, holding.stepped);
+            }
+        }
+    }
+
+    /// Programs that it runs and whose samples did not come from their remote I/Os in this cycle.
+    pub(super) fn lacks(&self) -> ProgramSet {
+        let runs: ProgramSet = self.replicas.iter().map(Replica::id).collect();
+        runs.without(self.cycle.direct)
+    }
+
+    /// The turn with the samples that others lack and that no station has relayed in this cycle, as many as a frame takes.
+    pub(super) fn with_relayed(&self, mut turn: Turn) -> Body {
+        let lacked = self
+            .lacked
+            .or(self.cycle.lacked)
+            .without(self.cycle.relayed);
+        let samples = self.cycle.samples.iter();
+        turn.relayed = samples
+            .filter_map(|frame| match (frame.header.sender, &frame.body) {
+                (Party::RemoteIo(program), Body::Sample(sample)) if lacked.contains(program) => {
+                    Some(Relayed {
+                        program,
+                        sample: sample.clone(),
+                    })
+                }
+                _ => None,
+            })
+            .collect();
+        // Which of them have to wait changes from cycle to cycle: a history bridges the cycles between.
+        if let Some(first) = turn.relayed.len().checked_sub(1) {
+            let moment = self.clock.moment().unwrap_or_default();
+            let by = moment.cycle.0 as usize % (first + 1);
+            turn.relayed.rotate_left(by);
+        }
+        while !turn.relayed.is_empty() {
+            let frame = self.frame(Body::Turn(turn.clone()));
+            if encode(&frame, &mut Vec::new()).is_ok() {
+                break;
+            }
+            turn.relayed.pop();
+        }
+        Body::Turn(turn)
+    }
+
+    fn has_sample(&self, sender: Party) -> bool {
+        let mut samples = self.cycle.samples.iter();
+        samples.any(|frame| frame.header.sender == sender)
+    }
+}
+
+/// Whether it was not changed since it was sampled.
+fn leads_where_it_says(sample: &Sample) -> bool {
+    let newest = sample.history.last();
+    newest.is_some_and(|newest| sample.before.after(newest) == sample.after)
+}

@@ -1,0 +1,124 @@
+//! Whether the failure of one station would be masked now: the controller and an understudy, or two understudies, prove this
+//! program's output in this cycle. What is lost for `flag_after` cycles in a row is reported at once, with the reason.
+
+use smallvec::SmallVec;
+use understudy_wire::{Body, Lineage, Mode, Moment, StationId, StationSet, Turn};
+
+use super::{Phase, RemoteIo};
+use crate::event::{Event, Lacking, LackingReason};
+
+/// Stations of which each one alone proves the output.
+const STATIONS_NEEDED: usize = 2;
+
+/// Kept from deadline to deadline.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub(super) struct Protection {
+    /// As it was reported last; nothing before the program was protected for the first time.
+    reported: Option<bool>,
+    /// Deadlines in a row at which it was not protected, and the cycle of the first of them.
+    missed: u32,
+    since: Moment,
+}
+
+impl RemoteIo {
+    /// Looks at the turns of a cycle at its deadline, where it was sampled.
+    pub(super) fn watch_protection(&mut self) {
+        if let Phase::Running {
+            history,
+            sampled: true,
+            ..
+        } = &self.phase
+        {
+            self.note_protection(self.lacking(history.head()));
+        }
+    }
+
+    /// A deadline without a cycle: no station proves anything.
+    pub(super) fn note_idle(&mut self) {
+        let reason = LackingReason::NotReceived;
+        let all = self.witnesses.stations();
+        self.note_protection(all.map(|station| Lacking { station, reason }).collect());
+    }
+
+    fn note_protection(&mut self, lacking: SmallVec<[Lacking; 2]>) {
+        let stations = self.witnesses.stations().count();
+        if stations < STATIONS_NEEDED {
+            return;
+        }
+        let moment = self.moment();
+        let proving = stations.saturating_sub(lacking.len());
+        let paper = self.settings.agreement.mode == Mode::Paper;
+        let protected = proving >= STATIONS_NEEDED && (lacking.is_empty() || !paper);
+        let protection = &mut self.protection;
+        if protected {
+            protection.missed = 0;
+            if protection.reported.replace(true) != Some(true) {
+                self.report(Event::Protected { moment });
+            }
+            return;
+        }
+        if protection.missed == 0 {
+            protection.since = moment;
+        }
+        protection.missed = protection.missed.saturating_add(1);
+        if protection.missed >= self.settings.agreement.flag_after
+            && protection.reported == Some(true)
+        {
+            protection.reported = Some(false);
+            let since = protection.since;
+            self.report(Event::Unprotected {
+                moment,
+                since,
+                lacking,
+            });
+        }
+    }
+
+    /// The stations that do not prove this program's output in this cycle, and why; in the paper's mode also the failed ones that
+    /// have no part in this program.
+    fn lacking(&self, head: Lineage) -> SmallVec<[Lacking; 2]> {
+        let own = self.witnesses.stations().filter_map(|station| {
+            let reason = self.lacks(station, head)?;
+            Some(Lacking { station, reason })
+        });
+        let mut lacking: SmallVec<[Lacking; 2]> = own.collect();
+        if self.settings.agreement.mode == Mode::Paper {
+            let all = StationSet::first(self.turns.len());
+            let part: StationSet = self.witnesses.stations().collect();
+            let failed = all.without(part).without(self.attendance.spoke());
+            let reason = LackingReason::Failed;
+            lacking.extend(failed.iter().map(|station| Lacking { station, reason }));
+        }
+        lacking
+    }
+
+    /// Why a station does not prove this program's output in this cycle, if it does not.
+    fn lacks(&self, station: StationId, head: Lineage) -> Option<LackingReason> {
+        if self.trust.excluded().contains(station) {
+            return Some(LackingReason::Excluded);
+        }
+        let Some(turn) = self.turn_of(station) else {
+            let joins = self.attendance.flagged().contains(station);
+            return Some(if joins && self.witnesses.is_living(station) {
+                LackingReason::Joining
+            } else {
+                LackingReason::NotReceived
+            });
+        };
+        let program = self.settings.program;
+        let mut holdings = turn.holdings.iter();
+        let Some(holding) = holdings.find(|holding| holding.program == program) else {
+            return Some(LackingReason::Joining);
+        };
+        let says = turn.words.iter().any(|word| word.members.contains(program));
+        let stepped = holding.stepped;
+        (!says || holding.lineage != head).then_some(LackingReason::Behind { stepped })
+    }
+
+    fn turn_of(&self, station: StationId) -> Option<&Turn> {
+        match &self.turns.get(station.index())?.as_ref()?.body {
+            Body::Turn(turn) => Some(turn),
+            _ => None,
+        }
+    }
+}

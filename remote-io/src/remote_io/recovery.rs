@@ -1,0 +1,204 @@
+//! From which state the program continues: after a restart of this remote I/O, or when no living station is on its history.
+//!
+//! ```text
+//!   no living station holds a state ───────────────────── cold start
+//!   a state at the floor, or one that covers it ────────── adopted
+//!   different states of one cycle after a restart ──────── the operator chooses (`release`)
+//!   only states before the floor, or none that is proved
+//!   to cover it after a restart ────────────────────────── the state is lost: see `StaleState`
+//! ```
+
+use understudy_wire::{Holding, Moment, StateChoice, StationId, StationSet};
+
+use super::{Floor, Phase, Question, RemoteIo};
+use crate::event::Event;
+use crate::history::History;
+use crate::settings::{Release, StaleState};
+use crate::trust::Trust;
+
+/// What the living stations allow.
+enum Verdict {
+    Cold,
+    Adopt(StationId, Holding),
+    Disputed(StationSet),
+    Stale(StationId, Holding),
+}
+
+impl RemoteIo {
+    /// Listens until it is known which station holds which state; notices when no living station is on this history any more.
+    pub(super) fn find_history(&mut self, moment: Moment) {
+        let listen_cycles = self.settings.agreement.listen_cycles;
+        let waited = match &mut self.phase {
+            Phase::Running {
+                history,
+                unfollowed,
+                ..
+            } => {
+                let on_it = |holding: &Holding| history.place(holding.lineage).is_some();
+                let follower = self
+                    .witnesses
+                    .holdings()
+                    .find_map(|(station, holding)| on_it(holding).then_some(station));
+                *unfollowed = if follower.is_some() || !self.witnesses.anybody() {
+                    0
+                } else {
+                    unfollowed.saturating_add(1)
+                };
+                let waited = unfollowed.saturating_sub(listen_cycles);
+                if let Some(from) = follower
+                    && self.question.take() == Some(Question::StateLost)
+                {
+                    self.report(Event::StateRecovered { moment, from });
+                }
+                waited
+            }
+            Phase::Listening { cycles } => {
+                *cycles = cycles.saturating_add(u32::from(self.witnesses.anybody()));
+                *cycles
+            }
+        };
+        // A station that could hold the state and is not there gets longer: it may be the only one that does.
+        let patience = if self.witnesses.everybody() { 1 } else { 5 };
+        // A history without a sample is one that no station can follow.
+        if waited < listen_cycles * patience || waited == 0 || self.field_lost {
+            return;
+        }
+        match self.verdict() {
+            // The operator has been asked: a state that cannot be seen for a moment is no reason to start cold.
+            Verdict::Cold if self.question == Some(Question::StateLost) => {}
+            Verdict::Cold => self.start(moment, None),
+            Verdict::Adopt(from, holding) => self.start(moment, Some((from, holding))),
+            Verdict::Disputed(stations) => {
+                if self.question.replace(Question::Disputed) != Some(Question::Disputed) {
+                    self.report(Event::Disputed { moment, stations });
+                }
+            }
+            Verdict::Stale(holder, holding) => self.lose_state(moment, holder, &holding),
+        }
+    }
+
+    fn verdict(&self) -> Verdict {
+        let Some((from, newest)) = self.witnesses.newest() else {
+            return Verdict::Cold;
+        };
+        match self.floor {
+            Floor::At { lineage, .. } => {
+                let mut holdings = self.witnesses.holdings();
+                match holdings.find(|(_, holding)| holding.lineage == lineage) {
+                    Some((from, holding)) => Verdict::Adopt(from, *holding),
+                    None => Verdict::Stale(from, *newest),
+                }
+            }
+            Floor::Unknown | Floor::Nothing => match self.witnesses.disputed() {
+                Some(stations) => Verdict::Disputed(stations),
+                None if self.floor == Floor::Unknown
+                    && !self.witnesses.covers_all_applied(newest) =>
+                {
+                    Verdict::Stale(from, *newest)
+                }
+                None => Verdict::Adopt(from, *newest),
+            },
+        }
+    }
+
+    fn lose_state(&mut self, moment: Moment, holder: StationId, newest: &Holding) {
+        if self.question == Some(Question::StateLost) {
+            return;
+        }
+        self.question = Some(Question::StateLost);
+        let applied = match self.floor {
+            Floor::At { moment, .. } => Some(moment),
+            Floor::Unknown | Floor::Nothing => None,
+        };
+        let asks = self.settings.stale_state == StaleState::Operator;
+        self.report(Event::StateLost {
+            moment,
+            applied,
+            newest: newest.stepped,
+            holder,
+            asks,
+        });
+        if !asks {
+            self.start(moment, None);
+        }
+    }
+
+    /// The operator's answer.
+    pub(super) fn choose(&mut self, choice: StateChoice) {
+        let moment = self.moment();
+        let newest = self
+            .witnesses
+            .newest()
+            .map(|(from, newest)| (from, *newest));
+        match (self.question, choice, newest) {
+            (Some(Question::StateLost), StateChoice::Cold, _) => self.start(moment, None),
+            (Some(_), StateChoice::Newest { cycle }, Some((from, newest)))
+                if cycle.is_none_or(|cycle| cycle == newest.stepped.cycle) =>
+            {
+                self.start(moment, Some((from, newest)));
+            }
+            (question, ..) => {
+                let newest = newest.filter(|_| question.is_some());
+                let newest = newest.map(|(_, newest)| newest.stepped);
+                self.report(Event::ChoiceRefused { moment, newest });
+            }
+        }
+    }
+
+    /// Starts to sample: from the state of a station, or cold.
+    fn start(&mut self, moment: Moment, state: Option<(StationId, Holding)>) {
+        let capacity = self.settings.agreement.history;
+        let history = match state {
+            Some((from, holding)) => {
+                let lineage = holding.lineage;
+                self.report(Event::AdoptedLineage {
+                    moment,
+                    lineage,
+                    from,
+                });
+                History::from(holding.born, lineage, capacity)
+            }
+            None => {
+                let awaits_release = self.settings.release == Release::Operator;
+                self.released = !awaits_release;
+                self.last_true = None;
+                self.report(Event::StartedCold {
+                    born: moment,
+                    awaits_release,
+                });
+                History::genesis(self.settings.hash, moment, capacity)
+            }
+        };
+        if self.floor == Floor::Unknown {
+            self.remember(moment, state.map(|(station, _)| station));
+        }
+        self.question = None;
+        self.floor = match state {
+            None => Floor::Nothing,
+            Some(_) if self.floor == Floor::Nothing => Floor::Nothing,
+            Some((_, holding)) => Floor::At {
+                moment: holding.stepped,
+                lineage: holding.lineage,
+            },
+        };
+        self.phase = Phase::Running {
+            history,
+            sampled: false,
+            unfollowed: 0,
+        };
+    }
+
+    /// After a restart: takes up from what the stations recall.
+    fn remember(&mut self, moment: Moment, from: Option<StationId>) {
+        self.witnesses.recall_gone();
+        if let Some(inputs) = from.and_then(|station| self.witnesses.inputs(station)) {
+            self.diagnosing.recall(inputs);
+            self.field = inputs.clone();
+        }
+        let stations = self.witnesses.excluded();
+        if !self.pardons && !stations.is_empty() {
+            self.trust = Trust::excluding(stations);
+            self.report(Event::RecalledExclusion { moment, stations });
+        }
+    }
+}
