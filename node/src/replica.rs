@@ -149,19 +149,29 @@ impl Replica {
                 witnessed: true,
                 applied: sample.applied,
                 excluded: sample.excluded,
-                gone: sample.gone,
+                accounted_for: sample.gone,
                 inputs: inputs.clone(),
             };
             self.recalled = Some((Some(moment), recalled));
         }
     }
 
-    /// A station claims a state: one that is newer than the newest sample received here comes from a station that is not gone.
-    pub(crate) fn hear_claim(&mut self, station: StationId, stepped: Moment) {
-        if let Some((heard, recalled)) = &mut self.recalled
-            && heard.is_none_or(|heard| stepped > heard)
-        {
-            recalled.gone.remove(station);
+    /// A station claims at `now` to hold the state of the cycle `stepped`. One that is no newer than the newest sample received here,
+    /// `silent_after` cycles after it, means that the remote I/O is silent there too.
+    pub(crate) fn hear_claim(
+        &mut self,
+        station: StationId,
+        stepped: Moment,
+        now: Moment,
+        silent_after: u32,
+    ) {
+        let Some((Some(heard), recalled)) = &mut self.recalled else {
+            return;
+        };
+        if stepped > *heard {
+            recalled.accounted_for.remove(station);
+        } else if now >= heard.plus(u64::from(silent_after)) {
+            recalled.accounted_for.insert(station);
         }
     }
 

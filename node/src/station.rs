@@ -55,6 +55,8 @@ pub struct Station {
     differed: SmallVec<[(ProgramId, StationId); 1]>,
     /// Programs whose samples any other station lacked in the last cycle.
     lacked: ProgramSet,
+    /// Those of them whose samples this station had.
+    awaited: ProgramSet,
 }
 
 /// What a station remembers of the current cycle only.
@@ -113,6 +115,7 @@ impl Station {
             joining: StationSet::EMPTY,
             differed: SmallVec::new(),
             lacked: ProgramSet::EMPTY,
+            awaited: ProgramSet::EMPTY,
             settings,
         };
         station.waking.ask(station.next_wakeup());
@@ -321,10 +324,11 @@ impl Hash for Station {
             joining,
             differed,
             lacked,
+            awaited,
         } = self;
         (reception, clock, attendance, replicas, copies).hash(hasher);
         (cycle, started, waking, paces, wanted).hash(hasher);
-        (joining, differed, lacked).hash(hasher);
+        (joining, differed, lacked, awaited).hash(hasher);
     }
 }
 

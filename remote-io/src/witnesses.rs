@@ -96,8 +96,8 @@ impl Witnesses {
     }
 
     /// Whether no output can have been applied that came of a newer state than `holding`, as far as living stations recall: each
-    /// station that could have proved one has received samples in this life and lives, or was gone at a sample that a living
-    /// one received, and none recalls a newer applied sample.
+    /// station that could have proved one lives and has received samples in this life, or is accounted for by one that does, and
+    /// none recalls a newer applied sample.
     ///
     /// What remains: a remote I/O and a station that were cut off together from all others, and lost their memory together.
     pub(crate) fn covers_all_applied(&self, holding: &Holding) -> bool {
@@ -105,14 +105,10 @@ impl Witnesses {
             let living = self.entries.iter().filter(|entry| self.lives(entry));
             living.filter_map(|entry| Some((entry.station, entry.recalled.as_ref()?)))
         };
-        let gone = recalling().fold(StationSet::EMPTY, |gone, (_, recalled)| {
-            gone.or(recalled.gone)
+        let witnesses = recalling().filter(|(_, recalled)| recalled.witnessed);
+        let accounted_for = witnesses.fold(StationSet::EMPTY, |all, (station, recalled)| {
+            all.or(StationSet::only(station)).or(recalled.accounted_for)
         });
-        let witnesses: StationSet = recalling()
-            .filter(|(_, recalled)| recalled.witnessed)
-            .map(|(station, _)| station)
-            .collect();
-        let accounted_for = gone.or(witnesses);
         let all = self.entries.iter();
         let newest = recalling()
             .filter_map(|(_, recalled)| recalled.applied)
@@ -126,7 +122,7 @@ impl Witnesses {
     pub(crate) fn recall_gone(&mut self) {
         let living = self.entries.iter().filter(|entry| self.lives(entry));
         let recalled = living.filter_map(|entry| entry.recalled.as_ref());
-        let gone = recalled.fold(StationSet::EMPTY, |gone, one| gone.or(one.gone));
+        let gone = recalled.fold(StationSet::EMPTY, |gone, one| gone.or(one.accounted_for));
         let heard = self.entries.iter().filter(|entry| entry.silent < u32::MAX);
         let heard: StationSet = heard.map(|entry| entry.station).collect();
         self.recalled_gone = gone.without(heard);

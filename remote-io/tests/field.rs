@@ -75,7 +75,6 @@ impl Bench {
             holdings: Default::default(),
             recalled: Vec::new(),
             lacks: ProgramSet::EMPTY,
-            relayed: Vec::new(),
         };
         for body in [Body::Sync, Body::Join(join)] {
             let frame = Arc::new(Frame { header, body });
@@ -112,6 +111,7 @@ fn settings() -> Settings {
         fail_safe: Image::zero(1),
         release: Release::Automatic,
         value_fault: ValueFault::default(),
+        stale_state: StaleState::Operator,
     }
 }
 

@@ -7,7 +7,7 @@ use understudy_remote_io::{Event, Release, RemoteIo, Settings, StaleState, Value
 use understudy_wire::{
     Agreement, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding,
     Image, Input, Join, Lineage, Machine, Mode, Moment, Output, Party, ProgramHash, ProgramId,
-    ProgramSet, Schedule, Source, StationId, StationSet, Time,
+    ProgramSet, Recalled, Schedule, Source, StationId, StationSet, Time,
 };
 
 const PERIOD: Duration = Duration::from_millis(10);
@@ -74,7 +74,14 @@ fn run(held: [Held; 3], release: Release, released_at: u64, cycles: u64) -> Vec<
                 body: Body::Join(Join {
                     wants: ProgramSet::EMPTY,
                     holdings: holdings.into_iter().collect(),
-                    recalled: Vec::new(),
+                    recalled: vec![Recalled {
+                        program: ProgramId(0),
+                        witnessed: true,
+                        applied: None,
+                        excluded: StationSet::EMPTY,
+                        accounted_for: StationSet::EMPTY,
+                        inputs: Image::zero(1),
+                    }],
                     lacks: ProgramSet::EMPTY,
                 }),
             });

@@ -177,8 +177,9 @@ pub struct Recalled {
     pub applied: Option<Moment>,
     /// Stations that it excluded.
     pub excluded: StationSet,
-    /// As in a [`Sample`], without those that claimed a newer state since.
-    pub gone: StationSet,
+    /// Stations that can have proved no output of a newer sample: gone, as in a [`Sample`], or received after this program's remote
+    /// I/O had become silent, with a state that is no newer.
+    pub accounted_for: StationSet,
     /// u(i), with the channels that were failed and the values that they kept.
     pub inputs: Image,
 }

@@ -49,7 +49,7 @@ fn recalled(program: u8) -> Recalled {
         witnessed: true,
         applied: Some(moment(3, 3)),
         excluded: StationSet::from_bits(0b100),
-        gone: StationSet::from_bits(0b1),
+        accounted_for: StationSet::from_bits(0b1),
         inputs: image(4, 0b1010),
     }
 }

@@ -176,7 +176,7 @@ mod tests {
                     witnessed: true,
                     applied: Some(LATE),
                     excluded: StationSet::from_bits(u64::MAX),
-                    gone: StationSet::from_bits(u64::MAX),
+                    accounted_for: StationSet::from_bits(u64::MAX),
                     inputs: ones(bits),
                 };
                 let word = Word {

@@ -33,7 +33,7 @@ impl Station {
         }
         self.copies.clear();
         self.joining = self.cycle.joiners;
-        self.lacked = self.cycle.lacked;
+        self.close_relay();
         self.differed = std::mem::take(&mut self.cycle.differs);
         self.cycle = CycleNotes::default();
     }

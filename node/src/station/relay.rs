@@ -51,10 +51,12 @@ impl Station {
 
     /// What other stations claim to hold.
     pub(super) fn hear_claims(&mut self, station: StationId, holdings: &[Holding]) {
+        let now = self.clock.moment().unwrap_or_default();
+        let silent_after = self.settings.agreement.flag_after;
         for holding in holdings {
             let mut replicas = self.replicas.iter_mut();
             if let Some(replica) = replicas.find(|replica| replica.id() == holding.program) {
-                replica.hear_claim(station, holding.stepped);
+                replica.hear_claim(station, holding.stepped, now, silent_after);
             }
         }
     }
@@ -63,6 +65,27 @@ impl Station {
     pub(super) fn lacks(&self) -> ProgramSet {
         let runs: ProgramSet = self.replicas.iter().map(Replica::id).collect();
         runs.without(self.cycle.direct)
+    }
+
+    /// Whether it has the samples that it relayed in the last cycle; it waits for them until its slot starts.
+    pub(super) fn has_what_others_lack(&self) -> bool {
+        let relayed_by_others = self.cycle.relayed;
+        let mut awaited = self.awaited.without(relayed_by_others).iter();
+        awaited.all(|program| self.has_sample(Party::RemoteIo(program)))
+    }
+
+    /// Ends a cycle: what others lacked in it they will lack in the next one.
+    pub(super) fn close_relay(&mut self) {
+        self.lacked = self.cycle.lacked;
+        let had = self
+            .cycle
+            .samples
+            .iter()
+            .filter_map(|frame| match frame.header.sender {
+                Party::RemoteIo(program) => Some(program),
+                _ => None,
+            });
+        self.awaited = self.lacked.and(had.collect());
     }
 
     /// The turn with the samples that others lack and that no station has relayed in this cycle, as many as a frame takes.

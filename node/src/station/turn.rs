@@ -98,7 +98,9 @@ impl Station {
             return;
         }
         let due = self.speaks_by(moment);
-        if now >= due || (self.has_token() && self.knows_all_outputs(moment)) {
+        let early =
+            self.has_token() && self.knows_all_outputs(moment) && self.has_what_others_lack();
+        if now >= due || early {
             self.speak(now, moment);
         }
     }

@@ -1,0 +1,255 @@
+//! An output that was applied has moved the plant: no program continues from a state before it, unless the operator says so.
+//!
+//! One broken link from a remote I/O costs no protection: another station relays the samples. A station that receives nothing for
+//! long holds a stale state: it is not adopted, the loss is reported, and the operator decides.
+
+mod press_cell;
+
+use understudy_remote_io::{Event, LackingReason, StaleState};
+use understudy_simulator::{Action, Fault, Network, Record, Simulation};
+use understudy_wire::{Mode, Party, ProgramId, Source, StateChoice, StationId};
+
+const PROGRAMS: u8 = 2;
+const UNDERSTUDY: StationId = StationId(PROGRAMS);
+const STATIONS: u8 = PROGRAMS + 1;
+const ROBOT_IO: Party = Party::RemoteIo(ProgramId(0));
+
+fn fault(at_cycle: u64, phase: f64, party: Party, action: Action) -> Fault {
+    Fault {
+        at_cycle,
+        phase,
+        party,
+        action,
+    }
+}
+
+fn station(rank: u8) -> Party {
+    Party::Station(StationId(rank))
+}
+
+/// Every link from a remote I/O to a station is cut for each length, then each station crashes: no cycle is lost, whether the
+/// link is whole again before, after, or not at all.
+#[test]
+fn a_broken_link_of_a_remote_io_costs_no_protection() {
+    for (program, deaf, crashing) in (0..PROGRAMS)
+        .flat_map(|program| (0..STATIONS).map(move |deaf| (program, deaf)))
+        .flat_map(|(program, deaf)| (0..STATIONS).map(move |dies| (program, deaf, dies)))
+    {
+        for (length, heals) in [2, 3, 9, 40, 300]
+            .into_iter()
+            .flat_map(|length| [Some(-1), Some(5), None].map(|heals| (length, heals)))
+        {
+            let remote_io = Party::RemoteIo(ProgramId(program));
+            let to = station(deaf);
+            let mut simulation = Simulation::new(
+                press_cell::parts(Mode::Full, 1),
+                Network::default(),
+                u64::from(program),
+            );
+            let (cut, dies) = (10, 10 + length);
+            simulation.schedule(fault(cut, 0.9, remote_io, Action::Cut { to }));
+            simulation.schedule(fault(dies, 0.3, station(crashing), Action::Crash));
+            if let Some(heals) = heals {
+                let at = dies.saturating_add_signed(heals);
+                simulation.schedule(fault(at, 0.9, remote_io, Action::Heal { to }));
+            }
+            let mut unprotected = Vec::new();
+            simulation
+                .run(dies + 60, 100, &mut |_, cycle, _, record| {
+                    if let Record::RemoteIo(Event::Unprotected { .. }) = record {
+                        unprotected.push(cycle);
+                    }
+                })
+                .expect("the cluster gets ready");
+            let what = format!("{program} to {deaf}, {crashing} dies after {length}, {heals:?}");
+            assert_eq!(simulation.violations(), [], "{what}");
+            for tally in simulation.tallies() {
+                assert_eq!(tally.held + tally.fail_safe, 0, "{what}: {tally:?}");
+            }
+            // Protection is lost by the crash, not by the link.
+            assert!(
+                unprotected.iter().all(|&cycle| cycle >= Some(dies)),
+                "{what}: {unprotected:?}"
+            );
+            assert!(!unprotected.is_empty(), "{what}");
+        }
+    }
+}
+
+/// The understudy receives neither the samples of the robot nor any station for `length` cycles, then what
+/// `ends` says happens to the robot's controller.
+fn stale(length: u64, stale_state: StaleState, ends: Action) -> Simulation {
+    let mut parts = press_cell::parts(Mode::Full, 1);
+    for remote_io in &mut parts.remote_ios {
+        remote_io.stale_state = stale_state;
+    }
+    let mut simulation = Simulation::new(parts, Network::default(), 1);
+    let to = Party::Station(UNDERSTUDY);
+    for from in [ROBOT_IO, station(0), station(1)] {
+        simulation.schedule(fault(10, 0.0, from, Action::Cut { to }));
+        simulation.schedule(fault(10 + length + 5, 0.0, from, Action::Heal { to }));
+    }
+    simulation.schedule(fault(10 + length, 0.5, station(0), ends));
+    simulation
+}
+
+/// What the robot's remote I/O reports and applies.
+#[derive(Default)]
+struct Seen {
+    unprotected: Vec<(u64, Vec<LackingReason>)>,
+    lost: Vec<(u64, u64, Option<u64>)>,
+    sources: Vec<(u64, Source)>,
+    cold: u64,
+}
+
+impl Seen {
+    fn note(&mut self, cycle: Option<u64>, party: Party, record: &Record<'_>) {
+        let (Some(cycle), Party::RemoteIo(ProgramId(0)), Record::RemoteIo(event)) =
+            (cycle, party, record)
+        else {
+            return;
+        };
+        match event {
+            Event::Unprotected { lacking, .. } => {
+                let reasons = lacking.iter().map(|one| one.reason).collect();
+                self.unprotected.push((cycle, reasons));
+            }
+            Event::StateLost {
+                newest, applied, ..
+            } => {
+                let applied = applied.map(|applied| applied.cycle.0);
+                self.lost.push((cycle, newest.cycle.0, applied));
+            }
+            Event::Applied { source, .. } => self.sources.push((cycle, *source)),
+            Event::StartedCold { .. } => self.cold += 1,
+            _ => {}
+        }
+    }
+}
+
+#[test]
+fn a_stale_state_is_not_adopted_and_the_operator_is_asked() {
+    for length in [20, 60, 300] {
+        let mut simulation = stale(length, StaleState::Operator, Action::Crash);
+        let mut seen = Seen::default();
+        simulation
+            .run(10 + length + 100, 100, &mut |_, cycle, party, record| {
+                seen.note(cycle, party, &record)
+            })
+            .expect("the cluster gets ready");
+        assert_eq!(simulation.violations(), []);
+        let [(at, reasons)] = &seen.unprotected[..] else {
+            panic!("{:?}", seen.unprotected);
+        };
+        assert!(
+            (10..10 + 5).contains(at),
+            "protection is lost with the link, not later: {at}"
+        );
+        assert!(
+            matches!(reasons[..], [LackingReason::Behind { .. }]),
+            "{reasons:?}"
+        );
+        let [(_, newest, Some(applied))] = seen.lost[..] else {
+            panic!("{:?}", seen.lost);
+        };
+        assert!(
+            (length - 2..=length + 2).contains(&(applied - newest)),
+            "{applied} {newest}"
+        );
+        assert_eq!(seen.cold, 0);
+        let after = |source| {
+            let dead = seen
+                .sources
+                .iter()
+                .filter(|(cycle, _)| *cycle > 10 + length);
+            dead.filter(|(_, of)| *of == source).count()
+        };
+        assert_eq!(after(Source::Reconstructed) + after(Source::Direct), 0);
+        assert_eq!(after(Source::Held), 3);
+        // The operator chooses the state as it is offered, and no other one.
+        for (cycle, continues) in [(newest + 1, false), (newest, true)] {
+            let cycle = Some(understudy_wire::Cycle(cycle));
+            let choice = StateChoice::Newest { cycle };
+            simulation.schedule(fault(0, 0.0, ROBOT_IO, Action::Choose { choice }));
+            let done = simulation.run(5, 60, &mut |_, _, _, _| {});
+            // The robot's controller is dead: all others are served again.
+            assert!(done.is_err());
+            let reconstructed = simulation.tallies()[0].reconstructed > 0;
+            assert_eq!(reconstructed, continues);
+            assert_eq!(simulation.violations(), []);
+        }
+    }
+}
+
+#[test]
+fn a_stale_state_is_followed_by_a_cold_start_where_that_is_configured() {
+    let mut simulation = stale(100, StaleState::Cold, Action::Crash);
+    let mut seen = Seen::default();
+    simulation
+        .run(300, 100, &mut |_, cycle, party, record| {
+            seen.note(cycle, party, &record)
+        })
+        .expect("the cluster gets ready");
+    assert_eq!(simulation.violations(), []);
+    assert_eq!((seen.lost.len(), seen.cold), (1, 1));
+    let last = seen.sources.last().map(|(_, source)| *source);
+    assert_eq!(last, Some(Source::Reconstructed));
+}
+
+/// A controller that was suspended while the understudy was cut off returns with the state: the program continues without help.
+#[test]
+fn a_station_that_returns_with_the_state_ends_the_loss() {
+    let mut simulation = stale(100, StaleState::Operator, Action::Stop);
+    simulation.schedule(fault(200, 0.5, station(0), Action::Continue));
+    let mut recovered = 0;
+    simulation
+        .run(300, 100, &mut |_, _, _, record| {
+            recovered += u64::from(matches!(
+                record,
+                Record::RemoteIo(Event::StateRecovered { .. })
+            ));
+        })
+        .expect("the cluster gets ready");
+    assert_eq!(recovered, 1);
+    assert_eq!(simulation.run(5, 100, &mut |_, _, _, _| {}), Ok(()));
+    assert_eq!(simulation.violations(), []);
+}
+
+/// The remote I/O and its controller lose their memory together: what was applied last is not known, so the operator is asked. Where
+/// the controller was gone before, or dies after the remote I/O was seen to be silent, nothing newer can have been applied.
+#[test]
+fn a_remote_io_that_cannot_know_what_it_applied_asks() {
+    for (controller_dies, asks) in [
+        (20, false),
+        (99, true),
+        (100, true),
+        (101, true),
+        (108, false),
+    ] {
+        let parts = press_cell::parts(Mode::Full, 1);
+        let mut simulation = Simulation::new(parts, Network::default(), 1);
+        simulation.schedule(fault(controller_dies, 0.3, station(0), Action::Crash));
+        simulation.schedule(fault(100, 0.3, ROBOT_IO, Action::Crash));
+        simulation.schedule(fault(120, 0.3, ROBOT_IO, Action::Restart));
+        let mut seen = Seen::default();
+        simulation
+            .run(250, 100, &mut |_, cycle, party, record| {
+                seen.note(cycle, party, &record)
+            })
+            .expect("the cluster gets ready");
+        assert_eq!(simulation.violations(), []);
+        assert_eq!(
+            !seen.lost.is_empty(),
+            asks,
+            "{controller_dies}: {:?}",
+            seen.lost
+        );
+        let last = seen.sources.last().map(|(_, source)| *source);
+        let expected = if asks {
+            Source::FailSafe
+        } else {
+            Source::Reconstructed
+        };
+        assert_eq!(last, Some(expected), "{controller_dies}");
+    }
+}
