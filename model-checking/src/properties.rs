@@ -1,6 +1,6 @@
 //! What must hold in every state. Each is a file that names the rule; wrong outputs are what the simulator's referee says.
 
-mod history_is_the_plants;
+mod never_back;
 mod nothing_wrong;
 mod one_station_costs_nothing;
 mod only_held_or_safe;
@@ -35,7 +35,7 @@ pub struct Property {
 pub const ALL: [Property; 5] = [
     nothing_wrong::PROPERTY,
     only_held_or_safe::PROPERTY,
-    history_is_the_plants::PROPERTY,
+    never_back::PROPERTY,
     one_station_costs_nothing::PROPERTY,
     protection_comes_back::PROPERTY,
 ];

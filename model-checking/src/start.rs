@@ -4,7 +4,7 @@
 //! the run, all at one time; those who are behind stood still for the cycle before it.
 
 use understudy_simulator::{Action, Fault};
-use understudy_wire::Party;
+use understudy_wire::{MAXIMUM_HISTORY, Party};
 
 use crate::step::Place;
 
@@ -15,7 +15,12 @@ pub struct Start {
     pub restarted: Vec<Party>,
     /// Who stood still for a cycle.
     pub behind: Vec<Party>,
+    /// Links, from a sender to a receiver, that were broken for longer than the history of a sample.
+    pub broken: Vec<(Party, Party)>,
 }
+
+/// Cycles for which a link was broken.
+const BROKEN_CYCLES: u64 = MAXIMUM_HISTORY as u64 / 4;
 
 /// The first place after the cycle in which the cluster came into step.
 const IN_STEP: Place = Place { cycle: 1, slot: 0 };
@@ -24,7 +29,11 @@ impl Start {
     /// Where the run begins.
     pub(crate) fn first(&self) -> Place {
         Place {
-            cycle: IN_STEP.cycle + u64::from(!self.behind.is_empty()),
+            cycle: match (self.behind.is_empty(), self.broken.is_empty()) {
+                (true, true) => IN_STEP.cycle,
+                (false, true) => IN_STEP.cycle + 1,
+                (_, false) => IN_STEP.cycle + BROKEN_CYCLES,
+            },
             slot: 0,
         }
     }
@@ -50,6 +59,12 @@ impl Start {
         let restarts = self.restarted.iter().flat_map(|&party| {
             [Action::Crash, Action::Restart].map(|action| fault(first, party, action))
         });
-        stops.chain(goes_on).chain(restarts).collect()
+        let broken = self.broken.iter().flat_map(|&(from, to)| {
+            [
+                fault(IN_STEP, from, Action::Cut { to }),
+                fault(first, from, Action::Heal { to }),
+            ]
+        });
+        stops.chain(goes_on).chain(restarts).chain(broken).collect()
     }
 }

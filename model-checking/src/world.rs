@@ -19,7 +19,7 @@ const PATIENCE_CYCLES: u64 = 200;
 pub struct Model {
     /// Where nothing has been done yet that the start asks for.
     origin: Simulation,
-    start: Start,
+    pub(crate) start: Start,
     pub(crate) parties: Vec<Party>,
     period: Duration,
     pub(crate) budget: Budget,

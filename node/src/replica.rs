@@ -157,21 +157,26 @@ impl Replica {
     }
 
     /// A station claims at `now` to hold the state of the cycle `stepped`. One that is no newer than the newest sample received here,
-    /// `silent_after` cycles after it, means that the remote I/O is silent there too.
+    /// `silent_after` cycles after it, means that the remote I/O is silent there too; if that station received samples itself, as it
+    /// recalls, no newer output came of its state.
     pub(crate) fn hear_claim(
         &mut self,
         station: StationId,
         stepped: Moment,
-        now: Moment,
-        silent_after: u32,
+        theirs: Option<&Recalled>,
+        (now, silent_after): (Moment, u32),
     ) {
         let Some((Some(heard), recalled)) = &mut self.recalled else {
             return;
         };
+        let theirs = theirs.filter(|theirs| theirs.witnessed);
         if stepped > *heard {
             recalled.accounted_for.remove(station);
-        } else if now >= heard.plus(u64::from(silent_after)) {
+        } else if let Some(theirs) = theirs
+            && now >= heard.plus(u64::from(silent_after))
+        {
             recalled.accounted_for.insert(station);
+            recalled.applied = recalled.applied.max(theirs.applied);
         }
     }
 

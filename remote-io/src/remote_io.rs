@@ -170,6 +170,11 @@ impl RemoteIo {
         remote_io
     }
 
+    /// Whether the operator has to choose the state that the program continues from.
+    pub fn asks_operator(&self) -> bool {
+        self.question.is_some()
+    }
+
     fn moment(&self) -> Moment {
         self.clock.moment().unwrap_or_default()
     }

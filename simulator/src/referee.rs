@@ -66,6 +66,8 @@ pub struct Referee {
     /// Samples for which the program may go on from a state that the operator has chosen.
     choice: u32,
     cold_starts: u64,
+    /// Whether outputs were applied since the last cold start.
+    applied: bool,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -156,7 +158,7 @@ impl Hash for Referee {
             .for_each(|state| state.hash(hasher));
         let newest = self.newest.map(|place| place - self.floor.min(place));
         (newest, &self.truth, &self.last_true).hash(hasher);
-        (self.held, self.blind, self.choice).hash(hasher);
+        (self.held, self.blind, self.choice, self.applied).hash(hasher);
     }
 }
 
@@ -185,6 +187,7 @@ impl Referee {
             seen: VecDeque::new(),
             choice: 0,
             cold_starts: 0,
+            applied: false,
         }
     }
 
@@ -235,10 +238,11 @@ impl Referee {
         Some(&self.states[place].bits)
     }
 
-    /// Whether a station that holds `lineage` could continue the program.
-    pub fn may_continue_from(&self, lineage: Lineage) -> bool {
-        self.place_of(lineage)
-            .is_some_and(|place| place >= self.floor)
+    /// Whether a cold start would lose the state of `lineage`: outputs were applied since the last one, and the program could
+    /// continue from that state.
+    pub fn would_be_lost(&self, lineage: Lineage) -> bool {
+        let place = self.place_of(lineage);
+        self.applied && place.is_some_and(|place| place >= self.floor)
     }
 
     /// h(x(t), u(t)) of the newest sample, with its cycle.
@@ -340,6 +344,7 @@ impl Referee {
         if before == Lineage::genesis(self.hash, born) {
             self.choice = 0;
             self.cold_starts += 1;
+            self.applied = false;
             self.last_true = None;
             let initial = Image::from_words(self.scan.register_count(), self.scan.initial());
             let initial = initial.expect("a circuit packs its initial state");
@@ -419,6 +424,7 @@ impl Referee {
                 let truth = truth.map(|(_, outputs)| outputs);
                 if truth == Some(driven) {
                     self.floor = self.newest.unwrap_or(self.floor);
+                    self.applied = true;
                     return Ok(());
                 }
                 Err(Violation::Wrong {

@@ -244,6 +244,14 @@ impl Simulation {
         &self.tallies
     }
 
+    /// Programs of which the operator has to choose the state that they continue from.
+    pub fn asking(&self) -> ProgramSet {
+        let programs = (0..).map(ProgramId).zip(&self.remote_ios);
+        let asking =
+            programs.filter(|(_, slot)| slot.running().is_some_and(RemoteIo::asks_operator));
+        asking.map(|(program, _)| program).collect()
+    }
+
     /// Everything that must never happen and did.
     pub fn violations(&self) -> &[Violation] {
         &self.violations
@@ -467,7 +475,7 @@ impl Simulation {
             let connected =
                 self.links.reaches(station, remote_io) && self.links.reaches(remote_io, station);
             let state = slot.running().and_then(|it| it.state_of(program));
-            connected && state.is_some_and(|(lineage, _)| referee.may_continue_from(lineage))
+            connected && state.is_some_and(|(lineage, _)| referee.would_be_lost(lineage))
         });
         holder.map(|(rank, _)| (*moment, StationId(rank)))
     }

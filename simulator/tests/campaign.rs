@@ -8,7 +8,7 @@ use std::time::Duration;
 use proptest::prelude::*;
 use understudy_remote_io::Event;
 use understudy_simulator::{Action, Disturbance, Fault, Network, Record, Simulation};
-use understudy_wire::{Mode, Party, ProgramId, ProgramSet, StateChoice, StationId};
+use understudy_wire::{Mode, Party, ProgramId, StateChoice, StationId};
 
 /// Something is done to a party, and undone later where it lasts.
 #[derive(Debug, Clone)]
@@ -95,20 +95,6 @@ fn accuses(record: &Record<'_>) -> bool {
     }
 }
 
-/// Whether a remote I/O asks the operator from which state its program continues.
-fn note_question(asking: &mut ProgramSet, party: Party, record: &Record<'_>) {
-    let (Party::RemoteIo(program), Record::RemoteIo(event)) = (party, record) else {
-        return;
-    };
-    match event {
-        Event::StateLost { asks: true, .. } => asking.insert(program),
-        Event::StateRecovered { .. } | Event::AdoptedLineage { .. } | Event::StartedCold { .. } => {
-            asking.remove(program)
-        }
-        _ => {}
-    }
-}
-
 fn check(mode: Mode, understudies: usize, troubles: &[Trouble], network: Network, seed: u64) {
     let quiet = Network {
         latency: network.latency,
@@ -136,19 +122,18 @@ fn check(mode: Mode, understudies: usize, troubles: &[Trouble], network: Network
         }
     }
     let mut accusations = 0;
-    let mut asking = ProgramSet::EMPTY;
-    let mut observe = |_, _, party, record: Record<'_>| {
-        accusations += u64::from(accuses(&record));
-        note_question(&mut asking, party, &record);
-    };
+    let mut observe = |_, _, _, record: Record<'_>| accusations += u64::from(accuses(&record));
     simulation
         .run(cycles, 2000, &mut observe)
         .expect("the cluster gets ready");
     assert_eq!(simulation.violations().first(), None);
     // All are back by now: all are synchronised again without help, unless an operator is asked.
     if let Err(error) = simulation.run(10, 200, &mut observe) {
-        assert!(!asking.is_empty(), "protection comes back: {error}");
-        for program in asking.iter() {
+        assert!(
+            !simulation.asking().is_empty(),
+            "protection comes back: {error}"
+        );
+        for program in simulation.asking().iter() {
             simulation.schedule(Fault {
                 at_cycle: 0,
                 phase: 0.0,
@@ -159,7 +144,7 @@ fn check(mode: Mode, understudies: usize, troubles: &[Trouble], network: Network
             });
         }
         simulation
-            .run(10, 200, &mut |_, _, _, _| {})
+            .run(10, 200, &mut observe)
             .expect("protection comes back after the operator's choice");
     }
     assert_eq!(simulation.violations().first(), None);

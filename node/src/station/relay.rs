@@ -12,7 +12,8 @@
 use std::sync::Arc;
 
 use understudy_wire::{
-    Body, Frame, Header, Holding, Party, ProgramSet, Relayed, Sample, StationId, Turn, encode,
+    Body, Frame, Header, Holding, Party, ProgramSet, Recalled, Relayed, Sample, StationId, Turn,
+    encode,
 };
 
 use super::Station;
@@ -50,13 +51,19 @@ impl Station {
     }
 
     /// What other stations claim to hold.
-    pub(super) fn hear_claims(&mut self, station: StationId, holdings: &[Holding]) {
+    pub(super) fn hear_claims(
+        &mut self,
+        station: StationId,
+        holdings: &[Holding],
+        recalled: &[Recalled],
+    ) {
         let now = self.clock.moment().unwrap_or_default();
         let silent_after = self.settings.agreement.flag_after;
         for holding in holdings {
             let mut replicas = self.replicas.iter_mut();
             if let Some(replica) = replicas.find(|replica| replica.id() == holding.program) {
-                replica.hear_claim(station, holding.stepped, now, silent_after);
+                let theirs = recalled.iter().find(|it| it.program == holding.program);
+                replica.hear_claim(station, holding.stepped, theirs, (now, silent_after));
             }
         }
     }

@@ -16,7 +16,7 @@ impl Station {
         }
         self.cycle.joiners.insert(station);
         self.is_told(&join.recalled);
-        self.hear_claims(station, &join.holdings);
+        self.hear_claims(station, &join.holdings, &join.recalled);
         self.cycle.lacked = self.cycle.lacked.or(join.lacks);
         for program in join.wants.iter() {
             if self.cycle.others_have.contains(program) && self.own().0 != program.0 {

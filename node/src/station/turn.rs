@@ -40,7 +40,7 @@ impl Station {
             }
         }
         self.is_told(&turn.recalled);
-        self.hear_claims(station, &turn.holdings);
+        self.hear_claims(station, &turn.holdings, &turn.recalled);
         self.compare(station, &turn.holdings);
     }
 
