@@ -21,6 +21,7 @@ Example:
   understudy model-check examples/press-cell/cluster.toml --faults 1 --cycles 2
   understudy model-check examples/press-cell/cluster.toml --restarted all --kinds loss,delay --cycles 12
   understudy model-check examples/press-cell/cluster.toml --behind robot --restarted press-io
+  understudy model-check examples/press-cell/cluster.toml --broken robot-io:understudy --kinds crash
 
 The very state machines of stations and remote I/Os run in virtual time, with a slot of the schedule as its grain. What breaks a
 property is written as a scenario that `understudy simulate` replays. States grow with the power of the faults: 2 faults in 2 cycles of the
@@ -43,6 +44,9 @@ pub(crate) struct Arguments {
     /// Who stood still for the cycle before
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     behind: Vec<String>,
+    /// Links that were broken until the run begins, for longer than the history of a sample: sender and receiver
+    #[arg(long, value_name = "FROM:TO", value_delimiter = ',')]
+    broken: Vec<String>,
     /// Which faults; all of them where none are named
     #[arg(long, value_name = "KIND", value_enum, value_delimiter = ',')]
     kinds: Vec<Kind>,
@@ -154,8 +158,21 @@ fn start(arguments: &Arguments, cluster: &Cluster) -> Result<Start, Answer> {
         found
     };
     let (restarted, behind) = (find(&arguments.restarted), find(&arguments.behind));
+    let mut broken = Vec::new();
+    for link in &arguments.broken {
+        let (from, to) = link.split_once(':').unwrap_or((link, ""));
+        let (senders, receivers) = (find(&[from.to_owned()]), find(&[to.to_owned()]));
+        for &from in &senders {
+            let others = receivers.iter().filter(|&&to| to != from);
+            broken.extend(others.map(|&to| (from, to)));
+        }
+    }
     if unknown.is_empty() {
-        return Ok(Start { restarted, behind });
+        return Ok(Start {
+            restarted,
+            behind,
+            broken,
+        });
     }
     let known: Vec<&str> = cluster
         .parties()

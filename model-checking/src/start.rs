@@ -19,8 +19,8 @@ pub struct Start {
     pub broken: Vec<(Party, Party)>,
 }
 
-/// Cycles for which a link was broken.
-const BROKEN_CYCLES: u64 = MAXIMUM_HISTORY as u64 / 4;
+/// Cycles for which a link was broken: a sample carries no longer history.
+const BROKEN_CYCLES: u64 = MAXIMUM_HISTORY as u64 + 2;
 
 /// The first place after the cycle in which the cluster came into step.
 const IN_STEP: Place = Place { cycle: 1, slot: 0 };

@@ -126,7 +126,9 @@ impl Observer for ExchangeMeter {
 
 #[cfg(test)]
 mod tests {
-    use understudy_wire::{ClusterHash, ConfigurationHash, Cycle, Epoch, Header, StationId, Turn};
+    use understudy_wire::{
+        ClusterHash, ConfigurationHash, Cycle, Epoch, Header, ProgramSet, StationId, Turn,
+    };
 
     use super::*;
 

@@ -48,18 +48,18 @@ fn check_broken(broken: &[(Party, Party)], states: usize) {
 
 #[test]
 fn the_understudy_did_not_receive_a_remote_io() {
-    check_broken(&[(remote_io(0), station(2))], 185_128);
+    check_broken(&[(remote_io(0), station(2))], 185_133);
 }
 
 #[test]
 fn the_understudy_received_neither_a_remote_io_nor_a_station() {
     let deaf = [remote_io(0), station(0), station(1)];
-    check_broken(&deaf.map(|from| (from, station(2))), 229_865);
+    check_broken(&deaf.map(|from| (from, station(2))), 229_878);
 }
 
 #[test]
 fn a_controller_did_not_receive_its_remote_io() {
-    check_broken(&[(remote_io(0), station(0))], 185_467);
+    check_broken(&[(remote_io(0), station(0))], 185_472);
 }
 
 /// Anything once, in so many cycles.
