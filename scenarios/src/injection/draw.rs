@@ -10,13 +10,16 @@ use std::time::Duration;
 use rand::RngExt;
 use rand_pcg::Pcg64;
 use understudy_simulator::{Action, Disturbance, Fault, Network};
-use understudy_wire::{Party, ProgramId, Schedule};
+use understudy_wire::{Party, ProgramId, Schedule, StationId};
 
 use super::faultload::{Faultload, Injection};
 use super::kind::{Kind, Role};
 
 /// Injections of one run, at most.
 const MAXIMUM_INJECTIONS: u32 = 6;
+
+/// Cycles for which a link is broken, at most, where a station crashes after it.
+const LONGEST_OUTAGE: f64 = 10_000.0;
 
 /// Restarts of one storm, at most.
 const MAXIMUM_RESTARTS: u64 = 6;
@@ -142,6 +145,10 @@ impl Draw<'_> {
                 let to = self.other(party)?;
                 lasting(Action::Cut { to }, Action::Heal { to })
             }
+            Kind::BrokenLink => {
+                let to = self.other(party)?;
+                self.broken_link(party, to, phase, from)
+            }
             Kind::Cut => {
                 let peer = self.other(party)?;
                 cuts(&[peer], party, phase, from, to)
@@ -181,6 +188,33 @@ impl Draw<'_> {
             Kind::Loss | Kind::Duplication | Kind::Jitter | Kind::Corruption => return None,
         };
         Some(Injection { kind, role, steps })
+    }
+
+    /// From `from` on `to` does not receive `party`, then a station crashes, and the link is whole again about that time: short
+    /// outages are as likely as long ones.
+    fn broken_link(&mut self, party: Party, to: Party, phase: f64, from: u64) -> Vec<Fault> {
+        let last = self.cycles.end - 1;
+        let length = LONGEST_OUTAGE.powf(self.random.random_range(0.0..1.0)) as u64;
+        let crashes = (from + length).min(last);
+        let heals = (from + (length + self.random.random_range(0..6)).saturating_sub(3)).min(last);
+        let restarts = (crashes + self.random.random_range(1..40)).min(last);
+        let stations = self.schedule.stations() as u8;
+        let station = Party::Station(StationId(self.random.random_range(0..stations)));
+        let mut steps: Vec<Fault> = [
+            (from, party, Action::Cut { to }),
+            (crashes, station, Action::Crash),
+            (heals, party, Action::Heal { to }),
+            (restarts, station, Action::Restart),
+        ]
+        .map(|(at_cycle, party, action)| Fault {
+            at_cycle,
+            phase,
+            party,
+            action,
+        })
+        .to_vec();
+        steps.sort_by_key(|step| step.at_cycle);
+        steps
     }
 
     fn flip(&mut self) -> (u16, u16) {

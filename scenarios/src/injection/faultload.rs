@@ -29,14 +29,18 @@ impl Injection {
 
     /// Whether two injections would both decide whether the process of one party runs.
     pub(super) fn collides_with(&self, other: &Self) -> bool {
-        let runs = |injection: &Self| {
-            let step = injection.steps.first()?;
-            let decides = matches!(step.action, Action::Crash | Action::Stop);
-            decides.then_some(step.party)
+        let decides = |step: &&Fault| matches!(step.action, Action::Crash | Action::Stop);
+        let mut decided = self.steps.iter().filter(decides);
+        let by_other = |party| {
+            other
+                .steps
+                .iter()
+                .filter(decides)
+                .any(|it| it.party == party)
         };
         let (own, others) = (self.cycles(), other.cycles());
         let meet = own.start < others.end && others.start < own.end;
-        meet && runs(self).is_some_and(|party| runs(other) == Some(party))
+        meet && decided.any(|step| by_other(step.party))
     }
 }
 

@@ -24,6 +24,8 @@ pub enum Kind {
     Misconfiguration,
     /// One party does not hear another for a while.
     OneWayCut,
+    /// The link from one party to another is broken for long, then a station crashes.
+    BrokenLink,
     /// Two parties do not hear each other for a while.
     Cut,
     /// What one party sends comes late to another for a while.
@@ -54,7 +56,7 @@ pub enum Kind {
 
 impl Kind {
     /// In the order in which they are explained.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 21] = [
         Self::Crash,
         Self::RestartStorm,
         Self::ClockJump,
@@ -62,6 +64,7 @@ impl Kind {
         Self::Slow,
         Self::Misconfiguration,
         Self::OneWayCut,
+        Self::BrokenLink,
         Self::Cut,
         Self::LateLink,
         Self::Isolation,
@@ -87,6 +90,7 @@ impl Kind {
             Self::Slow => "slow",
             Self::Misconfiguration => "misconfiguration",
             Self::OneWayCut => "one-way-cut",
+            Self::BrokenLink => "broken-link",
             Self::Cut => "cut",
             Self::LateLink => "late-link",
             Self::Isolation => "isolation",
