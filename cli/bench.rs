@@ -33,7 +33,7 @@ use crate::scan;
 #[command(after_help = "\
 Example:
   understudy bench exchange --cycles 2000
-  understudy bench kills --count 100 --link udp
+  understudy bench kills --count 100
   understudy bench failover --figure failover.svg
   understudy bench scan examples/press-cell/robot.ladder
   understudy bench join --trials 50 --loss 10%")]

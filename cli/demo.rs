@@ -18,7 +18,8 @@ use crate::watch::{BesideArguments, Page};
 #[command(after_help = "\
 Example:
   understudy demo
-  understudy demo --period 5ms --link udp
+  understudy demo --period 5ms
+  understudy demo --link zenoh
 
 Station 1 is killed at cycle 200 and started again at 327, station 2 at 400 and 527, station 3 at 600 and 727 (Table II).
 Exit status 0 only when every plant stayed functional and nothing wrong was applied.")]

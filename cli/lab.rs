@@ -23,7 +23,7 @@ use crate::watch::{BesideArguments, Page};
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  understudy lab examples/press-cell/cluster.toml --scenario scenarios/kill-each.toml --link udp
+  understudy lab examples/press-cell/cluster.toml --scenario scenarios/kill-each.toml --link zenoh
   understudy lab examples/press-cell/cluster.toml --hosts netns --loss 1%
   understudy lab examples/press-cell/cluster.toml --watch")]
 pub(crate) struct Arguments {

@@ -28,7 +28,7 @@ const LONGEST_LIMIT: Duration = Duration::from_secs(365 * 24 * 3600);
 #[command(after_help = "\
 Example:
   understudy measure examples/press-cell/cluster.toml --mtbf 25h --mttr 30min --failures 200 --seed 1
-  understudy measure examples/press-cell/cluster.toml --real --mtbf 3s --mttr 200ms --failures 5 --link udp
+  understudy measure examples/press-cell/cluster.toml --real --mtbf 3s --mttr 200ms --failures 5
 
 The protocol is the real one and its own time is not accelerated: what it needs to detect a failure and to take over states is
 measured, added to the repair in the model, and the bias of it is printed. The system fails where a remote I/O comes to its

@@ -26,10 +26,10 @@ pub(crate) struct OverrideArguments {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum LinkArgument {
-    /// Zenoh
-    Zenoh,
     /// Plain UDP
     Udp,
+    /// Zenoh
+    Zenoh,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -53,8 +53,8 @@ impl OverrideArguments {
         Overrides {
             period: self.period,
             link: self.link.map(|link| match link {
-                LinkArgument::Zenoh => Link::Zenoh,
                 LinkArgument::Udp => Link::Udp,
+                LinkArgument::Zenoh => Link::Zenoh,
             }),
             security: self.security.map(|security| match security {
                 SecurityArgument::Keys => Security::Keys,
@@ -120,8 +120,8 @@ impl OverrideArguments {
 /// What carries the frames of a cluster.
 pub(crate) fn link_kind(cluster: &Cluster) -> LinkKind {
     match cluster.link() {
-        Link::Zenoh => LinkKind::Zenoh,
         Link::Udp => LinkKind::Udp,
+        Link::Zenoh => LinkKind::Zenoh,
     }
 }
 

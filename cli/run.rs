@@ -143,8 +143,13 @@ fn text(summary: &Summary, directory: Option<&Path>) -> String {
         let _ = writeln!(text, "repeat it with: {}", summary.circumstances.repeat);
     }
     if may_have_been_late(summary) {
-        text.push_str(
-            "nothing wrong was driven; a machine that is busy leaves cycles late, and a longer --period, such as 50ms, or --link udp gives it more room\n",
+        let lighter = match summary.circumstances.link.as_str() {
+            "udp" => "",
+            _ => ", or --link udp,",
+        };
+        let _ = writeln!(
+            text,
+            "nothing wrong was driven; a machine that is busy leaves cycles late, and a longer --period, such as 50ms{lighter} gives it more room"
         );
     }
     if let Some(directory) = directory {

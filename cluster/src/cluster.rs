@@ -18,11 +18,11 @@ use understudy_wire::{Agreement, Epoch, Image, Party, ProgramHash, ProgramId, St
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Link {
-    /// Zenoh.
-    #[default]
-    Zenoh,
     /// Plain UDP.
+    #[default]
     Udp,
+    /// Zenoh.
+    Zenoh,
 }
 
 /// Who may speak.

@@ -90,7 +90,7 @@ const fn count(least: u32, most: u32, default: u32) -> Kind {
 const MANY_CYCLES: u32 = 100_000;
 
 pub(crate) const MODES: [&str; 2] = ["full", "paper"];
-pub(crate) const LINKS: [&str; 2] = ["zenoh", "udp"];
+pub(crate) const LINKS: [&str; 2] = ["udp", "zenoh"];
 pub(crate) const SECURITIES: [&str; 2] = ["keys", "off"];
 pub(crate) const RELEASES: [&str; 2] = ["automatic", "operator"];
 pub(crate) const VALUE_FAULTS: [&str; 3] = ["hold", "alarm", "fail-safe"];

@@ -187,7 +187,7 @@ fn build(
     check_understudies(understudy_count, mode, &cluster.span, diagnostics);
     let link = overrides
         .link
-        .unwrap_or([Link::Zenoh, Link::Udp][cluster.link]);
+        .unwrap_or([Link::Udp, Link::Zenoh][cluster.link]);
 
     let controllers: Option<Vec<Controller>> = members.into_iter().map(controller).collect();
     let (controllers, name) = (controllers?, cluster.name.as_ref()?.value.clone());

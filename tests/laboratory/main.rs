@@ -152,13 +152,12 @@ fn a_remote_io_that_is_started_again_adopts_its_history() {
 fn the_demo_at_a_shorter_length() {
     let _one = one_at_a_time();
     let out = empty_folder("demo");
-    let arguments = [
-        "demo", "--cycles", "250", "--link", "udp", "--period", PERIOD, "--out",
-    ];
+    let arguments = ["demo", "--cycles", "250", "--period", PERIOD, "--out"];
     let (status, document, errors) =
         answer(&[&arguments[..], &[out.to_str().expect("text")]].concat());
     no_orphan(&out);
     let summary = &document["result"]["summary"];
+    assert_eq!(summary["circumstances"]["link"], "udp", "{document:#}");
     assert_eq!(summary["violation_count"], 0, "{document:#}\n{errors}");
     assert_met(summary);
     assert_eq!(summary["passed"], status == 0, "{document:#}\n{errors}");

@@ -183,9 +183,6 @@ fn systemd_starts_watches_and_restarts_the_parties() {
         fs::create_dir(folder.join(part)).expect("it is ours");
     }
     let cluster = addressed_cell(&folder.join("cell"));
-    let udp = fs::read_to_string(&cluster).expect("it is ours");
-    let udp = udp.replace("[cluster]", "[cluster]\nlink = \"udp\"");
-    fs::write(&cluster, udp).expect("it is ours");
     let keys = folder.join("keys");
     let made = answer(&["keys", "init", text(&cluster), "--folder", text(&keys)]);
     assert_eq!(made.0, 0, "{:#}", made.1);

@@ -52,7 +52,7 @@ fn what_does_not_matter_is_not_in_the_hash() {
             "ladder = \"robot.ladder\"",
             "ladder = \"robot.ladder\"\naddress = \"10.0.0.1:7000\"",
         )],
-        &[(FILE, "period", "link = \"udp\"\nperiod")],
+        &[(FILE, "period", "link = \"zenoh\"\nperiod")],
         &[(FILE, "[[understudy]]\nname = \"understudy\"", "")],
         &[(
             "robot.ladder",
@@ -157,12 +157,12 @@ fn the_command_line_replaces_what_the_file_says() {
     let period = Some(Duration::from_millis(20));
     let loaded = replaced(Overrides {
         period,
-        link: Some(Link::Udp),
+        link: Some(Link::Zenoh),
         security: Some(Security::Off),
         mode: None,
     });
     let loaded = loaded.cluster.expect("it is in bounds");
-    assert_eq!(loaded.link(), Link::Udp);
+    assert_eq!(loaded.link(), Link::Zenoh);
     assert_eq!(loaded.security(), Security::Off);
     let written = hash(&[(FILE, "10ms", "20ms")]);
     assert_eq!(loaded.agreement().configuration, written);
