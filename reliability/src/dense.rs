@@ -8,6 +8,33 @@ use crate::poisson_weights::PoissonWeights;
 /// States of a chain that is handled this way, at most.
 pub(crate) const MAXIMUM_DENSE: usize = 300;
 
+/// What may be left out of a sum, relative to its least term.
+const LEFT_OUT: f64 = 1e-20;
+
+/// Decides when a series of probabilities is summed: what is to come must be small beside each of the sums, and none may be left at 0
+/// that later terms reach.
+#[derive(Debug, Default)]
+pub(crate) struct Series {
+    reached: usize,
+}
+
+impl Series {
+    /// Whether the terms that follow, together at most `rest` each, can be left out of `sums`.
+    pub(crate) fn is_summed(&mut self, rest: f64, sums: &[f64]) -> bool {
+        if rest > LEFT_OUT {
+            return false;
+        }
+        let positive = sums.iter().filter(|sum| **sum > 0.0);
+        let (reached, least) = positive.fold((0, 1.0_f64), |(reached, least), sum| {
+            (reached + 1, least.min(*sum))
+        });
+        // Each step reaches further, until one reaches nothing new.
+        let all = reached == self.reached;
+        self.reached = reached;
+        all && rest <= least * LEFT_OUT
+    }
+}
+
 /// P(1), P(2), P(4), ... in units of time.
 #[derive(Debug)]
 pub(crate) struct Squares {
@@ -20,11 +47,13 @@ impl Squares {
         let weights = PoissonWeights::new(1.0);
         let mut power = Dense::identity(step.size);
         let mut sum = Dense::zero(step.size);
+        let mut series = Series::default();
         for count in 0..=weights.last() {
             sum.add(weights.at(count), &power);
-            if count < weights.last() {
-                power = step.times(&power);
+            if series.is_summed(weights.past(count), &sum.high) {
+                break;
             }
+            power = step.times(&power);
         }
         sum.balance();
         Self { squares: vec![sum] }

@@ -13,6 +13,7 @@ const CUT: f64 = 1e-322;
 /// Weights of the counts `first`, `first + 1`, ... in a Poisson law.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PoissonWeights {
+    mean: f64,
     /// The least count that is kept.
     pub(crate) first: usize,
     /// Their probabilities; they sum to one.
@@ -24,6 +25,7 @@ impl PoissonWeights {
     pub(crate) fn new(mean: f64) -> Self {
         if mean <= 0.0 {
             return Self {
+                mean: 0.0,
                 first: 0,
                 weights: vec![Extended::ONE],
             };
@@ -57,6 +59,7 @@ impl PoissonWeights {
         let total = sum(&below) + sum(&above) + Extended::ONE;
         let weights = below.into_iter().rev().chain([Extended::ONE]).chain(above);
         Self {
+            mean,
             first,
             weights: weights.map(|weight| weight / total).collect(),
         }
@@ -65,6 +68,16 @@ impl PoissonWeights {
     /// The largest count that is kept.
     pub(crate) fn last(&self) -> usize {
         self.first + self.weights.len() - 1
+    }
+
+    /// At least the sum of the weights past a count.
+    pub(crate) fn past(&self, count: usize) -> f64 {
+        let ratio = self.mean / (count + 2) as f64;
+        if ratio < 1.0 {
+            self.at(count + 1).high / (1.0 - ratio)
+        } else {
+            1.0
+        }
     }
 
     /// The weight of a count.
@@ -97,6 +110,10 @@ mod tests {
             );
         }
         assert_eq!(weights.at(weights.last() + 1), Extended::ZERO);
+        let middle = weights.first + weights.weights.len() / 2;
+        let past = weights.weights[middle + 1 - weights.first..].iter();
+        let past = past.copied().sum::<Extended>().get();
+        assert!(past <= weights.past(middle) * (1.0 + 1e-12), "{mean}");
     }
 
     #[test]

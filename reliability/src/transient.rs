@@ -5,7 +5,7 @@
 //! exactly, and probabilities are [`Extended`]: twelve digits are left for both R(t) and 1 - R(t) down to [`MINIMUM_PROBABILITY`].
 
 use crate::chain::Chain;
-use crate::dense::{Dense, MAXIMUM_DENSE, Squares};
+use crate::dense::{Dense, MAXIMUM_DENSE, Series, Squares};
 use crate::error::ReliabilityError;
 use crate::extended::Extended;
 use crate::poisson_weights::PoissonWeights;
@@ -20,8 +20,8 @@ const MAXIMUM_UNITS: f64 = 1e30;
 /// Steps taken at once: past it, P(t) is computed in several strides, which bounds the weights in memory.
 const STRIDE_STEPS: f64 = 1e7;
 
-/// Terms of the Poisson law of mean 1 that are not below the least number.
-const TERMS: f64 = 180.0;
+/// Terms of a series with a mean of 1, mostly.
+const TERMS: f64 = 40.0;
 
 /// What becomes of the chain by a time.
 #[derive(Debug, Clone, PartialEq)]
@@ -236,7 +236,7 @@ impl Steps {
         let strides = hours.iter().zip(befores);
         let steps = strides.map(|(time, before)| {
             let mean = self.fastest * (time - before);
-            mean + 40.0 * mean.sqrt() + TERMS
+            mean + 12.0 * mean.sqrt() + TERMS
         });
         steps.sum()
     }
@@ -258,24 +258,28 @@ impl Steps {
         let weights = PoissonWeights::new(mean);
         let mut next = vec![Extended::ZERO; state.len()];
         let mut mixed = vec![Extended::ZERO; state.len()];
+        let mut series = Series::default();
+        let mut sums = vec![0.0; state.len()];
         for count in 0..=weights.last() {
             let weight = weights.at(count);
             if weight.high > 0.0 {
-                for (mixed, state) in mixed.iter_mut().zip(&state) {
+                for ((mixed, state), sum) in mixed.iter_mut().zip(&state).zip(&mut sums) {
                     *mixed += weight * *state;
+                    *sum = mixed.high;
                 }
             }
-            if count < weights.last() {
-                for (target, next) in next.iter_mut().enumerate() {
-                    let row = self.rows[target]..self.rows[target + 1];
-                    let arriving = self.sources[row.clone()].iter().zip(&self.shares[row]);
-                    *next = self.stays[target] * state[target]
-                        + arriving
-                            .map(|(source, share)| state[*source as usize] * *share)
-                            .sum::<Extended>();
-                }
-                std::mem::swap(&mut state, &mut next);
+            if series.is_summed(weights.past(count), &sums) {
+                break;
             }
+            for (target, next) in next.iter_mut().enumerate() {
+                let row = self.rows[target]..self.rows[target + 1];
+                let arriving = self.sources[row.clone()].iter().zip(&self.shares[row]);
+                *next = self.stays[target] * state[target]
+                    + arriving
+                        .map(|(source, share)| state[*source as usize] * *share)
+                        .sum::<Extended>();
+            }
+            std::mem::swap(&mut state, &mut next);
         }
         mixed
     }
