@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 use understudy_diagnostic::Report;
+use understudy_scenarios::named_file;
 use understudy_supervisor::{
     Automaton, Model, draw_automaton_svg, draw_dot, read_ads, read_model, write_ads, write_model,
 };
@@ -118,9 +119,7 @@ pub(crate) fn is_model(path: &Path) -> bool {
 pub(crate) fn model(path: &Path) -> Result<Sources<Model>, Answer> {
     let text = files::text_of(Kind::Model, path)?;
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-    let read = read_model(&text, |file| {
-        std::fs::read_to_string(folder.join(file)).map_err(|error| error.to_string())
-    });
+    let read = read_model(&text, |file| named_file(&folder, file));
     let name = path.display().to_string();
     let mut reports = vec![Report {
         name,

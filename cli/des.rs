@@ -6,14 +6,14 @@ use clap::{Args, Subcommand};
 use serde_json::{Value, json};
 use understudy_supervisor::ladder::avalanche_events;
 use understudy_supervisor::operations::{
-    Difference, allevents, condat, isomorph, lift, meet, minstate, mutex, nonconflict, project,
-    reachable, selfloop, supcon, supreduce, sync, trim,
+    ControlData, Difference, allevents, condat, isomorph, lift, meet, minstate, mutex, nonconflict,
+    project, reachable, selfloop, supcon, supreduce, sync, trim,
 };
 use understudy_supervisor::{
     Automaton, AutomatonError, Bounds, Event, Label, Model, State, TooLarge, synthesis_findings,
 };
 
-use crate::answer::{Answer, Failure, Status};
+use crate::answer::{Answer, Status};
 use crate::automata::{self, Sources, description, summary};
 
 /// Work with automata: the operations of TCT, under its names and with its meanings
@@ -206,7 +206,15 @@ impl Operation {
             Self::Trim { .. } => Outcome::of(trim(parts[0])),
             Self::Supcon { lift, .. } => supervisor(parts[0], parts[1], *lift, bounds)?,
             Self::Condat { .. } => Outcome::Answer(control_data(parts[0], parts[1], bounds)?),
-            Self::Supreduce { .. } => Outcome::of(supreduce(parts[0], parts[1], bounds)?),
+            Self::Supreduce { .. } => {
+                let data = condat(parts[0], parts[1], bounds)?;
+                let answer = refusing(Answer::done("", json!({})), parts[0], parts[1], &data);
+                if answer.failures.is_empty() {
+                    Outcome::of(supreduce(parts[0], parts[1], bounds)?)
+                } else {
+                    Outcome::Answer(answer)
+                }
+            }
             Self::Minstate { .. } => Outcome::of(minstate(parts[0])),
             Self::Isomorph { .. } => Outcome::Answer(compare(parts[0], parts[1])),
             Self::Allevents { .. } => Outcome::of(allevents(parts[0].alphabet())),
@@ -332,7 +340,7 @@ fn supervisor(
     let answer = Answer::done(
         lines.collect::<String>(),
         json!({
-            "product_states": result.product_states,
+            "explored_states": result.explored_states,
             "findings": findings.iter().map(|finding| json!({
                 "code": finding.code,
                 "severity": finding.severity,
@@ -373,19 +381,30 @@ fn control_data(
         "pairs": data.pairs(),
         "table": table.collect::<serde_json::Map<_, _>>(),
     });
-    let mut answer = Answer::done(text, result);
+    Ok(refusing(
+        Answer::done(text, result),
+        plant,
+        supervisor,
+        &data,
+    ))
+}
+
+/// Adds where a supervisor forbids what it cannot.
+fn refusing(
+    mut answer: Answer,
+    plant: &Automaton,
+    supervisor: &Automaton,
+    data: &ControlData,
+) -> Answer {
     for disabled in &data.uncontrollable {
-        answer.status = Status::Failed;
-        answer.failures.push(Failure {
-            code: "U0846".to_owned(),
-            message: format!(
-                "in state {} the supervisor forbids {}, which is uncontrollable: it is none for this plant",
-                supervisor.state_name(disabled.state),
-                plant.alphabet().name(disabled.event)
-            ),
-        });
+        let message = format!(
+            "in state {} the supervisor forbids {}, which is uncontrollable: it is no supervisor of this plant",
+            supervisor.state_name(disabled.state),
+            plant.alphabet().name(disabled.event)
+        );
+        answer = answer.and_failure(Status::Failed, "U0846", message);
     }
-    Ok(answer)
+    answer
 }
 
 fn compare(left: &Automaton, right: &Automaton) -> Answer {

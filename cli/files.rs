@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use understudy_cluster::{Cluster, Loaded, Overrides, TemplateFile};
 use understudy_diagnostic::Report;
 use understudy_diagnostic::spelling::nearest;
-use understudy_scenarios::{Parties, Scenario, read as read_scenario};
+use understudy_scenarios::{Parties, Scenario, named_file, read as read_scenario};
 
 use crate::answer::{Answer, Status};
 use crate::kind::{self, Kind};
@@ -83,7 +83,7 @@ pub(crate) fn read_cluster(path: &Path, text: &str, overrides: Overrides) -> Loa
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
     let mut loaded =
         understudy_cluster::read_with(&path.display().to_string(), text, overrides, &mut |name| {
-            fs::read_to_string(folder.join(name)).map_err(|error| error.to_string())
+            named_file(&folder, name)
         });
     // Ladders are shown as a person would open them from here.
     for report in loaded.reports.iter_mut().skip(1) {

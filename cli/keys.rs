@@ -106,7 +106,8 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
                 Authority::init(&folder.folder, &cluster, now).map_err(|error| failed(&[error]))?;
             let operators = [DEFAULT_OPERATOR.to_owned()];
             let issued = authority.issue(&cluster, &names, operators[..].into(), days.days, now);
-            issued.map_err(|errors| failed(&errors))
+            let issued = issued.map_err(|errors| failed(&errors))?;
+            Ok((issued, without_address(&cluster, &names)))
         }),
         What::Issue {
             cluster,
@@ -122,7 +123,8 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
                 address: *address,
             };
             let issued = authority.issue(&cluster, names, operators, days.days, now);
-            issued.map_err(|errors| failed(&errors))
+            let issued = issued.map_err(|errors| failed(&errors))?;
+            Ok((issued, without_address(&cluster, names)))
         }),
         What::List { folder } => {
             return match open(folder) {
@@ -132,11 +134,12 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         }
         What::Revoke { names, folder } => open(folder).and_then(|mut authority| {
             let revoked = authority.revoke(names, now);
-            revoked.map_err(|errors| failed(&errors))
+            let revoked = revoked.map_err(|errors| failed(&errors))?;
+            Ok((revoked, Vec::new()))
         }),
     };
     match done {
-        Ok(issued) => changed(&issued, now),
+        Ok((issued, without_address)) => changed(&issued, without_address, now),
         Err(answer) => answer,
     }
 }
@@ -186,6 +189,8 @@ struct List<'a> {
     holders: Vec<Shown<'a>>,
     /// Those that changed.
     folders: Vec<String>,
+    /// Members whose certificates are for 127.0.0.1.
+    without_address: Vec<String>,
 }
 
 fn shown(holder: &Holder, now: Date) -> Shown<'_> {
@@ -238,14 +243,32 @@ fn listed(holders: &[Holder], now: Date) -> Answer {
     let list = List {
         holders: holders.iter().map(|holder| shown(holder, now)).collect(),
         folders: Vec::new(),
+        without_address: Vec::new(),
     };
     Answer::done(table(holders, now), list)
 }
 
-fn changed(issued: &Issued, now: Date) -> Answer {
+/// Members that the cluster file gives no address, and whose certificates are therefore for 127.0.0.1.
+fn without_address(cluster: &Cluster, names: &[String]) -> Vec<String> {
+    let lacks = |name: &&String| {
+        let member = cluster.party(name);
+        member.is_some_and(|member| cluster.address(member).is_none())
+    };
+    names.iter().filter(lacks).cloned().collect()
+}
+
+fn changed(issued: &Issued, without_address: Vec<String>, now: Date) -> Answer {
     let folders = issued.folders.iter();
     let folders: Vec<String> = folders.map(|folder| folder.display().to_string()).collect();
-    let mut text = table(&issued.holders, now);
+    let mut text = String::new();
+    if !without_address.is_empty() {
+        let _ = writeln!(
+            text,
+            "warning[U0915]: no address in the cluster file for {}; their certificates are for 127.0.0.1 and are refused on other machines: give each an `address`, then `understudy keys issue`",
+            without_address.join(", ")
+        );
+    }
+    text.push_str(&table(&issued.holders, now));
     text.push_str(
         "\nthese folders changed; copy each to the machine of its party, and to nobody else:\n",
     );
@@ -259,6 +282,7 @@ fn changed(issued: &Issued, now: Date) -> Answer {
             .map(|holder| shown(holder, now))
             .collect(),
         folders,
+        without_address,
     };
     Answer::done(text, list)
 }

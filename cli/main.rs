@@ -60,9 +60,10 @@ mod why;
 
 use std::process::ExitCode;
 
+use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use answer::Answer;
+use answer::{Answer, Status};
 use console::Console;
 
 /// A redundant array of independent controllers: RAID for PLCs.
@@ -223,11 +224,29 @@ impl Command {
 }
 
 fn main() -> ExitCode {
-    let matches = help::flowing(Arguments::command()).get_matches();
-    let Arguments { json, command } =
-        Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    let matches = help::flowing(Arguments::command()).try_get_matches();
+    let parsed = matches.and_then(|matches| Arguments::from_arg_matches(&matches));
+    let Arguments { json, command } = match parsed {
+        Ok(arguments) => arguments,
+        Err(error) => return misused(&error),
+    };
     let mut console = Console::new(json);
     let name = command.name();
     let answer = command.run(&mut console);
     console.finish(name, &answer)
+}
+
+/// The answer to wrong arguments: a code like that of any other failure, and a document where one was asked for. Help and the
+/// version are no failures.
+fn misused(error: &clap::Error) -> ExitCode {
+    let json = std::env::args_os().any(|argument| argument == "--json");
+    let is_help = error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand;
+    if !error.use_stderr() || (is_help && !json) {
+        error.exit();
+    }
+    let text = error.render().to_string();
+    let message = text.strip_prefix("error: ").unwrap_or(&text).trim_end();
+    let command = std::env::args().nth(1).unwrap_or_default();
+    let answer = Answer::failed(Status::BadInput, "U0600", message);
+    Console::new(json).finish(&command, &answer)
 }

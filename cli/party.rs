@@ -15,7 +15,7 @@ use understudy_bus::{
     NoObserver, PartySettings, Peer, Segments, SimulatedField, ZENOH_RUNTIME, hold_back_signals,
     run_party,
 };
-use understudy_cluster::{Cluster, Security};
+use understudy_cluster::{Cluster, Security, why_unreachable};
 use understudy_keys::{Date, PartyKeys, RevocationWatch};
 use understudy_node::Station;
 use understudy_plant::PlantMachine;
@@ -310,10 +310,18 @@ pub(crate) fn peers(cluster: &Cluster, list: Option<&Path>) -> Result<Vec<Peer>,
 }
 
 fn listed(path: &Path) -> Result<Vec<Peer>, Answer> {
-    serde_json::from_str(&files::text(path)?).map_err(|error| {
+    let refused = |error: String| {
         let message = format!("{} is no list of endpoints: {error}", path.display());
         Answer::failed(Status::BadInput, "U0607", message)
-    })
+    };
+    let peers: Vec<Peer> =
+        serde_json::from_str(&files::text(path)?).map_err(|error| refused(error.to_string()))?;
+    for Peer { name, address, .. } in &peers {
+        if let Some(why) = why_unreachable(*address) {
+            return Err(refused(format!("{name} has the address {address}: {why}")));
+        }
+    }
+    Ok(peers)
 }
 
 fn addressed(cluster: &Cluster) -> Result<Vec<Peer>, Answer> {

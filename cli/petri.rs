@@ -19,7 +19,7 @@ use crate::answer::{Answer, Status};
 use crate::automata::{self, Sources, description, summary};
 use crate::files;
 use crate::kind::Kind;
-use crate::supervisor_to_ladder::{listed, notes};
+use crate::supervisor_to_ladder::{listed, notes, withheld};
 
 /// Work with automation Petri nets: their bounds, automata and drawings, and proved ladders of nets with supervisors
 #[derive(Debug, Args)]
@@ -317,7 +317,7 @@ fn proved(
     found: &Result<Vec<Finding>, String>,
     output: Option<&Path>,
 ) -> Answer {
-    let result = json!({
+    let mut result = json!({
         "rungs": ladder.lines().filter(|line| line.starts_with("rung")).count(),
         "proof": {
             "states": proof.states,
@@ -326,8 +326,15 @@ fn proved(
             "never_fired": proof.never_fired,
         },
         "findings": found.as_ref().ok().map(|found| listed(found)),
-        "ladder": ladder,
     });
+    if let Some(answer) = found
+        .as_ref()
+        .ok()
+        .and_then(|found| withheld(found, &result))
+    {
+        return answer;
+    }
+    result["ladder"] = json!(ladder);
     let Some(path) = output else {
         return Answer::done(ladder, result);
     };
@@ -345,7 +352,6 @@ fn proved(
     if !proof.never_fired.is_empty() {
         text.push_str(&format!("; never fired: {}", proof.never_fired.join(" ")));
     }
-    let mut result = result;
     said(&mut text, &mut result, path);
     Answer::done(text, result)
 }

@@ -8,6 +8,7 @@ use understudy_diagnostic::{Diagnostic, Report};
 use understudy_ladder::print;
 use understudy_reconfiguration::project::{self, Loaded, Project};
 use understudy_reconfiguration::{Failure, Outcome, analyse};
+use understudy_scenarios::named_file;
 use understudy_supervisor::{draw_automaton_svg, draw_dot};
 
 use crate::answer::{Answer, Status};
@@ -95,7 +96,7 @@ fn read(path: &Path) -> Result<(Project, Vec<Report>), Answer> {
 pub(crate) fn read_project(path: &Path, text: &str) -> Loaded {
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
     let mut loaded = project::read(&path.display().to_string(), text, &mut |name| {
-        std::fs::read_to_string(folder.join(name)).map_err(|error| error.to_string())
+        named_file(&folder, name)
     });
     for report in loaded.reports.iter_mut().skip(1) {
         report.name = folder.join(&report.name).display().to_string();

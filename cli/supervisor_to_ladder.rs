@@ -26,8 +26,8 @@ Example:
       --io examples/motivating-example/map.toml --mode manual -o motivating.ladder
 
 The supervisor is a file of TCT (.ADS) or a model (.toml) with supervisors. A reduced supervisor does not know the state of
-its plant; give it its plants with --plant. Findings about the supervisor are warnings, but for those that no ladder can
-mend. The ladder is written only when it is proved.")]
+its plant; give it its plants with --plant. Findings about the supervisor are warnings, except those that no ladder can fix:
+these are errors. The ladder is written only when it is proved and no finding is an error.")]
 pub(crate) struct Arguments {
     /// The supervisor
     #[arg(value_name = "SUPERVISOR")]
@@ -238,6 +238,22 @@ pub(crate) fn listed(found: &[Finding]) -> Value {
     listed.collect()
 }
 
+/// The answer where findings are errors: each is a failure, and no ladder is printed or written.
+pub(crate) fn withheld(found: &[Finding], result: &Value) -> Option<Answer> {
+    let (errors, warnings): (Vec<&Finding>, Vec<&Finding>) = found
+        .iter()
+        .partition(|finding| finding.severity == FindingSeverity::Error);
+    if errors.is_empty() {
+        return None;
+    }
+    let warnings: Vec<Finding> = warnings.into_iter().cloned().collect();
+    let answer = Answer::done(notes(&warnings), result);
+    Some(errors.into_iter().fold(answer, |answer, finding| {
+        let message = format!("{}; the ladder is not written", finding.message);
+        answer.and_failure(Status::Failed, finding.code(), message)
+    }))
+}
+
 fn answer(
     arguments: &Arguments,
     modules: &Modules,
@@ -270,6 +286,9 @@ fn answer(
         "joint_states": proof.joint_states,
         "events": proof.events.len(),
     });
+    if let Some(answer) = withheld(found, &result) {
+        return answer;
+    }
     let ladder = print(program);
     let text = if arguments.table {
         let tables = modules.all().zip(&conversion.rows);
@@ -281,12 +300,8 @@ fn answer(
         ladder.clone()
     };
     result["ladder"] = Value::String(ladder.clone());
-    let failed = found
-        .iter()
-        .any(|finding| finding.severity == FindingSeverity::Error);
-    let status = if failed { Status::Failed } else { Status::Done };
     let Some(path) = &arguments.output else {
-        return Answer::done(text, result).with_status(status);
+        return Answer::done(text, result);
     };
     if let Err(answer) = files::write(path, &ladder) {
         return answer;
@@ -298,5 +313,5 @@ fn answer(
         proof.states,
         proof.scans
     );
-    Answer::done(summary, result).with_status(status)
+    Answer::done(summary, result)
 }

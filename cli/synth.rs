@@ -112,7 +112,7 @@ fn explicit(arguments: &Arguments, model: Model, bounds: Bounds) -> Result<Answe
     let supervisor = named(arguments, supervisor);
     let mut value = description(&supervisor);
     value["engine"] = json!("explicit");
-    value["product_states"] = json!(result.product_states);
+    value["explored_states"] = json!(result.explored_states);
     let answer = Answer::done(summary(&supervisor), value);
     written(
         arguments,

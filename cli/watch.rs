@@ -164,7 +164,13 @@ impl Page {
 }
 
 fn failed(error: &WatchError) -> Answer {
-    Answer::failed(Status::Failed, error.code(), error.to_string())
+    let status = match error {
+        WatchError::Certificate(_) | WatchError::Logins { .. } | WatchError::NoLogins(_) => {
+            Status::BadInput
+        }
+        WatchError::Listen { .. } | WatchError::System { .. } => Status::Failed,
+    };
+    Answer::failed(status, error.code(), error.to_string())
 }
 
 #[derive(Serialize)]

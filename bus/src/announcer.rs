@@ -10,7 +10,7 @@ use zenoh::Wait;
 use zenoh::bytes::Encoding;
 use zenoh::query::Queryable;
 
-use crate::error::BusError;
+use crate::error::{BusError, reason};
 
 /// The newest text under each key.
 type Newest = Arc<Mutex<BTreeMap<String, String>>>;
@@ -34,7 +34,7 @@ impl Announcer {
             .map_err(|source| BusError::listen(address, source))?;
         let failed = |error: zenoh::Error| BusError::Zenoh {
             address,
-            reason: error.to_string(),
+            reason: reason(&error),
         };
         let session = settings(address)
             .and_then(|config| zenoh::open(config).wait())

@@ -35,7 +35,7 @@ use zenoh::query::{Query, Queryable};
 use crate::clock::Clock;
 use crate::control::{LINE_BYTES, order};
 use crate::endpoints::Endpoints;
-use crate::error::BusError;
+use crate::error::{BusError, reason};
 use crate::journal::{EventSink, HostEvent, JournalSender, Noted};
 use crate::orders::{Control, Order};
 use crate::rights::run_in_background;
@@ -246,7 +246,7 @@ impl<E: Send + 'static> Channel<E> {
                 return Some(opened);
             }
             Err(error) => HostEvent::ChannelFailed {
-                reason: error.to_string(),
+                reason: reason(&error),
             },
         };
         self.sink.record(self.clock.now(), Noted::Host(event));

@@ -92,6 +92,23 @@ pub enum BusError {
     },
 }
 
+/// What Zenoh says, without the places in its source files: ` at /…/file.rs:12.`.
+pub(crate) fn reason(error: &zenoh::Error) -> String {
+    let said = error.to_string();
+    let mut kept = String::new();
+    let mut rest = said.as_str();
+    while let Some(end) = rest.find(".rs:") {
+        let after = rest[end + 4..].trim_start_matches(|digit: char| digit.is_ascii_digit());
+        let Some(start) = rest[..end].rfind(" at ") else {
+            break;
+        };
+        kept.push_str(&rest[..start]);
+        rest = after.strip_prefix('.').unwrap_or(after);
+    }
+    kept.push_str(rest);
+    kept
+}
+
 impl BusError {
     /// The stable code, such as `U0501`.
     pub fn code(&self) -> &'static str {
@@ -122,5 +139,27 @@ impl BusError {
             what,
             source: error.into(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::reason;
+
+    #[test]
+    fn a_reason_has_no_places_of_source_files() {
+        let check = |said: &str, expected: &str| {
+            assert_eq!(reason(&zenoh::Error::from(said)), expected);
+        };
+        check("no route", "no route");
+        check(
+            "Unable to connect to any of [tls/127.0.0.1:9]! at /root/.cargo/zenoh-1.10.2/src/net/orchestrator.rs:305.",
+            "Unable to connect to any of [tls/127.0.0.1:9]!",
+        );
+        check(
+            "timeout at a/b.rs:1. - Caused by refused at 127.0.0.1 at /x y/c.rs:22.",
+            "timeout - Caused by refused at 127.0.0.1",
+        );
+        check("see main.rs:7", "see main.rs:7");
     }
 }

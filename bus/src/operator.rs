@@ -8,7 +8,7 @@ use understudy_wire::{ClusterHash, Force, SignalPlace, StateChoice};
 use zenoh::Wait;
 
 use crate::channel::{TlsKeys, hash_key, insert, prefix, tls_config};
-use crate::error::BusError;
+use crate::error::{BusError, reason};
 
 /// Longer than it takes a party on a network that works.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -85,7 +85,7 @@ impl Call {
         let uncalled = |error: zenoh::Error| BusError::Uncalled {
             name: name.to_owned(),
             address,
-            reason: error.to_string(),
+            reason: reason(&error),
         };
         let config = || -> zenoh::Result<zenoh::Config> {
             let mut config = tls_config("client", keys)?;

@@ -24,7 +24,7 @@ use zenoh::qos::{CongestionControl, Priority};
 
 use crate::doorbell::{Inbox, Outbox, doorbell};
 use crate::endpoints::{Endpoints, Peer};
-use crate::error::BusError;
+use crate::error::{BusError, reason};
 use crate::link::{Link, LinkCounters, LinkKind};
 use crate::rights::raise_link_thread;
 
@@ -85,7 +85,7 @@ impl ZenohLink {
         bindable(address, kind)?;
         let failed = |error: zenoh::Error| BusError::Zenoh {
             address,
-            reason: error.to_string(),
+            reason: reason(&error),
         };
         let (outbox, inbox) =
             doorbell(QUEUE_FRAMES).map_err(BusError::system("an eventfd for what arrives"))?;

@@ -4,7 +4,7 @@
 //! reported and the default goes on in its place, so that the rest is still checked.
 
 use std::collections::BTreeMap;
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::ops::Range;
 use std::time::Duration;
 
@@ -29,6 +29,21 @@ pub(crate) const CODES: Codes = Codes {
     out_of_bounds: "U0205",
     unknown_word: "U0207",
 };
+
+/// Why no other member can reach one at this address; nothing where it could.
+pub fn why_unreachable(address: SocketAddr) -> Option<&'static str> {
+    let host = address.ip().to_canonical();
+    let is_broadcast = matches!(host, IpAddr::V4(host) if host.is_broadcast());
+    if host.is_unspecified() {
+        Some("it means every interface of the machine that listens, and cannot be called")
+    } else if host.is_multicast() || is_broadcast {
+        Some("it means many devices at once")
+    } else if address.port() == 0 {
+        Some("port 0 means any free port, and cannot be called")
+    } else {
+        None
+    }
+}
 
 /// One table of the file.
 pub(crate) struct Fields<'a, 't> {
@@ -120,7 +135,18 @@ impl<'a, 't> Fields<'a, 't> {
     ) -> Option<Placed<SocketAddr>> {
         let Placed { value, span } = self.text(name, diagnostics)?;
         match value.parse() {
-            Ok(value) => Some(Placed { value, span }),
+            Ok(address) => {
+                if let Some(why) = why_unreachable(address) {
+                    let message = format!("{address} is no address of one device: {why}");
+                    let help = "the address and the port at which the others reach it";
+                    diagnostics.push(Diagnostic::error("U0210", message, span).with_help(help));
+                    return None;
+                }
+                Some(Placed {
+                    value: address,
+                    span,
+                })
+            }
             Err(_) => {
                 let message = format!("{value:?} is no address");
                 let expected = self.section.key(name).kind.expected();

@@ -20,7 +20,7 @@ mod template;
 
 pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Security, Understudy};
 pub use device::{FieldDevice, NoPoint, Point};
-pub use fields::MAXIMUM_NAME_LENGTH;
+pub use fields::{MAXIMUM_NAME_LENGTH, why_unreachable};
 pub use read::{Loaded, MAXIMUM_TEXT_BYTES, Overrides, read, read_with};
 pub use schema::schema;
 pub use template::{TemplateFile, press_cell, template};

@@ -11,7 +11,7 @@
 //! | U0207 | a word that is none of those allowed |
 //! | U0208 | a name, or the place of a remote I/O or of a plant, that is taken |
 //! | U0209 | a name that nothing has |
-//! | U0210 | an address that is none, or that is taken |
+//! | U0210 | an address that is none, at which nothing can be reached, or that is taken |
 //! | U0211 | a ladder that cannot be read |
 //! | U0212 | a program that does not become a circuit |
 //! | U0213 | more stations, or wider images, than there may be |

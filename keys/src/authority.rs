@@ -361,6 +361,7 @@ impl Authority {
             name: holder.name.clone(),
             role: holder.role,
             generation: holder.generation,
+            issued: Some(holder.issued),
             expires: holder.expires,
             own: String::new(),
             members: Vec::new(),

@@ -44,6 +44,11 @@ pub(crate) fn random<const N: usize>(name: &str) -> Result<[u8; N], KeysError> {
     Ok(bytes)
 }
 
+/// When a certificate that was issued then begins to hold.
+pub(crate) fn begins(issued: Date) -> Date {
+    Date::from(issued.inner() - CLOCKS_DIFFER)
+}
+
 /// A certificate that signs itself and others.
 pub(crate) fn authority(subject: &Subject<'_>) -> Result<Pair, KeysError> {
     let mut parameters = parameters(subject)?;
@@ -98,7 +103,7 @@ fn parameters(subject: &Subject<'_>) -> Result<CertificateParams, KeysError> {
     let mut parameters = CertificateParams::default();
     parameters.distinguished_name = name;
     parameters.serial_number = Some(SerialNumber::from_slice(&serial));
-    parameters.not_before = subject.issued.inner() - CLOCKS_DIFFER;
+    parameters.not_before = begins(subject.issued).inner();
     parameters.not_after = subject.expires.inner();
     Ok(parameters)
 }

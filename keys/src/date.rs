@@ -40,6 +40,12 @@ impl Date {
     }
 }
 
+impl From<OffsetDateTime> for Date {
+    fn from(date: OffsetDateTime) -> Self {
+        Self(date)
+    }
+}
+
 impl fmt::Display for Date {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (hour, minute, second) = self.0.to_hms();

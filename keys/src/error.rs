@@ -70,6 +70,18 @@ pub enum KeysError {
         /// When.
         expires: Date,
     },
+    /// Too early, by the clock of the machine.
+    #[error(
+        "U0914: the certificate of {name} is valid from {begins}, and the clock of this machine is at {now}; set the clock"
+    )]
+    NotYetValid {
+        /// Whose.
+        name: String,
+        /// When it begins.
+        begins: Date,
+        /// What the clock says.
+        now: Date,
+    },
     /// They no longer count.
     #[error(
         "U0909: the keys of {name} (generation {generation}) are revoked; `understudy keys issue` makes new ones"
@@ -133,6 +145,7 @@ impl KeysError {
             Self::NoKey { .. } => "U0911",
             Self::Certificate { .. } => "U0912",
             Self::AlreadyRevoked { .. } => "U0913",
+            Self::NotYetValid { .. } => "U0914",
         }
     }
 }

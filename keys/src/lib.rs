@@ -35,6 +35,7 @@
 //! | U0911 | no key for a party that is to be heard |
 //! | U0912 | the certificate cannot be made |
 //! | U0913 | keys that are revoked already |
+//! | U0914 | a certificate that is not valid yet, by the clock of the machine |
 
 mod authority;
 mod certificate;

@@ -9,6 +9,7 @@ use understudy_cluster::Cluster;
 use understudy_seal::{FrameKey, KEY_BYTES, Opener, Revocations, Seal, TransferKey};
 use understudy_wire::{Party, StationId, Topic};
 
+use crate::certificate;
 use crate::date::Date;
 use crate::error::KeysError;
 use crate::files;
@@ -23,6 +24,9 @@ pub(crate) struct KeysFile {
     pub(crate) name: String,
     pub(crate) role: Role,
     pub(crate) generation: u32,
+    /// When its certificate was issued; files of earlier versions do not say it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) issued: Option<Date>,
     pub(crate) expires: Date,
     /// Its frame key, hexadecimal; empty for an operator.
     pub(crate) own: String,
@@ -98,7 +102,7 @@ impl PartyKeys {
     ///
     /// # Errors
     /// All that is wrong with it: [`KeysError::Read`], [`KeysError::Permissions`], [`KeysError::Damaged`],
-    /// [`KeysError::Others`], [`KeysError::Expired`], [`KeysError::Revoked`] and [`KeysError::NoKey`].
+    /// [`KeysError::Others`], [`KeysError::NotYetValid`], [`KeysError::Expired`], [`KeysError::Revoked`] and [`KeysError::NoKey`].
     pub fn load(
         folder: &Path,
         cluster: &Cluster,
@@ -300,6 +304,14 @@ fn read(
                 Role::Operator => "an operator".to_owned(),
             };
             errors.push(others(file.name.clone(), wanted));
+        }
+        let begins = file.issued.map(certificate::begins);
+        if let Some(begins) = begins.filter(|begins| now < *begins) {
+            errors.push(KeysError::NotYetValid {
+                name: file.name.clone(),
+                begins,
+                now,
+            });
         }
         if now >= file.expires {
             errors.push(KeysError::Expired {

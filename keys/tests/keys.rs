@@ -341,6 +341,16 @@ fn everything_that_is_wrong_is_said_at_once() {
     let operator = authority.folder_of(DEFAULT_OPERATOR);
     OperatorKeys::load(&operator, &cluster, now()).expect("they were just issued");
 
+    // Clocks may differ by a day; one that is further behind cannot take part in TLS.
+    let early =
+        |text: &str| PartyKeys::load(&folder, &cluster, robot, text.parse().expect("a date"));
+    early("2026-11-20T18:00:00Z").expect("a day before the issue");
+    let refused = early("2026-11-20T17:59:59Z").expect_err("too early");
+    assert_eq!(codes(&refused), ["U0914"]);
+    let said = refused[0].to_string();
+    assert!(said.contains("valid from 2026-11-20T18:00:00Z"), "{said}");
+    assert!(said.contains("is at 2026-11-20T17:59:59Z"), "{said}");
+
     let keys = folder.join("keys.toml");
     fs::set_permissions(&keys, fs::Permissions::from_mode(0o644)).expect("it is ours");
     fs::remove_file(folder.join("certificate.pem")).expect("it is ours");

@@ -4,10 +4,7 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
-use understudy_reliability::{
-    ChainBuilder, Level, ThreeState, Unit, at_most_down, birth_death_mttf, product_reliability,
-    simulate,
-};
+use understudy_reliability::{ChainBuilder, Level, ThreeState, birth_death_mttf, simulate};
 
 fn main() {
     divan::main();
@@ -62,31 +59,4 @@ fn three_state_paths(bencher: Bencher<'_, '_>) {
     bencher
         .counter(ItemsCount::new(1_000_000_u32))
         .bench_local(|| simulate(&model, 1_000_000, None, 0.95, &mut random).expect("a mean"));
-}
-
-fn units() -> Vec<Unit> {
-    (0..20)
-        .map(|k| {
-            Unit::new(
-                FAILURE_RATE * (1.0 + f64::from(k) / 10.0),
-                1.0 / (20.0 + f64::from(k)),
-            )
-            .expect("a unit")
-        })
-        .collect()
-}
-
-/// A million states: twenty unequal units that fail together when more than ten are down.
-#[divan::bench(sample_count = 1, sample_size = 1)]
-fn product_of_twenty_units(bencher: Bencher<'_, '_>) {
-    let units = units();
-    bencher
-        .bench(|| product_reliability(&units, |mask| mask.count_ones() <= 10, 1_000.0).expect("R"));
-}
-
-/// Where every state may be passed through.
-#[divan::bench]
-fn poisson_binomial_of_twenty_units(bencher: Bencher<'_, '_>) {
-    let units = units();
-    bencher.bench(|| at_most_down(&units, 10, 1_000.0));
 }

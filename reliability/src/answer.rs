@@ -4,11 +4,11 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
+use crate::chain::Chain;
 use crate::error::ReliabilityError;
 use crate::options::Options;
-use crate::quantity::grouped;
+use crate::quantity::{grouped, probability, stated};
 use crate::system::System;
-use crate::three_state::ThreeState;
 use crate::transient::AfterFailure;
 
 /// The answer, as it stands in JSON. Times in hours. What is nothing was not asked for.
@@ -35,29 +35,38 @@ pub struct Answer {
     pub mission: Option<Mission>,
 }
 
-/// What holds at the end of the mission.
+/// Probabilities at the end of the mission. A probability below [`MINIMUM_PROBABILITY`](crate::MINIMUM_PROBABILITY) is nothing; each of the
+/// others has twelve digits, 1 - R as well as R.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Mission {
     /// Its length.
     pub mission_hours: f64,
     /// R of the paper's model, (18).
-    pub reliability_paper: f64,
+    pub reliability_paper: Option<f64>,
     /// R of the cluster as it is built.
-    pub reliability_cluster: f64,
+    pub reliability_cluster: Option<f64>,
     /// R of the full duplex, (21).
-    pub reliability_duplex: f64,
+    pub reliability_duplex: Option<f64>,
     /// R without a spare.
-    pub reliability_simplex: f64,
+    pub reliability_simplex: Option<f64>,
     /// R of TMR.
-    pub reliability_tmr: f64,
-    /// 1 - R of the cluster with all its digits.
-    pub unreliability_cluster: f64,
+    pub reliability_tmr: Option<f64>,
+    /// 1 - R of the paper's model.
+    pub unreliability_paper: Option<f64>,
+    /// 1 - R of the cluster as it is built.
+    pub unreliability_cluster: Option<f64>,
+    /// 1 - R of the full duplex.
+    pub unreliability_duplex: Option<f64>,
+    /// 1 - R without a spare.
+    pub unreliability_simplex: Option<f64>,
+    /// 1 - R of TMR.
+    pub unreliability_tmr: Option<f64>,
     /// All boxes of the paper's model work, (15).
-    pub p0: f64,
+    pub p0: Option<f64>,
     /// Some box of it is down, (16).
-    pub p1: f64,
+    pub p1: Option<f64>,
     /// It has failed, (17).
-    pub p2: f64,
+    pub p2: Option<f64>,
 }
 
 /// Calculates all that was asked.
@@ -71,49 +80,36 @@ pub fn calculate(options: &Options) -> Result<Answer, Vec<ReliabilityError>> {
     let paper = system.as_paper();
     let simplex = system.as_simplex();
     let one = |error| vec![error];
-    let cluster_chain = system.chain()?;
+    let (cluster_chain, paper_chain) = (system.chain()?, paper.chain()?);
     let mean = |system: &System| system.chain()?.mttf().map_err(one);
-    let closed = closed_form(options)?;
     let mission = match options.mission {
         None => None,
         Some(hours) => {
             let hours = hours.get();
-            let reliability = |system: &System| system.chain()?.reliability(hours).map_err(one);
-            let states = match &closed {
-                Some(closed) => closed.probabilities(hours),
-                None => {
-                    let chain = paper.chain()?;
-                    let found = chain.transient(hours, AfterFailure::Final).map_err(one)?;
-                    let p0 = found.probabilities[0];
-                    let alive = (1..chain.states()).filter(|state| !chain.is_failure(*state));
-                    crate::StateProbabilities {
-                        p0,
-                        p1: alive.map(|state| found.probabilities[state]).sum(),
-                        p2: found.failed,
-                    }
-                }
-            };
-            let failed = cluster_chain
-                .transient(hours, AfterFailure::Final)
-                .map_err(one)?
-                .failed;
-            let reliability_duplex = match equal_pairs(options)? {
-                Some(pair) => (f64::from(options.controllers) * pair.log_reliability(hours)).exp(),
-                None => duplex.reliability(hours).map_err(one)?,
-            };
+            let at = |chain: &Chain| chain.transient(hours, AfterFailure::Final).map_err(one);
+            let (cluster, simplex) = (at(&cluster_chain)?, at(&simplex.chain()?)?);
+            let states = at(&paper_chain)?;
+            // Its first state is the one in which all boxes work, and it comes back to no failure.
+            let p0 = states.probabilities[0];
+            let alive = (1..paper_chain.states()).filter(|state| !paper_chain.is_failure(*state));
+            let p1: f64 = alive.map(|state| states.probabilities[state]).sum();
+            let duplex = system.copies_survival(2, hours)?;
+            let tmr = system.copies_survival(3, hours)?;
             Some(Mission {
                 mission_hours: hours,
-                reliability_paper: closed
-                    .as_ref()
-                    .map_or(states.p0 + states.p1, |closed| closed.reliability(hours)),
-                reliability_cluster: cluster_chain.reliability(hours).map_err(one)?,
-                reliability_duplex,
-                reliability_simplex: reliability(&simplex)?,
-                reliability_tmr: tmr.reliability(hours).map_err(one)?,
-                unreliability_cluster: failed,
-                p0: states.p0,
-                p1: states.p1,
-                p2: states.p2,
+                reliability_paper: stated(states.working),
+                reliability_cluster: stated(cluster.working),
+                reliability_duplex: stated(duplex.working),
+                reliability_simplex: stated(simplex.working),
+                reliability_tmr: stated(tmr.working),
+                unreliability_paper: stated(states.failed),
+                unreliability_cluster: stated(cluster.failed),
+                unreliability_duplex: stated(duplex.failed),
+                unreliability_simplex: stated(simplex.failed),
+                unreliability_tmr: stated(tmr.failed),
+                p0: stated(p0),
+                p1: stated(p1),
+                p2: stated(states.failed),
             })
         }
     };
@@ -121,10 +117,7 @@ pub fn calculate(options: &Options) -> Result<Answer, Vec<ReliabilityError>> {
     Ok(Answer {
         options: options.clone(),
         boxes: system.boxes(),
-        mttf_paper_hours: match &closed {
-            Some(closed) => closed.mttf(),
-            None => mean(&paper)?,
-        },
+        mttf_paper_hours: paper_chain.mttf().map_err(one)?,
         mttf_cluster_hours: cluster_chain.mttf().map_err(one)?,
         mttf_duplex_hours: duplex.mttf().map_err(one)?,
         mttf_simplex_hours: mean(&simplex)?,
@@ -132,47 +125,6 @@ pub fn calculate(options: &Options) -> Result<Answer, Vec<ReliabilityError>> {
         deviation_cluster_hours: moments.map(|moments| moments.variance_hours_squared.sqrt()),
         mission,
     })
-}
-
-/// Whether the boxes fail by themselves and nothing else fails, so that the closed forms hold.
-fn plain(options: &Options) -> bool {
-    options.unequal.is_empty()
-        && options.detection.is_none()
-        && options.beta == 0.0
-        && options.shared.is_empty()
-}
-
-/// (15) to (20), with coverage.
-fn closed_form(options: &Options) -> Result<Option<ThreeState>, Vec<ReliabilityError>> {
-    three_state(options, u64::from(options.controllers), plain(options))
-}
-
-/// One pair of the full duplex, (21) with theta at N = 1; independent where there is a crew for each.
-fn equal_pairs(options: &Options) -> Result<Option<ThreeState>, Vec<ReliabilityError>> {
-    let independent = options
-        .crews
-        .is_none_or(|crews| crews >= options.controllers);
-    three_state(options, 1, plain(options) && independent)
-}
-
-fn three_state(
-    options: &Options,
-    controllers: u64,
-    holds: bool,
-) -> Result<Option<ThreeState>, Vec<ReliabilityError>> {
-    if !holds {
-        return Ok(None);
-    }
-    let coverage =
-        crate::Probability::new("the coverage", options.coverage).map_err(|error| vec![error])?;
-    ThreeState::with_coverage(
-        controllers,
-        options.mtbf.rate(),
-        options.mttr.rate(),
-        coverage,
-    )
-    .map(Some)
-    .map_err(|error| vec![error])
 }
 
 impl Answer {
@@ -195,53 +147,55 @@ impl Answer {
                 "no spare",
                 n,
                 self.mttf_simplex_hours,
-                mission.map(|at| at.reliability_simplex),
+                mission.map(|at| (at.reliability_simplex, at.unreliability_simplex)),
             ),
             (
                 "paper's model",
                 n + 1,
                 self.mttf_paper_hours,
-                mission.map(|at| at.reliability_paper),
+                mission.map(|at| (at.reliability_paper, at.unreliability_paper)),
             ),
             (
                 "this cluster",
                 self.boxes,
                 self.mttf_cluster_hours,
-                mission.map(|at| at.reliability_cluster),
+                mission.map(|at| (at.reliability_cluster, at.unreliability_cluster)),
             ),
             (
                 "full duplex",
                 2 * n,
                 self.mttf_duplex_hours,
-                mission.map(|at| at.reliability_duplex),
+                mission.map(|at| (at.reliability_duplex, at.unreliability_duplex)),
             ),
             (
                 "TMR",
                 3 * n,
                 self.mttf_tmr_hours,
-                mission.map(|at| at.reliability_tmr),
+                mission.map(|at| (at.reliability_tmr, at.unreliability_tmr)),
             ),
         ];
         let mut text = format!("{:<14} {:>6} {:>14}", "", "boxes", "MTTF in h");
         if let Some(at) = mission {
-            let _ = write!(text, "  R({} h)", grouped(at.mission_hours));
+            let works = format!("R({} h)", grouped(at.mission_hours));
+            let _ = write!(text, "  {works:<12}  1 - R");
         }
         text.push('\n');
-        for (name, boxes, mean, reliability) in rows {
+        for (name, boxes, mean, at_end) in rows {
             let _ = write!(text, "{name:<14} {boxes:>6} {:>14}", grouped(mean));
-            if let Some(reliability) = reliability {
-                let _ = write!(text, "  {reliability:.9}");
+            if let Some((works, failed)) = at_end {
+                let (works, failed) = (probability(works, 9), probability(failed, 9));
+                let _ = write!(text, "  {works:<12}  {failed}");
             }
             text.push('\n');
         }
         if let Some(at) = mission {
             let _ = writeln!(
                 text,
-                "The paper's states at {} h: p0 {:.9}, p1 {:.9}, p2 {:.3e}",
+                "The paper's states at {} h: p0 {}, p1 {}, p2 {}",
                 grouped(at.mission_hours),
-                at.p0,
-                at.p1,
-                at.p2
+                probability(at.p0, 9),
+                probability(at.p1, 9),
+                probability(at.p2, 9)
             );
         }
         text

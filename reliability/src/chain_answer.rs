@@ -6,13 +6,14 @@ use serde::Serialize;
 
 use crate::chain::Chain;
 use crate::error::ReliabilityError;
-use crate::quantity::{Hours, grouped};
+use crate::quantity::{Hours, grouped, probability, stated};
 use crate::transient::AfterFailure;
 
 /// States that are listed in text, at most.
 const MAXIMUM_LISTED: usize = 30;
 
-/// What a chain says. What is nothing does not exist for this chain, or was not asked for; `remarks` say why.
+/// What a chain says. What is nothing does not exist for this chain, or was not asked for, as `remarks` say, or is a probability below
+/// [`MINIMUM_PROBABILITY`](crate::MINIMUM_PROBABILITY).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChainAnswer {
     /// States, failures too.
@@ -38,11 +39,11 @@ pub struct ChainMission {
     /// Its length.
     pub mission_hours: f64,
     /// Probability that there was no failure.
-    pub reliability: f64,
+    pub reliability: Option<f64>,
     /// Probability that there was one.
-    pub unreliability: f64,
+    pub unreliability: Option<f64>,
     /// Probability of a failure state, where failures are repaired as the chain says.
-    pub point_unavailability: f64,
+    pub point_unavailability: Option<f64>,
 }
 
 /// One state.
@@ -95,12 +96,16 @@ pub fn answer_chain(
         Some(hours) => {
             let first = chain.transient(hours.get(), AfterFailure::Final)?;
             let later = chain.transient(hours.get(), AfterFailure::Repaired)?;
-            let alive = (0..chain.states()).filter(|state| !chain.is_failure(*state));
+            // Without a failure state there is no failure, and this is no number that is too small.
+            let failed = |probability| match failures().next() {
+                None => Some(0.0),
+                Some(_) => stated(probability),
+            };
             let answer = ChainMission {
                 mission_hours: hours.get(),
-                reliability: alive.map(|state| first.probabilities[state]).sum(),
-                unreliability: first.failed,
-                point_unavailability: later.failed,
+                reliability: stated(first.working),
+                unreliability: failed(first.failed),
+                point_unavailability: failed(later.failed),
             };
             Some((answer, later.probabilities))
         }
@@ -109,18 +114,19 @@ pub fn answer_chain(
     let by_state = (0..chain.states()).map(|state| StateAnswer {
         name: chain.name(state),
         failure: chain.is_failure(state),
-        steady: steady.as_ref().map(|steady| steady[state]),
+        steady: steady.as_ref().and_then(|steady| stated(steady[state])),
         at_mission: later
             .as_ref()
-            .map(|(_, probabilities)| probabilities[state]),
+            .and_then(|(_, probabilities)| stated(probabilities[state])),
     });
     Ok(ChainAnswer {
         states: chain.states(),
         mttf_hours,
         deviation_hours,
-        unavailability: steady
-            .as_ref()
-            .map(|steady| failures().fold(0.0, |sum, state| sum + steady[state])),
+        unavailability: steady.as_ref().and_then(|steady| match failures().next() {
+            None => Some(0.0),
+            Some(_) => stated(failures().map(|state| steady[state]).sum()),
+        }),
         by_state: by_state.collect(),
         mission: later.map(|(answer, _)| answer),
         remarks,
@@ -145,28 +151,34 @@ impl ChainAnswer {
             self.deviation_hours
                 .map(|hours| format!("{} h", grouped(hours))),
         );
-        line(
-            "unavailability",
-            self.unavailability.map(|share| format!("{share:.6e}")),
-        );
+        let tiny = || probability(None, 6);
+        if let Some(share) = self.unavailability {
+            line("unavailability", Some(format!("{share:.6e}")));
+        }
         if let Some(at) = &self.mission {
             let hours = grouped(at.mission_hours);
             line(
                 &format!("R({hours} h)"),
-                Some(format!("{:.12}", at.reliability)),
+                Some(probability(at.reliability, 12)),
             );
             line(
                 &format!("1 - R({hours} h)"),
-                Some(format!("{:.6e}", at.unreliability)),
+                Some(
+                    at.unreliability
+                        .map_or_else(tiny, |share| format!("{share:.6e}")),
+                ),
             );
         }
         for state in self.by_state.iter().take(MAXIMUM_LISTED) {
             let steady = state
                 .steady
                 .map(|share| format!("{share:.6e} in the long run"));
-            let later = state
-                .at_mission
-                .map(|share| format!("{share:.6e} at the end of the mission"));
+            let later = self.mission.as_ref().map(|_| {
+                let share = state
+                    .at_mission
+                    .map_or_else(tiny, |share| format!("{share:.6e}"));
+                format!("{share} at the end of the mission")
+            });
             let said: Vec<String> = [steady, later].into_iter().flatten().collect();
             line(&state.name, (!said.is_empty()).then(|| said.join(", ")));
         }

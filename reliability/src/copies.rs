@@ -1,11 +1,13 @@
 //! What a cluster is compared with: each controller by itself with copies of its kind, of which one may be down. With two boxes for
 //! each it is the full duplex of (21), with three TMR. Controllers may differ; a controller's copies are like it.
 //!
-//! Units of one kind are alike, so only how many of each kind lack a box is kept: the chain is exactly lumped.
+//! Units of one kind are alike, so only how many of each kind lack a box is kept: the chain is exactly lumped. Where each controller has
+//! a repair crew, controllers are independent of each other, and R(t) is the product of those of single controllers.
 
 use crate::chain::{Chain, explore};
 use crate::error::ReliabilityError;
 use crate::system::{CommonCause, CommonCauseConvention, MAXIMUM_MODEL_STATES, System};
+use crate::transient::AfterFailure;
 
 /// Units of one kind that lack a box: not noticed, and noticed.
 type State = Vec<(u32, u32)>;
@@ -16,6 +18,15 @@ struct Kind {
     repair_rate: f64,
 }
 
+/// Whether a system works at some time, with the digits of both probabilities.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Survival {
+    /// Probability of no failure until then.
+    pub working: f64,
+    /// Probability of a failure until then.
+    pub failed: f64,
+}
+
 impl System {
     /// The chain of `copies` boxes for each controller, of which one may be down at a time.
     ///
@@ -23,6 +34,48 @@ impl System {
     /// As [`System::chain`].
     pub fn copies_chain(&self, copies: u32) -> Result<Chain, Vec<ReliabilityError>> {
         self.check()?;
+        self.chain_of_copies(&self.copied(), self.lethal_to_copies(), copies)
+    }
+
+    /// Whether [`System::copies_chain`] has failed by `hours`.
+    ///
+    /// # Errors
+    /// As [`System::chain`] and [`Chain::transients`].
+    pub fn copies_survival(
+        &self,
+        copies: u32,
+        hours: f64,
+    ) -> Result<Survival, Vec<ReliabilityError>> {
+        self.check()?;
+        let (kinds, lethal) = (self.copied(), self.lethal_to_copies());
+        let at = |chain: Chain| {
+            let found = chain.transient(hours, AfterFailure::Final);
+            found.map_err(|error| vec![error])
+        };
+        let independent = self
+            .crews
+            .is_none_or(|crews| crews >= self.controller_count());
+        if !independent {
+            let found = at(self.chain_of_copies(&kinds, lethal, copies)?)?;
+            return Ok(Survival {
+                working: found.working,
+                failed: found.failed,
+            });
+        }
+        let mut logarithm = -lethal * hours;
+        for kind in kinds {
+            let units = f64::from(kind.units);
+            let alone = self.chain_of_copies(&[Kind { units: 1, ..kind }], 0.0, copies)?;
+            logarithm += units * at(alone)?.log_working();
+        }
+        Ok(Survival {
+            working: logarithm.exp(),
+            failed: -logarithm.exp_m1(),
+        })
+    }
+
+    /// Controllers by kind; kinds that cannot be told apart are one.
+    fn copied(&self) -> Vec<Kind> {
         let alone = match self.common_cause {
             Some(CommonCause {
                 beta,
@@ -45,13 +98,26 @@ impl System {
                 }),
             }
         }
+        kinds
+    }
+
+    /// Rate of what fails all controllers at once.
+    fn lethal_to_copies(&self) -> f64 {
         let shared: f64 = self.shared.iter().map(|part| part.mtbf.rate()).sum();
         let rates = self.controllers.iter().map(|kind| kind.mtbf.rate());
         let fastest = rates.fold(0.0, f64::max);
-        let lethal = shared
+        shared
             + self
                 .common_cause
-                .map_or(0.0, |cause| cause.beta.get() * fastest);
+                .map_or(0.0, |cause| cause.beta.get() * fastest)
+    }
+
+    fn chain_of_copies(
+        &self,
+        kinds: &[Kind],
+        lethal: f64,
+        copies: u32,
+    ) -> Result<Chain, Vec<ReliabilityError>> {
         let first = vec![(0, 0); kinds.len()];
         let (chain, _) = explore(
             first,
@@ -61,7 +127,7 @@ impl System {
                 if lethal > 0.0 {
                     found.push((None, lethal));
                 }
-                self.copies_successors(&kinds, copies, state, found);
+                self.copies_successors(kinds, copies, state, found);
             },
         )?;
         Ok(chain)

@@ -106,6 +106,11 @@ impl Chain {
         let mut probability = vec![0.0; self.states()];
         let by_place = eliminated.visits();
         let total: f64 = by_place.iter().sum();
+        if !total.is_finite() {
+            return Err(ReliabilityError::OutOfRange {
+                what: "the steady state".into(),
+            });
+        }
         for (place, state) in all.order.iter().enumerate() {
             probability[*state] = by_place[place] / total;
         }

@@ -20,13 +20,13 @@ mod dense;
 mod drawing;
 mod elimination;
 mod error;
+mod extended;
 mod figures;
 mod format;
 mod graph;
 mod measured;
 mod options;
 mod poisson_weights;
-mod product;
 mod quantile;
 mod quantity;
 mod report;
@@ -41,6 +41,7 @@ pub use boxes::{UNDERSTUDIES, UnequalBoxes};
 pub use campaign::{Assessment, Campaign, SystemFailure, assess};
 pub use chain::{Chain, ChainBuilder, MAXIMUM_STATES};
 pub use chain_answer::{ChainAnswer, ChainMission, StateAnswer, answer_chain};
+pub use copies::Survival;
 pub use elimination::TimeToFailure;
 pub use error::ReliabilityError;
 pub use figures::{FigurePoint, PerUnit, figures_5_and_6};
@@ -51,8 +52,9 @@ pub use measured::{
     simulate, times_to_failure,
 };
 pub use options::Options;
-pub use product::{MAXIMUM_UNITS, Unit, at_most_down, poisson_binomial, product_reliability};
-pub use quantity::{Hours, MAXIMUM_HOURS, MINIMUM_HOURS, Probability, grouped};
+pub use quantity::{
+    Hours, MAXIMUM_HOURS, MINIMUM_HOURS, MINIMUM_PROBABILITY, Probability, grouped,
+};
 pub use report::{OverTime, Provenance, Report, ReportData, report, report_data};
 pub use sensitivity::{
     ByUnderstudies, Sensitivity, WhatIf, by_understudies, sensitivities, what_if,

@@ -12,6 +12,9 @@ pub const MINIMUM_HOURS: f64 = 1e-12;
 /// The longest time that is taken, in hours.
 pub const MAXIMUM_HOURS: f64 = 1e15;
 
+/// The least probability that is stated; twelve digits cannot be had of much smaller ones.
+pub const MINIMUM_PROBABILITY: f64 = 1e-300;
+
 /// Units of a time and their length in hours.
 const UNITS: [(&str, f64); 7] = [
     ("us", 1.0 / 3_600_000_000.0),
@@ -136,6 +139,20 @@ impl Probability {
     /// As a number.
     pub fn get(self) -> f64 {
         self.0
+    }
+}
+
+/// A probability that is positive, or nothing where it is below [`MINIMUM_PROBABILITY`].
+pub(crate) fn stated(probability: f64) -> Option<f64> {
+    (probability >= MINIMUM_PROBABILITY).then_some(probability)
+}
+
+/// A probability for people with some decimals, or in powers of ten where it is small; nothing is one below [`MINIMUM_PROBABILITY`].
+pub(crate) fn probability(stated: Option<f64>, decimals: usize) -> String {
+    match stated {
+        None => "below 1e-300".into(),
+        Some(value) if value == 0.0 || value >= 1e-3 => format!("{value:.decimals$}"),
+        Some(value) => format!("{value:.6e}"),
     }
 }
 

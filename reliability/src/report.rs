@@ -12,7 +12,7 @@ use crate::error::ReliabilityError;
 use crate::figures::{FigurePoint, figures_5_and_6};
 use crate::graph::graph;
 use crate::options::Options;
-use crate::quantity::grouped;
+use crate::quantity::{grouped, probability};
 use crate::sensitivity::{
     ByUnderstudies, Sensitivity, WhatIf, by_understudies, sensitivities, what_if,
 };
@@ -164,17 +164,13 @@ fn curve(chain: &Chain, from: f64, to: f64) -> Result<Vec<(f64, f64, f64)>, Reli
         .collect();
     let found = chain.transients(&hours, AfterFailure::Final)?;
     let points = hours.iter().zip(found).map(|(hours, at)| {
-        let alive: f64 = (0..chain.states())
-            .filter(|state| !chain.is_failure(*state))
-            .map(|state| at.probabilities[state])
-            .sum();
         let density: f64 = at
             .probabilities
             .iter()
             .zip(&lethal)
             .map(|(p, rate)| p * rate)
             .sum();
-        (*hours, alive, density / alive)
+        (*hours, at.working, density / at.working)
     });
     Ok(points.filter(|(_, alive, _)| *alive > 1e-9).collect())
 }
@@ -251,6 +247,7 @@ pub fn report(data: &ReportData) -> Result<Report, ReliabilityError> {
     let mut environment = Environment::new();
     environment.add_filter("grouped", grouped);
     environment.add_filter("small", |value: f64| format!("{value:.4e}"));
+    environment.add_filter("probability", probability);
     environment.add_filter("fixed", |value: f64, digits: usize| {
         format!("{value:.digits$}")
     });

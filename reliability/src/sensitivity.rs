@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::error::ReliabilityError;
-use crate::quantity::{Hours, Probability};
+use crate::quantity::{Hours, Probability, stated};
 use crate::system::System;
 
 /// One bar of the tornado.
@@ -30,7 +30,7 @@ pub struct WhatIf {
     pub mttf_hours: f64,
     /// MTTF with it over MTTF without it.
     pub factor: f64,
-    /// 1 - R over the mission, with it.
+    /// 1 - R over the mission, with it; nothing without a mission, or below [`MINIMUM_PROBABILITY`](crate::MINIMUM_PROBABILITY).
     pub unreliability: Option<f64>,
 }
 
@@ -228,12 +228,10 @@ pub fn what_if(
             let chain = system.chain()?;
             let mttf_hours = chain.mttf().map_err(one)?;
             let unreliability = match mission {
-                Some(hours) => Some(
-                    chain
-                        .transient(hours.get(), crate::AfterFailure::Final)
-                        .map_err(one)?
-                        .failed,
-                ),
+                Some(hours) => {
+                    let found = chain.transient(hours.get(), crate::AfterFailure::Final);
+                    stated(found.map_err(one)?.failed)
+                }
                 None => None,
             };
             Ok(WhatIf {

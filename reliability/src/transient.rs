@@ -1,27 +1,48 @@
 //! Transients by uniformisation: P(t) is a mixture, with Poisson weights, of the states after 0, 1, 2, ... steps of a discrete chain.
-//! All terms are probabilities, so nothing cancels: also the least probability of failure has its digits.
+//! All terms are probabilities, so nothing cancels: also the least probability of failure, or of survival, has its digits.
+//!
+//! Steps are many, and a loss in each would add up. So the discrete chain steps at a power of two per hour, by which rates are divided
+//! exactly, and probabilities are [`Extended`]: twelve digits are left for both R(t) and 1 - R(t) down to [`MINIMUM_PROBABILITY`].
 
 use crate::chain::Chain;
-use crate::dense::{Dense, MAXIMUM_DENSE};
+use crate::dense::{Dense, MAXIMUM_DENSE, Series, Squares};
 use crate::error::ReliabilityError;
+use crate::extended::Extended;
 use crate::poisson_weights::PoissonWeights;
+use crate::quantity::MINIMUM_PROBABILITY;
 
 /// Steps times transitions of one computation, at most: some tens of seconds.
-const MAXIMUM_WORK: f64 = 2e10;
+const MAXIMUM_WORK: f64 = 5e9;
+
+/// Steps of one computation by squaring, at most; a bound for its memory.
+const MAXIMUM_UNITS: f64 = 1e30;
 
 /// Steps taken at once: past it, P(t) is computed in several strides, which bounds the weights in memory.
 const STRIDE_STEPS: f64 = 1e7;
 
-/// From this number of steps on, a small chain is squared instead.
-const SQUARE_FROM: f64 = 3e3;
+/// Terms of a series with a mean of 1, mostly.
+const TERMS: f64 = 40.0;
 
 /// What becomes of the chain by a time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transient {
     /// Probability of each state; where failures are final, of having failed before it was left.
     pub probabilities: Vec<f64>,
+    /// Probability of a state that is no failure.
+    pub working: f64,
     /// Probability of a failure state.
     pub failed: f64,
+}
+
+impl Transient {
+    /// ln of the probability of a state that is no failure.
+    pub fn log_working(&self) -> f64 {
+        if self.failed < 0.5 {
+            (-self.failed).ln_1p()
+        } else {
+            self.working.ln()
+        }
+    }
 }
 
 /// Whether a failure is left again.
@@ -37,11 +58,15 @@ impl Chain {
     /// R(t): the probability that no failure state was met by `hours`.
     ///
     /// # Errors
-    /// As [`Chain::transients`].
+    /// As [`Chain::transients`], and R(t) below [`MINIMUM_PROBABILITY`].
     pub fn reliability(&self, hours: f64) -> Result<f64, ReliabilityError> {
         let found = self.transient(hours, AfterFailure::Final)?;
-        let alive = (0..self.states()).filter(|state| !self.is_failure(*state));
-        Ok(alive.map(|state| found.probabilities[state]).sum())
+        if found.working < MINIMUM_PROBABILITY {
+            return Err(ReliabilityError::OutOfRange {
+                what: format!("the reliability at {hours} hours, which is below 1e-300,"),
+            });
+        }
+        Ok(found.working)
     }
 
     /// P(t) at `hours`.
@@ -76,40 +101,38 @@ impl Chain {
             }
             last = time;
         }
-        let steps = Steps::new(self, after);
-        let (needed, work) = (steps.fastest * last, steps.work() * steps.fastest * last);
-        if work > MAXIMUM_WORK && self.states() > MAXIMUM_DENSE {
+        let steps = Steps::new(self, after)?;
+        let mut squares = if steps.squared_is_cheaper(hours) {
+            Some(Squares::new(&steps.matrix()))
+        } else {
+            None
+        };
+        let (needed, longest) = match squares {
+            Some(_) => (steps.fastest * last, MAXIMUM_UNITS),
+            None => (steps.count(hours), MAXIMUM_WORK / steps.work()),
+        };
+        if needed > longest {
             return Err(ReliabilityError::TooManySteps {
                 steps: needed,
                 hours: last,
                 per_hour: steps.fastest,
-                maximum: MAXIMUM_WORK / steps.work(),
+                maximum: longest,
             });
         }
-        let mut state = vec![0.0; self.states()];
-        state[self.start()] = 1.0;
+        let mut state = vec![Extended::ZERO; self.states()];
+        state[self.start()] = Extended::ONE;
         let mut now = 0.0;
         let mut found = Vec::with_capacity(hours.len());
-        // Of the last stride, for most grids are even.
-        let mut squared: Option<(f64, Dense)> = None;
         for &time in hours {
-            let stride = time - now;
-            if self.states() <= MAXIMUM_DENSE && steps.fastest * stride > SQUARE_FROM {
-                let known = squared
-                    .take()
-                    .filter(|(known, _)| (known / stride - 1.0).abs() < 1e-13);
-                let (_, matrix) =
-                    squared.insert(known.unwrap_or_else(|| (stride, steps.squared(stride))));
-                state = matrix.apply(&state);
-                now = time;
-                found.push(self.found(&state));
-                continue;
+            // In units of one step on average.
+            let mut stride = steps.fastest * (time - now);
+            if let Some(squares) = &mut squares {
+                state = squares.advance(state, stride.floor() as u128);
+                stride -= stride.floor();
             }
-            let strides = (steps.fastest * (time - now) / STRIDE_STEPS)
-                .ceil()
-                .max(1.0);
+            let strides = (stride / STRIDE_STEPS).ceil().max(1.0);
             for _ in 0..strides as u64 {
-                state = steps.advance(state, (time - now) / strides);
+                state = steps.advance(state, stride / strides);
             }
             now = time;
             found.push(self.found(&state));
@@ -117,19 +140,24 @@ impl Chain {
         Ok(found)
     }
 
-    fn found(&self, state: &[f64]) -> Transient {
-        let failures = (0..self.states()).filter(|state| self.is_failure(*state));
+    fn found(&self, state: &[Extended]) -> Transient {
+        let sum = |failure: bool| {
+            let places = (0..self.states()).filter(|place| self.is_failure(*place) == failure);
+            places.map(|place| state[place]).sum::<Extended>().get()
+        };
         Transient {
-            failed: failures.fold(0.0, |sum, place| sum + state[place]),
-            probabilities: state.to_vec(),
+            working: sum(false),
+            failed: sum(true),
+            probabilities: state.iter().map(|share| share.get()).collect(),
         }
     }
 }
 
 /// The discrete chain: in one step, state i goes to a source's target with rate / fastest.
 struct Steps {
+    /// Steps per hour, a power of two.
     fastest: f64,
-    stays: Vec<f64>,
+    stays: Vec<Extended>,
     /// By target: sources and probabilities.
     rows: Vec<usize>,
     sources: Vec<u32>,
@@ -137,13 +165,13 @@ struct Steps {
 }
 
 impl Steps {
-    fn new(chain: &Chain, after: AfterFailure) -> Self {
+    fn new(chain: &Chain, after: AfterFailure) -> Result<Self, ReliabilityError> {
         let states = chain.states();
         let counts = |state: usize| after == AfterFailure::Repaired || !chain.is_failure(state);
-        let mut leaving = vec![0.0; states];
+        let mut leaving: f64 = 0.0;
         let mut rows = vec![0; states + 1];
         for state in (0..states).filter(|state| counts(*state)) {
-            leaving[state] = chain.leaving(state);
+            leaving = leaving.max(chain.leaving(state));
             for (to, _) in chain.successors(state) {
                 rows[to + 1] += 1;
             }
@@ -152,47 +180,49 @@ impl Steps {
             rows[state + 1] += rows[state];
         }
         // A little faster than the fastest state, so that none is left for certain and the chain does not swing.
-        let fastest = leaving.iter().fold(0.0, |most: f64, rate| most.max(*rate)) * 1.02;
+        let fastest = if leaving > 0.0 {
+            2.0_f64.powi((leaving * 1.01).log2().ceil() as i32)
+        } else {
+            0.0
+        };
+        if !fastest.is_finite() || (leaving > 0.0 && fastest < f64::MIN_POSITIVE) {
+            return Err(ReliabilityError::OutOfRange {
+                what: format!("a rate of {leaving:e} per hour"),
+            });
+        }
         let mut fill = rows.clone();
         let transitions = rows.last().copied().unwrap_or(0);
         let (mut sources, mut shares) = (vec![0; transitions], vec![0.0; transitions]);
+        let mut stays = vec![Extended::ONE; states];
         for state in (0..states).filter(|state| counts(*state)) {
             for (to, rate) in chain.successors(state) {
+                let share = rate / fastest;
                 sources[fill[to]] = state as u32;
-                shares[fill[to]] = rate / fastest;
+                shares[fill[to]] = share;
+                stays[state] = stays[state] - Extended::from(share);
                 fill[to] += 1;
             }
         }
-        let stays = leaving
-            .iter()
-            .map(|leaving| {
-                if fastest > 0.0 {
-                    (fastest - leaving) / fastest
-                } else {
-                    1.0
-                }
-            })
-            .collect();
-        Self {
+        Ok(Self {
             fastest,
             stays,
             rows,
             sources,
             shares,
-        }
+        })
     }
 
-    /// The matrix P(h).
-    fn squared(&self, hours: f64) -> Dense {
-        let states = self.stays.len();
-        let mut entries = vec![0.0; states * states];
-        for target in 0..states {
-            entries[target * states + target] = self.stays[target];
+    /// As a full matrix.
+    fn matrix(&self) -> Dense {
+        let mut matrix = Dense::zero(self.stays.len());
+        for target in 0..self.stays.len() {
+            matrix.set(target, target, self.stays[target]);
             for at in self.rows[target]..self.rows[target + 1] {
-                entries[self.sources[at] as usize * states + target] = self.shares[at];
+                let source = self.sources[at] as usize;
+                matrix.set(source, target, Extended::from(self.shares[at]));
             }
         }
-        Dense::new(states, entries).exponential(self.fastest * hours)
+        matrix
     }
 
     /// Multiplications of one step.
@@ -200,28 +230,56 @@ impl Steps {
         (self.sources.len() + 2 * self.stays.len()) as f64
     }
 
-    fn advance(&self, mut state: Vec<f64>, hours: f64) -> Vec<f64> {
-        let weights = PoissonWeights::new(self.fastest * hours);
-        let mut next = vec![0.0; state.len()];
-        let mut mixed = vec![0.0; state.len()];
+    /// Steps that uniformisation takes up to each of `hours`, from the one before.
+    fn count(&self, hours: &[f64]) -> f64 {
+        let befores = [0.0].into_iter().chain(hours.iter().copied());
+        let strides = hours.iter().zip(befores);
+        let steps = strides.map(|(time, before)| {
+            let mean = self.fastest * (time - before);
+            mean + 12.0 * mean.sqrt() + TERMS
+        });
+        steps.sum()
+    }
+
+    /// Whether squaring a full matrix takes less than the steps do.
+    fn squared_is_cheaper(&self, hours: &[f64]) -> bool {
+        let longest = self.fastest * hours.last().copied().unwrap_or(0.0);
+        let size = self.stays.len();
+        if size > MAXIMUM_DENSE || longest < 1.0 {
+            return false;
+        }
+        let (states, squares) = (size as f64, longest.log2() + 1.0);
+        let series = TERMS * (self.sources.len() as f64 + 2.0 * states) * states;
+        let applied = hours.len() as f64 * (squares * states * states + TERMS * self.work());
+        states.powi(3) * squares + series + applied < self.work() * self.count(hours)
+    }
+
+    fn advance(&self, mut state: Vec<Extended>, mean: f64) -> Vec<Extended> {
+        let weights = PoissonWeights::new(mean);
+        let mut next = vec![Extended::ZERO; state.len()];
+        let mut mixed = vec![Extended::ZERO; state.len()];
+        let mut series = Series::default();
+        let mut sums = vec![0.0; state.len()];
         for count in 0..=weights.last() {
             let weight = weights.at(count);
-            if weight > 0.0 {
-                for (mixed, state) in mixed.iter_mut().zip(&state) {
-                    *mixed += weight * state;
+            if weight.high > 0.0 {
+                for ((mixed, state), sum) in mixed.iter_mut().zip(&state).zip(&mut sums) {
+                    *mixed += weight * *state;
+                    *sum = mixed.high;
                 }
             }
-            if count < weights.last() {
-                for (target, next) in next.iter_mut().enumerate() {
-                    let row = self.rows[target]..self.rows[target + 1];
-                    let arriving = self.sources[row.clone()].iter().zip(&self.shares[row]);
-                    *next = self.stays[target] * state[target]
-                        + arriving
-                            .map(|(source, share)| share * state[*source as usize])
-                            .sum::<f64>();
-                }
-                std::mem::swap(&mut state, &mut next);
+            if series.is_summed(weights.past(count), &sums) {
+                break;
             }
+            for (target, next) in next.iter_mut().enumerate() {
+                let row = self.rows[target]..self.rows[target + 1];
+                let arriving = self.sources[row.clone()].iter().zip(&self.shares[row]);
+                *next = self.stays[target] * state[target]
+                    + arriving
+                        .map(|(source, share)| state[*source as usize] * *share)
+                        .sum::<Extended>();
+            }
+            std::mem::swap(&mut state, &mut next);
         }
         mixed
     }

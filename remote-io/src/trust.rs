@@ -54,7 +54,7 @@ impl Trust {
         self.excluded
     }
 
-    /// Whether there is anything that an operator could release.
+    /// Whether no station is excluded or accused, so that an operator has nothing to release.
     pub(crate) fn is_complete(&self) -> bool {
         *self == Self::default()
     }

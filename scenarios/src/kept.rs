@@ -14,6 +14,7 @@ use understudy_cluster::{Cluster, Link, Overrides, Security, read_with};
 use understudy_diagnostic::Report;
 use understudy_wire::Mode;
 
+use crate::named_files::named_file;
 use crate::run_directory::RunDirectoryError;
 
 const FOLDER: &str = "cluster";
@@ -82,7 +83,7 @@ pub fn keep_cluster(run: &Path, file: &Path, cluster: &Cluster) -> Result<(), Ru
     let beside = file.parent().unwrap_or(Path::new(""));
     let mut ladders: BTreeMap<String, String> = BTreeMap::new();
     let _ = read_with(CLUSTER_FILE, &text, overrides, &mut |name| {
-        let ladder = fs::read_to_string(beside.join(name)).map_err(|error| error.to_string())?;
+        let ladder = named_file(beside, name)?;
         ladders.insert(name.to_owned(), ladder.clone());
         Ok(ladder)
     });
@@ -136,7 +137,7 @@ pub fn kept_cluster(run: &Path) -> Result<Cluster, KeptError> {
     };
     let loaded = read_with(&file.display().to_string(), &text, overrides, &mut |name| {
         let file = kept.ladders.get(name).map_or(name, String::as_str);
-        fs::read_to_string(folder.join(file)).map_err(|error| error.to_string())
+        named_file(&folder, file)
     });
     loaded.cluster.ok_or(KeptError::Files {
         reports: loaded.reports,

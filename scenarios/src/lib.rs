@@ -8,6 +8,7 @@ mod joining;
 mod journal;
 mod kept;
 mod laboratory;
+mod named_files;
 mod observed;
 mod operator;
 mod outlook;
@@ -47,6 +48,7 @@ pub use laboratory::{
     HostKind, LaboratoryError, LaboratoryRun, LaboratorySettings, NetworkSettings, Progress,
     monotonic_ns, run_commanded, run_laboratory,
 };
+pub use named_files::{ALLOWED_FOLDERS, named_file};
 pub use observed::{JournalView, ObservationError, observe_journal};
 pub use operator::{
     Acknowledgement, Command, Commanded, Commander, Commands, OperatorAction, Refusal, RunSocket,

@@ -94,9 +94,9 @@ pub fn synthesis_findings(model: &Model, result: &Supcon) -> Vec<Finding> {
 
 /// U0846 where the specifications, as they were given, are no supervisors: something has to be forbidden beyond them.
 pub fn specification_findings(result: &Supcon) -> Option<Finding> {
-    let (kept, all) = (result.supervisor.state_count(), result.product_states);
+    let (kept, explored) = (result.supervisor.state_count(), result.explored_states);
     let message = format!(
-        "the specifications are no supervisors by themselves: with the plants they have {all} states, and a supervisor keeps to {kept} of them"
+        "the specifications are no supervisors by themselves: of {explored} explored states of their product with the plants, a supervisor keeps to {kept}"
     );
     (!result.is_as_specified()).then(|| Finding::error("U0846", message))
 }

@@ -104,3 +104,92 @@ fn every_engine_synthesises_the_small_factory() {
         bounded.errors
     );
 }
+
+/// A machine that may fail, and what forbids that.
+const NEVER_FAILS: &str = "\
+[events]
+start  = { controllable = true }
+finish = { controllable = false }
+fail   = { controllable = false }
+
+[[plant]]
+name = \"machine\"
+marked = \"all\"
+transitions = [\"idle start working\", \"working finish idle\", \"working fail idle\"]
+";
+const FORBIDDING: &str = "\
+[[supervisor]]
+name = \"never_fail\"
+marked = \"all\"
+events = [\"fail\"]
+transitions = [\"a start b\", \"b finish a\"]
+";
+
+#[test]
+fn a_supervisor_that_forbids_what_it_cannot_is_not_reduced() {
+    let folder = empty_folder("uncontrollable");
+    let file = |name: &str, text: &str| {
+        let path = folder.join(name);
+        std::fs::write(&path, text).expect("written");
+        path.display().to_string()
+    };
+    let plant = file("plant.toml", NEVER_FAILS);
+    let events = NEVER_FAILS.split("[[").next().expect("events");
+    let supervisor = file("supervisor.toml", &format!("{events}{FORBIDDING}"));
+    let reduced = folder.join("reduced.toml");
+    let out = reduced.to_str().expect("text");
+    for operation in ["condat", "supreduce"] {
+        let answer = understudy(&["des", operation, &plant, &supervisor, "-o", out]);
+        assert_eq!(answer.status, 1, "{operation}: {}", answer.output);
+        assert!(
+            answer
+                .errors
+                .contains("error[U0846]: in state b the supervisor forbids fail"),
+            "{operation}: {}",
+            answer.errors
+        );
+        assert!(!reduced.exists(), "{operation} writes nothing");
+    }
+}
+
+#[test]
+fn a_ladder_with_errors_is_not_written() {
+    let folder = empty_folder("withheld");
+    let model = folder.join("model.toml");
+    let text = "[events]\nstart = { controllable = true }\nfull = { controllable = false }\n\n\
+                [[supervisor]]\nname = \"pump\"\nmarked = [\"off\"]\n\
+                transitions = [\"off start on\", \"on full stuck\"]\n";
+    std::fs::write(&model, text).expect("written");
+    let (model, out) = (model.to_str().expect("text"), folder.join("made.ladder"));
+    let to_file = [
+        "supervisor-to-ladder",
+        model,
+        "-o",
+        out.to_str().expect("text"),
+    ];
+    for arguments in [&to_file[..], &to_file[..2]] {
+        let answer = understudy(arguments);
+        assert_eq!(answer.status, 1, "{}", answer.output);
+        assert!(answer.errors.contains("error[U0882]"), "{}", answer.errors);
+        assert!(!answer.output.contains("rung"), "{}", answer.output);
+        assert!(!out.exists());
+    }
+}
+
+/// Behind the place where the specification forbids a failure there are two more states of the product.
+#[test]
+fn explored_states_are_not_called_the_product() {
+    let folder = empty_folder("explored");
+    let model = folder.join("model.toml");
+    let text = "[events]\nstart = { controllable = true }\nfail = { controllable = false }\n\
+                stop = { controllable = true }\n\n[[plant]]\nname = \"machine\"\nmarked = \"all\"\n\
+                transitions = [\"idle start working\", \"working fail broken\", \"working stop ended\"]\n\n\
+                [[specification]]\nname = \"never_fail\"\nmarked = \"all\"\nevents = [\"fail\"]\ntransitions = []\n";
+    std::fs::write(&model, text).expect("written");
+    let model = model.to_str().expect("text");
+    let found = understudy(&["synth", model, "--json"]).json();
+    assert_eq!(found["result"]["explored_states"], json!(2), "{found}");
+    let specified = understudy(&["synth", model, "--engine", "specified"]);
+    let said = "of 2 explored states of their product with the plants, a supervisor keeps to 1";
+    assert!(specified.errors.contains(said), "{}", specified.errors);
+}

@@ -12,6 +12,7 @@ mod explain;
 mod gateway;
 mod help;
 mod model_check;
+mod named_files;
 mod others;
 mod petri;
 mod reconfigure;

@@ -356,3 +356,32 @@ model = "press"
 "#
     )));
 }
+
+/// Each would be called, and nothing answers there.
+#[test]
+fn addresses_at_which_nothing_can_be_reached() {
+    let member = |address: &str| check(&format!("{HEAD}address = \"{address}\"\n"));
+    for (address, why) in [
+        ("0.0.0.0:7450", "every interface"),
+        ("[::]:7450", "every interface"),
+        ("[::ffff:0.0.0.0]:7450", "every interface"),
+        ("224.0.0.1:7450", "many devices"),
+        ("[ff02::1]:7450", "many devices"),
+        ("255.255.255.255:7450", "many devices"),
+        ("192.168.1.11:0", "port 0"),
+    ] {
+        let found = member(address);
+        assert!(
+            found.contains("U0210") && found.contains(why),
+            "{address}: {found}"
+        );
+        let device = format!(
+            "{HEAD}[[remote_io]]\ncontroller = \"robot\"\n[remote_io.field]\nmodbus = \"{address}\"\n\
+             inputs = {{ there = \"discrete:0\", lost = \"discrete:1\" }}\noutputs = {{ go = \"coil:0\" }}\n"
+        );
+        let found = check(&device);
+        assert!(found.contains("U0210"), "{address}: {found}");
+    }
+    let right = member("192.168.1.11:7450");
+    assert!(!right.contains("U0210"), "{right}");
+}

@@ -43,7 +43,7 @@ impl Law {
         let mean = chain.mttf()?;
         let hours = times(mean);
         let found = chain.transients(&hours, AfterFailure::Final)?;
-        let exposure = found.iter().map(|at| -(-at.failed).ln_1p()).collect();
+        let exposure = found.iter().map(|at| -at.log_working()).collect();
         Ok(Self {
             mean,
             hours,

@@ -9,8 +9,11 @@ use serde::Serialize;
 
 use super::estimate::{Interval, beta, chi_squared, significance};
 use crate::error::ReliabilityError;
-use crate::quantity::{Hours, MAXIMUM_HOURS, MINIMUM_HOURS, Probability, grouped};
+use crate::quantity::{
+    Hours, MAXIMUM_HOURS, MINIMUM_HOURS, MINIMUM_PROBABILITY, Probability, grouped, stated,
+};
 use crate::system::System;
+use crate::transient::AfterFailure;
 
 /// Draws of one prediction, at least.
 const MINIMUM_DRAWS: usize = 100;
@@ -129,10 +132,16 @@ pub fn outlook(
             .map(|law| time(law.sample(random)))
             .transpose()
             .map_err(one)?;
-        reliabilities.push(drawn.chain()?.reliability(ahead.get()).map_err(one)?);
+        let at = drawn.chain()?.transient(ahead.get(), AfterFailure::Final);
+        reliabilities.push(at.map_err(one)?.working);
     }
     reliabilities.sort_by(f64::total_cmp);
     let at = |share: f64| reliabilities[((draws - 1) as f64 * share).round() as usize];
+    let predicted = stated(reliabilities.iter().sum::<f64>() / draws as f64);
+    let predicted = predicted.ok_or_else(|| {
+        let what = format!("the reliability over the next {ahead}, which is below 1e-300,");
+        vec![ReliabilityError::OutOfRange { what }]
+    })?;
     Ok(Outlook {
         failure_rate: rate(failures, observed.working_hours).map_err(one)?,
         repair_rate: rate(observed.repairs as f64, observed.repairing_hours).map_err(one)?,
@@ -144,12 +153,12 @@ pub fn outlook(
         },
         ahead_hours: ahead.get(),
         reliability: Interval {
-            estimate: Some(at(0.5)),
+            estimate: stated(at(0.5)),
             lower: at(alpha / 2.0),
-            upper: Some(at(1.0 - alpha / 2.0)),
+            upper: Some(at(1.0 - alpha / 2.0).max(MINIMUM_PROBABILITY)),
             confidence,
         },
-        predicted: reliabilities.iter().sum::<f64>() / draws as f64,
+        predicted,
         doubts: doubts(observed, random),
     })
 }

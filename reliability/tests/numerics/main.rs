@@ -2,6 +2,6 @@
 
 mod chains;
 mod closed_forms;
-mod products;
 mod support;
+mod survival;
 mod systems;

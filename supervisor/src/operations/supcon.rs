@@ -47,14 +47,15 @@ pub struct Supcon {
     pub explanation: Option<Explanation>,
     /// Events of the plant that the specification does not know, and that the meet therefore forbids for ever.
     pub not_lifted: Vec<Label>,
-    /// States of the product that were looked at.
-    pub product_states: usize,
+    /// States of the product that were explored. The product may have more: behind a state in which a specification forbids what the
+    /// plant does, nothing is explored.
+    pub explored_states: usize,
 }
 
 impl Supcon {
     /// Whether nothing had to be forbidden beyond the specification, so that it is a supervisor as it was given.
     pub fn is_as_specified(&self) -> bool {
-        self.explanation.is_none() && self.product_states == self.supervisor.state_count()
+        self.explanation.is_none() && self.explored_states == self.supervisor.state_count()
     }
 }
 
@@ -129,7 +130,7 @@ pub(crate) fn explicit_supcon(
         Some(Fate::Good) => None,
         Some(_) => explain(&product, &fates, plants, specifications, joint),
     };
-    let product_states = product.state_count();
+    let explored_states = product.state_count();
     let names = state_names(&product, &parts);
     let keep: Vec<bool> = fates.iter().map(|&fate| fate == Fate::Good).collect();
     let automaton = product.into_automaton(joined_name(&parts));
@@ -142,7 +143,7 @@ pub(crate) fn explicit_supcon(
         violation,
         explanation,
         not_lifted: Vec::new(),
-        product_states,
+        explored_states,
     })
 }
 
