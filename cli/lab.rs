@@ -44,6 +44,9 @@ pub(crate) struct RunArguments {
     /// Cycles in place of the scenario's; steps and expectations past them are left out
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=understudy_scenarios::MAXIMUM_CYCLES))]
     pub(crate) cycles: Option<u64>,
+    /// Start a member again that ended unexpectedly: after 0.5 s, and after up to 8 s where it ends again and again
+    #[arg(long)]
+    pub(crate) restart: bool,
     #[command(flatten)]
     pub(crate) overrides: OverrideArguments,
     #[command(flatten)]
@@ -54,9 +57,6 @@ pub(crate) struct RunArguments {
     /// What the journal may take of the disk, such as 200MB; its oldest records go when it is full
     #[arg(long, value_name = "SIZE", default_value = "1GB", value_parser = parse_size)]
     pub(crate) journal_limit: u64,
-    /// Start a member again that ended unexpectedly: after 0.5 s, and after up to 8 s where it ends again and again
-    #[arg(long)]
-    pub(crate) restart: bool,
 }
 
 /// What lies between the processes.

@@ -207,6 +207,19 @@ mod tests {
     }
 
     #[test]
+    fn only_a_laboratory_cuts_links() {
+        let line = r#"cut {"stations":1,"remote_ios":2}"#;
+        let cuts = cut(line).expect("it is one");
+        assert_eq!(
+            serde_json::to_value(cuts).expect("JSON"),
+            serde_json::json!({ "stations": 1, "remote_ios": 2 })
+        );
+        assert_eq!(order(line), None, "no operator's order");
+        assert_eq!(cut("cut"), None);
+        assert_eq!(cut(r#"heal {"stations":1,"remote_ios":2}"#), None);
+    }
+
+    #[test]
     fn a_line_without_an_end_is_cut() {
         let long = [b'a'; LINE_BYTES * 3 + 1];
         let cut = "a".repeat(LINE_BYTES);

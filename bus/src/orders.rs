@@ -134,3 +134,40 @@ impl Orders {
         self.inbox.readiness()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use understudy_wire::{ProgramId, StationId};
+
+    use super::*;
+
+    const ROBOT: Party = Party::Station(StationId(0));
+    const PRESS_IO: Party = Party::RemoteIo(ProgramId(1));
+
+    #[test]
+    fn a_cut_is_not_lost_where_orders_are() {
+        let (control, orders) = orders().expect("an eventfd");
+        for _ in 0..=BOUND {
+            control.give(Order::Release);
+        }
+        let mut cuts = Cuts::default();
+        cuts.set(ROBOT, true);
+        cuts.set(PRESS_IO, true);
+        control.give(Order::Cut(cuts));
+        assert!(orders.is_cut(ROBOT) && orders.is_cut(PRESS_IO));
+        assert!(!orders.is_cut(Party::Station(StationId(1))));
+        assert!(!orders.is_cut(Party::RemoteIo(ProgramId(0))));
+        cuts.set(ROBOT, false);
+        control.give(Order::Cut(cuts));
+        assert!(!orders.is_cut(ROBOT) && orders.is_cut(PRESS_IO));
+    }
+
+    #[test]
+    fn a_plant_stays_with_its_remote_io() {
+        let plant = Party::Plant(ProgramId(1));
+        let mut cuts = Cuts::default();
+        cuts.set(plant, true);
+        assert_eq!(cuts, Cuts::default());
+        assert!(!cuts.contains(plant));
+    }
+}

@@ -117,7 +117,10 @@ fn every_kind_of_member_is_killed_from_outside_and_started_again_by_an_operator(
     assert_eq!(child.wait().expect("it ends").code(), Some(1), "{said}");
     no_orphan(&out);
     let restart = format!("understudy operate {} --name press restart", run.display());
-    let told = run.file_name().and_then(|name| name.to_str()).expect("text");
+    let told = run
+        .file_name()
+        .and_then(|name| name.to_str())
+        .expect("text");
     assert!(
         said.contains("press ended unexpectedly (signal: 9 (SIGKILL))")
             && said.contains(&format!("{told} --name press restart")),
@@ -139,7 +142,9 @@ fn every_kind_of_member_is_killed_from_outside_and_started_again_by_an_operator(
 /// Kills the press's controller in a laboratory of 200 cycles; answers with the exit status, the text, and whether it ran again.
 fn killed(name: &str, more: &[&str]) -> (Option<i32>, String, bool) {
     let out = empty_folder(name);
-    let arguments = ["lab", PRESS_CELL, "--link", "udp", "--period", "50ms", "--out"];
+    let arguments = [
+        "lab", PRESS_CELL, "--link", "udp", "--period", "50ms", "--out",
+    ];
     let (mut child, _errors) = running_with(&arguments, &out, more, "in step: ");
     let run = fs::canonicalize(out.join("latest")).expect("a run");
     let mut records = Records::of(&run);
@@ -169,7 +174,8 @@ fn only_the_verdict_of_a_scenario_that_did_not_ask_for_the_death_differs() {
 
     let folder = empty_folder("quiet");
     let quiet = folder.join("quiet.toml");
-    let expects = "title = \"Nothing happens\"\ncycles = 200\n\n[expect]\nwrong = 0\nprotected = true\n";
+    let expects =
+        "title = \"Nothing happens\"\ncycles = 200\n\n[expect]\nwrong = 0\nprotected = true\n";
     fs::write(&quiet, expects).expect("written");
     let quiet = quiet.to_str().expect("text");
     let (status, text, again) = killed("restarted", &["--scenario", quiet, "--restart"]);
