@@ -1,10 +1,12 @@
 //! Commands of the page against a real laboratory: each is done or refused with a reason, and each is in the journal.
 
 use std::fs;
+use std::path::Path;
 use std::time::Duration;
 
-use nix::sys::signal::Signal;
+use nix::sys::signal::{Signal, kill};
 use nix::time::{ClockId, clock_gettime};
+use nix::unistd::Pid;
 use serde_json::{Value, json};
 
 use crate::{Page, empty_folder, one_at_a_time, party, understudy};
@@ -86,6 +88,39 @@ fn a_page_that_is_suspended_stops_nothing() {
         .iter()
         .filter(|source| ["held", "fail-safe"].contains(&source.as_str()));
     assert!(not_true.count() <= TOLERATED_CYCLES, "{sources:?}");
+}
+
+/// The process of a member, as its newest `ready` record says it.
+fn process_of(runs: &Path, name: &str) -> Pid {
+    let journal = fs::read_to_string(runs.join("latest/journal.jsonl")).expect("a journal");
+    let whole = journal.rsplit_once('\n').map_or("", |(whole, _)| whole);
+    let process = whole
+        .lines()
+        .map(|line| serde_json::from_str::<Value>(line).expect("a record"))
+        .filter(|record| record["name"] == name && record["event"]["event"] == "ready")
+        .filter_map(|record| record["event"]["process"].as_i64())
+        .last();
+    let process = process.expect("it is ready");
+    Pid::from_raw(i32::try_from(process).expect("a process id"))
+}
+
+#[test]
+fn the_page_shows_what_is_killed_from_outside_and_starts_it_again() {
+    let _turn = one_at_a_time();
+    let (page, runs) = started("outside");
+    for name in ["robot", "press-io"] {
+        kill(process_of(&runs, name), Signal::SIGKILL).expect("it runs");
+        let state = page.wait_for("its end", |state| party(state, name)["state"] == "ended");
+        assert_eq!(party(&state, name)["down"], true);
+        let restart = json!({ "command": "restart" });
+        assert_eq!(give(&page, name, &restart), (200, String::new()));
+        page.wait_for("its return", |state| {
+            ["speaking", "serving"].contains(&party(state, name)["state"].as_str().expect("text"))
+        });
+    }
+    let alarms = page.get("/api/events").json().to_string();
+    assert!(alarms.contains("robot ended unexpectedly"), "{alarms:.2000}");
+    assert_eq!(page.end(), 0);
 }
 
 #[test]
