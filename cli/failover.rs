@@ -99,6 +99,7 @@ struct KilledSummary {
     violation_count: u64,
     cycles_asked: u64,
     cycles_run: u64,
+    death_count: u64,
     remote_ios: Vec<KilledRemoteIo>,
 }
 
@@ -133,6 +134,10 @@ fn real(
         let (run, asked) = (summary.cycles_run, summary.cycles_asked);
         let early = format!("it ended after {run} of {asked} cycles");
         real.failure.get_or_insert(early);
+    }
+    if summary.death_count > 0 {
+        let more = format!("{} members ended unexpectedly", summary.death_count);
+        real.failure.get_or_insert(more);
     }
     real.wrong = summary.violation_count;
     for remote_io in &summary.remote_ios {

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use understudy_cluster::Cluster;
 use understudy_network::Share;
 use understudy_scenarios::{
-    HostKind, JOURNAL_LIMIT_BYTES, LaboratoryError, LaboratorySettings, NetworkSettings,
+    Deaths, HostKind, JOURNAL_LIMIT_BYTES, LaboratoryError, LaboratorySettings, NetworkSettings,
     RunDirectory, RunDirectoryError, Scenario, Summary, World, run_commanded,
 };
 
@@ -44,6 +44,9 @@ pub(crate) struct RunArguments {
     /// Cycles in place of the scenario's; steps and expectations past them are left out
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=understudy_scenarios::MAXIMUM_CYCLES))]
     pub(crate) cycles: Option<u64>,
+    /// Start a member again that ended unexpectedly: after 0.5 s, and after up to 8 s where it ends again and again
+    #[arg(long)]
+    pub(crate) restart: bool,
     #[command(flatten)]
     pub(crate) overrides: OverrideArguments,
     #[command(flatten)]
@@ -104,7 +107,6 @@ impl NetworkArguments {
             },
             impairment: self.impairment.impairment(),
             seed: self.network_seed,
-            can_be_cut: false,
         }
     }
 }
@@ -171,6 +173,7 @@ pub(crate) fn laboratory_settings(
         link: link_kind(cluster),
         network,
         journal_limit_bytes: JOURNAL_LIMIT_BYTES,
+        deaths: Deaths::EndTheRun,
     })
 }
 
@@ -222,12 +225,14 @@ pub(crate) fn judged(
     page: Option<&Page>,
     console: &mut Console,
 ) -> Result<(Summary, Judged), Answer> {
-    let network = NetworkSettings {
-        can_be_cut: page.is_some_and(Page::may_command),
-        ..arguments.network.settings()
-    };
+    let network = arguments.network.settings();
     let settings = LaboratorySettings {
         journal_limit_bytes: arguments.journal_limit,
+        deaths: if arguments.restart {
+            Deaths::Restarted
+        } else {
+            Deaths::Survived
+        },
         ..laboratory_settings(cluster, cluster_file, &arguments.overrides, network)?
     };
     let served = page.map(|page| page.beside(directory.path(), console));

@@ -111,6 +111,15 @@ fn text(summary: &Summary, directory: Option<&Path>) -> String {
             expectation.expected, expectation.found
         );
     }
+    for death in &summary.deaths {
+        let _ = writeln!(text, "ENDED UNEXPECTEDLY: {death}");
+        for line in &death.said {
+            let _ = writeln!(text, "  {line}");
+        }
+    }
+    if summary.death_count > summary.deaths.len() as u64 {
+        let _ = writeln!(text, "ENDED UNEXPECTEDLY: {} in all", summary.death_count);
+    }
     for violation in summary.violations.iter().take(5) {
         let _ = writeln!(text, "VIOLATION at {}: {}", violation.name, violation.what);
     }

@@ -129,7 +129,7 @@ fn open(arguments: &Arguments, console: &mut Console) -> Result<Opened, Answer> 
 
 /// Writes into the journal that somebody has seen these alarms. They are shown as seen when they are read there.
 fn acknowledge(seen: &[Alarm], commander: &Commander) {
-    let owner = std::env::var("USER").unwrap_or_else(|_| "terminal".to_owned());
+    let owner = owner();
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     let now = since.map_or(0, |since| since.as_secs());
     for alarm in seen {
@@ -137,6 +137,11 @@ fn acknowledge(seen: &[Alarm], commander: &Commander) {
         // One that cannot be written stays unseen, and is shown so.
         let _ = commander.acknowledge_and_wait(seen);
     }
+}
+
+/// Who acts at this terminal.
+pub(crate) fn owner() -> String {
+    std::env::var("USER").unwrap_or_else(|_| "terminal".to_owned())
 }
 
 fn failed(error: io::Error) -> Answer {

@@ -10,7 +10,7 @@ use nix::sys::signalfd::{SfdFlags, SignalFd};
 use understudy_wire::Force;
 
 use crate::error::BusError;
-use crate::orders::{Control, Order};
+use crate::orders::{Control, Cuts, Order};
 
 /// Whether commands are read, one a line: `stop`, `release`, `force {...}` and `unforce {...}` with a [`Force`] and a [`SignalPlace`](understudy_wire::SignalPlace) as JSON.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,7 +19,7 @@ pub enum Commands {
     None,
     /// Commands are read; the end of standard input means nothing.
     Read,
-    /// Commands are read, and the party ends with standard input: whoever started it is gone then.
+    /// Commands are read, and `cut {...}` with a [`Cuts`] as JSON; the party ends with standard input: whoever started it is gone then.
     ReadAndEndWithInput,
 }
 
@@ -99,7 +99,13 @@ pub(crate) fn watch(
                 }
                 Ok(length) => {
                     for line in lines.take(&bytes[..length]) {
-                        match order(&line) {
+                        let order = match cut(&line) {
+                            Some(cuts) if commands == Commands::ReadAndEndWithInput => {
+                                Some(Order::Cut(cuts))
+                            }
+                            _ => order(&line),
+                        };
+                        match order {
                             Some(order) => control.give(order),
                             None if line.is_empty() => {}
                             None => unknown(line),
@@ -126,6 +132,11 @@ pub(crate) fn order(line: &str) -> Option<Order> {
         ("unforce", signal) => serde_json::from_str(signal).ok().map(Order::Unforce),
         _ => None,
     }
+}
+
+/// The links that a laboratory wants to be cut; no operator can.
+fn cut(line: &str) -> Option<Cuts> {
+    serde_json::from_str(line.strip_prefix("cut ")?).ok()
 }
 
 /// Lines out of pieces.
@@ -201,6 +212,19 @@ mod tests {
         );
         check("choose", None);
         check("", None);
+    }
+
+    #[test]
+    fn only_a_laboratory_cuts_links() {
+        let line = r#"cut {"stations":1,"remote_ios":2}"#;
+        let cuts = cut(line).expect("it is one");
+        assert_eq!(
+            serde_json::to_value(cuts).expect("JSON"),
+            serde_json::json!({ "stations": 1, "remote_ios": 2 })
+        );
+        assert_eq!(order(line), None, "no operator's order");
+        assert_eq!(cut("cut"), None);
+        assert_eq!(cut(r#"heal {"stations":1,"remote_ios":2}"#), None);
     }
 
     #[test]

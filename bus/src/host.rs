@@ -151,6 +151,8 @@ impl<M: Machine> Host<'_, M> {
         while let Some(order) = self.orders.take() {
             let input = match &order {
                 Order::Stop => return true,
+                // Holds already: it is asked of the orders for each frame.
+                Order::Cut(_) => continue,
                 Order::Release => Input::Release,
                 Order::Choose(choice) => Input::Choose(*choice),
                 Order::Force(force) => Input::Force(force),
@@ -194,6 +196,7 @@ impl<M: Machine> Host<'_, M> {
             match self.guard.open(&mut round.received) {
                 // In order, and for another station.
                 Ok(None) => {}
+                Ok(Some(frame)) if self.orders.is_cut(frame.header.sender) => {}
                 Ok(Some(frame)) => {
                     let frame = Arc::new(frame);
                     round.summary.frames_heard += 1;

@@ -47,7 +47,7 @@ pub use journal::{
 pub use link::{Link, LinkCounters, LinkKind, NoSuchLink};
 pub use observer::{NoObserver, Observer};
 pub use operator::{Call, Request};
-pub use orders::{Control, Order, Orders, orders};
+pub use orders::{Control, Cuts, Order, Orders, orders};
 pub use party::{PartySettings, run_party};
 pub use ports::free_addresses;
 pub use rights::Rights;

@@ -2,14 +2,15 @@
 
 use std::os::fd::BorrowedFd;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use understudy_wire::{Force, SignalPlace, StateChoice};
+use serde::{Deserialize, Serialize};
+use understudy_wire::{Force, Party, ProgramSet, SignalPlace, StateChoice, StationSet};
 
 use crate::doorbell::{Inbox, Outbox, doorbell};
 use crate::error::BusError;
 
-/// Orders that wait, at most; what comes on top of them is dropped. To stop is never dropped.
+/// Orders that wait, at most; what comes on top of them is dropped. To stop and to cut are never dropped.
 const BOUND: usize = 16;
 
 /// One order.
@@ -25,20 +26,58 @@ pub enum Order {
     Force(Force),
     /// The operator takes it back.
     Unforce(SignalPlace),
+    /// The laboratory cuts the links from these members, and heals those from all others.
+    Cut(Cuts),
+}
+
+/// Members whose frames a member of a laboratory drops, as if the links from them were cut.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Cuts {
+    stations: StationSet,
+    remote_ios: ProgramSet,
+}
+
+impl Cuts {
+    /// Cuts the link from a member, or heals it. A plant stays with its remote I/O.
+    pub fn set(&mut self, party: Party, cut: bool) {
+        match (party, cut) {
+            (Party::Station(station), true) => self.stations.insert(station),
+            (Party::Station(station), false) => self.stations.remove(station),
+            (Party::RemoteIo(program), true) => self.remote_ios.insert(program),
+            (Party::RemoteIo(program), false) => self.remote_ios.remove(program),
+            (Party::Plant(_), _) => {}
+        }
+    }
+
+    pub(crate) fn contains(self, party: Party) -> bool {
+        match party {
+            Party::Station(station) => self.stations.contains(station),
+            Party::RemoteIo(program) => self.remote_ios.contains(program),
+            Party::Plant(_) => false,
+        }
+    }
+}
+
+/// What holds from an order until the next one of its kind; it waits in no queue, so that none of it is lost.
+#[derive(Debug, Default)]
+struct Standing {
+    stopping: AtomicBool,
+    cut_stations: AtomicU64,
+    cut_remote_ios: AtomicU64,
 }
 
 /// The party's end.
 #[derive(Debug)]
 pub struct Orders {
     inbox: Inbox<Order>,
-    stopping: Arc<AtomicBool>,
+    standing: Arc<Standing>,
 }
 
 /// The end of whoever gives orders; may be cloned, and used from any thread.
 #[derive(Debug, Clone)]
 pub struct Control {
     outbox: Outbox<Order>,
-    stopping: Arc<AtomicBool>,
+    standing: Arc<Standing>,
 }
 
 /// Both ends.
@@ -47,19 +86,30 @@ pub struct Control {
 /// [`BusError::System`] where there is no eventfd to be had.
 pub fn orders() -> Result<(Control, Orders), BusError> {
     let (outbox, inbox) = doorbell(BOUND).map_err(BusError::system("an eventfd for orders"))?;
-    let stopping = Arc::new(AtomicBool::new(false));
+    let standing = Arc::new(Standing::default());
     let control = Control {
         outbox,
-        stopping: Arc::clone(&stopping),
+        standing: Arc::clone(&standing),
     };
-    Ok((control, Orders { inbox, stopping }))
+    Ok((control, Orders { inbox, standing }))
 }
 
 impl Control {
     /// Gives an order; never blocks.
     pub fn give(&self, order: Order) {
-        if order == Order::Stop {
-            self.stopping.store(true, Ordering::SeqCst);
+        match &order {
+            Order::Stop => self.standing.stopping.store(true, Ordering::SeqCst),
+            Order::Cut(cuts) => {
+                let standing = &self.standing;
+                standing
+                    .cut_stations
+                    .store(cuts.stations.bits(), Ordering::Relaxed);
+                standing
+                    .cut_remote_ios
+                    .store(cuts.remote_ios.bits(), Ordering::Relaxed);
+                return;
+            }
+            _ => {}
         }
         self.outbox.put(order);
     }
@@ -67,13 +117,59 @@ impl Control {
 
 impl Orders {
     pub(crate) fn take(&self) -> Option<Order> {
-        if self.stopping.load(Ordering::SeqCst) {
+        if self.standing.stopping.load(Ordering::SeqCst) {
             return Some(Order::Stop);
         }
         self.inbox.take()
     }
 
+    /// Whether the link from a member is cut.
+    pub(crate) fn is_cut(&self, party: Party) -> bool {
+        let cuts = Cuts {
+            stations: StationSet::from_bits(self.standing.cut_stations.load(Ordering::Relaxed)),
+            remote_ios: ProgramSet::from_bits(self.standing.cut_remote_ios.load(Ordering::Relaxed)),
+        };
+        cuts.contains(party)
+    }
+
     pub(crate) fn readiness(&self) -> BorrowedFd<'_> {
         self.inbox.readiness()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use understudy_wire::{ProgramId, StationId};
+
+    use super::*;
+
+    const ROBOT: Party = Party::Station(StationId(0));
+    const PRESS_IO: Party = Party::RemoteIo(ProgramId(1));
+
+    #[test]
+    fn a_cut_is_not_lost_where_orders_are() {
+        let (control, orders) = orders().expect("an eventfd");
+        for _ in 0..=BOUND {
+            control.give(Order::Release);
+        }
+        let mut cuts = Cuts::default();
+        cuts.set(ROBOT, true);
+        cuts.set(PRESS_IO, true);
+        control.give(Order::Cut(cuts));
+        assert!(orders.is_cut(ROBOT) && orders.is_cut(PRESS_IO));
+        assert!(!orders.is_cut(Party::Station(StationId(1))));
+        assert!(!orders.is_cut(Party::RemoteIo(ProgramId(0))));
+        cuts.set(ROBOT, false);
+        control.give(Order::Cut(cuts));
+        assert!(!orders.is_cut(ROBOT) && orders.is_cut(PRESS_IO));
+    }
+
+    #[test]
+    fn a_plant_stays_with_its_remote_io() {
+        let plant = Party::Plant(ProgramId(1));
+        let mut cuts = Cuts::default();
+        cuts.set(plant, true);
+        assert_eq!(cuts, Cuts::default());
+        assert!(!cuts.contains(plant));
     }
 }

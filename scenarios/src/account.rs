@@ -48,6 +48,9 @@ const MAXIMUM_OPEN_CYCLES: usize = 2048;
 /// Violations that are listed, at most; all are counted.
 const MAXIMUM_VIOLATIONS: usize = 100;
 
+/// Unexpected ends of members that are listed, at most; all are counted.
+const MAXIMUM_DEATHS: usize = 100;
+
 /// What an account has to know of a cluster.
 #[derive(Debug, Clone)]
 pub struct Terms {
@@ -80,6 +83,18 @@ pub(crate) struct DoneStep {
     pub(crate) asked: u64,
     /// The first cycle whose deadline came after it.
     pub(crate) measured: u64,
+}
+
+/// An unexpected end of a member.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Death {
+    pub(crate) party: Party,
+    /// The first cycle whose deadline came after it; none before the origin.
+    pub(crate) cycle: Option<u64>,
+    /// The signal or the exit status.
+    pub(crate) how: String,
+    /// Its last lines on standard error.
+    pub(crate) said: Vec<String>,
 }
 
 /// How a range of the expectation fared.
@@ -121,6 +136,8 @@ pub struct Account {
     stalls: Stalls,
     pub(crate) traces: Traces,
     pub(crate) steps: Vec<DoneStep>,
+    pub(crate) deaths: Vec<Death>,
+    pub(crate) death_count: u64,
     pub(crate) violations: Vec<(u64, ProgramId, Violation)>,
     pub(crate) violation_count: u64,
     pub(crate) during: Vec<(During, RangeFinding)>,
@@ -155,6 +172,8 @@ impl Account {
                 stations: vec![Trace::default(); stations],
             },
             steps: Vec::new(),
+            deaths: Vec::new(),
+            death_count: 0,
             violations: Vec::new(),
             violation_count: 0,
             during: scenario
@@ -378,16 +397,25 @@ impl Account {
                 {
                     referee.operator_chooses();
                 }
-                let number = self.numbering.latest().unwrap_or(0) + 1;
-                self.stalls.step(number, *party, *action);
-                let measured = self.since_origin(number).unwrap_or(0);
-                self.presences.step(measured, *party, *action);
+                let measured = self.disturb(*party, *action).unwrap_or(0);
                 self.steps.push(DoneStep {
                     action: *action,
                     party: *party,
                     asked: *asked,
                     measured,
                 });
+            }
+            RunEvent::Ended { party, how, said } => {
+                let cycle = self.disturb(*party, Action::Crash);
+                self.death_count += 1;
+                if self.deaths.len() < MAXIMUM_DEATHS {
+                    self.deaths.push(Death {
+                        party: *party,
+                        cycle,
+                        how: how.clone(),
+                        said: said.clone(),
+                    });
+                }
             }
             RunEvent::Interrupted => {
                 self.interrupted = true;
@@ -402,9 +430,17 @@ impl Account {
             | RunEvent::Acknowledged(_)
             | RunEvent::Attached { .. }
             | RunEvent::Detached { .. }
-            | RunEvent::Ended { .. }
             | RunEvent::Finished => {}
         }
+    }
+
+    /// Something is done to a member, or happens to it: answers with the first cycle whose deadline comes after it.
+    fn disturb(&mut self, party: Party, action: Action) -> Option<u64> {
+        let number = self.numbering.latest().unwrap_or(0) + 1;
+        self.stalls.step(number, party, action);
+        let measured = self.since_origin(number);
+        self.presences.step(measured.unwrap_or(0), party, action);
+        measured
     }
 
     fn unwritten(&mut self, party: Party, records: u64) {

@@ -1,7 +1,8 @@
 //! A scenario on real processes: one for each party, over a real network, on real clocks.
 //!
 //! The laboratory starts them, reads what they report, does the steps of the scenario when the cycles come that they are meant
-//! for, and ends everything that it started, whatever happens. It decides nothing about the cycle.
+//! for, and ends everything that it started, whatever happens. It decides nothing about the cycle, and no frame passes through it
+//! unless it shapes the links. The unexpected end of a member is a fault like any other: it is recorded, and the run goes on.
 
 mod conductor;
 mod error;
@@ -10,6 +11,7 @@ mod operator;
 mod patience;
 mod process;
 mod processes;
+mod recovery;
 mod site;
 mod steps;
 
@@ -20,7 +22,7 @@ use std::time::{Duration, Instant};
 use nix::time::{ClockId, clock_gettime};
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::mpsc::{Receiver, Sender, channel};
-use understudy_bus::LinkKind;
+use understudy_bus::{Cuts, LinkKind};
 use understudy_cluster::Cluster;
 use understudy_simulator::Action;
 use understudy_wire::Party;
@@ -40,11 +42,15 @@ pub use site::{HostKind, NetworkSettings};
 use keys::RunKeys;
 use patience::Waits;
 use process::{Process, Said};
+use recovery::Recovery;
 use site::Site;
 use steps::Steps;
 
 /// What the parties say and nobody has read yet, at most; then they wait, and lose records rather than cycles.
 const UNREAD_LINES: usize = 16_384;
+
+/// The folder of the keys of a run, in its directory.
+pub(crate) const KEYS: &str = "keys";
 
 /// How often the clock is looked at when nobody says anything.
 const TICK: Duration = Duration::from_millis(50);
@@ -64,6 +70,19 @@ pub struct LaboratorySettings {
     pub network: NetworkSettings,
     /// What the journal may take of the disk.
     pub journal_limit_bytes: u64,
+    /// What follows when a member ends unexpectedly.
+    pub deaths: Deaths,
+}
+
+/// What the laboratory does when a member ends unexpectedly after it was ready.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Deaths {
+    /// The run goes on without the member, which an operator can start again.
+    Survived,
+    /// The run goes on, and the member is started again after a while.
+    Restarted,
+    /// The run ends: a measurement in which a failure that was not drawn counted as one would be wrong.
+    EndTheRun,
 }
 
 /// How far a run is.
@@ -194,7 +213,7 @@ fn run(
         settings.journal_limit_bytes,
     )
     .map_err(system("to write journal.jsonl"))?;
-    let keys = RunKeys::make(cluster, directory.file("keys"))
+    let keys = RunKeys::make(cluster, directory.file(KEYS))
         .map_err(|errors| LaboratoryError::Keys { errors })?;
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
@@ -211,6 +230,8 @@ fn run(
         lives: BTreeMap::new(),
         ready: BTreeSet::new(),
         machine: BTreeSet::new(),
+        cuts: BTreeMap::new(),
+        recovery: Recovery::default(),
         conductor,
         commanded: commands.is_some(),
         directory: directory.path().to_owned(),
@@ -259,6 +280,9 @@ struct Laboratory<'w> {
     /// Parties that have said that they listen.
     ready: BTreeSet<Party>,
     machine: BTreeSet<String>,
+    /// By receiver: of whom it drops the frames.
+    cuts: BTreeMap<Party, Cuts>,
+    recovery: Recovery,
     conductor: &'w mut dyn Conductor,
     /// Whether somebody gives commands, or said that he might.
     commanded: bool,
@@ -301,12 +325,13 @@ impl Laboratory<'_> {
             .map(|(party, _)| party)
             .collect();
         for party in parties {
-            self.start(party)?;
+            self.start(party).await?;
         }
         let mut waits = Waits::new();
         let mut tick = tokio::time::interval(TICK);
         loop {
-            let due = self.conductor.next_due();
+            let due = [self.conductor.next_due(), self.recovery.next_due()];
+            let due = due.into_iter().flatten().min();
             let sleep =
                 tokio::time::sleep_until(due.unwrap_or_else(|| Instant::now() + TICK).into());
             tokio::select! {
@@ -326,6 +351,9 @@ impl Laboratory<'_> {
             self.conductor.follow(self.account.cycle(), now);
             while let Some(step) = self.conductor.take_due(now) {
                 self.do_step(&step).await?;
+            }
+            while let Some(party) = self.recovery.take_due(now) {
+                self.restart(party).await;
             }
             self.show_progress(&mut waits);
             if self.conductor.is_over(now) {

@@ -8,6 +8,7 @@ mod joining;
 mod journal;
 mod kept;
 mod laboratory;
+mod leftovers;
 mod named_files;
 mod observed;
 mod operator;
@@ -45,8 +46,8 @@ pub use joining::{JOIN_CYCLES, Joined, join_trial};
 pub use journal::{JOURNAL_LIMIT_BYTES, Journal, JournalError, JournalState, records, records_of};
 pub use kept::{KeptError, keep_cluster, kept_cluster};
 pub use laboratory::{
-    HostKind, LaboratoryError, LaboratoryRun, LaboratorySettings, NetworkSettings, Progress,
-    monotonic_ns, run_commanded, run_laboratory,
+    Deaths, HostKind, LaboratoryError, LaboratoryRun, LaboratorySettings, NetworkSettings,
+    Progress, monotonic_ns, run_commanded, run_laboratory,
 };
 pub use named_files::{ALLOWED_FOLDERS, named_file};
 pub use observed::{JournalView, ObservationError, observe_journal};
@@ -66,7 +67,7 @@ pub use scenario::{
 pub use schema::scenario_schema;
 pub use simulation::{NotInStep, simulate};
 pub use summary::{
-    Circumstances, ExpectationSummary, PlantSummary, RefusedSummary, RemoteIoSummary,
+    Circumstances, DeathSummary, ExpectationSummary, PlantSummary, RefusedSummary, RemoteIoSummary,
     StationSummary, StepSummary, Summary, ViolationSummary, World,
 };
 pub use table::{Cell, Row, Table};

@@ -70,7 +70,7 @@ impl ObservationError {
 enum Sign {
     Spoke(StationId),
     Flagged(StationId),
-    /// A step of the scenario took it away.
+    /// A step of the scenario took it away, or its process ended unexpectedly.
     Taken(StationId),
     Stalled,
     /// A deadline.
@@ -166,6 +166,13 @@ fn sign(record: &Record) -> Option<Sign> {
         (
             Happening::Run(RunEvent::Fault {
                 action: Action::Crash | Action::Stop,
+                party: Party::Station(rank),
+                ..
+            }),
+            _,
+        )
+        | (
+            Happening::Run(RunEvent::Ended {
                 party: Party::Station(rank),
                 ..
             }),

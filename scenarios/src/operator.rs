@@ -20,6 +20,7 @@ use understudy_wire::{Force, Party, SignalPlace, StateChoice};
 
 pub use acknowledgement::Acknowledgement;
 pub use socket::RunSocket;
+pub(crate) use socket::SOCKET;
 
 /// Commands that wait, at most; whoever gives another is told so.
 const WAITING: usize = 16;
@@ -81,9 +82,6 @@ pub enum Refusal {
         /// What is needed.
         needs: &'static str,
     },
-    /// There is nothing between the parties that could cut.
-    #[error("U0555: the links of this run cannot be cut: nothing lies between its processes")]
-    NoProxy,
     /// The program has no such signal, or the force is not complete.
     #[error("U0556: {0}")]
     Force(String),
@@ -229,6 +227,14 @@ impl Commander {
     /// # Errors
     /// [`Refusal`].
     pub fn acknowledge_and_wait(&self, acknowledgement: Acknowledgement) -> Result<(), Refusal> {
+        self.act_and_wait(&OperatorAction::Acknowledge(acknowledgement))
+    }
+
+    /// Does what an operator wants, from a thread that has nothing else to do.
+    ///
+    /// # Errors
+    /// [`Refusal`].
+    pub fn act_and_wait(&self, action: &OperatorAction) -> Result<(), Refusal> {
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build();
@@ -236,7 +242,7 @@ impl Commander {
             name: "a runtime".to_owned(),
             reason: error.to_string(),
         })?;
-        runtime.block_on(self.acknowledge(acknowledgement))
+        runtime.block_on(self.act(action.clone()))
     }
 
     async fn act(&self, action: OperatorAction) -> Result<(), Refusal> {

@@ -85,12 +85,15 @@ pub enum RunEvent {
         /// Why, in words.
         reason: String,
     },
-    /// A party's process ended; asked for or not.
+    /// The process of a member ended unexpectedly.
     Ended {
-        /// Who.
+        /// Which member.
         party: Party,
-        /// How, in words.
+        /// By which signal or exit status, such as `signal: 9 (SIGKILL)`.
         how: String,
+        /// Its last lines on standard error.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        said: Vec<String>,
     },
     /// Everybody is in step: from here on cycles are counted.
     Origin {

@@ -8,6 +8,7 @@ use std::time::SystemTime;
 
 use crate::account::Account;
 use crate::figure::{FigureError, figure};
+use crate::leftovers::remove_leftovers;
 use crate::report::{ReportError, report};
 use crate::summary::Summary;
 use crate::writer::WriterLock;
@@ -19,7 +20,7 @@ const MAXIMUM_TRIES: u32 = 1000;
 #[derive(Debug, Clone)]
 pub struct RunDirectory {
     path: PathBuf,
-    _lock: Option<Arc<WriterLock>>,
+    _lock: Arc<WriterLock>,
 }
 
 /// Something could not be written.
@@ -64,11 +65,12 @@ impl RunDirectory {
             let path = runs.join(&name);
             match fs::create_dir(&path) {
                 Ok(()) => {
+                    let lock = WriterLock::of_new(&path).map_err(at(&path))?;
                     point_latest(runs, &name).map_err(at(&runs.join("latest")))?;
-                    let lock = WriterLock::take(&path).map_err(at(&path))?;
+                    remove_leftovers(runs);
                     return Ok(Self {
                         path,
-                        _lock: lock.map(Arc::new),
+                        _lock: Arc::new(lock),
                     });
                 }
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
@@ -88,13 +90,13 @@ impl RunDirectory {
             path: path.clone(),
             source,
         })?;
-        let lock = WriterLock::take(&path).map_err(|source| RunDirectoryError::Write {
+        let lock = WriterLock::of_new(&path).map_err(|source| RunDirectoryError::Write {
             path: path.clone(),
             source,
         })?;
         Ok(Self {
             path,
-            _lock: lock.map(Arc::new),
+            _lock: Arc::new(lock),
         })
     }
 
@@ -131,15 +133,18 @@ impl RunDirectory {
         self.path.join(name)
     }
 
-    /// Writes a file in it.
+    /// Writes a file in it, which is there whole or not at all.
     ///
     /// # Errors
     /// [`RunDirectoryError::Write`].
     pub fn write(&self, name: &str, text: &str) -> Result<(), RunDirectoryError> {
         let path = self.file(name);
         let parent = path.parent().unwrap_or(&self.path);
+        // Two files of one name are not written at once: a run has one writer.
+        let begun = path.with_extension("new");
         fs::create_dir_all(parent)
-            .and_then(|()| fs::write(&path, text))
+            .and_then(|()| fs::write(&begun, text))
+            .and_then(|()| fs::rename(&begun, &path))
             .map_err(|source| RunDirectoryError::Write { path, source })
     }
 
@@ -161,9 +166,19 @@ impl RunDirectory {
     }
 }
 
+/// How the names of links begin that are to become `latest`.
+const NEW_LATEST: &str = ".latest-";
+
+/// Whether a link was to become `latest` when the process that made it was killed.
+pub(crate) fn is_of_latest(link: &Path) -> bool {
+    let name = link.file_name().and_then(|name| name.to_str());
+    let process = name.and_then(|name| name.strip_prefix(NEW_LATEST));
+    process.is_some_and(|process| !Path::new("/proc").join(process).exists())
+}
+
 /// Replaces the link `latest`, so that it never points to nothing.
 fn point_latest(runs: &Path, name: &str) -> io::Result<()> {
-    let new = runs.join(format!(".latest-{}", std::process::id()));
+    let new = runs.join(format!("{NEW_LATEST}{}", std::process::id()));
     match fs::remove_file(&new) {
         Ok(()) => {}
         Err(error) if error.kind() == io::ErrorKind::NotFound => {}

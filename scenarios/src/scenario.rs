@@ -43,6 +43,11 @@ impl Scenario {
         })
     }
 
+    /// Whether it does nothing to the cluster and expects nothing of it: a cluster that merely runs.
+    pub fn asks_for_nothing(&self) -> bool {
+        self.steps.is_empty() && self.network.is_none() && self.expect == Expectation::default()
+    }
+
     /// The same with `cycles` cycles in place of its own; steps and expectations that they do not reach are left out, and so
     /// are counts of finished parts and protection at the end, which belong to the whole.
     #[must_use]

@@ -1,5 +1,7 @@
 //! `summary.json`: what a run came to, for machines; the table, the report and the command line read nothing else.
 
+use std::fmt;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_wire::{Party, ProgramId, Source};
@@ -35,6 +37,10 @@ pub struct Summary {
     pub plants: Vec<PlantSummary>,
     /// What was done to whom, in order.
     pub steps: Vec<StepSummary>,
+    /// Members that ended unexpectedly, at most 100 of them.
+    pub deaths: Vec<DeathSummary>,
+    /// How many there were.
+    pub death_count: u64,
     /// What must never happen and did, at most 100 of them.
     pub violations: Vec<ViolationSummary>,
     /// How many there were.
@@ -132,6 +138,29 @@ pub struct StepSummary {
     pub measured: u64,
 }
 
+/// A member that ended unexpectedly.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct DeathSummary {
+    /// Its name.
+    pub name: String,
+    /// The first cycle whose deadline came after it; nothing before the cluster was synchronised.
+    pub cycle: Option<u64>,
+    /// The signal or the exit status.
+    pub how: String,
+    /// Its last lines on standard error.
+    pub said: Vec<String>,
+}
+
+impl fmt::Display for DeathSummary {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { name, how, .. } = self;
+        match self.cycle {
+            Some(cycle) => write!(formatter, "{name} in cycle {cycle} ({how})"),
+            None => write!(formatter, "{name} before cycle 0 ({how})"),
+        }
+    }
+}
+
 /// Something that must never happen.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct ViolationSummary {
@@ -217,6 +246,17 @@ impl Summary {
             remote_ios: remote_ios.collect(),
             plants: plants.collect(),
             steps: steps.collect(),
+            deaths: account
+                .deaths
+                .iter()
+                .map(|death| DeathSummary {
+                    name: name(death.party),
+                    cycle: death.cycle,
+                    how: death.how.clone(),
+                    said: death.said.clone(),
+                })
+                .collect(),
+            death_count: account.death_count,
             violations: violations
                 .map(|(cycle, program, violation)| ViolationSummary {
                     cycle: *cycle,
@@ -289,6 +329,14 @@ fn expectations(
                 met: false,
             });
         }
+    }
+    if summary.death_count > 0 && !scenario.asks_for_nothing() {
+        let each: Vec<String> = summary.deaths.iter().map(ToString::to_string).collect();
+        list.push(ExpectationSummary {
+            expected: "no member ends but by a step of the scenario".to_owned(),
+            found: format!("ended unexpectedly: {}", each.join(", ")),
+            met: false,
+        });
     }
     if let Some(held) = expect.held {
         list.push(at_most(

@@ -4,15 +4,31 @@
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::path::Path;
+use std::time::Duration;
 
 /// In the directory of a run.
 const LOCK: &str = "run.lock";
+
+/// How often the lock of a new run is tried.
+const ATTEMPTS: u32 = 200;
+const BETWEEN_ATTEMPTS: Duration = Duration::from_millis(5);
 
 /// Held by whoever writes a run.
 #[derive(Debug)]
 pub(crate) struct WriterLock(#[allow(dead_code, reason = "it is held")] File);
 
 impl WriterLock {
+    /// Takes the lock of a run that begins. Others only look at it for a moment ([`writing`]), so it is waited for.
+    pub(crate) fn of_new(run: &Path) -> io::Result<Self> {
+        for _ in 0..ATTEMPTS {
+            if let Some(lock) = Self::take(run)? {
+                return Ok(lock);
+            }
+            std::thread::sleep(BETWEEN_ATTEMPTS);
+        }
+        Err(io::ErrorKind::WouldBlock.into())
+    }
+
     /// Takes the lock of a run; nothing where another process has it.
     pub(crate) fn take(run: &Path) -> io::Result<Option<Self>> {
         let file = OpenOptions::new()
@@ -54,6 +70,24 @@ pub fn writing(run: &Path) -> Writing {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn whoever_looks_does_not_keep_the_lock_of_a_new_run() {
+        let name = format!("understudy-writer-new-{}", std::process::id());
+        let run = std::env::temp_dir().join(name);
+        std::fs::create_dir_all(&run).expect("a folder");
+        let looks = File::create(run.join(LOCK)).expect("a file");
+        looks.lock_shared().expect("locked");
+        let looking = std::thread::spawn(move || {
+            std::thread::sleep(BETWEEN_ATTEMPTS * 4);
+            drop(looks);
+        });
+        let lock = WriterLock::of_new(&run).expect("free soon");
+        assert_eq!(writing(&run), Writing::Now);
+        looking.join().expect("it looks");
+        drop(lock);
+        std::fs::remove_dir_all(run).expect("it goes");
+    }
 
     #[test]
     fn one_writes_and_the_others_see_it() {

@@ -11,6 +11,7 @@
 
 mod boiler;
 mod campaigns;
+mod deaths;
 mod field;
 mod hosts;
 #[allow(dead_code, reason = "each test uses its part")]
@@ -143,6 +144,17 @@ fn stations_that_stand_still_do_not_speak_from_a_stale_state() {
 }
 
 #[test]
+fn stations_that_are_cut_off_are_masked_and_come_back() {
+    let scenario = "examples/press-cell/cut-off-and-healed.toml";
+    let summary = check("cut_off", scenario, &[]);
+    assert_met(&summary);
+    assert!(count(&summary, 0, "reconstructed") >= 150);
+    // No proxy lies between the members for it.
+    let circumstances = summary["circumstances"]["machine"].to_string();
+    assert!(!circumstances.contains("proxy"), "{circumstances}");
+}
+
+#[test]
 fn a_remote_io_that_is_started_again_adopts_its_history() {
     let summary = check("remote_io_restart", "scenarios/remote-io-restart.toml", &[]);
     assert_met(&summary);
@@ -238,29 +250,27 @@ fn an_interrupted_run_leaves_its_results_and_no_orphan() {
 }
 
 #[test]
-fn a_killed_laboratory_leaves_no_orphan() {
+fn a_killed_laboratory_leaves_no_orphan_and_the_next_run_cleans_up() {
     let _one = one_at_a_time();
     let out = empty_folder("killed");
     let (mut child, _errors) = running(&out, &[]);
+    let run = fs::canonicalize(out.join("latest")).expect("a run");
+    // A suspended member ends as well.
+    signal(process_of(&out, "robot"), Signal::SIGSTOP);
     child.kill().expect("it lives");
     child.wait().expect("it ends");
     no_orphan(&out);
-}
-
-#[test]
-fn a_party_that_dies_unasked_ends_the_run_and_is_named() {
-    let _one = one_at_a_time();
-    let out = empty_folder("dies");
-    let (mut child, mut errors) = running(&out, &[]);
-    signal(process_of(&out, "press"), Signal::SIGKILL);
-    let mut said = String::new();
-    errors.read_to_string(&mut said).expect("text");
-    assert_eq!(child.wait().expect("it ends").code(), Some(1));
-    assert!(
-        said.contains("error[U0522]: press ended by itself"),
-        "{said}"
-    );
+    assert!(run.join("keys").exists() && run.join("operator.sock").exists());
+    let (mut child, _errors) = running(&out, &[]);
+    for left in ["keys", "operator.sock"] {
+        assert!(!run.join(left).exists(), "{left} of the killed run");
+        assert!(out.join("latest").join(left).exists(), "{left} of this run");
+    }
+    assert!(run.join("journal.jsonl").exists());
+    signal(child.id(), Signal::SIGINT);
+    child.wait().expect("it ends");
     no_orphan(&out);
+    assert!(!out.join("latest").join("keys").exists());
 }
 
 /// The process id that a party of a running laboratory has told in its journal's first record.

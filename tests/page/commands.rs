@@ -1,7 +1,12 @@
 //! Commands of the page against a real laboratory: each is done or refused with a reason, and each is in the journal.
 
 use std::fs;
+use std::path::Path;
+use std::time::Duration;
 
+use nix::sys::signal::{Signal, kill};
+use nix::time::{ClockId, clock_gettime};
+use nix::unistd::Pid;
 use serde_json::{Value, json};
 
 use crate::{Page, empty_folder, one_at_a_time, party, understudy};
@@ -33,6 +38,92 @@ fn give(page: &Page, name: &str, command: &Value) -> (u16, String) {
         answer.code()
     };
     (answer.status, code)
+}
+
+/// For how long the page is suspended: some 60 cycles.
+const SUSPENDED: Duration = Duration::from_secs(3);
+
+/// Cycles that a busy machine may cost; a suspended network costs all.
+const TOLERATED_CYCLES: usize = 5;
+
+fn monotonic_ns() -> u64 {
+    let now = clock_gettime(ClockId::CLOCK_MONOTONIC).expect("a clock");
+    let nanoseconds = now.tv_sec() * 1_000_000_000 + now.tv_nsec();
+    u64::try_from(nanoseconds).expect("a time since the start")
+}
+
+#[test]
+fn a_page_that_is_suspended_stops_nothing() {
+    let _turn = one_at_a_time();
+    let (page, runs) = started("suspended");
+    let cycles = i64::try_from(SUSPENDED.as_millis() / 50).expect("a few");
+    let newest = page.wait_for("a state", |state| state["cycle"].is_i64());
+    let before = newest["cycle"].as_i64().expect("a cycle");
+    let from = monotonic_ns();
+    page.signal(Signal::SIGSTOP);
+    std::thread::sleep(SUSPENDED);
+    let to = monotonic_ns();
+    page.signal(Signal::SIGCONT);
+    // What the members reported meanwhile is read now.
+    page.wait_for("the cycles of that time", |state| {
+        state["cycle"].as_i64() > Some(before + cycles + 10)
+    });
+    let run = fs::canonicalize(runs.join("latest")).expect("a run");
+    assert_eq!(page.end(), 0);
+    let journal = fs::read_to_string(run.join("journal.jsonl")).expect("a journal");
+    let records = journal
+        .lines()
+        .map(|line| serde_json::from_str::<Value>(line).expect("a record"));
+    let within = |record: &Value| {
+        let at = record["at_ns"].as_u64().expect("a time");
+        (from..to).contains(&at) && record["event"]["event"] == "applied"
+    };
+    let sources: Vec<String> = records
+        .filter(within)
+        .map(|record| record["event"]["source"].as_str().expect("text").to_owned())
+        .collect();
+    // Of both remote I/Os; a busy machine may skip some deadlines.
+    assert!(sources.len() as i64 > cycles, "{}", sources.len());
+    let not_true = sources
+        .iter()
+        .filter(|source| ["held", "fail-safe"].contains(&source.as_str()));
+    assert!(not_true.count() <= TOLERATED_CYCLES, "{sources:?}");
+}
+
+/// The process of a member, as its newest `ready` record says it.
+fn process_of(runs: &Path, name: &str) -> Pid {
+    let journal = fs::read_to_string(runs.join("latest/journal.jsonl")).expect("a journal");
+    let whole = journal.rsplit_once('\n').map_or("", |(whole, _)| whole);
+    let process = whole
+        .lines()
+        .map(|line| serde_json::from_str::<Value>(line).expect("a record"))
+        .filter(|record| record["name"] == name && record["event"]["event"] == "ready")
+        .filter_map(|record| record["event"]["process"].as_i64())
+        .last();
+    let process = process.expect("it is ready");
+    Pid::from_raw(i32::try_from(process).expect("a process id"))
+}
+
+#[test]
+fn the_page_shows_what_is_killed_from_outside_and_starts_it_again() {
+    let _turn = one_at_a_time();
+    let (page, runs) = started("outside");
+    for name in ["robot", "press-io"] {
+        kill(process_of(&runs, name), Signal::SIGKILL).expect("it runs");
+        let state = page.wait_for("its end", |state| party(state, name)["state"] == "ended");
+        assert_eq!(party(&state, name)["down"], true);
+        let restart = json!({ "command": "restart" });
+        assert_eq!(give(&page, name, &restart), (200, String::new()));
+        page.wait_for("its return", |state| {
+            ["speaking", "serving"].contains(&party(state, name)["state"].as_str().expect("text"))
+        });
+    }
+    let alarms = page.get("/api/events").json().to_string();
+    assert!(
+        alarms.contains("robot ended unexpectedly"),
+        "{alarms:.2000}"
+    );
+    assert_eq!(page.end(), 0);
 }
 
 #[test]

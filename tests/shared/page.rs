@@ -146,8 +146,12 @@ impl Page {
     }
 
     pub(crate) fn ask_to_end(&self) {
+        self.signal(Signal::SIGINT);
+    }
+
+    pub(crate) fn signal(&self, signal: Signal) {
         let id = i32::try_from(self.process.id()).expect("a process id");
-        kill(Pid::from_raw(id), Signal::SIGINT).expect("it runs");
+        kill(Pid::from_raw(id), signal).expect("it runs");
     }
 
     /// Asks it to end, and waits until it has.

@@ -39,7 +39,7 @@ pub use history::{Driven, History, Sampled, Step};
 pub use listing::{Filter, JournalLine, Listing};
 pub use margin::{Holders, Loss, Margin, Outcome};
 pub use model::{Bounds, Model, Spoken};
-pub use run::{Run, find_run, find_run_of, find_running};
+pub use run::{Run, find_run, find_run_of, find_running, find_running_of};
 pub use series::Series;
 pub use snapshot::{
     MarginSnapshot, OutcomeSnapshot, ProgramSnapshot, RunState, Snapshot, StationSnapshot,

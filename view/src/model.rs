@@ -298,15 +298,15 @@ impl Model {
             self.close_up_to(latest);
         }
         match event {
-            RunEvent::Started {
-                party: Party::Station(station),
-            } => {
-                if let Some(track) = self.stations.get_mut(station.index()) {
-                    let text =
-                        format!("{} is started", self.parties.name(Party::Station(*station)));
+            RunEvent::Started { party } => {
+                let name = self.parties.name(*party).to_owned();
+                if let Party::Station(station) = party
+                    && let Some(track) = self.stations.get_mut(station.index())
+                {
                     track.started();
-                    track.done = Some((text, cycle));
+                    track.done = Some((format!("{name} is started"), cycle));
                 }
+                self.alarms.over(&(name, "ended"), cycle);
             }
             RunEvent::Fault { action, party, .. } => {
                 let text = fault_text(*action, *party, &self.parties);
@@ -316,9 +316,9 @@ impl Model {
                     track.fault(*action, cycle, text);
                 }
             }
-            RunEvent::Ended { party, how } => {
+            RunEvent::Ended { party, how, .. } => {
                 let name = self.parties.name(*party).to_owned();
-                let text = format!("{name} has ended by itself: {how}");
+                let text = format!("{name} ended unexpectedly: {how}");
                 if let Party::Station(station) = party
                     && let Some(track) = self.stations.get_mut(station.index())
                 {
@@ -332,10 +332,6 @@ impl Model {
             }
             RunEvent::Interrupted => self.interrupted = true,
             RunEvent::Finished => self.finished = true,
-            RunEvent::Started { party } => {
-                let name = self.parties.name(*party).to_owned();
-                self.alarms.over(&(name, "ended"), cycle);
-            }
             RunEvent::Acknowledged(seen) => self.alarms.acknowledged(seen, cycle),
             // What it said before it was heard again is not known here.
             RunEvent::Attached {

@@ -93,16 +93,26 @@ pub fn find_run_of(runs: &Path, cluster: &Cluster) -> Result<Run, ViewError> {
 
 /// The run of a cluster, with the same configuration, that a process writes now, where there is one below a directory of runs.
 pub fn find_running(runs: &Path, cluster: &Cluster) -> Option<Run> {
+    let configuration = cluster.agreement().configuration;
+    running(runs).find(|run| run.cluster.agreement().configuration == configuration)
+}
+
+/// As [`find_running`], and where none has the same configuration, the newest of the same name: the command line may have changed its period.
+pub fn find_running_of(runs: &Path, cluster: &Cluster) -> Option<Run> {
+    let namesake = |run: &Run| run.cluster.name() == cluster.name();
+    find_running(runs, cluster).or_else(|| running(runs).find(namesake))
+}
+
+/// The runs that a process writes now, the newest first.
+fn running(runs: &Path) -> impl Iterator<Item = Run> {
     let folders = std::fs::read_dir(runs).into_iter().flatten().flatten();
     let mut written: Vec<PathBuf> = folders
         .map(|entry| entry.path())
         .filter(|path| !path.is_symlink() && writing(path) == Writing::Now)
         .collect();
     written.sort();
-    let configuration = cluster.agreement().configuration;
-    let runs = written.iter().rev().take(LOOKED_AT);
-    runs.filter_map(|path| Run::open(path).ok())
-        .find(|run| run.cluster.agreement().configuration == configuration)
+    let newest = written.into_iter().rev().take(LOOKED_AT);
+    newest.filter_map(|path| Run::open(&path).ok())
 }
 
 /// Runs that are opened to find one of a cluster.

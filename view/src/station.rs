@@ -133,7 +133,7 @@ impl StationTrack {
     }
 
     pub(crate) fn ready(&mut self) {
-        if self.process != Process::Killed {
+        if !matches!(self.process, Process::Killed | Process::Ended) {
             self.process = Process::Running;
         }
     }

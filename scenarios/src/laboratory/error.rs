@@ -20,8 +20,8 @@ pub enum LaboratoryError {
         /// What the system said.
         source: io::Error,
     },
-    /// A process ended that nobody had asked to.
-    #[error("U0522: {name} ended by itself ({how}){}", said(.lines))]
+    /// A member ended before it was ready, or in a measurement that its end would falsify.
+    #[error("U0522: {name} ended unexpectedly ({how}){}", said(.lines))]
     Ended {
         /// Which party.
         name: String,

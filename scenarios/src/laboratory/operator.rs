@@ -4,6 +4,7 @@ use understudy_simulator::{Action, Fault};
 use understudy_wire::{Force, Party, ProgramId};
 
 use super::Laboratory;
+use super::process::Process;
 use crate::operator::{Command, Commanded, OperatorAction, Refusal};
 use crate::record::RunEvent;
 
@@ -52,8 +53,8 @@ impl Laboratory<'_> {
     fn refusal(&self, party: Party, command: &Command) -> Option<Refusal> {
         let name = || self.name(party);
         let process = self.processes.get(&party);
-        let running = process.is_some_and(|process| !process.may_end);
-        let still = process.is_some_and(|process| process.stands_still());
+        let running = self.is_running(party);
+        let still = process.is_some_and(Process::is_suspended);
         let already = |is| Refusal::Already { name: name(), is };
         let wrong = |needs| Refusal::WrongParty {
             name: name(),
@@ -63,7 +64,6 @@ impl Laboratory<'_> {
         match command {
             Command::Restart if running => Some(Refusal::Running(name())),
             Command::Restart => None,
-            Command::Isolate | Command::Rejoin if !self.site.can_cut() => Some(Refusal::NoProxy),
             Command::Isolate | Command::Rejoin if matches!(party, Party::Plant(_)) => {
                 Some(wrong("a plant stays with its remote I/O"))
             }

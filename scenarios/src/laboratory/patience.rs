@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use super::process::Process;
 use super::{Laboratory, LaboratoryError, Progress};
 
 const READY_PATIENCE: Duration = Duration::from_secs(20);
@@ -35,19 +36,28 @@ impl Laboratory<'_> {
         now: Instant,
     ) -> Result<(), LaboratoryError> {
         let over = |since: Instant, patience: Duration| now.duration_since(since) > patience;
-        if self.ready.len() < self.processes.len() && self.account.cycle().is_none() {
+        // One that has ended is not waited for: what that means shows in the cycles.
+        let living = self.processes.iter().filter(|(_, one)| !one.has_ended());
+        let mut lacking = living
+            .map(|(party, _)| *party)
+            .filter(|party| !self.ready.contains(party))
+            .peekable();
+        if lacking.peek().is_some() && self.account.cycle().is_none() {
             if over(waits.started, READY_PATIENCE) {
-                let lacking = self.processes.keys().copied();
                 return Err(LaboratoryError::NotReady {
                     seconds: READY_PATIENCE.as_secs(),
-                    names: self.names(lacking.filter(|party| !self.ready.contains(party))),
+                    names: self.names(lacking),
                 });
             }
             waits.ready_since = now;
             return Ok(());
         }
         let Some(cycle) = self.account.cycle() else {
-            if over(waits.ready_since, STEP_PATIENCE) {
+            let one_is_down = self.processes.values().any(Process::has_ended);
+            if one_is_down && (self.commanded || self.recovery.is_pending()) {
+                // It is started again, or whoever commands may do that.
+                waits.ready_since = now;
+            } else if over(waits.ready_since, STEP_PATIENCE) {
                 return Err(LaboratoryError::NotInStep {
                     seconds: STEP_PATIENCE.as_secs(),
                     names: self.names(self.account.awaited()),
@@ -55,7 +65,8 @@ impl Laboratory<'_> {
             }
             return Ok(());
         };
-        let waits_on = self.commanded || self.conductor.wait_for_time();
+        let comes_back = self.conductor.wait_for_time() || self.recovery.is_pending();
+        let waits_on = self.commanded || comes_back;
         if waits.cycle != Some(cycle) || waits_on {
             waits.cycle = Some(cycle);
             waits.cycle_since = now;

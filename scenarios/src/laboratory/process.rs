@@ -42,9 +42,18 @@ pub(super) struct Process {
     life: u32,
     child: Child,
     input: Option<ChildStdin>,
-    /// Whether its end is no surprise.
-    pub(super) may_end: bool,
-    stands_still: bool,
+    state: State,
+}
+
+/// What the laboratory knows of a process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    Running,
+    /// By SIGSTOP.
+    Suspended,
+    /// It was asked to end.
+    Ending,
+    Ended,
 }
 
 impl Process {
@@ -86,8 +95,7 @@ impl Process {
             life,
             child,
             input,
-            may_end: false,
-            stands_still: false,
+            state: State::Running,
         })
     }
 
@@ -99,26 +107,36 @@ impl Process {
         self.party
     }
 
-    /// Whether SIGSTOP has made it stand still.
-    pub(super) fn stands_still(&self) -> bool {
-        self.stands_still
+    /// Whether it has neither ended nor been asked to.
+    pub(super) fn is_running(&self) -> bool {
+        matches!(self.state, State::Running | State::Suspended)
+    }
+
+    /// Whether it is gone.
+    pub(super) fn has_ended(&self) -> bool {
+        self.state == State::Ended
+    }
+
+    /// Whether the laboratory has suspended it with SIGSTOP.
+    pub(super) fn is_suspended(&self) -> bool {
+        self.state == State::Suspended
     }
 
     /// As `kill -9`.
     pub(super) async fn crash(&mut self) -> io::Result<()> {
-        self.may_end = true;
+        self.state = State::Ended;
         self.child.kill().await
     }
 
     /// SIGSTOP.
     pub(super) fn stop(&mut self) -> io::Result<()> {
-        self.stands_still = true;
+        self.state = State::Suspended;
         self.signal(Signal::SIGSTOP)
     }
 
     /// SIGCONT.
     pub(super) fn go_on(&mut self) -> io::Result<()> {
-        self.stands_still = false;
+        self.state = State::Running;
         self.signal(Signal::SIGCONT)
     }
 
@@ -135,18 +153,21 @@ impl Process {
 
     /// Asks it to end.
     pub(super) async fn ask_to_end(&mut self) {
-        self.may_end = true;
-        if self.stands_still {
+        if self.has_ended() {
+            return;
+        }
+        if self.is_suspended() {
             // One that is gone already needs nothing.
             let _ = self.go_on();
         }
+        self.state = State::Ending;
         let _ = self.command("stop").await;
         self.input = None;
     }
 
     /// Waits for its end, and makes one after `patience`.
     pub(super) async fn end(&mut self, patience: Duration) -> Option<ExitStatus> {
-        self.may_end = true;
+        self.state = State::Ended;
         match tokio::time::timeout(patience, self.child.wait()).await {
             Ok(status) => status.ok(),
             Err(_) => {

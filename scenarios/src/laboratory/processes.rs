@@ -1,17 +1,18 @@
 //! The processes of a run: they are started, heard, disturbed and ended here.
 
 use std::collections::BTreeSet;
-use std::time::Duration;
+use std::process::ExitStatus;
+use std::time::{Duration, Instant};
 
 use tokio::process::Command;
 use tokio::sync::mpsc::Receiver;
-use understudy_bus::{HostEvent, ZENOH_RUNTIME};
+use understudy_bus::{Cuts, HostEvent, ZENOH_RUNTIME};
 use understudy_simulator::{Action, Fault};
 use understudy_wire::Party;
 
 use super::error::LaboratoryError;
 use super::process::{Process, Said, Saying};
-use super::{Laboratory, Progress};
+use super::{Deaths, Laboratory, Progress};
 use crate::record::{Happening, Record, RunEvent};
 use crate::scenario::action_word;
 
@@ -19,7 +20,7 @@ use crate::scenario::action_word;
 const END_PATIENCE: Duration = Duration::from_secs(3);
 
 impl Laboratory<'_> {
-    pub(super) fn start(&mut self, party: Party) -> Result<(), LaboratoryError> {
+    pub(super) async fn start(&mut self, party: Party) -> Result<(), LaboratoryError> {
         let name = self.name(party);
         let mut command = Command::new(&self.settings.program);
         command
@@ -43,14 +44,42 @@ impl Laboratory<'_> {
             .or_insert(1);
         let start = || Process::start(party, *life, command, self.sender.clone());
         let process = self.site.at(party, start)?;
-        let process = process.map_err(|source| LaboratoryError::Start {
+        let mut process = process.map_err(|source| LaboratoryError::Start {
             name,
             program: self.settings.program.clone(),
             source,
         })?;
+        if let Some(cuts) = self.cuts.get(&party) {
+            cut(&mut process, cuts).await;
+        }
         self.processes.insert(party, process);
+        self.recovery.started(party);
         self.note(RunEvent::Started { party });
         Ok(())
+    }
+
+    pub(super) fn is_running(&self, party: Party) -> bool {
+        self.processes.get(&party).is_some_and(Process::is_running)
+    }
+
+    /// Starts a member that has ended unexpectedly.
+    pub(super) async fn restart(&mut self, party: Party) {
+        let step = Fault {
+            at_cycle: self.account.cycle().map_or(0, |cycle| cycle + 1),
+            phase: 0.0,
+            party,
+            action: Action::Restart,
+        };
+        if let Err(error) = self.do_step(&step).await {
+            let after = self.recovery.ended(party, Instant::now());
+            self.show_step(format!("{error}; again in {after:?}"));
+        }
+    }
+
+    /// A line for whoever watches the run.
+    fn show_step(&mut self, what: String) {
+        let cycle = self.account.cycle().unwrap_or(0);
+        (self.watch)(Progress::Step { cycle, what });
     }
 
     pub(super) async fn hear(&mut self, said: Said) -> Result<(), LaboratoryError> {
@@ -61,22 +90,50 @@ impl Laboratory<'_> {
                 let Some(process) = self.processes.get_mut(&party) else {
                     return Ok(());
                 };
-                if process.life() != life || process.may_end {
+                if process.life() != life || !process.is_running() {
                     return Ok(());
                 }
                 let status = process.end(END_PATIENCE).await;
-                let how = status.map_or("by no status".to_owned(), |status| status.to_string());
-                self.note(RunEvent::Ended {
-                    party,
-                    how: how.clone(),
-                });
-                Err(LaboratoryError::Ended {
-                    name: self.name(party),
-                    how,
-                    lines,
-                })
+                self.died(party, life, status, lines)
             }
         }
+    }
+
+    /// A member has ended unexpectedly.
+    fn died(
+        &mut self,
+        party: Party,
+        life: u32,
+        status: Option<ExitStatus>,
+        lines: Vec<String>,
+    ) -> Result<(), LaboratoryError> {
+        let how = status.map_or("it closed its output".to_owned(), |it| it.to_string());
+        self.note(RunEvent::Ended {
+            party,
+            how: how.clone(),
+            said: lines.clone(),
+        });
+        self.show_journal();
+        // A member that says itself why it cannot work keeps the run from beginning; what a signal does comes from outside.
+        let refused = status.is_some_and(|status| status.code().is_some());
+        let never_worked = life == 1 && !self.ready.contains(&party) && refused;
+        if never_worked || self.settings.deaths == Deaths::EndTheRun {
+            let name = self.name(party);
+            return Err(LaboratoryError::Ended { name, how, lines });
+        }
+        let name = self.name(party);
+        let back = match self.settings.deaths {
+            Deaths::Restarted => {
+                let after = self.recovery.ended(party, Instant::now());
+                format!("it is started again in {after:?}")
+            }
+            _ => format!(
+                "start it again with `understudy operate {} --name {name} restart`",
+                self.directory.display()
+            ),
+        };
+        self.show_step(format!("{name} ended unexpectedly ({how}): {back}"));
+        Ok(())
     }
 
     fn read(&mut self, party: Party, line: &str) -> Result<(), LaboratoryError> {
@@ -96,32 +153,48 @@ impl Laboratory<'_> {
 
     pub(super) async fn do_step(&mut self, step: &Fault) -> Result<(), LaboratoryError> {
         let name = self.name(step.party);
-        if step.action == Action::Restart {
-            self.start(step.party)?;
-        } else {
-            let Some(process) = self.processes.get_mut(&step.party) else {
-                return Ok(());
-            };
-            let done = match step.action {
-                Action::Cut { to } => self.site.cut(step.party, to, true),
-                Action::Heal { to } => self.site.cut(step.party, to, false),
-                Action::Crash => process.crash().await,
-                Action::Stop => process.stop(),
-                Action::Continue => process.go_on(),
-                Action::Release => process.command("release").await,
-                Action::Choose { choice } => {
-                    let line = serde_json::to_string(&choice).map(|it| format!("choose {it}"));
-                    process.command(&line.unwrap_or_default()).await
-                }
-                // Refused before the run began.
-                _ => Err(std::io::ErrorKind::Unsupported.into()),
-            };
-            done.map_err(|source| LaboratoryError::Step {
-                action: action_word(step.action),
-                name: name.clone(),
-                source,
-            })?;
+        let running = self.is_running(step.party);
+        let cannot = match step.action {
+            Action::Restart if running => Some("it runs already"),
+            Action::Crash
+            | Action::Stop
+            | Action::Continue
+            | Action::Release
+            | Action::Choose { .. }
+                if !running =>
+            {
+                Some("it has ended")
+            }
+            _ => None,
+        };
+        if let Some(why) = cannot {
+            // Only after a member ended unexpectedly, or an operator acted: scenarios are checked for it.
+            self.show_step(format!("no {} of {name}: {why}", action_word(step.action)));
+            return Ok(());
         }
+        let done = match (step.action, self.processes.get_mut(&step.party)) {
+            (Action::Restart, _) => {
+                self.start(step.party).await?;
+                Ok(())
+            }
+            (Action::Cut { to }, _) => self.cut(step.party, to, true).await,
+            (Action::Heal { to }, _) => self.cut(step.party, to, false).await,
+            (Action::Crash, Some(process)) => process.crash().await,
+            (Action::Stop, Some(process)) => process.stop(),
+            (Action::Continue, Some(process)) => process.go_on(),
+            (Action::Release, Some(process)) => process.command("release").await,
+            (Action::Choose { choice }, Some(process)) => {
+                let line = serde_json::to_string(&choice).map(|it| format!("choose {it}"));
+                process.command(&line.unwrap_or_default()).await
+            }
+            // Refused before the run began.
+            _ => Err(std::io::ErrorKind::Unsupported.into()),
+        };
+        done.map_err(|source| LaboratoryError::Step {
+            action: action_word(step.action),
+            name: name.clone(),
+            source,
+        })?;
         self.note(RunEvent::Fault {
             action: step.action,
             party: step.party,
@@ -134,6 +207,19 @@ impl Laboratory<'_> {
         Ok(())
     }
 
+    /// No frame of one member counts for another any more, or each does again.
+    async fn cut(&mut self, from: Party, to: Party, is_cut: bool) -> std::io::Result<()> {
+        if self.site.cut(from, to, is_cut)? {
+            return Ok(());
+        }
+        let cuts = self.cuts.entry(to).or_default();
+        cuts.set(from, is_cut);
+        if let Some(process) = self.processes.get_mut(&to) {
+            cut(process, cuts).await;
+        }
+        Ok(())
+    }
+
     /// Everybody ends: asked first, then made to.
     pub(super) async fn end(&mut self, receiver: &mut Receiver<Said>) {
         for process in self.processes.values_mut() {
@@ -143,6 +229,7 @@ impl Laboratory<'_> {
         let mut living: BTreeSet<(Party, u32)> = self
             .processes
             .values()
+            .filter(|process| !process.has_ended())
             .map(|process| (process.party(), process.life()))
             .collect();
         // What they still say belongs to the journal, and they only end when somebody listens.
@@ -164,4 +251,12 @@ impl Laboratory<'_> {
             process.end(Duration::from_millis(100)).await;
         }
     }
+}
+
+/// Tells a member of which others it shall drop the frames.
+async fn cut(process: &mut Process, cuts: &Cuts) {
+    // Two numbers are always writable as JSON.
+    let cuts = serde_json::to_string(cuts).unwrap_or_default();
+    // One that has ended meanwhile is told when it starts again.
+    let _ = process.command(&format!("cut {cuts}")).await;
 }

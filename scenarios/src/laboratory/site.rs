@@ -2,13 +2,13 @@
 //!
 //! | hosts | links | a cut is made by |
 //! |---|---|---|
-//! | this machine's loopback interface | direct | nobody |
-//! | this machine's loopback interface | through the proxy | the proxy |
+//! | this machine's loopback interface | direct | the receiver, which drops the frames |
 //! | one network namespace for each station, and for each remote I/O with its plant | the bridge between them | `nft` |
-//! | the same | through the proxy, on the bridge | the proxy |
+//! | either | through the proxy, where the links are impaired | the receiver |
 //!
-//! The proxy is used where something is asked for that the rest cannot do. Then each party is told of addresses at which the
-//! proxy stands for its peers, one for each pair and direction, and knows nothing of it.
+//! Frames pass through the proxy, a thread of this process, only where the links lose, delay or change what they carry: a laboratory that
+//! is suspended must not stop its plants because an operator may cut a link. With the proxy each member is told of addresses at which it
+//! stands for the member's peers, one for each pair and direction, and knows nothing of it.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -17,10 +17,8 @@ use std::path::{Path, PathBuf};
 
 use understudy_bus::{Endpoints, LinkKind, Peer};
 use understudy_cluster::Cluster;
-use understudy_network::{
-    Direction, Hosts, Impairment, NetworkError, Proxy, ProxyOrder, Route, Share, Transport,
-};
-use understudy_simulator::{Action, Network};
+use understudy_network::{Hosts, Impairment, NetworkError, Proxy, Route, Share, Transport};
+use understudy_simulator::Network;
 use understudy_wire::{Party, ProgramId};
 
 use super::error::LaboratoryError;
@@ -49,8 +47,6 @@ pub struct NetworkSettings {
     pub impairment: Impairment,
     /// What the fates of datagrams come from.
     pub seed: u64,
-    /// Whether somebody may want to cut links that the scenario does not.
-    pub can_be_cut: bool,
 }
 
 /// Where everybody is.
@@ -120,11 +116,11 @@ impl Site {
                 ..Impairment::default()
             };
         match &mut hosts {
-            Some(hosts) if only_loss && !site.cuts_within_a_host(scenario) => {
+            Some(hosts) if only_loss => {
                 let pairs = site.pairs_of_hosts();
                 hosts.lose(&pairs, impairment.loss)?;
             }
-            None if impairment.is_none() && !has_cuts(scenario) && !settings.can_be_cut => {}
+            None if impairment.is_none() => {}
             _ => {
                 let feeds = feeds(cluster);
                 site.route(cluster, &feeds, link, &peers, hosts.as_ref(), settings.seed)?;
@@ -149,35 +145,16 @@ impl Site {
         self.endpoints.get(&party).map(PathBuf::as_path)
     }
 
-    /// Whether something lies between the parties that can cut.
-    pub(super) fn can_cut(&self) -> bool {
-        self.proxy.is_some() || self.hosts.is_some()
-    }
-
-    /// Nothing that one says reaches the other any more, or everything does again.
-    pub(super) fn cut(&mut self, from: Party, to: Party, cut: bool) -> io::Result<()> {
-        if let Some(proxy) = &self.proxy {
-            let ways = [
-                ((from, to), Direction::Forth),
-                ((to, from), Direction::Back),
-            ];
-            for (pair, direction) in ways {
-                if let Some(&route) = self.routes.get(&pair) {
-                    proxy.order(ProxyOrder::Cut {
-                        route,
-                        direction,
-                        cut,
-                    });
-                }
-            }
-            return Ok(());
-        }
+    /// Lets no frame of one member through to another any more, or each again. False where nothing between them can do that, so that the
+    /// receiver has to drop them.
+    pub(super) fn cut(&mut self, from: Party, to: Party, cut: bool) -> io::Result<bool> {
         let places = (self.host_of.get(&from), self.host_of.get(&to));
-        match (&mut self.hosts, places) {
-            (Some(hosts), (Some(&from), Some(&to))) => {
-                hosts.cut(&[(from, to)], cut).map_err(io::Error::other)
+        match (&mut self.hosts, &self.proxy, places) {
+            (Some(hosts), None, (Some(&from), Some(&to))) if from != to => {
+                let done = hosts.cut(&[(from, to)], cut);
+                done.map(|()| true).map_err(io::Error::other)
             }
-            _ => Err(io::ErrorKind::Unsupported.into()),
+            _ => Ok(false),
         }
     }
 
@@ -279,15 +256,6 @@ impl Site {
         Ok(())
     }
 
-    fn cuts_within_a_host(&self, scenario: &Scenario) -> bool {
-        scenario.steps.iter().any(|step| match step.action {
-            Action::Cut { to } | Action::Heal { to } => {
-                self.host_of.get(&step.party) == self.host_of.get(&to)
-            }
-            _ => false,
-        })
-    }
-
     fn pairs_of_hosts(&self) -> Vec<(usize, usize)> {
         let count = self
             .parties
@@ -297,11 +265,6 @@ impl Site {
         let pairs = (0..count).flat_map(|from| (0..count).map(move |to| (from, to)));
         pairs.filter(|(from, to)| from != to).collect()
     }
-}
-
-fn has_cuts(scenario: &Scenario) -> bool {
-    let mut steps = scenario.steps.iter();
-    steps.any(|step| matches!(step.action, Action::Cut { .. } | Action::Heal { .. }))
 }
 
 /// The same as the simulator's network, but that jitter keeps the order.

@@ -79,6 +79,15 @@ fn killed(ms: u64, rank: u8) -> Record {
     Record::of_run(ms * MILLISECOND, event)
 }
 
+fn ended(ms: u64, rank: u8) -> Record {
+    let event = RunEvent::Ended {
+        party: Party::Station(StationId(rank)),
+        how: "signal: 9 (SIGKILL)".to_owned(),
+        said: Vec::new(),
+    };
+    Record::of_run(ms * MILLISECOND, event)
+}
+
 /// Two controllers and an understudy that speak until one second, and `more`.
 fn view(more: Vec<Record>) -> JournalView {
     let mut records = vec![
@@ -95,6 +104,14 @@ fn view(more: Vec<Record>) -> JournalView {
 
 fn milliseconds(hours: f64) -> f64 {
     (hours * 3.6e6 * 1e3).round() / 1e3
+}
+
+#[test]
+fn a_station_whose_process_ended_unexpectedly_failed_then() {
+    let steps = |taken: fn(u64, u8) -> Record| {
+        view(vec![taken(2_002, 0), flagged(2_032, 0), spoke(2_532, 0)])
+    };
+    assert_eq!(steps(ended), steps(killed));
 }
 
 #[test]

@@ -19,7 +19,7 @@ use tokio::task::JoinHandle;
 use super::{Commander, OperatorAction, Refusal, acknowledgement};
 
 /// In the directory of a run.
-const SOCKET: &str = "operator.sock";
+pub(crate) const SOCKET: &str = "operator.sock";
 
 /// Bytes of one line, at most.
 const LINE_BYTES: u64 = 8192;
@@ -205,7 +205,7 @@ mod tests {
                 let commanded = commands.next().await;
                 let done = match commanded.action {
                     OperatorAction::Acknowledge(_) => Ok(()),
-                    OperatorAction::Command { .. } => Err(Refusal::NoProxy),
+                    OperatorAction::Command { .. } => Err(Refusal::Down("robot".to_owned())),
                 };
                 commanded.answer(done);
             }
@@ -227,7 +227,7 @@ mod tests {
             let cut = there.give(party, Command::Isolate, by.0, by.1).await;
             (there.acknowledge(seen()).await, cut)
         });
-        let refused = Refusal::Said(Refusal::NoProxy.to_string());
+        let refused = Refusal::Said(Refusal::Down("robot".to_owned()).to_string());
         assert_eq!(asked, (Ok(()), Err(refused)));
         drop(socket);
         assert!(!run.join(SOCKET).exists());

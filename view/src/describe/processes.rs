@@ -74,7 +74,7 @@ pub(super) fn host(event: &HostEvent) -> Words {
 }
 
 pub(super) fn run(event: &RunEvent, parties: &Parties) -> Words {
-    use Level::{Info, Notice, Warning};
+    use Level::{Alarm, Info, Notice, Warning};
     match event {
         RunEvent::Started { party } => (
             "started",
@@ -120,11 +120,13 @@ pub(super) fn run(event: &RunEvent, parties: &Parties) -> Words {
             Warning,
             format!("{} is not heard here: {reason}", parties.name(*party)),
         ),
-        RunEvent::Ended { party, how } => (
-            "ended",
-            Warning,
-            format!("{} has ended by itself: {how}", parties.name(*party)),
-        ),
+        RunEvent::Ended { party, how, said } => {
+            let last = said
+                .last()
+                .map_or(String::new(), |line| format!("; {line:.200}"));
+            let text = format!("{} ended unexpectedly: {how}{last}", parties.name(*party));
+            ("ended", Alarm, text)
+        }
         RunEvent::Origin { .. } => (
             "origin",
             Info,

@@ -1,8 +1,8 @@
 //! States, sources, events and alarms as they stand in the scenario.
 
 use understudy_scenarios::{Record, RunEvent, Scenario};
-use understudy_view::{RunState, Snapshot, StationState};
-use understudy_wire::{ProgramId, Source, StationId};
+use understudy_view::{Model, RunState, Snapshot, StationState};
+use understudy_wire::{Party, ProgramId, Source, StationId};
 
 use crate::support::{KILL_EACH, cell, model, scenario};
 
@@ -129,6 +129,42 @@ fn a_loss_is_an_alarm_with_its_cause() {
     assert_eq!(states, ["speaking", "killed", "killed"]);
     let lost = model.why("press.move_down", Some(50)).expect("it is known");
     assert_eq!((lost.source, lost.because), (Some("fail-safe"), None));
+}
+
+/// A station and a remote I/O whose processes end unexpectedly are alarms until they are started again; what they reported before may be
+/// read afterwards.
+#[test]
+fn an_unexpected_end_is_an_alarm_until_the_member_is_started_again() {
+    let cell = cell();
+    let text = "title = \"quiet\"\ncycles = 60\n";
+    let mut model = model(&cell, &scenario(&cell, text), 1);
+    let robot = Party::Station(StationId(0));
+    let press_io = Party::RemoteIo(ProgramId(1));
+    for party in [robot, press_io] {
+        let event = RunEvent::Ended {
+            party,
+            how: "signal: 9 (SIGKILL)".to_owned(),
+            said: vec!["killed".to_owned()],
+        };
+        model.note(&Record::of_run(model.at_ns(), event));
+    }
+    assert_eq!(model.station_state(StationId(0)), Some(StationState::Ended));
+    let open = |model: &Model| -> Vec<String> {
+        let lasting = model.alarms().filter(|alarm| alarm.over.is_none());
+        lasting.map(|alarm| alarm.text.clone()).collect()
+    };
+    assert_eq!(
+        open(&model),
+        [
+            "robot ended unexpectedly: signal: 9 (SIGKILL)",
+            "press-io ended unexpectedly: signal: 9 (SIGKILL)"
+        ]
+    );
+    for party in [robot, press_io] {
+        model.note(&Record::of_run(model.at_ns(), RunEvent::Started { party }));
+    }
+    assert_eq!(open(&model), [""; 0]);
+    assert_ne!(model.station_state(StationId(0)), Some(StationState::Ended));
 }
 
 /// A run that nobody disturbs has no event of note and a quiet margin; its times are those of the schedule.
