@@ -23,9 +23,9 @@ use std::sync::Arc;
 use smallvec::SmallVec;
 use understudy_logic::Scratch;
 use understudy_wire::{
-    Admission, Arrival, Attendance, Body, Copies, CycleClock, Digest, Frame, Header, Holding,
-    Image, Input, Lineage, Machine, Moment, Output, Party, ProgramId, ProgramSet, Recalled,
-    Reception, Sample, StationId, StationSet, Time, Waking,
+    Admission, Arrival, Attendance, Body, ConfigurationHash, Copies, CycleClock, Digest, Frame,
+    Header, Holding, Image, Input, Lineage, Machine, Moment, Output, Party, ProgramId, ProgramSet,
+    Recalled, Reception, Sample, StationId, StationSet, Time, Waking,
 };
 
 use crate::event::Event;
@@ -127,6 +127,11 @@ impl Station {
         if let Some(replica) = self.replicas.iter_mut().find(|it| it.id() == program) {
             replica.flip_state(bit);
         }
+    }
+
+    /// The configuration that it runs; it refuses members with another one.
+    pub fn configuration(&self) -> ConfigurationHash {
+        self.settings.agreement.configuration
     }
 
     /// The state of a program that it holds, with its lineage; it may be behind the newest sample.

@@ -29,9 +29,9 @@ use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
 use understudy_wire::{
-    Admission, Arrival, Attendance, Body, Change, Copies, CycleClock, Frame, Header, Holding,
-    Image, Input, Lineage, Machine, Moment, Output, Party, ProgramId, Recalled, Reception, Source,
-    StateChoice, StationId, StationSet, Time, Waking,
+    Admission, Arrival, Attendance, Body, Change, ConfigurationHash, Copies, CycleClock, Frame,
+    Header, Holding, Image, Input, Lineage, Machine, Moment, Output, Party, ProgramId, Recalled,
+    Reception, Source, StateChoice, StationId, StationSet, Time, Waking,
 };
 
 use crate::diagnosis::Diagnosing;
@@ -168,6 +168,11 @@ impl RemoteIo {
         };
         remote_io.waking.ask(remote_io.next_wakeup());
         remote_io
+    }
+
+    /// The configuration that it runs; it refuses members with another one.
+    pub fn configuration(&self) -> ConfigurationHash {
+        self.settings.agreement.configuration
     }
 
     /// Whether the operator has to choose the state that the program continues from.

@@ -469,12 +469,14 @@ impl Simulation {
             return None;
         }
         let remote_io = Party::RemoteIo(program);
+        let own = self.remote_ios[program.index()].running()?.configuration();
         let mut stations = (0..).zip(&self.stations);
         let holder = stations.find(|(rank, slot)| {
             let station = Party::Station(StationId(*rank));
             let connected =
                 self.links.reaches(station, remote_io) && self.links.reaches(remote_io, station);
-            let state = slot.running().and_then(|it| it.state_of(program));
+            let admitted = slot.running().filter(|it| it.configuration() == own);
+            let state = admitted.and_then(|it| it.state_of(program));
             connected && state.is_some_and(|(lineage, _)| referee.would_be_lost(lineage))
         });
         holder.map(|(rank, _)| (*moment, StationId(rank)))
