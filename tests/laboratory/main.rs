@@ -155,6 +155,23 @@ fn stations_that_are_cut_off_are_masked_and_come_back() {
 }
 
 #[test]
+fn a_broken_link_costs_no_protection() {
+    let scenario = "examples/press-cell/broken-link.toml";
+    let summary = check("broken_link", scenario, &[]);
+    assert_met(&summary);
+    assert!(count(&summary, 0, "reconstructed") >= 290);
+}
+
+#[test]
+fn a_lost_state_is_not_replaced_by_an_older_one_until_the_operator_says_so() {
+    let scenario = "examples/press-cell/lost-state.toml";
+    let summary = check("lost_state", scenario, &[]);
+    assert_met(&summary);
+    assert!(count(&summary, 0, "fail_safe") >= 90);
+    assert!(count(&summary, 0, "reconstructed") >= 190);
+}
+
+#[test]
 fn a_remote_io_that_is_started_again_adopts_its_history() {
     let summary = check("remote_io_restart", "scenarios/remote-io-restart.toml", &[]);
     assert_met(&summary);
