@@ -14,10 +14,10 @@ use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
 use understudy_wire::{
     Epoch, Field, Frame, Input, Machine, Moment, Output, Party, ProgramId, ProgramSet, Source,
-    StationId, Time,
+    StateChoice, StationId, Time,
 };
 
-use crate::fault::Fault;
+use crate::fault::{Action, Fault};
 use crate::field::Plants;
 use crate::links::{Links, Metered};
 use crate::network::{Disturbance, Network};
@@ -250,6 +250,24 @@ impl Simulation {
         let asking =
             programs.filter(|(_, slot)| slot.running().is_some_and(RemoteIo::asks_operator));
         asking.map(|(program, _)| program).collect()
+    }
+
+    /// Lets the operator answer where a state is lost, now: the newest available state, or a cold start where no station holds one.
+    pub fn let_operator_choose(&mut self) {
+        let choices = [StateChoice::Newest { cycle: None }, StateChoice::Cold];
+        for (program, choice) in self
+            .asking()
+            .iter()
+            .flat_map(|it| choices.map(|one| (it, one)))
+        {
+            // The second one is refused where the first was taken.
+            self.schedule(Fault {
+                at_cycle: 0,
+                phase: 0.0,
+                party: Party::RemoteIo(program),
+                action: Action::Choose { choice },
+            });
+        }
     }
 
     /// Everything that must never happen and did.

@@ -8,7 +8,7 @@ use std::time::Duration;
 use proptest::prelude::*;
 use understudy_remote_io::Event;
 use understudy_simulator::{Action, Disturbance, Fault, Network, Record, Simulation};
-use understudy_wire::{Mode, Party, ProgramId, StateChoice, StationId};
+use understudy_wire::{Mode, Party, ProgramId, StationId};
 
 /// Something is done to a party, and undone later where it lasts.
 #[derive(Debug, Clone)]
@@ -133,16 +133,7 @@ fn check(mode: Mode, understudies: usize, troubles: &[Trouble], network: Network
             !simulation.asking().is_empty(),
             "protection comes back: {error}"
         );
-        for program in simulation.asking().iter() {
-            simulation.schedule(Fault {
-                at_cycle: 0,
-                phase: 0.0,
-                party: Party::RemoteIo(program),
-                action: Action::Choose {
-                    choice: StateChoice::Newest { cycle: None },
-                },
-            });
-        }
+        simulation.let_operator_choose();
         simulation
             .run(10, 200, &mut observe)
             .expect("protection comes back after the operator's choice");
