@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use understudy_supervisor::ladder::avalanche_events;
 use understudy_supervisor::operations::{
     ControlData, Difference, allevents, condat, isomorph, lift, meet, minstate, mutex, nonconflict,
-    project, reachable, selfloop, supcon, supreduce, sync, trim,
+    project, reachable, selfloop, supcon, sync, trim,
 };
 use understudy_supervisor::{
     Automaton, AutomatonError, Bounds, Event, Label, Model, State, TooLarge, synthesis_findings,
@@ -15,6 +15,8 @@ use understudy_supervisor::{
 
 use crate::answer::{Answer, Status};
 use crate::automata::{self, Sources, description, summary};
+use crate::console::Console;
+use crate::reduction::reduced;
 
 /// Work with automata: the operations of TCT, under its names and with its meanings
 #[derive(Debug, Args)]
@@ -25,7 +27,8 @@ Example:
   understudy des condat PLANT.ADS SUPER.ADS --json
 
 Files are TCT's .ADS or models of one automaton (.toml). A result is written as .ADS, .toml, .dot or .svg.
-supcon takes the meet with the specification: events that it does not know are forbidden unless it is lifted.")]
+supcon takes the meet with the specification: events that it does not know are forbidden unless it is lifted.
+supreduce ends after 30 s, or at Ctrl-C, with the smallest supervisor so far.")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     operation: Operation,
@@ -118,7 +121,7 @@ fn pair(text: &str) -> Result<(State, State), String> {
     numbers.ok_or_else(|| "a pair of states is written as 1:2".to_owned())
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
     let bounds = Bounds {
         memory_bytes: arguments.memory.saturating_mul(1_000_000),
     };
@@ -132,7 +135,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         Err(answer) => return answer,
     };
     let parts: Vec<&Automaton> = read.iter().collect();
-    let answer = match arguments.operation.answer(&parts, bounds) {
+    let answer = match arguments.operation.answer(&parts, bounds, console) {
         Ok(Outcome::Answer(answer)) => answer,
         Ok(Outcome::Automaton(automaton, answer)) => made(arguments, &automaton, answer),
         Err(error) => Answer::failed(Status::Failed, error.code(), error.to_string()),
@@ -197,7 +200,12 @@ impl Operation {
     }
 
     /// `parts` are the automata of [`Self::files`], in their order.
-    fn answer(&self, parts: &[&Automaton], bounds: Bounds) -> Result<Outcome, TooLarge> {
+    fn answer(
+        &self,
+        parts: &[&Automaton],
+        bounds: Bounds,
+        console: &mut Console,
+    ) -> Result<Outcome, TooLarge> {
         let labels = |numbers: &[u32]| numbers.iter().map(|&number| Label::new(number)).collect();
         Ok(match self {
             Self::Check { .. } => Outcome::Answer(check(parts, bounds)?),
@@ -206,15 +214,7 @@ impl Operation {
             Self::Trim { .. } => Outcome::of(trim(parts[0])),
             Self::Supcon { lift, .. } => supervisor(parts[0], parts[1], *lift, bounds)?,
             Self::Condat { .. } => Outcome::Answer(control_data(parts[0], parts[1], bounds)?),
-            Self::Supreduce { .. } => {
-                let data = condat(parts[0], parts[1], bounds)?;
-                let answer = refusing(Answer::done("", json!({})), parts[0], parts[1], &data);
-                if answer.failures.is_empty() {
-                    Outcome::of(supreduce(parts[0], parts[1], bounds)?)
-                } else {
-                    Outcome::Answer(answer)
-                }
-            }
+            Self::Supreduce { .. } => reduce(parts[0], parts[1], bounds, console)?,
             Self::Minstate { .. } => Outcome::of(minstate(parts[0])),
             Self::Isomorph { .. } => Outcome::Answer(compare(parts[0], parts[1])),
             Self::Allevents { .. } => Outcome::of(allevents(parts[0].alphabet())),
@@ -405,6 +405,28 @@ fn refusing(
         answer = answer.and_failure(Status::Failed, "U0846", message);
     }
     answer
+}
+
+/// A supervisor of this plant with fewer states.
+fn reduce(
+    plant: &Automaton,
+    supervisor: &Automaton,
+    bounds: Bounds,
+    console: &mut Console,
+) -> Result<Outcome, TooLarge> {
+    let data = condat(plant, supervisor, bounds)?;
+    let answer = refusing(Answer::done("", json!({})), plant, supervisor, &data);
+    if !answer.failures.is_empty() {
+        return Ok(Outcome::Answer(answer));
+    }
+    Ok(match reduced(plant, supervisor, bounds, console) {
+        Err(answer) => Outcome::Answer(answer),
+        Ok((reduced, warning)) => {
+            let result = json!({ "is_complete": warning.is_none() });
+            let answer = Answer::done(warning.unwrap_or_default(), result);
+            Outcome::Automaton(reduced, answer)
+        }
+    })
 }
 
 fn compare(left: &Automaton, right: &Automaton) -> Answer {

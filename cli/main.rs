@@ -43,6 +43,7 @@ mod party;
 mod petri;
 mod proxy;
 mod reconfigure;
+mod reduction;
 mod reliability;
 mod resources;
 mod run;
@@ -189,8 +190,8 @@ impl Command {
             Self::Verify(arguments) => verify::run(&arguments, console),
             Self::Draw(arguments) => draw::run(&arguments),
             Self::Convert(arguments) => convert::run(&arguments),
-            Self::Des(arguments) => des::run(&arguments),
-            Self::Synth(arguments) => synth::run(&arguments),
+            Self::Des(arguments) => des::run(&arguments, console),
+            Self::Synth(arguments) => synth::run(&arguments, console),
             Self::SupervisorToLadder(arguments) => supervisor_to_ladder::run(&arguments),
             Self::Petri(arguments) => petri::run(&arguments),
             Self::Reconfigure(arguments) => reconfigure::run(&arguments),

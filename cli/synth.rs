@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use understudy_diagnostic::Severity;
-use understudy_supervisor::operations::{minstate, supreduce, sync};
+use understudy_supervisor::operations::{minstate, sync};
 use understudy_supervisor::{
     Automaton, Bounds, Finding, Model, SymbolicBounds, Together, empty_finding, model_findings,
     modular_findings, specification_findings, synthesis_findings, synthesise, synthesise_modularly,
@@ -14,7 +14,9 @@ use understudy_supervisor::{
 
 use crate::answer::{Answer, Failure, Status};
 use crate::automata::{self, Sources, description, summary};
+use crate::console::Console;
 use crate::files;
+use crate::reduction;
 
 /// Synthesise the least restrictive nonblocking supervisor of a model
 #[derive(Debug, Args)]
@@ -66,7 +68,7 @@ enum Engine {
     Specified,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
     let Sources {
         read: model,
         reports,
@@ -81,7 +83,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     {
         with_findings(Answer::done("", json!({})), &findings, Status::BadInput)
     } else {
-        match made(arguments, model) {
+        match made(arguments, model, console) {
             Ok(answer) | Err(answer) => answer,
         }
     };
@@ -92,28 +94,39 @@ fn failed(code: &str, message: String) -> Answer {
     Answer::failed(Status::Failed, code, message)
 }
 
-fn made(arguments: &Arguments, model: Model) -> Result<Answer, Answer> {
+fn made(arguments: &Arguments, model: Model, console: &mut Console) -> Result<Answer, Answer> {
     let bounds = Bounds {
         memory_bytes: arguments.memory.saturating_mul(1_000_000),
     };
     match arguments.engine {
-        Engine::Explicit => explicit(arguments, model, bounds),
+        Engine::Explicit => explicit(arguments, model, bounds, console),
         Engine::Specified => specified(arguments, model, bounds),
-        Engine::Symbolic => symbolic(arguments, &model, bounds),
-        Engine::Modular => modular(arguments, model, bounds),
+        Engine::Symbolic => symbolic(arguments, &model, bounds, console),
+        Engine::Modular => modular(arguments, model, bounds, console),
     }
 }
 
-fn explicit(arguments: &Arguments, model: Model, bounds: Bounds) -> Result<Answer, Answer> {
+fn explicit(
+    arguments: &Arguments,
+    model: Model,
+    bounds: Bounds,
+    console: &mut Console,
+) -> Result<Answer, Answer> {
     let result = synthesise(&model.plants(), &model.specifications(), bounds)
         .map_err(|error| failed(error.code(), error.to_string()))?;
     let findings = synthesis_findings(&model, &result);
-    let supervisor = reduced(arguments, &model.plants(), result.supervisor, bounds)?;
+    let (supervisor, warning) = reduced(
+        arguments,
+        &model.plants(),
+        result.supervisor,
+        bounds,
+        console,
+    )?;
     let supervisor = named(arguments, supervisor);
     let mut value = description(&supervisor);
     value["engine"] = json!("explicit");
     value["explored_states"] = json!(result.explored_states);
-    let answer = Answer::done(summary(&supervisor), value);
+    let answer = Answer::done(warning + &summary(&supervisor), value);
     written(
         arguments,
         model,
@@ -149,12 +162,18 @@ fn specified(arguments: &Arguments, model: Model, bounds: Bounds) -> Result<Answ
     written(arguments, model, supervisors, answer)
 }
 
-fn modular(arguments: &Arguments, model: Model, bounds: Bounds) -> Result<Answer, Answer> {
+fn modular(
+    arguments: &Arguments,
+    model: Model,
+    bounds: Bounds,
+    console: &mut Console,
+) -> Result<Answer, Answer> {
     let result = synthesise_modularly(&model.plants(), &model.specifications(), bounds)
         .map_err(|error| failed(error.code(), error.to_string()))?;
     let findings = modular_findings(&model, &result);
     let mut supervisors = Vec::new();
     let mut values = Vec::new();
+    let mut warnings = String::new();
     for local in &result.local {
         let specification = local
             .specification
@@ -166,8 +185,15 @@ fn modular(arguments: &Arguments, model: Model, bounds: Bounds) -> Result<Answer
             .collect();
         let name = arguments.name.as_deref().unwrap_or("SUPER");
         let name = format!("{name}_{}", specification.unwrap_or(plants[0].name()));
-        let supervisor =
-            reduced(arguments, &plants, local.result.supervisor.clone(), bounds)?.with_name(name);
+        let (supervisor, warning) = reduced(
+            arguments,
+            &plants,
+            local.result.supervisor.clone(),
+            bounds,
+            console,
+        )?;
+        let supervisor = supervisor.with_name(name);
+        warnings.push_str(&warning);
         let mut value = description(&supervisor);
         value["specification"] = json!(specification);
         value["plants"] = json!(plants.iter().map(|plant| plant.name()).collect::<Vec<_>>());
@@ -180,13 +206,18 @@ fn modular(arguments: &Arguments, model: Model, bounds: Bounds) -> Result<Answer
         Together::Undecided => "undecided",
     };
     let lines: Vec<String> = supervisors.iter().map(summary).collect();
-    let text = format!("{}\ntogether: {together}", lines.join("\n"));
+    let text = format!("{warnings}{}\ntogether: {together}", lines.join("\n"));
     let value = json!({ "engine": "modular", "supervisors": values, "together": together });
     let answer = with_findings(Answer::done(text, value), &findings, Status::Failed);
     written(arguments, model, supervisors, answer)
 }
 
-fn symbolic(arguments: &Arguments, model: &Model, bounds: Bounds) -> Result<Answer, Answer> {
+fn symbolic(
+    arguments: &Arguments,
+    model: &Model,
+    bounds: Bounds,
+    console: &mut Console,
+) -> Result<Answer, Answer> {
     let (plants, specifications) = (model.plants(), model.specifications());
     let made = synthesise_symbolically(&plants, &specifications, SymbolicBounds::default())
         .map_err(|error| failed(error.code(), error.to_string()))?;
@@ -225,10 +256,11 @@ fn symbolic(arguments: &Arguments, model: &Model, bounds: Bounds) -> Result<Answ
     let listed = made
         .to_automaton(bounds)
         .map_err(|error| failed(error.code(), error.to_string()))?;
-    let supervisor = named(arguments, reduced(arguments, &plants, listed, bounds)?);
+    let (supervisor, warning) = reduced(arguments, &plants, listed, bounds, console)?;
+    let supervisor = named(arguments, supervisor);
     let mut value = description(&supervisor);
     value["engine"] = json!("symbolic");
-    answer.text = format!("{}\n{}", answer.text, summary(&supervisor));
+    answer.text = format!("{warning}{}\n{}", answer.text, summary(&supervisor));
     answer.result = value;
     written(arguments, model.clone(), vec![supervisor], answer)
 }
@@ -241,22 +273,23 @@ fn named(arguments: &Arguments, supervisor: Automaton) -> Automaton {
     }
 }
 
+/// The supervisor with fewer states where that was asked for, and a warning or nothing.
 fn reduced(
     arguments: &Arguments,
     plants: &[&Automaton],
     supervisor: Automaton,
     bounds: Bounds,
-) -> Result<Automaton, Answer> {
+    console: &mut Console,
+) -> Result<(Automaton, String), Answer> {
     if arguments.minstate {
-        return Ok(minstate(&supervisor));
+        return Ok((minstate(&supervisor), String::new()));
     }
     if !arguments.reduce {
-        return Ok(supervisor);
+        return Ok((supervisor, String::new()));
     }
-    let plant = sync(plants, bounds);
-    plant
-        .and_then(|plant| supreduce(&plant, &supervisor, bounds))
-        .map_err(|error| failed(error.code(), error.to_string()))
+    let plant = sync(plants, bounds).map_err(|error| failed(error.code(), error.to_string()))?;
+    let (supervisor, warning) = reduction::reduced(&plant, &supervisor, bounds, console)?;
+    Ok((supervisor, warning.unwrap_or_default()))
 }
 
 /// Errors are failures of the answer; warnings stand before its text.

@@ -54,6 +54,25 @@ pub(crate) fn ending_signals() -> Result<SignalFd, BusError> {
     .map_err(BusError::system("a signalfd"))
 }
 
+/// SIGINT and SIGTERM to a command that has something to save: they do not end the process any more.
+#[derive(Debug)]
+pub struct Interruption(SignalFd);
+
+impl Interruption {
+    /// From now on. To be called before any other thread starts, as [`hold_back_signals`].
+    ///
+    /// # Errors
+    /// [`BusError::System`].
+    pub fn expected() -> Result<Self, BusError> {
+        ending_signals().map(Self)
+    }
+
+    /// Whether one came since this was last asked.
+    pub fn came(&self) -> bool {
+        matches!(self.0.read_signal(), Ok(Some(_)))
+    }
+}
+
 /// Passes commands and signals on until `finished` becomes readable. Lines that are no command go to `unknown`.
 pub(crate) fn watch(
     commands: Commands,

@@ -34,7 +34,7 @@ mod zenoh_link;
 pub use announcer::Announcer;
 pub use channel::{Admitted, ChannelSettings, DONE, TlsKeys};
 pub use clock::Clock;
-pub use control::{Commands, hold_back_signals};
+pub use control::{Commands, Interruption, hold_back_signals};
 pub use endpoints::{Endpoints, Peer};
 pub use error::BusError;
 pub use field::{FieldDriver, Look, NoField, SimulatedField};

@@ -175,16 +175,17 @@ impl Answer {
             ),
         ];
         let mut text = format!("{:<14} {:>6} {:>14}", "", "boxes", "MTTF in h");
-        if let Some(at) = mission {
-            let works = format!("R({} h)", grouped(at.mission_hours));
-            let _ = write!(text, "  {works:<12}  1 - R");
+        let works = mission.map(|at| format!("R({} h)", grouped(at.mission_hours)));
+        let width = works.as_ref().map_or(0, String::len).max(12);
+        if let Some(works) = works {
+            let _ = write!(text, "  {works:<width$}  1 - R");
         }
         text.push('\n');
         for (name, boxes, mean, at_end) in rows {
             let _ = write!(text, "{name:<14} {boxes:>6} {:>14}", grouped(mean));
             if let Some((works, failed)) = at_end {
                 let (works, failed) = (probability(works, 9), probability(failed, 9));
-                let _ = write!(text, "  {works:<12}  {failed}");
+                let _ = write!(text, "  {works:<width$}  {failed}");
             }
             text.push('\n');
         }

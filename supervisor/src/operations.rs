@@ -37,4 +37,6 @@ pub use products::{meet, mutex, sync};
 pub use project::project;
 pub(crate) use supcon::explicit_supcon;
 pub use supcon::{Explanation, Supcon, Violation, lift, supcon};
-pub use supreduce::{Inequivalent, control_equivalent, supreduce};
+pub use supreduce::{
+    Inequivalent, Reducing, Reduction, control_equivalent, supreduce, supreduce_while,
+};

@@ -69,3 +69,53 @@ fn a_misspelt_command_is_bad_input() {
     assert_eq!(answer.status, 2);
     assert!(answer.errors.contains("'check'"), "{}", answer.errors);
 }
+
+#[test]
+fn wrong_arguments_have_a_code() {
+    for arguments in [
+        &["check"][..],
+        &["check", "--perod", "10ms"],
+        &["reliability", "--controllers", "two"],
+        &["chek"],
+    ] {
+        let answer = understudy(arguments);
+        assert_eq!(answer.status, 2, "{arguments:?}: {}", answer.errors);
+        let said = &answer.errors;
+        assert!(said.starts_with("error[U0600]: "), "{arguments:?}: {said}");
+        assert!(said.contains("--help"), "{arguments:?}: {said}");
+        let document = understudy(&[arguments, &["--json"]].concat());
+        assert_eq!((document.status, document.errors.as_str()), (2, ""));
+        let document = document.json();
+        assert_eq!(document["failures"][0]["code"], "U0600", "{document}");
+        assert_eq!(document["command"], arguments[0]);
+    }
+    // Help and the version are no misuse.
+    for arguments in [&["--help"][..], &["--version"], &["check", "--help"]] {
+        assert_eq!(understudy(arguments).status, 0, "{arguments:?}");
+    }
+}
+
+#[test]
+fn a_page_that_asks_nobody_who_he_is_ends_as_a_wrong_input_does() {
+    let folder = crate::empty_folder("no_logins");
+    let answer = crate::understudy_in(&folder, &["init", "."]);
+    assert_eq!(answer.status, 0, "{}", answer.errors);
+    let page = ["watch", "cluster.toml", "--address", "0.0.0.0:0"];
+    let answer = crate::understudy_in(&folder, &page);
+    assert_eq!(answer.status, 2, "{}", answer.errors);
+    assert!(answer.errors.contains("error[U0674]"), "{}", answer.errors);
+}
+
+#[test]
+fn keys_without_addresses_are_said_to_be_for_one_machine() {
+    let folder = crate::empty_folder("keys_without_addresses");
+    assert_eq!(crate::understudy_in(&folder, &["init", "."]).status, 0);
+    let made = crate::understudy_in(&folder, &["keys", "init", "cluster.toml", "--json"]).json();
+    let lacking = made["result"]["without_address"].as_array().map(Vec::len);
+    assert!(lacking.is_some_and(|lacking| lacking > 0), "{made}");
+    let renewed = crate::understudy_in(&folder, &["keys", "issue", "cluster.toml", "tank"]);
+    let warning = "warning[U0915]: no address in the cluster file for tank;";
+    assert!(renewed.output.starts_with(warning), "{}", renewed.output);
+    let revoked = crate::understudy_in(&folder, &["keys", "revoke", "tank"]);
+    assert!(!revoked.output.contains("U0915"), "{}", revoked.output);
+}

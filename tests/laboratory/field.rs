@@ -86,11 +86,9 @@ fn cluster(out: &Path, port: u16) -> PathBuf {
     let text = fs::read_to_string(root.join("modbus-cell/cluster.toml")).expect("text");
     assert!(text.contains("127.0.0.1:5020"));
     let text = text.replace("127.0.0.1:5020", &format!("127.0.0.1:{port}"));
-    let text = text.replace("../press-cell/", "");
     fs::write(out.join("cluster.toml"), text).expect("written");
-    for file in ["modbus-cell/tank.ladder", "press-cell/press.ladder"] {
-        let name = Path::new(file).file_name().expect("a file");
-        fs::copy(root.join(file), out.join(name)).expect("copied");
+    for file in ["tank.ladder", "press.ladder"] {
+        fs::copy(root.join("modbus-cell").join(file), out.join(file)).expect("copied");
     }
     out.join("cluster.toml")
 }

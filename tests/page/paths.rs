@@ -238,7 +238,7 @@ fn a_page_for_other_machines_asks_who_may_log_in() {
         .output()
         .expect("the binary is built");
     let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert_eq!(output.status.code(), Some(2), "{said}");
     assert!(said.contains("U0674"), "{said}");
     let nothing = understudy(&["watch", "nothing-lies-here"])
         .output()

@@ -12,6 +12,30 @@ use crate::alphabet::Label;
 use crate::automaton::{Automaton, Edge, State};
 use crate::explicit::{Bounds, Joint, Product, TooLarge};
 
+/// How far a reduction is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reducing {
+    /// The order in which pairs are tried now, from 1.
+    pub order: usize,
+    /// How many orders there are.
+    pub orders: usize,
+    /// States of which every pair was tried in this order.
+    pub tried: usize,
+    /// States of the supervisor.
+    pub states: usize,
+    /// States that are left so far.
+    pub left: usize,
+}
+
+/// A reduced supervisor.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Reduction {
+    /// With the same effect on the plant, also where the reduction was stopped.
+    pub supervisor: Automaton,
+    /// Whether all pairs of states were tried; otherwise it was stopped before, and fewer states may do.
+    pub is_complete: bool,
+}
+
 /// `supreduce`: a supervisor with no more states than `supervisor` and the same effect on `plant`; usually with far fewer, for it forgets
 /// what the plant knows by itself. Its states have no names.
 ///
@@ -22,19 +46,50 @@ pub fn supreduce(
     supervisor: &Automaton,
     bounds: Bounds,
 ) -> Result<Automaton, TooLarge> {
+    supreduce_while(plant, supervisor, bounds, &mut |_| true).map(|made| made.supervisor)
+}
+
+/// As [`supreduce`], for as long as `go_on` says so, which is asked many times a second; the smallest result until then is kept.
+///
+/// # Errors
+/// The product of the two passes the bounds.
+pub fn supreduce_while(
+    plant: &Automaton,
+    supervisor: &Automaton,
+    bounds: Bounds,
+    go_on: &mut dyn FnMut(Reducing) -> bool,
+) -> Result<Reduction, TooLarge> {
+    let mut best = Reduction {
+        supervisor: supervisor.clone(),
+        is_complete: true,
+    };
     if supervisor.is_empty() {
-        return Ok(supervisor.clone());
+        return Ok(best);
     }
     let demands = Demands::new(plant, supervisor, bounds)?;
     let orders = [ascending(supervisor), depth_first(supervisor)];
-    let reductions = orders.iter().map(|order| {
+    for (number, order) in orders.iter().enumerate() {
         let mut cells = Cells::new(supervisor, &demands);
-        cells.merge_greedily(order);
-        cells.reduced(supervisor)
-    });
-    let smallest =
-        reductions.min_by_key(|reduced| (reduced.state_count(), reduced.transition_count()));
-    Ok(smallest.unwrap_or_else(|| supervisor.clone()))
+        let mut go_on = |tried, left| {
+            go_on(Reducing {
+                order: number + 1,
+                orders: orders.len(),
+                tried,
+                states: supervisor.state_count(),
+                left,
+            })
+        };
+        best.is_complete = cells.merge_greedily(order, &mut go_on);
+        let reduced = cells.reduced(supervisor);
+        let size = |automaton: &Automaton| (automaton.state_count(), automaton.transition_count());
+        if number == 0 || size(&reduced) < size(&best.supervisor) {
+            best.supervisor = reduced;
+        }
+        if !best.is_complete {
+            break;
+        }
+    }
+    Ok(best)
 }
 
 fn ascending(supervisor: &Automaton) -> Vec<State> {
@@ -108,6 +163,16 @@ impl Demands {
 
 const NONE: u32 = u32::MAX;
 
+/// Whether to go on: asked each time that the patience is used up.
+fn spend(patience: &mut u32, go_on: &mut dyn FnMut() -> bool) -> bool {
+    *patience -= 1;
+    if *patience > 0 {
+        return true;
+    }
+    *patience = PATIENCE;
+    go_on()
+}
+
 /// A partition of the states into cells whose members agree, with what a cell asks for and where its events lead. A step that
 /// turns out wrong is taken back.
 struct Cells {
@@ -122,10 +187,17 @@ struct Cells {
     /// What a tentative merge changed.
     undo: Vec<Change>,
     pending: Vec<(u32, u32)>,
+    /// Cells that are left.
+    left: usize,
+    /// Until it is asked again whether to go on.
+    patience: u32,
 }
 
+/// Pairs of states that are looked at between two questions whether to go on: some milliseconds.
+const PATIENCE: u32 = 1 << 16;
+
 enum Change {
-    Parent(u32),
+    Parent(u32, u32),
     Enabled(usize, u64),
     Disabled(usize, u64),
     Target(usize),
@@ -149,6 +221,8 @@ impl Cells {
             targets,
             undo: Vec::new(),
             pending: Vec::new(),
+            left: supervisor.state_count(),
+            patience: PATIENCE,
         }
     }
 
@@ -159,21 +233,51 @@ impl Cells {
         state
     }
 
+    /// As [`Self::root`], and makes the way there shorter for the next time.
+    fn find(&mut self, state: u32) -> u32 {
+        let root = self.root(state);
+        let mut at = state;
+        while self.parent[at as usize] != root && at != root {
+            let next = std::mem::replace(&mut self.parent[at as usize], root);
+            self.undo.push(Change::Parent(at, next));
+            at = next;
+        }
+        root
+    }
+
     fn is_root(&self, state: State) -> bool {
         self.parent[state.index()] == state.number()
     }
 
-    fn merge_greedily(&mut self, order: &[State]) {
+    /// Tries every pair of cells in an order; false where it was stopped before. `go_on` is told how many states were tried with all
+    /// others, and how many cells are left.
+    fn merge_greedily(
+        &mut self,
+        order: &[State],
+        go_on: &mut dyn FnMut(usize, usize) -> bool,
+    ) -> bool {
         for (place, &state) in order.iter().enumerate() {
             if !self.is_root(state) {
                 continue;
             }
             for &other in &order[place + 1..] {
-                if self.is_root(other) && self.agree(self.root(state.number()), other.number()) {
-                    self.try_merge(state.number(), other.number());
+                if !self.is_root(other) {
+                    continue;
+                }
+                let mut asked = || go_on(place, self.left);
+                if !spend(&mut self.patience, &mut asked) {
+                    return false;
+                }
+                let root = self.find(state.number());
+                self.undo.clear();
+                if self.agree(root, other.number())
+                    && !self.try_merge(root, other.number(), place, go_on)
+                {
+                    return false;
                 }
             }
         }
+        true
     }
 
     /// Whether neither of two cells enables what the other disables.
@@ -186,28 +290,42 @@ impl Cells {
         })
     }
 
-    /// Merges two cells and all that must then be merged; or takes everything back.
-    fn try_merge(&mut self, left: u32, right: u32) {
+    /// Merges two cells and all that must then be merged, the nearest first; or takes everything back. False where it was stopped, with
+    /// everything taken back.
+    fn try_merge(
+        &mut self,
+        left: u32,
+        right: u32,
+        tried: usize,
+        go_on: &mut dyn FnMut(usize, usize) -> bool,
+    ) -> bool {
+        let before = self.left;
         self.pending.clear();
         self.pending.push((left, right));
-        while let Some((left, right)) = self.pending.pop() {
-            let (left, right) = (self.root(left), self.root(right));
+        let mut next = 0;
+        while let Some(&(left, right)) = self.pending.get(next) {
+            next += 1;
+            let goes_on = spend(&mut self.patience, &mut || go_on(tried, before));
+            let (left, right) = (self.find(left), self.find(right));
             if left == right {
                 continue;
             }
-            if !self.agree(left, right) {
+            if !goes_on || !self.agree(left, right) || !self.join(left, right) {
                 self.take_back();
-                return;
+                self.left = before;
+                return goes_on;
             }
-            self.join(left, right);
+            self.left -= 1;
         }
         self.undo.clear();
+        true
     }
 
-    fn join(&mut self, left: u32, right: u32) {
+    /// Makes two cells one, and notes what must then be merged; false where some of that cannot.
+    fn join(&mut self, left: u32, right: u32) -> bool {
         let (kept, joined) = (left.min(right), left.max(right));
         self.parent[joined as usize] = kept;
-        self.undo.push(Change::Parent(joined));
+        self.undo.push(Change::Parent(joined, joined));
         for word in 0..self.words {
             let (to, from) = (
                 kept as usize * self.words + word,
@@ -233,15 +351,23 @@ impl Cells {
                 self.targets[place] = other;
                 self.undo.push(Change::Target(place));
             } else {
-                self.pending.push((self.targets[place], other));
+                let (one, other) = (self.find(self.targets[place]), self.find(other));
+                if one != other {
+                    // Most attempts fail, and soon: before anything else is changed for them.
+                    if !self.agree(one, other) {
+                        return false;
+                    }
+                    self.pending.push((one, other));
+                }
             }
         }
+        true
     }
 
     fn take_back(&mut self) {
         while let Some(change) = self.undo.pop() {
             match change {
-                Change::Parent(state) => self.parent[state as usize] = state,
+                Change::Parent(state, parent) => self.parent[state as usize] = parent,
                 Change::Enabled(place, set) => self.enabled[place] = set,
                 Change::Disabled(place, set) => self.disabled[place] = set,
                 Change::Target(place) => self.targets[place] = NONE,

@@ -3,7 +3,7 @@
 use crate::models::{MODELS, Model, OF_PAPERS, automaton, counts, counts_in, json};
 use understudy_supervisor::operations::{
     condat, control_equivalent, isomorph, lift, meet, minstate, nonconflict, supcon, supreduce,
-    sync,
+    supreduce_while, sync,
 };
 use understudy_supervisor::{Alphabet, Automaton, Bounds, synthesise};
 
@@ -114,6 +114,36 @@ fn small_models() {
 #[test]
 fn guided_vehicles() {
     check("agv");
+}
+
+/// Wherever a reduction is stopped, what there is has the same effect; the later, the smaller.
+#[test]
+fn a_reduction_that_is_stopped_is_right() {
+    let bounds = Bounds::default();
+    let model = Model::read("agv");
+    let plant = sync(&model.plants(), bounds).expect("it fits");
+    let supervisor = model.file("_SUPER");
+    let mut sizes = vec![supervisor.state_count()];
+    for questions in [1, 2, 8] {
+        let mut asked = 0;
+        let made = supreduce_while(&plant, &supervisor, bounds, &mut |at| {
+            assert!(at.tried < at.states && at.left <= at.states && at.order <= at.orders);
+            asked += 1;
+            asked < questions
+        });
+        let made = made.expect("it fits");
+        assert_eq!((made.is_complete, asked), (false, questions));
+        sizes.push(made.supervisor.state_count());
+        let difference = control_equivalent(&plant, &made.supervisor, &supervisor, bounds);
+        assert_eq!(difference, Ok(None), "{questions}");
+    }
+    let whole = supreduce_while(&plant, &supervisor, bounds, &mut |_| true).expect("it fits");
+    assert!(whole.is_complete);
+    let reduced = supreduce(&plant, &supervisor, bounds).expect("it fits");
+    assert_eq!(whole.supervisor, reduced);
+    sizes.push(reduced.state_count());
+    assert!(sizes.is_sorted_by(|a, b| a >= b), "{sizes:?}");
+    assert!(sizes[1] > sizes[4], "{sizes:?}");
 }
 
 #[test]

@@ -1,0 +1,61 @@
+//! The reduction of a supervisor: what is said while it takes time, and when it ends before every pair of states was tried.
+
+use std::time::{Duration, Instant};
+
+use understudy_bus::Interruption;
+use understudy_supervisor::operations::{Reducing, supreduce_while};
+use understudy_supervisor::{Automaton, Bounds};
+
+use crate::answer::{Answer, Status};
+use crate::console::Console;
+
+/// After this time the smallest supervisor so far is the answer.
+const LIMIT: Duration = Duration::from_secs(30);
+
+/// From one line about the progress to the next.
+const BETWEEN: Duration = Duration::from_secs(3);
+
+/// A reduced supervisor; with a warning where the reduction was stopped by the limit, or by SIGINT or SIGTERM.
+///
+/// # Errors
+/// The answer where the product of the two passes the bounds.
+pub(crate) fn reduced(
+    plant: &Automaton,
+    supervisor: &Automaton,
+    bounds: Bounds,
+    console: &mut Console,
+) -> Result<(Automaton, Option<String>), Answer> {
+    // Without it an interruption ends the command, as it ends any other.
+    let interruption = Interruption::expected().ok();
+    let begin = Instant::now();
+    let mut told = begin;
+    let mut interrupted = false;
+    let mut go_on = |at: Reducing| {
+        if told.elapsed() >= BETWEEN {
+            told = Instant::now();
+            console.note(&format!(
+                "{} s: order {} of {}: {} of {} states tried, {} left; Ctrl-C takes what there is",
+                begin.elapsed().as_secs(),
+                at.order,
+                at.orders,
+                at.tried,
+                at.states,
+                at.left
+            ));
+        }
+        interrupted = interruption.as_ref().is_some_and(Interruption::came);
+        !interrupted && begin.elapsed() < LIMIT
+    };
+    let made = supreduce_while(plant, supervisor, bounds, &mut go_on)
+        .map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))?;
+    let warning = (!made.is_complete).then(|| {
+        format!(
+            "warning[U0847]: the reduction was {} after {} s at {} of {} states; the supervisor has the same effect, but fewer states may do\n",
+            if interrupted { "interrupted" } else { "stopped" },
+            begin.elapsed().as_secs(),
+            made.supervisor.state_count(),
+            supervisor.state_count()
+        )
+    });
+    Ok((made.supervisor, warning))
+}
