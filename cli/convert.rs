@@ -148,10 +148,7 @@ fn converted(program: &Program, arguments: &Arguments, period: Duration) -> Resu
         Form::Plcopen => Ok(write(program, period)),
         Form::Digraph => Ok(digraph::write(program)),
         Form::Ldmicro => Err("LDmicro's files are read only".to_owned()),
-        Form::St => {
-            let circuit = program.lower(period).map_err(|error| error.to_string())?;
-            Ok(structured_text(&circuit, &program.addresses()))
-        }
+        Form::St => Ok(structured_text(program, period)),
     }
 }
 
