@@ -180,7 +180,10 @@ impl<'a> Writer<'a> {
             .coils
             .chunk_by(|left, right| left.kind.is_latch() && right.kind.is_latch())
         {
-            self.coils(coils, &power);
+            match coils {
+                [coil] => self.coil(coil, &power),
+                latches => self.latches(latches, &power),
+            }
         }
     }
 
@@ -226,45 +229,43 @@ impl<'a> Writer<'a> {
         Power::Word(format!("{name}.Q"))
     }
 
-    /// One coil, or several set and reset coils.
-    fn coils(&mut self, coils: &[Coil], power: &Power) {
+    /// Set and reset coils with the same power, which is read once.
+    fn latches(&mut self, coils: &[Coil], power: &Power) {
         let latched = |coil: &Coil| {
-            let value = match coil.kind {
-                CoilKind::Set => "TRUE",
-                _ => "FALSE",
+            let value = if coil.kind == CoilKind::Set {
+                "TRUE"
+            } else {
+                "FALSE"
             };
             format!("{} := {value}", self.names.operand(&coil.target))
         };
+        let latched: Vec<String> = coils.iter().map(latched).collect();
+        if matches!(power, Power::On) {
+            for latched in latched {
+                self.state(&[latched]);
+            }
+            return;
+        }
         let mut words = vec!["IF".into()];
         power.words(0, &mut words);
         words.push("THEN".into());
-        match coils {
-            [coil] if !coil.kind.is_latch() => self.coil(coil, power),
-            _ if matches!(power, Power::On) => {
-                for latched in coils.iter().map(latched).collect::<Vec<_>>() {
-                    self.state(&[latched]);
-                }
-            }
-            [coil] => {
-                words.push(format!("{}; END_IF", latched(coil)));
-                self.state(&words);
-            }
-            _ => {
-                let latched: Vec<String> = coils.iter().map(latched).collect();
-                broken(&mut self.body, &words);
-                for latched in latched {
-                    self.body.push_str(&format!("\n    {latched};"));
-                }
-                self.body.push_str("\n  END_IF;\n");
-            }
+        if let [latched] = latched.as_slice() {
+            words.push(format!("{latched}; END_IF"));
+            self.state(&words);
+            return;
         }
+        broken(&mut self.body, &words);
+        for latched in latched {
+            self.body.push_str(&format!("\n    {latched};"));
+        }
+        self.body.push_str("\n  END_IF;\n");
     }
 
-    /// A coil that is written in every scan.
     fn coil(&mut self, coil: &Coil, power: &Power) {
         let target = self.names.operand(&coil.target);
         match coil.kind {
-            CoilKind::Plain | CoilKind::Set | CoilKind::Reset => self.assign(&target, power),
+            CoilKind::Set | CoilKind::Reset => self.latches(std::slice::from_ref(coil), power),
+            CoilKind::Plain => self.assign(&target, power),
             CoilKind::Negated => {
                 let mut words = vec![target, ":=".into()];
                 match power {
