@@ -7,9 +7,9 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use understudy_diagnostic::Report;
-use understudy_interchange::plcopen::{Fidelity, write};
-use understudy_interchange::{Format, digraph, read};
-use understudy_ladder::{Program, parse_time, print, structured_text};
+use understudy_interchange::plcopen::Fidelity;
+use understudy_interchange::{Compared, Format, WriteError, Written, read, write};
+use understudy_ladder::parse_time;
 
 use crate::answer::{Answer, Status};
 use crate::files;
@@ -93,33 +93,39 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     let format = arguments.from.map(Form::format);
     let format = format.unwrap_or_else(|| Format::of(&name, &source));
     let reading = read(format, &name, &source, arguments.unit.as_deref());
-    let report = Report {
+    let mut report = Report {
         name,
         text: source,
         diagnostics: reading.diagnostics,
     };
-    let kept = if arguments.fidelity {
+    let mut kept = if arguments.fidelity {
         fidelity_text(&reading.fidelity, &report)
     } else {
         String::new()
     };
-    let fidelity = fidelity_value(&reading.fidelity, &report);
     let Some(program) = reading.program else {
+        let fidelity = fidelity_value(&reading.fidelity, &report, None);
         let mut answer = Answer::bad_files(vec![report]);
         answer.text = kept;
         answer.result = json!({ "file": null, "text": null, "fidelity": fidelity });
         return answer;
     };
-    let period = arguments
-        .period
-        .or(reading.period)
-        .unwrap_or(Duration::from_millis(10));
-    let text = match converted(&program, arguments, period) {
-        Ok(text) => text,
-        Err(message) => {
-            return Answer::failed(Status::BadInput, "U1014", message).with_reports(vec![report]);
+    let period = arguments.period.or(reading.period);
+    let written = form_of_output(arguments).and_then(|form| {
+        write(form.format(), &program, period).map_err(|error| (code(&error), error.to_string()))
+    });
+    let written = match written {
+        Ok(written) => written,
+        Err((code, message)) => {
+            return Answer::failed(Status::BadInput, code, message).with_reports(vec![report]);
         }
     };
+    if arguments.fidelity {
+        kept.push_str(&written_text(&written));
+    }
+    let fidelity = fidelity_value(&reading.fidelity, &report, Some(&written));
+    report.diagnostics.extend(written.losses);
+    let text = written.text;
     let answer = match &arguments.to_file {
         None => {
             let result = json!({ "file": null, "text": text, "fidelity": fidelity });
@@ -137,21 +143,18 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     answer.with_reports(vec![report])
 }
 
-fn converted(program: &Program, arguments: &Arguments, period: Duration) -> Result<String, String> {
-    let form = match (arguments.to, &arguments.to_file) {
-        (Some(form), _) => form,
-        (None, Some(path)) => form_of(path)?,
-        (None, None) => Form::Ladder,
-    };
-    match form {
-        Form::Ladder => Ok(print(program)),
-        Form::Plcopen => Ok(write(program, period)),
-        Form::Digraph => Ok(digraph::write(program)),
-        Form::Ldmicro => Err("LDmicro's files are read only".to_owned()),
-        Form::St => {
-            let circuit = program.lower(period).map_err(|error| error.to_string())?;
-            Ok(structured_text(&circuit, &program.addresses()))
-        }
+fn code(error: &WriteError) -> &'static str {
+    match error {
+        WriteError::ReadOnly | WriteError::Program(_) => "U1014",
+        WriteError::Different(_) => "U1019",
+    }
+}
+
+fn form_of_output(arguments: &Arguments) -> Result<Form, (&'static str, String)> {
+    match (arguments.to, &arguments.to_file) {
+        (Some(form), _) => Ok(form),
+        (None, Some(path)) => form_of(path).map_err(|message| ("U1014", message)),
+        (None, None) => Ok(Form::Ladder),
     }
 }
 
@@ -172,9 +175,6 @@ fn form_of(path: &Path) -> Result<Form, String> {
 
 fn fidelity_text(fidelity: &Fidelity, report: &Report) -> String {
     let mut text = String::from("\n");
-    if fidelity.counts.is_empty() && fidelity.notes.is_empty() {
-        text.push_str("nothing was lost\n");
-    }
     for count in &fidelity.counts {
         let _ = writeln!(
             text,
@@ -189,7 +189,31 @@ fn fidelity_text(fidelity: &Fidelity, report: &Report) -> String {
     text
 }
 
-fn fidelity_value(fidelity: &Fidelity, report: &Report) -> Value {
+/// What was found when the written text was read back.
+fn written_text(written: &Written) -> String {
+    let Compared {
+        signals,
+        blocks,
+        comments,
+        scans,
+        proved,
+    } = written.compared;
+    let lost = match written.losses.len() {
+        0 => "nothing was lost in writing".to_owned(),
+        1 => "not all of it is in the text: see the warning".to_owned(),
+        count => format!("not all of it is in the text: see the {count} warnings"),
+    };
+    let behaviour = if proved {
+        "proved equal in every scan".to_owned()
+    } else {
+        format!("equal in {scans} scans, not proved")
+    };
+    format!(
+        "read back and compared: {signals} signals, {blocks} blocks, {comments} comments; {lost}\nbehaviour: {behaviour}\n"
+    )
+}
+
+fn fidelity_value(fidelity: &Fidelity, report: &Report, written: Option<&Written>) -> Value {
     let counts = fidelity.counts.iter().map(|count| {
         json!({ "what": count.what, "in_file": count.in_file, "in_program": count.in_program })
     });
@@ -197,5 +221,20 @@ fn fidelity_value(fidelity: &Fidelity, report: &Report) -> Value {
         let place = report.line_and_column(note.span.start);
         json!({ "line": place.line, "column": place.column, "message": note.message })
     });
-    json!({ "counts": counts.collect::<Vec<_>>(), "notes": notes.collect::<Vec<_>>() })
+    let written = written.map(|written| {
+        let losses = written.losses.iter().map(|found| found.message.as_str());
+        json!({
+            "losses": losses.collect::<Vec<_>>(),
+            "signals": written.compared.signals,
+            "blocks": written.compared.blocks,
+            "comments": written.compared.comments,
+            "scans": written.compared.scans,
+            "proved": written.compared.proved,
+        })
+    });
+    json!({
+        "counts": counts.collect::<Vec<_>>(),
+        "notes": notes.collect::<Vec<_>>(),
+        "written": written,
+    })
 }

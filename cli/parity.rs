@@ -1,12 +1,11 @@
 //! `understudy parity`: the generated controller, in the forms in which people and PLCs take it.
 
-use std::collections::HashMap;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use understudy_cluster::{Cluster, Overrides};
-use understudy_ladder::{from_circuit, print, structured_text};
+use understudy_ladder::{circuit_as_structured_text, from_circuit, print};
 use understudy_parity::{Equations, Style};
 
 use crate::answer::Answer;
@@ -68,7 +67,7 @@ fn made(cluster: &Cluster, form: Form) -> (String, Value) {
     let text = match form {
         Form::Ladder => print(&from_circuit(circuit)),
         // The members' addresses are places of other PLCs, and would collide in this one.
-        Form::St => structured_text(circuit, &HashMap::new()),
+        Form::St => circuit_as_structured_text(circuit, cluster.agreement().schedule.period()),
         Form::Equations | Form::Json => {
             let equations = Equations::of(parity);
             let value = serde_json::to_value(&equations).unwrap_or_default();

@@ -37,6 +37,17 @@ pub struct Reading {
 }
 
 impl Format {
+    /// What it is called.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Ladder => "the ladder format",
+            Self::PlcOpen => "PLCopen XML",
+            Self::StructuredText => "Structured Text",
+            Self::Digraph => "digraph XML",
+            Self::LdMicro => "LDmicro",
+        }
+    }
+
     /// The form of a file, by its beginning where the end of its name says too little.
     pub fn of(name: &str, text: &str) -> Self {
         let ending = name.rsplit_once('.').map_or("", |(_, ending)| ending);

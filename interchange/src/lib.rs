@@ -5,8 +5,10 @@ mod format;
 pub mod ldmicro;
 pub mod plcopen;
 pub mod structured_text;
+mod written;
 
 pub use format::{Format, Reading, parse_program, read};
+pub use written::{Compared, USUAL_PERIOD, WriteError, Written, write};
 
 /// The examples of the codes of this crate are run with its own.
 #[cfg(doctest)]

@@ -29,6 +29,7 @@ pub use fidelity::{Count, Fidelity, Note};
 pub use write::write;
 pub use xml::{MAXIMUM_BYTES, MAXIMUM_DEPTH, MAXIMUM_NODES};
 
+use crate::written::USUAL_PERIOD;
 use document::{Body, Language, Pou, PouKind, Project};
 
 /// The namespaces of 2.01 and 2.0.
@@ -36,9 +37,6 @@ const NAMESPACES: [&str; 2] = [
     "http://www.plcopen.org/xml/tc6_0201",
     "http://www.plcopen.org/xml/tc6_0200",
 ];
-
-/// From one scan to the next, where no task says it.
-const USUAL_PERIOD: Duration = Duration::from_millis(10);
 
 /// What a file says.
 #[derive(Debug, Default)]

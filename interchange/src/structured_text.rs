@@ -211,6 +211,7 @@ fn lowered(
     let (mut program, found) = lower::lower(&unit.name, &resolving.program, &intervals);
     diagnostics.extend(found);
     program.comments.clone_from(&unit.comments);
+    program.footer.extend(unit.footer.iter().cloned());
     let program = (!has_errors(&diagnostics)).then_some(program);
     (program, diagnostics)
 }
@@ -265,6 +266,7 @@ fn unit_of(callable: &Callable, foreign: bool, diagnostics: &mut Vec<Diagnostic>
         },
         name: Name::from(callable.name.as_str()),
         comments: Vec::new(),
+        footer: Vec::new(),
         result,
         declarations,
         body,

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use understudy_ladder::{Program, from_circuit, parse, structured_text};
+use understudy_ladder::{Program, circuit_as_structured_text, from_circuit, parse};
 use understudy_logic::{Circuit, Expression, Operation, Scan, Scratch, Variable};
 
 const RUNGS: usize = 1_000;
@@ -94,8 +94,7 @@ fn ladder_from_circuit(bencher: Bencher<'_, '_>) {
 #[divan::bench]
 fn structured_text_from_circuit(bencher: Bencher<'_, '_>) {
     let circuit = circuit();
-    let addresses = program().addresses();
-    bencher.bench(|| structured_text(black_box(&circuit), &addresses));
+    bencher.bench(|| circuit_as_structured_text(black_box(&circuit), PERIOD));
 }
 
 /// 64 random inputs, packed, so that no scan is like the one before.

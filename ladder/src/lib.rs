@@ -38,7 +38,7 @@ pub use from_circuit::from_circuit;
 pub use interpreter::Interpreter;
 pub use lexer::{MAXIMUM_NAME_LENGTH, MAXIMUM_PRESET_TIME, parse_address, parse_time};
 pub use lower::{LowerError, Observer, PERIODS, Write};
-pub use names::{Language, Namer};
+pub use names::{Language, Namer, StandardNames};
 pub use parser::{
     KEYWORDS, MAXIMUM_NESTING, MAXIMUM_PRESET_VALUE, MAXIMUM_RUNGS, MAXIMUM_TEXT_BYTES, Parsed,
     parse,
@@ -48,4 +48,4 @@ pub use program::{
     Address, Area, Block, BlockKind, Coil, CoilKind, Comparison, Contact, ContactKind, Element,
     Feed, Name, Program, Relation, Rung, Series, Signal, visit,
 };
-pub use structured_text::structured_text;
+pub use structured_text::{circuit_as_structured_text, standard_time, structured_text};

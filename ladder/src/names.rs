@@ -1,6 +1,10 @@
 //! Names for generated programs: legal in their language, unique, and as near to the wanted ones as that allows.
 
+mod standard;
+
 use std::collections::HashSet;
+
+pub use self::standard::StandardNames;
 
 use crate::lexer::{MAXIMUM_NAME_LENGTH, is_name_part, is_name_start};
 use crate::parser::KEYWORDS;

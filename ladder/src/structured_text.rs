@@ -1,123 +1,59 @@
-//! A circuit as Structured Text of IEC 61131-3, for a real PLC.
+//! Structured Text of IEC 61131-3 that other compilers run as it is: a PROGRAM, and a CONFIGURATION whose task runs it.
 //!
-//! One PROGRAM with BOOL variables and assignments in the order of [`crate::plan`], so that one execution is one step of the
-//! synchronous circuit. Only NOT, AND, XOR, OR and brackets are used.
+//! A ladder becomes statements in the order of its rungs, with its timers, counters, latches and triggers as instances of the standard
+//! function blocks ([`structured_text`]). A circuit, such as that of the understudy, becomes Boolean assignments
+//! ([`circuit_as_structured_text`]).
 
-use std::collections::HashMap;
+mod circuit;
+mod program;
+
 use std::fmt::Write;
+use std::time::Duration;
 
-use understudy_logic::{Circuit, Expression, Operation};
+use crate::names::Namer;
+use crate::print::time_text;
 
-use crate::names::{Language, Namer};
-use crate::plan::{Named, Operand, Plan, Target};
-use crate::program::{Address, Program};
+pub use self::circuit::circuit_as_structured_text;
+pub use self::program::structured_text;
 
-/// Characters of a line past which an assignment is broken before an operator.
+/// Characters of a line past which a statement is broken before an operator.
 const LINE_WIDTH: usize = 96;
 
-impl Program {
-    /// The addresses of inputs and outputs by name, as [`structured_text`] takes them.
-    pub fn addresses(&self) -> HashMap<String, Address> {
-        let signals = self.inputs.iter().chain(&self.outputs);
-        let known = signals.filter_map(|signal| {
-            let address = signal.address.clone()?;
-            Some((signal.name.to_string(), address))
-        });
-        known.collect()
+/// A time literal of the standard, such as `T#1m30s`. The standard's smallest unit is the millisecond, with a fraction.
+pub fn standard_time(time: Duration) -> String {
+    let microseconds = time.as_micros() % 1_000_000;
+    if microseconds.is_multiple_of(1_000) {
+        return format!("T#{}", time_text(time));
     }
-}
-
-/// The text of a PROGRAM whose execution is one step of `circuit`.
-///
-/// Inputs and outputs with an entry in `addresses` (by their name in the circuit) are located there, `AT %IX0.3`; the others
-/// are VAR_INPUT and VAR_OUTPUT. Names become identifiers of the standard; what was changed is said in a comment.
-pub fn structured_text(circuit: &Circuit, addresses: &HashMap<String, Address>) -> String {
-    let plan = Plan::new(circuit, false);
-    let mut namer = Namer::new(Language::StructuredText);
-    let program = namer.name(circuit.name());
-    let names = Named::new(circuit, &plan, &mut namer, "_next");
-
-    let mut text = format!("PROGRAM {program}\n");
-    let wanted_inputs: Vec<&str> = circuit.inputs().iter().map(String::as_str).collect();
-    let wanted_outputs = circuit.outputs().iter().map(|output| output.name.as_str());
-    let wanted_outputs: Vec<&str> = wanted_outputs.collect();
-    located(
-        &mut text,
-        "VAR_INPUT",
-        &wanted_inputs,
-        &names.inputs,
-        addresses,
-    );
-    located(
-        &mut text,
-        "VAR_OUTPUT",
-        &wanted_outputs,
-        &names.outputs,
-        addresses,
-    );
-    let state = circuit
-        .registers()
-        .iter()
-        .zip(&names.registers)
-        .map(|(register, name)| {
-            let initial = if register.initial { "TRUE" } else { "FALSE" };
-            format!(
-                "{name} : BOOL := {initial};{}",
-                origin(&register.name, name)
-            )
-        });
-    section(&mut text, "VAR", state.collect());
-    let helpers = names.shared.iter().map(String::as_str).chain(names.held());
-    section(
-        &mut text,
-        "VAR",
-        helpers.map(|name| format!("{name} : BOOL;")).collect(),
-    );
-
-    let writer = Writer {
-        plan: &plan,
-        names: &names,
+    let seconds = match time.as_secs() {
+        0 => String::new(),
+        seconds => time_text(Duration::from_secs(seconds)),
     };
-    let mut section = "";
-    for assignment in &plan.assignments {
-        let heading = assignment.target.heading();
-        if section != heading {
-            let _ = writeln!(text, "\n  (* {heading} *)");
-            section = heading;
-        }
-        let target = names.target(assignment.target);
-        let mut words = vec![target.to_owned(), ":=".into()];
-        match assignment.target {
-            Target::Takeover(k) => words.push(names.next(k).to_owned()),
-            _ => writer.assignment(assignment.expression, target, &mut words),
-        }
-        statement(&mut text, &words);
-    }
-    text.push_str("END_PROGRAM\n");
-    text
+    let milliseconds = format!("{}.{:03}", microseconds / 1_000, microseconds % 1_000);
+    format!("T#{seconds}{}ms", milliseconds.trim_end_matches('0'))
 }
 
-/// Declares signals, those with an address apart from those without.
-fn located(
-    text: &mut String,
-    word: &str,
-    wanted: &[&str],
-    names: &[String],
-    addresses: &HashMap<String, Address>,
-) {
-    let (mut at, mut free) = (Vec::new(), Vec::new());
-    for (wanted, name) in wanted.iter().zip(names) {
-        let origin = origin(wanted, name);
-        match addresses.get(*wanted) {
-            Some(address) => at.push(format!("{name} AT {address} : BOOL;{origin}")),
-            None => free.push(format!("{name} : BOOL;{origin}")),
-        }
-    }
-    section(text, "VAR", at);
-    section(text, word, free);
+/// The CONFIGURATION that runs `program` every `period`.
+fn configuration(text: &mut String, program: &str, period: Duration, namer: &mut Namer) {
+    let mut name = |wanted: &str| namer.name(wanted);
+    let (configuration, resource) = (name("configuration0"), name("resource0"));
+    let (task, instance) = (name("task0"), name("instance0"));
+    let interval = standard_time(period);
+    let _ = write!(
+        text,
+        "
+CONFIGURATION {configuration}
+  RESOURCE {resource} ON PLC
+    TASK {task}(INTERVAL := {interval}, PRIORITY := 0);
+    PROGRAM {instance} WITH {task} : {program};
+  END_RESOURCE
+END_CONFIGURATION
+"
+    );
 }
 
-fn section(text: &mut String, word: &str, lines: Vec<String>) {
+/// Declarations of one kind, one a line.
+fn section(text: &mut String, word: &str, lines: &[String]) {
     if lines.is_empty() {
         return;
     }
@@ -128,11 +64,8 @@ fn section(text: &mut String, word: &str, lines: Vec<String>) {
     text.push_str("  END_VAR\n");
 }
 
-/// A comment with the name in the circuit, where it had to be changed.
-fn origin(wanted: &str, name: &str) -> String {
-    if wanted == name {
-        return String::new();
-    }
+/// A comment. Comments do not nest everywhere, so nothing in one looks like the beginning or the end of another.
+fn comment(content: &str) -> String {
     let harmless = |character: char| {
         if character.is_control() {
             ' '
@@ -140,13 +73,23 @@ fn origin(wanted: &str, name: &str) -> String {
             character
         }
     };
-    let wanted: String = wanted.chars().map(harmless).collect();
-    // Comments do not nest everywhere, so nothing in one may look like the beginning or the end of another.
-    format!("  (* {} *)", wanted.replace(['*', '(', ')'], "_"))
+    let mut content: String = content.chars().map(harmless).collect();
+    // Once is not enough for `(*)`.
+    for _ in 0..2 {
+        content = content.replace("(*", "( *").replace("*)", "* )");
+    }
+    format!("(* {} *)", content.trim())
 }
 
+/// Writes a statement.
 fn statement(text: &mut String, words: &[String]) {
-    let is_operator = |word: &String| matches!(word.as_str(), "AND" | "OR" | "XOR");
+    broken(text, words);
+    text.push_str(";\n");
+}
+
+/// Writes words, broken before operators where the line is long.
+fn broken(text: &mut String, words: &[String]) {
+    let is_operator = |word: &String| matches!(word.as_str(), "AND" | "OR" | "XOR" | "THEN");
     let mut line = String::from(" ");
     for (place, word) in words.iter().enumerate() {
         if is_operator(word) {
@@ -159,72 +102,10 @@ fn statement(text: &mut String, words: &[String]) {
                 line = String::from("     ");
             }
         }
-        if !line.ends_with('(') && word != ")" {
+        if !line.ends_with('(') && !word.starts_with(')') {
             line.push(' ');
         }
         line.push_str(word);
     }
-    let _ = writeln!(text, "{line};");
-}
-
-/// How tightly an operation binds; NOT binds tightest, then AND, XOR, OR.
-fn binding(operation: Operation) -> u8 {
-    match operation {
-        Operation::Or(_, _) => 0,
-        Operation::Xor(_, _) => 1,
-        Operation::And(_, _) => 2,
-        Operation::Not(_) => 3,
-        Operation::Constant(_) | Operation::Variable(_) => 4,
-    }
-}
-
-struct Writer<'a> {
-    plan: &'a Plan<'a>,
-    names: &'a Named,
-}
-
-impl Writer<'_> {
-    fn assignment(&self, expression: Expression, target: &str, words: &mut Vec<String>) {
-        match self.plan.operand(expression) {
-            Operand::Shared(number) if self.names.shared[number] == target => {
-                self.operation(self.plan.operation(expression), words);
-            }
-            _ => self.expression(expression, 0, words),
-        }
-    }
-
-    /// Writes an expression that stands where only `least` or a tighter binding needs no brackets.
-    fn expression(&self, expression: Expression, least: u8, words: &mut Vec<String>) {
-        match self.plan.operand(expression) {
-            Operand::Shared(number) => words.push(self.names.shared[number].clone()),
-            Operand::Variable(variable) => words.push(self.names.variable(variable).to_owned()),
-            Operand::Operation(operation) if binding(operation) < least => {
-                words.push("(".into());
-                self.operation(operation, words);
-                words.push(")".into());
-            }
-            Operand::Operation(operation) => self.operation(operation, words),
-        }
-    }
-
-    fn operation(&self, operation: Operation, words: &mut Vec<String>) {
-        let own = binding(operation);
-        let mut join = |left, word: &str, right| {
-            self.expression(left, own, words);
-            words.push(word.into());
-            self.expression(right, own, words);
-        };
-        match operation {
-            Operation::Constant(true) => words.push("TRUE".into()),
-            // A variable is an operand and never comes here.
-            Operation::Constant(false) | Operation::Variable(_) => words.push("FALSE".into()),
-            Operation::Not(operand) => {
-                words.push("NOT".into());
-                self.expression(operand, own, words);
-            }
-            Operation::And(left, right) => join(left, "AND", right),
-            Operation::Or(left, right) => join(left, "OR", right),
-            Operation::Xor(left, right) => join(left, "XOR", right),
-        }
-    }
+    text.push_str(&line);
 }

@@ -310,3 +310,38 @@ fn every_command_and_option_that_is_named_exists() {
     }
     assert!(helps.len() > 30 && wrong.is_empty(), "{wrong:#?}");
 }
+
+/// The page on deployment copies one binary of a release, and installs it once.
+#[test]
+fn a_release_is_copied_and_installed_once() {
+    let page = fs::read_to_string(root().join("docs/deployment.md")).expect("a page");
+    let copy = page.lines().find(|line| line.starts_with("scp "));
+    let pattern = copy.and_then(|line| line.split(' ').nth(1));
+    let pattern = pattern.expect("a command that copies the binary");
+    let folder = empty_folder("release_names");
+    fs::create_dir(folder.join("release")).expect("a folder");
+    // As deployment/release.sh names them.
+    for binary in ["understudy", "understudy-opcua"] {
+        for target in ["x86_64", "aarch64"] {
+            for ending in ["", ".cdx.json", ".sha256"] {
+                let name = format!("{binary}-0.1.0-{target}-unknown-linux-musl{ending}");
+                fs::write(folder.join("release").join(name), "").expect("written");
+            }
+        }
+    }
+    let shell = Command::new("sh")
+        .args(["-c", &format!("printf '%s\\n' {pattern}")])
+        .current_dir(&folder)
+        .output()
+        .expect("a shell");
+    let matched = String::from_utf8(shell.stdout).expect("text");
+    assert_eq!(
+        matched,
+        "release/understudy-0.1.0-aarch64-unknown-linux-musl\n"
+    );
+    let installs = page
+        .lines()
+        .filter(|line| line.contains("/usr/local/bin"))
+        .count();
+    assert_eq!(installs, 1, "the binary is installed by one command");
+}

@@ -52,3 +52,34 @@ fn a_file_with_errors_is_not_converted() {
     assert!(!folder.join("pump.ladder").exists());
     insta::assert_snapshot!(answer.shown());
 }
+
+#[test]
+fn what_was_lost_is_looked_for_in_what_was_written() {
+    let folder = empty_folder("convert_checked");
+    let text = "\
+program p
+input a at %IX0.0
+output y at %QX0.0
+memory seen at %MX0.2
+memory cell.empty  -- a name with a dot
+rung
+    a ( y ) (S seen )
+rung
+    /a {TON late 300ms} ( cell.empty )
+";
+    fs::write(folder.join("memory.ladder"), text).expect("written");
+    let answer = understudy_in(
+        &folder,
+        &["convert", "memory.ladder", "memory.st", "--fidelity"],
+    );
+    insta::assert_snapshot!(answer.shown());
+    insta::assert_snapshot!(fs::read_to_string(folder.join("memory.st")).expect("written"));
+    let back = ["convert", "memory.st", "back.ladder", "--json"];
+    let back = understudy_in(&folder, &back).json();
+    let written = &back["result"]["fidelity"]["written"];
+    assert_eq!(written["proved"], true);
+    let losses = written["losses"].as_array().expect("a list");
+    let interval = "the ladder format does not keep the interval of the task: 10ms";
+    assert_eq!(losses.len(), 1, "{losses:?}");
+    assert_eq!(losses[0], interval);
+}

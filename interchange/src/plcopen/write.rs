@@ -5,17 +5,16 @@
 //! that nothing asks for after everything else; so a rung whose coils change what it reads gets a bit that keeps its power,
 //! and a block at the end of a rung gets a coil.
 
-mod names;
 mod sheet;
 mod tree;
 
 use std::time::Duration;
 
 use understudy_ladder::{
-    Coil, CoilKind, Contact, ContactKind, Element, Program, Rung, Series, Signal, time_text, visit,
+    Coil, CoilKind, Contact, ContactKind, Element, Program, Rung, Series, Signal, StandardNames,
+    standard_time, visit,
 };
 
-use self::names::Names;
 use self::sheet::Sheet;
 use self::tree::Tree;
 
@@ -24,8 +23,8 @@ use self::tree::Tree;
 /// Names become names of IEC 61131-3; memory bits that rungs need (see above) follow those of the program. The dates in the
 /// header are fixed, so that the same program is the same file.
 pub fn write(program: &Program, period: Duration) -> String {
-    let mut names = Names::of(program);
-    let rungs = prepared(program, &mut names);
+    let mut names = StandardNames::of(program);
+    let (rungs, added) = prepared(program, &mut names);
     let sheet = Sheet::of(&rungs, &program.footer, &names);
     let mut tree = Tree::new();
     tree.open(
@@ -40,7 +39,7 @@ pub fn write(program: &Program, period: Duration) -> String {
     tree.empty("dataTypes", &[]);
     tree.open("pous", &[]);
     tree.open("pou", &[("name", names.program()), ("pouType", "program")]);
-    interface(&mut tree, program, &names);
+    interface(&mut tree, program, &names, &added);
     tree.open("body", &[]);
     tree.open("LD", &[]);
     sheet.write(&mut tree);
@@ -58,7 +57,7 @@ pub fn write(program: &Program, period: Duration) -> String {
     tree.close("pou");
     tree.close("pous");
     tree.close("types");
-    instances(&mut tree, names.program(), period);
+    instances(&mut tree, &mut names, period);
     tree.close("project");
     tree.finish()
 }
@@ -85,7 +84,7 @@ fn header(tree: &mut Tree, name: &str) {
 }
 
 /// Inputs and outputs with an address are local variables, as compilers want them.
-fn interface(tree: &mut Tree, program: &Program, names: &Names) {
+fn interface(tree: &mut Tree, program: &Program, names: &StandardNames, added: &[String]) {
     tree.open("interface", &[]);
     let mut list: Option<&str> = None;
     let inputs = program.inputs.iter().map(|signal| ("inputVars", signal));
@@ -100,7 +99,7 @@ fn interface(tree: &mut Tree, program: &Program, names: &Names) {
         enter(tree, &mut list, section);
         variable(tree, signal, names.signal(&signal.name));
     }
-    for name in names.added() {
+    for name in added {
         enter(tree, &mut list, "localVars");
         variable(tree, &Signal::default(), name);
     }
@@ -158,23 +157,22 @@ fn variable(tree: &mut Tree, signal: &Signal, name: &str) {
     tree.close("variable");
 }
 
-fn instances(tree: &mut Tree, program: &str, period: Duration) {
-    let interval = format!("T#{}", time_text(period));
+fn instances(tree: &mut Tree, names: &mut StandardNames, period: Duration) {
+    let interval = standard_time(period);
+    let configuration = names.add("configuration0");
+    let (resource, task) = (names.add("resource0"), names.add("task0"));
+    let instance = names.add("instance0");
     tree.open("instances", &[]);
     tree.open("configurations", &[]);
-    tree.open("configuration", &[("name", "configuration0")]);
-    tree.open("resource", &[("name", "resource0")]);
+    tree.open("configuration", &[("name", &configuration)]);
+    tree.open("resource", &[("name", &resource)]);
     tree.open(
         "task",
-        &[
-            ("name", "task0"),
-            ("interval", &interval),
-            ("priority", "0"),
-        ],
+        &[("name", &task), ("interval", &interval), ("priority", "0")],
     );
     tree.empty(
         "pouInstance",
-        &[("name", "instance0"), ("typeName", program)],
+        &[("name", &instance), ("typeName", names.program())],
     );
     tree.close("task");
     tree.close("resource");
@@ -183,22 +181,25 @@ fn instances(tree: &mut Tree, program: &str, period: Duration) {
     tree.close("instances");
 }
 
-/// The rungs with the bits that make other tools scan them as they are scanned here.
-fn prepared(program: &Program, names: &mut Names) -> Vec<Rung> {
+/// The rungs as other tools scan them like the scan here, and the bits that this adds.
+fn prepared(program: &Program, names: &mut StandardNames) -> (Vec<Rung>, Vec<String>) {
     let mut rungs = Vec::with_capacity(program.rungs.len());
+    let mut added = Vec::new();
     for rung in &program.rungs {
         if rung.coils.is_empty() {
             let wanted = program_block(&rung.network).unwrap_or("rung");
-            let target = names.add(&format!("{wanted}_out")).into();
+            let target = names.add(&format!("{wanted}_out"));
+            added.push(target.clone());
             rungs.push(Rung {
                 coils: vec![Coil {
                     kind: CoilKind::Plain,
-                    target,
+                    target: target.into(),
                 }],
                 ..rung.clone()
             });
         } else if changes_itself(rung) {
             let power = names.add("power");
+            added.push(power.clone());
             let keep = Coil {
                 kind: CoilKind::Plain,
                 target: power.as_str().into(),
@@ -223,7 +224,7 @@ fn prepared(program: &Program, names: &mut Names) -> Vec<Rung> {
             rungs.push(rung.clone());
         }
     }
-    rungs
+    (rungs, added)
 }
 
 /// The last block of a network.

@@ -44,7 +44,7 @@ const SIGNS: [&str; 22] = [
 ];
 
 /// The longest comment that is kept, in characters.
-const MAXIMUM_COMMENT: usize = 400;
+const MAXIMUM_COMMENT: usize = 1_000;
 
 /// All lexemes of `text` with an [`Lexeme::End`] last, and what was wrong.
 pub(super) fn lex(text: &str) -> (Vec<Placed>, Vec<Diagnostic>) {
@@ -152,7 +152,14 @@ impl<'a> Lexer<'a> {
             return Some(None);
         }
         let words: Vec<&str> = content[..length].split_whitespace().collect();
-        let kept: String = words.join(" ").chars().take(MAXIMUM_COMMENT).collect();
+        let words = words.join(" ");
+        let kept: String = words.chars().take(MAXIMUM_COMMENT).collect();
+        if kept.len() < words.len() {
+            let message =
+                format!("of this comment the first {MAXIMUM_COMMENT} characters are kept");
+            let warning = Diagnostic::warning("U1055", message, start..self.place);
+            self.diagnostics.push(warning);
+        }
         Some(Some(kept).filter(|kept| !kept.is_empty()))
     }
 

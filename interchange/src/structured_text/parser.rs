@@ -365,12 +365,14 @@ impl Parser {
             self.skip();
             body.extend(self.statements(&[end]));
         }
+        let footer = self.placed().comments.clone();
         self.need_word(end);
         self.take_sign(";");
         Some(Unit {
             kind,
             name: name?,
             comments,
+            footer,
             result,
             declarations,
             body,

@@ -35,6 +35,8 @@ pub(crate) struct Unit {
     pub(crate) kind: UnitKind,
     pub(crate) name: Name,
     pub(crate) comments: Vec<String>,
+    /// Comments behind the last statement.
+    pub(crate) footer: Vec<String>,
     /// What a function answers.
     pub(crate) result: Option<TypeName>,
     pub(crate) declarations: Vec<Declaration>,

@@ -1,9 +1,7 @@
 //! What this project writes as Structured Text reads back as the same circuit.
 
-use std::collections::HashMap;
-
 use proptest::prelude::*;
-use understudy_ladder::structured_text;
+use understudy_ladder::circuit_as_structured_text;
 use understudy_logic::{Circuit, CircuitBuilder};
 
 use crate::support::{Dice, PERIOD, program};
@@ -49,7 +47,7 @@ fn random_circuit(seed: u64) -> Circuit {
 }
 
 fn check(circuit: &Circuit, seed: u64) {
-    let text = structured_text(circuit, &HashMap::new());
+    let text = circuit_as_structured_text(circuit, PERIOD);
     let again = program(&text);
     let names: Vec<&str> = again
         .inputs

@@ -1,9 +1,7 @@
 //! Ladders and Structured Text made from circuits.
 
-use std::collections::HashMap;
-
 use proptest::prelude::*;
-use understudy_ladder::{from_circuit, parse, print, structured_text};
+use understudy_ladder::{circuit_as_structured_text, from_circuit, parse, print, structured_text};
 use understudy_logic::{Circuit, CircuitBuilder};
 
 use crate::random::{Dice, random_program};
@@ -56,7 +54,7 @@ fn check(circuit: &Circuit, seed: u64) {
     );
     assert_eq!(parsed.program, ladder, "{text}");
     let lowered = ladder.lower(PERIOD).expect("a sound program");
-    let source = structured_text(circuit, &HashMap::new());
+    let source = circuit_as_structured_text(circuit, PERIOD);
     let mut assignments = StructuredText::read(&source);
     let mut original = Running::new(circuit);
     let mut again = Running::new(&lowered);
@@ -108,7 +106,7 @@ fn the_robot_as_a_generated_ladder() {
 #[test]
 fn the_robot_as_structured_text() {
     let program = program(include_str!("../../../examples/press-cell/robot.ladder"));
-    insta::assert_snapshot!(structured_text(&robot(), &program.addresses()));
+    insta::assert_snapshot!(structured_text(&program, PERIOD));
 }
 
 /// Two registers that exchange their values, and a third that adds them up.
@@ -134,7 +132,7 @@ fn exchange() -> Circuit {
 fn registers_that_read_each_other_are_held() {
     check(&exchange(), 7);
     insta::assert_snapshot!(print(&from_circuit(&exchange())));
-    insta::assert_snapshot!(structured_text(&exchange(), &HashMap::new()));
+    insta::assert_snapshot!(circuit_as_structured_text(&exchange(), PERIOD));
 }
 
 #[test]
@@ -149,7 +147,7 @@ fn long_expressions_are_cut_and_lines_are_short() {
     builder.output("product", product);
     let circuit = builder.finish().expect("names are unique");
     check(&circuit, 1);
-    let text = structured_text(&circuit, &HashMap::new());
+    let text = circuit_as_structured_text(&circuit, PERIOD);
     let longest = text.lines().map(str::len).max();
     assert!(longest <= Some(100), "{longest:?}");
     let ladder = print(&from_circuit(&circuit));

@@ -34,7 +34,7 @@ impl StructuredText {
                 }
             }
         }
-        assert_eq!(words.next(), None);
+        assert_eq!(words.next(), Some("CONFIGURATION"));
         text
     }
 

@@ -3,11 +3,12 @@
 mod object;
 mod place;
 
-use understudy_ladder::{Block, Coil, Contact, Element, Relation, Rung, Series, time_text};
+use understudy_ladder::{
+    Block, Coil, Contact, Element, Relation, Rung, Series, StandardNames, standard_time,
+};
 
 use self::object::{Object, Source, WIRE, What};
 use self::place::Place;
-use super::names::Names;
 use super::tree::Tree;
 
 const LEFT: i64 = 40;
@@ -24,12 +25,12 @@ struct Reached {
 
 /// All objects of a program.
 pub(super) struct Sheet<'a> {
-    names: &'a Names,
+    names: &'a StandardNames,
     objects: Vec<Object>,
 }
 
 impl<'a> Sheet<'a> {
-    pub(super) fn of(rungs: &[Rung], footer: &[String], names: &'a Names) -> Self {
+    pub(super) fn of(rungs: &[Rung], footer: &[String], names: &'a StandardNames) -> Self {
         let mut sheet = Self {
             names,
             objects: Vec::new(),
@@ -297,7 +298,7 @@ impl<'a> Sheet<'a> {
             }
         }
         let preset = match (block.kind.preset_time(), block.kind.preset_value()) {
-            (Some(time), _) => Some(("PT", format!("T#{}", time_text(time)))),
+            (Some(time), _) => Some(("PT", standard_time(time))),
             (None, Some(value)) => Some(("PV", value.to_string())),
             (None, None) => None,
         };

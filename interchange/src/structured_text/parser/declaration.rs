@@ -142,9 +142,8 @@ impl Parser {
         if !self.need_sign(";") {
             return None;
         }
-        let description = self
-            .remark()
-            .or_else(|| (!above.is_empty()).then(|| above.join(" ")));
+        let about: Vec<String> = above.into_iter().chain(self.remark()).collect();
+        let description = (!about.is_empty()).then(|| about.join(" "));
         let declared = names.into_iter().map(|name| Declaration {
             name,
             class,

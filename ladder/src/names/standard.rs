@@ -2,24 +2,25 @@
 
 use std::collections::HashMap;
 
-use understudy_ladder::{Language, Name, Namer, Program};
+use super::{Language, Namer};
+use crate::program::{Name, Program};
 
-/// The names of a program in its file.
-pub(super) struct Names {
+/// The names of a program in a file of the standard.
+#[derive(Debug, Clone)]
+pub struct StandardNames {
     program: String,
     known: HashMap<String, String>,
     namer: Namer,
-    added: Vec<String>,
 }
 
-impl Names {
-    pub(super) fn of(program: &Program) -> Self {
+impl StandardNames {
+    /// Names for the program, its signals and its blocks.
+    pub fn of(program: &Program) -> Self {
         let mut namer = Namer::new(Language::StructuredText);
         let mut names = Self {
             program: namer.name(&program.name),
             known: HashMap::new(),
             namer,
-            added: Vec::new(),
         };
         let signals = program
             .inputs
@@ -35,19 +36,20 @@ impl Names {
         names
     }
 
-    pub(super) fn program(&self) -> &str {
+    /// The name of the program.
+    pub fn program(&self) -> &str {
         &self.program
     }
 
     /// The name of a signal or block.
-    pub(super) fn signal<'a>(&'a self, name: &'a Name) -> &'a str {
+    pub fn signal<'a>(&'a self, name: &'a Name) -> &'a str {
         self.known
             .get(name.as_str())
             .map_or(name.as_str(), String::as_str)
     }
 
     /// The name of what a contact reads: a signal, or block and output.
-    pub(super) fn operand(&self, name: &str) -> String {
+    pub fn operand(&self, name: &str) -> String {
         if let Some(known) = self.known.get(name) {
             return known.clone();
         }
@@ -60,14 +62,12 @@ impl Names {
         }
     }
 
-    /// A new bit.
-    pub(super) fn add(&mut self, wanted: &str) -> String {
-        let free = self.namer.name(wanted);
-        self.added.push(free.clone());
-        free
+    /// Another name, like `wanted`, that nothing has.
+    pub fn add(&mut self, wanted: &str) -> String {
+        self.namer.name(wanted)
     }
 
-    pub(super) fn added(&self) -> &[String] {
-        &self.added
+    pub(crate) fn namer(&mut self) -> &mut Namer {
+        &mut self.namer
     }
 }

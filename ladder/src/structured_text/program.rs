@@ -1,0 +1,474 @@
+//! A ladder as Structured Text: for each rung the calls of its blocks, then what its coils write, in the order of the scan.
+//!
+//! Invariant: every statement reads what the scan of the rung reads at that place. An expression is written at most once, unless it is a single
+//! operand: what is needed twice, or before a call that changes it, is held in a bit of its own.
+
+use std::collections::{HashMap, HashSet};
+use std::time::Duration;
+
+use super::{broken, comment, configuration, section, standard_time, statement};
+use crate::names::StandardNames;
+use crate::program::{
+    Block, Coil, CoilKind, Contact, ContactKind, Element, Program, Relation, Rung, Series, Signal,
+    visit, visit_any,
+};
+
+/// A PROGRAM whose execution is one scan of `program`, and the task that executes it every `period`.
+///
+/// Timers, counters, latches and triggers are instances of the standard function blocks; edge contacts and edge coils are instances of R_TRIG and
+/// F_TRIG. Names become identifiers of the standard; the ladder's name stands in the comment behind one that was changed.
+pub fn structured_text(program: &Program, period: Duration) -> String {
+    let mut writer = Writer::new(program);
+    for rung in &program.rungs {
+        writer.rung(rung);
+    }
+    let mut text = String::new();
+    for line in program.comments.iter().chain(&program.description) {
+        text.push_str(&format!("{}\n", comment(line)));
+    }
+    text.push_str(&format!("PROGRAM {}\n", writer.names.program()));
+    writer.declarations(&mut text);
+    text.push_str(&writer.body);
+    if !program.footer.is_empty() {
+        text.push('\n');
+    }
+    for line in &program.footer {
+        text.push_str(&format!("  {}\n", comment(line)));
+    }
+    text.push_str("END_PROGRAM\n");
+    writer.names.configuration(&mut text, period);
+    text
+}
+
+impl StandardNames {
+    fn configuration(&mut self, text: &mut String, period: Duration) {
+        let program = self.program().to_owned();
+        configuration(text, &program, period, self.namer());
+    }
+}
+
+/// Brackets of one statement that stand in each other.
+const MAXIMUM_DEPTH: usize = 16;
+
+/// The power at a place of a rung, as an expression.
+#[derive(Clone)]
+enum Power {
+    /// Of the left rail.
+    On,
+    /// One word: a variable, an output of a block, FALSE.
+    Word(String),
+    Not(String),
+    /// A comparison of a counter.
+    Compared(String),
+    All(Vec<Power>),
+    Any(Vec<Power>),
+}
+
+impl Power {
+    fn and(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::On, other) => other,
+            (power, Self::On) => power,
+            (Self::All(mut parts), Self::All(others)) => {
+                parts.extend(others);
+                Self::All(parts)
+            }
+            (Self::All(mut parts), other) => {
+                parts.push(other);
+                Self::All(parts)
+            }
+            (power, other) => Self::All(vec![power, other]),
+        }
+    }
+
+    fn is_word(&self) -> bool {
+        matches!(self, Self::On | Self::Word(_))
+    }
+
+    /// How tightly it binds; NOT and single words need no brackets.
+    fn binding(&self) -> u8 {
+        match self {
+            Self::Any(_) => 0,
+            Self::All(_) => 1,
+            Self::Compared(_) => 2,
+            Self::Not(_) | Self::On | Self::Word(_) => 3,
+        }
+    }
+
+    /// Appends its words where only `least` or a tighter binding needs no brackets.
+    fn words(&self, least: u8, words: &mut Vec<String>) {
+        if self.binding() < least {
+            words.push("(".into());
+            self.words(0, words);
+            words.push(")".into());
+            return;
+        }
+        let mut joined = |parts: &[Self], word: &str, least| {
+            for (place, part) in parts.iter().enumerate() {
+                if place > 0 {
+                    words.push(word.into());
+                }
+                part.words(least, words);
+            }
+        };
+        match self {
+            Self::On => words.push("TRUE".into()),
+            Self::Word(word) | Self::Compared(word) => words.push(word.clone()),
+            Self::Not(word) => words.push(format!("NOT {word}")),
+            Self::All(parts) => joined(parts, "AND", 3),
+            Self::Any(parts) => joined(parts, "OR", 1),
+        }
+    }
+}
+
+struct Writer<'a> {
+    program: &'a Program,
+    names: StandardNames,
+    presets: HashMap<&'a str, u16>,
+    /// Bits that hold an expression, in the order of their use.
+    held: Vec<String>,
+    /// Instances for edge contacts and edge coils, with their types.
+    edges: Vec<(String, &'static str)>,
+    /// Blocks of the present rung that are called further on.
+    pending: HashSet<&'a str>,
+    /// Blocks whose call takes the power of the present series: what is read of them goes into their call.
+    taking: HashSet<&'a str>,
+    /// Branches around the present element.
+    depth: usize,
+    body: String,
+}
+
+impl<'a> Writer<'a> {
+    fn new(program: &'a Program) -> Self {
+        let counters = program.blocks().into_iter();
+        let presets = counters
+            .filter_map(|block| Some((block.name.as_str(), block.kind.preset_value()?)))
+            .collect();
+        Self {
+            program,
+            names: StandardNames::of(program),
+            presets,
+            held: Vec::new(),
+            edges: Vec::new(),
+            pending: HashSet::new(),
+            taking: HashSet::new(),
+            depth: 0,
+            body: String::new(),
+        }
+    }
+
+    fn rung(&mut self, rung: &'a Rung) {
+        self.body.push('\n');
+        for line in rung.title.iter().chain(&rung.comments) {
+            self.body.push_str(&format!("  {}\n", comment(line)));
+        }
+        visit(&rung.network, &mut |element| {
+            if let Element::Block(block) = element {
+                self.pending.insert(&block.name);
+            }
+        });
+        let mut power = self.series(&rung.network, Power::On);
+        if rung.coils.is_empty() && !matches!(rung.network.last(), Some(Element::Block(_))) {
+            power = self.hold("power", power);
+        }
+        let is_choice = rung.coils.iter().all(|coil| coil.kind.is_latch());
+        let is_single = rung.coils.len() == 1 || is_choice;
+        if !is_single && (!power.is_word() || self.changes(rung, &power)) {
+            power = self.hold("power", power);
+        }
+        for coils in rung
+            .coils
+            .chunk_by(|left, right| left.kind.is_latch() && right.kind.is_latch())
+        {
+            match coils {
+                [coil] => self.coil(coil, &power),
+                latches => self.latches(latches, &power),
+            }
+        }
+    }
+
+    /// Whether a coil changes the one word that the coils behind it read.
+    fn changes(&self, rung: &Rung, power: &Power) -> bool {
+        let Some((_, changing)) = rung.coils.split_last() else {
+            return false;
+        };
+        matches!(power, Power::Word(word) if changing.iter().any(|coil| self.names.operand(&coil.target) == *word))
+    }
+
+    fn state(&mut self, words: &[String]) {
+        statement(&mut self.body, words);
+    }
+
+    fn assign(&mut self, target: &str, power: &Power) {
+        let mut words = vec![target.to_owned(), ":=".into()];
+        power.words(0, &mut words);
+        self.state(&words);
+    }
+
+    /// Keeps a value in a bit of its own.
+    fn hold(&mut self, wanted: &str, power: Power) -> Power {
+        let name = self.names.add(wanted);
+        self.assign(&name, &power);
+        self.held.push(name.clone());
+        Power::Word(name)
+    }
+
+    /// Calls an instance of its own that sees the edges of `power`, and gives its output; `of` is what the contact or coil is drawn with.
+    fn edge(&mut self, kind: &'static str, of: &str, power: &Power) -> Power {
+        let direction = if kind == "R_TRIG" {
+            "rising"
+        } else {
+            "falling"
+        };
+        let name = self.names.add(&format!("{of}_{direction}"));
+        let mut words = vec![format!("{name}("), "CLK".into(), ":=".into()];
+        power.words(0, &mut words);
+        words.push(")".into());
+        self.state(&words);
+        self.edges.push((name.clone(), kind));
+        Power::Word(format!("{name}.Q"))
+    }
+
+    /// Set and reset coils with the same power, which is read once.
+    fn latches(&mut self, coils: &[Coil], power: &Power) {
+        let latched = |coil: &Coil| {
+            let value = if coil.kind == CoilKind::Set {
+                "TRUE"
+            } else {
+                "FALSE"
+            };
+            format!("{} := {value}", self.names.operand(&coil.target))
+        };
+        let latched: Vec<String> = coils.iter().map(latched).collect();
+        if matches!(power, Power::On) {
+            for latched in latched {
+                self.state(&[latched]);
+            }
+            return;
+        }
+        let mut words = vec!["IF".into()];
+        power.words(0, &mut words);
+        words.push("THEN".into());
+        if let [latched] = latched.as_slice() {
+            words.push(format!("{latched}; END_IF"));
+            self.state(&words);
+            return;
+        }
+        broken(&mut self.body, &words);
+        for latched in latched {
+            self.body.push_str(&format!("\n    {latched};"));
+        }
+        self.body.push_str("\n  END_IF;\n");
+    }
+
+    fn coil(&mut self, coil: &Coil, power: &Power) {
+        let target = self.names.operand(&coil.target);
+        match coil.kind {
+            CoilKind::Set | CoilKind::Reset => self.latches(std::slice::from_ref(coil), power),
+            CoilKind::Plain => self.assign(&target, power),
+            CoilKind::Negated => {
+                let mut words = vec![target, ":=".into()];
+                match power {
+                    Power::On => words.push("FALSE".into()),
+                    // Not every compiler reads NOT NOT.
+                    Power::Not(word) => words.push(word.clone()),
+                    power => {
+                        words.push("NOT".into());
+                        power.words(3, &mut words);
+                    }
+                }
+                self.state(&words);
+            }
+            CoilKind::Rising => {
+                let pulse = self.edge("R_TRIG", &target, power);
+                self.assign(&target, &pulse);
+            }
+            CoilKind::Falling => {
+                let pulse = self.edge("F_TRIG", &target, power);
+                self.assign(&target, &pulse);
+            }
+        }
+    }
+
+    fn series(&mut self, series: &'a Series, rail: Power) -> Power {
+        self.taking.extend(direct_blocks(series));
+        let mut power = rail;
+        for element in series {
+            power = match element {
+                Element::Contact(contact) => {
+                    let passes = self.contact(contact);
+                    power.and(passes)
+                }
+                Element::Comparison(comparison) => {
+                    let counter = comparison.counter.as_str();
+                    let preset = self.presets.get(counter).copied();
+                    let sign = portable(comparison.relation, comparison.value, preset).sign();
+                    let counter_name = self.names.operand(counter);
+                    let text = format!("{counter_name}.CV {sign} {}", comparison.value);
+                    let passes = self.before(counter, Power::Compared(text));
+                    power.and(passes)
+                }
+                Element::Branches(branches) => self.branches(branches, power),
+                Element::Block(block) => self.block(block, &power),
+            };
+        }
+        for block in direct_blocks(series) {
+            self.taking.remove(block);
+        }
+        power
+    }
+
+    fn branches(&mut self, branches: &'a [Series], power: Power) -> Power {
+        let calls = |branch: &Series| visit_any(branch, |inner| matches!(inner, Element::Block(_)));
+        let has_block = branches.iter().any(calls);
+        // The power before the branches is common to them, and a block in one of them needs it there.
+        let power = if has_block && !power.is_word() {
+            self.hold("power", power)
+        } else {
+            power
+        };
+        let start = if has_block { power.clone() } else { Power::On };
+        self.depth += 1;
+        let depth = self.depth;
+        let parts: Vec<Power> = branches
+            .iter()
+            .map(|branch| self.series(branch, start.clone()))
+            .collect();
+        self.depth -= 1;
+        let mut any = Power::Any(parts);
+        if depth.is_multiple_of(MAXIMUM_DEPTH) {
+            any = self.hold("power", any);
+        }
+        if has_block { any } else { power.and(any) }
+    }
+
+    fn contact(&mut self, contact: &Contact) -> Power {
+        let operand = self.names.operand(&contact.operand);
+        match contact.kind {
+            ContactKind::NormallyOpen => self.read(contact, Power::Word(operand)),
+            ContactKind::NormallyClosed => self.read(contact, Power::Not(operand)),
+            ContactKind::Rising => self.edge("R_TRIG", &operand, &Power::Word(operand.clone())),
+            ContactKind::Falling => self.edge("F_TRIG", &operand, &Power::Word(operand.clone())),
+        }
+    }
+
+    fn read(&mut self, contact: &Contact, power: Power) -> Power {
+        match contact.operand.rsplit_once('.') {
+            Some((block, _)) => self.before(block, power),
+            None => power,
+        }
+    }
+
+    /// What is read of a block: above its call in the same rung it is the last scan's, and is kept before the call changes it.
+    fn before(&mut self, block: &str, power: Power) -> Power {
+        if self.pending.contains(block) && !self.taking.contains(block) {
+            self.hold("before", power)
+        } else {
+            power
+        }
+    }
+
+    fn block(&mut self, block: &'a Block, power: &Power) -> Power {
+        let kind = block.kind;
+        let mut fed = vec![(kind.wire_input(), power.clone())];
+        let around = std::mem::replace(&mut self.taking, HashSet::from([block.name.as_str()]));
+        for feed in &block.pins {
+            let network = self.series(&feed.network, Power::On);
+            fed.push((feed.pin.as_str(), network));
+        }
+        self.taking = around;
+        let preset = kind
+            .preset_time()
+            .map(|time| ("PT", standard_time(time)))
+            .or_else(|| kind.preset_value().map(|value| ("PV", value.to_string())));
+        fed.extend(preset.map(|(pin, text)| (pin, Power::Word(text))));
+        let name = self.names.operand(&block.name);
+        let mut words = vec![format!("{name}(")];
+        for (place, (pin, power)) in fed.iter().enumerate() {
+            if let (Some(last), true) = (words.last_mut(), place > 0) {
+                last.push(',');
+            }
+            words.extend([(*pin).to_owned(), ":=".into()]);
+            power.words(0, &mut words);
+        }
+        words.push(")".into());
+        self.state(&words);
+        self.pending.remove(block.name.as_str());
+        Power::Word(format!("{name}.{}", kind.outputs()[0]))
+    }
+
+    fn declarations(&self, text: &mut String) {
+        let program = self.program;
+        let inputs = program.inputs.iter().map(|signal| ("VAR_INPUT", signal));
+        let outputs = program.outputs.iter().map(|signal| ("VAR_OUTPUT", signal));
+        let memory = program.memory.iter().map(|signal| ("VAR", signal));
+        let mut group = (("", false), Vec::new());
+        for (word, signal) in inputs.chain(outputs).chain(memory) {
+            // Located variables have sections of their own.
+            let is_located = signal.address.is_some();
+            let key = (if is_located { "VAR" } else { word }, is_located);
+            if group.0 != key {
+                section(text, group.0.0, &group.1);
+                group = (key, Vec::new());
+            }
+            group.1.push(self.declaration(signal));
+        }
+        section(text, group.0.0, &group.1);
+        let blocks = program.blocks().into_iter().map(|block| {
+            let name = self.names.signal(&block.name);
+            let about = remark(&block.name, name, &Signal::default());
+            format!("{name} : {};{about}", block.kind.word())
+        });
+        let edges = self
+            .edges
+            .iter()
+            .map(|(name, word)| format!("{name} : {word};"));
+        let held = self.held.iter().map(|name| format!("{name} : BOOL;"));
+        let lines: Vec<String> = blocks.chain(edges).chain(held).collect();
+        section(text, "VAR", &lines);
+    }
+
+    fn declaration(&self, signal: &Signal) -> String {
+        let name = self.names.signal(&signal.name);
+        let address = signal.address.as_ref();
+        let address = address.map_or(String::new(), |address| format!(" AT {address}"));
+        let initial = match signal.initial {
+            None => "",
+            Some(true) => " := TRUE",
+            Some(false) => " := FALSE",
+        };
+        let about = remark(&signal.name, name, signal);
+        format!("{name}{address} : BOOL{initial};{about}")
+    }
+}
+
+fn direct_blocks(series: &Series) -> impl Iterator<Item = &str> {
+    series.iter().filter_map(|element| match element {
+        Element::Block(block) => Some(block.name.as_str()),
+        _ => None,
+    })
+}
+
+/// The comment behind a declaration: the ladder's name, where it was changed, and what is said about the signal.
+fn remark(wanted: &str, name: &str, signal: &Signal) -> String {
+    let changed = (wanted != name).then_some(wanted);
+    let about = signal.comments.iter().chain(&signal.description);
+    let parts: Vec<&str> = changed
+        .into_iter()
+        .chain(about.map(String::as_str))
+        .collect();
+    if parts.is_empty() {
+        String::new()
+    } else {
+        format!("  {}", comment(&parts.join("  ")))
+    }
+}
+
+/// The relation as it is also right where a counter counts on past its preset, as the third edition of the standard has it.
+fn portable(relation: Relation, value: u16, preset: Option<u16>) -> Relation {
+    match relation {
+        Relation::Equal if preset == Some(value) => Relation::GreaterOrEqual,
+        Relation::NotEqual if preset == Some(value) => Relation::Less,
+        relation => relation,
+    }
+}
