@@ -1,9 +1,19 @@
 //! What a command answers, for people and for machines alike.
 
+use std::borrow::Cow;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Map, Value};
-use understudy_diagnostic::{Report, Severity};
+use understudy_diagnostic::{
+    Diagnostic, Lines, MAXIMUM_MESSAGE, Position, Report, Severity, shortened,
+};
+
+/// The most findings of all files together that an answer shows.
+const MAXIMUM_SHOWN: usize = 500;
+
+/// The most failures that an answer shows.
+const MAXIMUM_FAILURES: usize = 100;
 
 /// How a command ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -112,6 +122,33 @@ impl Answer {
         });
         self
     }
+
+    /// Bounds the failures and their messages, which may quote a file.
+    pub(crate) fn bound(&mut self) {
+        let left = self.failures.len().saturating_sub(MAXIMUM_FAILURES);
+        self.failures.truncate(MAXIMUM_FAILURES);
+        for failure in &mut self.failures {
+            if let Cow::Owned(short) = shortened(&failure.message, 4 * MAXIMUM_MESSAGE) {
+                failure.message = short;
+            }
+        }
+        if left > 0 {
+            self.failures.push(Failure {
+                code: "U0617".to_owned(),
+                message: format!("{left} more failures are not shown"),
+            });
+        }
+    }
+}
+
+/// The findings of each file that an answer shows.
+pub(crate) fn shown(reports: &[Report]) -> impl Iterator<Item = (&Report, Vec<Diagnostic>)> {
+    let mut left = MAXIMUM_SHOWN;
+    reports.iter().map(move |report| {
+        let shown = report.shown(left);
+        left = left.saturating_sub(shown.len());
+        (report, shown)
+    })
 }
 
 /// The document that every command answers with under `--json`.
@@ -148,28 +185,28 @@ struct PlacedDiagnostic<'a> {
     /// The end, not included.
     end_column: usize,
     /// Stable code, such as `U0104`.
-    code: &'a str,
+    code: &'static str,
     /// `error` or `warning`.
-    severity: &'a str,
+    severity: &'static str,
     /// What is wrong.
-    message: &'a str,
+    message: String,
     /// Short text at the place.
-    label: Option<&'a str>,
+    label: Option<String>,
     /// The way out.
-    help: Option<&'a str>,
+    help: Option<String>,
     /// Other places of the same file that explain this one.
-    related: Vec<PlacedRelated<'a>>,
+    related: Vec<PlacedRelated>,
 }
 
 /// Another place.
 #[derive(Debug, Serialize, JsonSchema)]
-struct PlacedRelated<'a> {
+struct PlacedRelated {
     /// Counted from 1.
     line: usize,
     /// Counted from 1, in characters.
     column: usize,
     /// What is to be seen there.
-    message: &'a str,
+    message: String,
 }
 
 impl<'a> Envelope<'a> {
@@ -178,7 +215,7 @@ impl<'a> Envelope<'a> {
             understudy: env!("CARGO_PKG_VERSION"),
             command,
             status: answer.status.code(),
-            diagnostics: answer.reports.iter().flat_map(placed).collect(),
+            diagnostics: shown(&answer.reports).flat_map(placed).collect(),
             failures: &answer.failures,
             result: &answer.result,
             numbers: &answer.numbers,
@@ -186,16 +223,20 @@ impl<'a> Envelope<'a> {
     }
 }
 
-fn placed(report: &Report) -> impl Iterator<Item = PlacedDiagnostic<'_>> {
-    report.diagnostics.iter().map(|diagnostic| {
-        let start = report.line_and_column(diagnostic.span.start);
-        let end = report.line_and_column(diagnostic.span.end);
-        let related = diagnostic.related.iter().map(|related| {
-            let place = report.line_and_column(related.span.start);
+fn placed((report, found): (&Report, Vec<Diagnostic>)) -> Vec<PlacedDiagnostic<'_>> {
+    if found.is_empty() {
+        return Vec::new();
+    }
+    let lines = Lines::new(&report.text);
+    let place = |diagnostic: Diagnostic| {
+        let start = lines.position(diagnostic.span.start);
+        let end = lines.position(diagnostic.span.end);
+        let related = diagnostic.related.into_iter().map(|related| {
+            let Position { line, column } = lines.position(related.span.start);
             PlacedRelated {
-                line: place.line,
-                column: place.column,
-                message: &related.message,
+                line,
+                column,
+                message: related.message,
             }
         });
         PlacedDiagnostic {
@@ -209,10 +250,11 @@ fn placed(report: &Report) -> impl Iterator<Item = PlacedDiagnostic<'_>> {
                 Severity::Error => "error",
                 Severity::Warning => "warning",
             },
-            message: &diagnostic.message,
-            label: diagnostic.label.as_deref(),
-            help: diagnostic.help.as_deref(),
+            message: diagnostic.message,
+            label: diagnostic.label,
+            help: diagnostic.help,
             related: related.collect(),
         }
-    })
+    };
+    found.into_iter().map(place).collect()
 }

@@ -3,7 +3,6 @@
 mod remarks;
 
 use std::fmt::Write as _;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -11,7 +10,7 @@ use clap::Args;
 use serde::Serialize;
 use understudy_cluster::{Cluster, Overrides};
 use understudy_diagnostic::{Diagnostic, Report, Severity, has_errors};
-use understudy_interchange::parse_program;
+use understudy_interchange::{parse_program, unknown_form};
 use understudy_ladder::parse_time;
 use understudy_scenarios::{Parties, read};
 use understudy_supervisor::ladder::read_map;
@@ -20,7 +19,7 @@ use understudy_supervisor::read_ads;
 
 use crate::answer::{Answer, Failure, Status};
 use crate::automata;
-use crate::files::{read_cluster, unreadable};
+use crate::files::{self, read_cluster};
 use crate::kind::Kind;
 use crate::reconfigure::read_project;
 use remarks::Looking;
@@ -62,7 +61,7 @@ struct Result {
 #[derive(Serialize)]
 struct CheckedFile {
     name: String,
-    /// `ladder`, `cluster`, `scenario`, `model`, `net`, `map`, `project` or `ADS`; nothing for a file that cannot be read.
+    /// `ladder`, `cluster`, `scenario`, `model`, `net`, `map`, `project`, `ADS` or `unknown`; nothing for a file that cannot be read.
     kind: Option<&'static str>,
     errors: usize,
     warnings: usize,
@@ -111,6 +110,10 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
                 }
                 found.add_file(Kind::Ladder, path, text, diagnostics);
             }
+            Kind::Unknown => {
+                let diagnostics = vec![unknown_form(&text)];
+                found.add_file(Kind::Unknown, path, text, diagnostics);
+            }
             Kind::Scenario => scenarios.push((path, text)),
             Kind::Project => {
                 found.add_with_ladders(Kind::Project, read_project(path, &text).reports);
@@ -139,7 +142,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
 /// Of the `cluster.toml` in the folder of a scenario, where there is a right one.
 fn parties_beside(scenario: &Path) -> Option<Parties> {
     let path = scenario.with_file_name("cluster.toml");
-    let text = fs::read_to_string(&path).ok()?;
+    let text = files::text(&path).ok()?;
     let cluster = read_cluster(&path, &text, Overrides::default()).cluster?;
     Some(Parties::of(&cluster))
 }
@@ -169,14 +172,11 @@ impl Found {
     }
 
     fn text(&mut self, path: &Path) -> Option<String> {
-        match fs::read_to_string(path) {
+        match files::text(path) {
             Ok(text) => Some(text),
-            Err(error) => {
+            Err(answer) => {
                 self.unreadable.push(path.display().to_string());
-                self.failures.push(Failure {
-                    code: "U0601".to_owned(),
-                    message: unreadable(path, &error),
-                });
+                self.failures.extend(answer.failures);
                 None
             }
         }

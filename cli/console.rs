@@ -4,15 +4,15 @@ use std::io::{self, IsTerminal, Write};
 use std::process::ExitCode;
 use std::time::Duration;
 
-use codespan_reporting::diagnostic::{Diagnostic as Drawn, Label};
-use codespan_reporting::files::SimpleFile;
+use codespan_reporting::diagnostic::Diagnostic as Drawn;
 use codespan_reporting::term::termcolor::{BufferedStandardStream, ColorChoice};
 use codespan_reporting::term::{self, Config};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use understudy_diagnostic::{Diagnostic, Report, Severity};
+use understudy_diagnostic::{Diagnostic, Lines, Report, Severity};
 use understudy_scenarios::Progress;
 
-use crate::answer::{Answer, Envelope};
+use crate::answer::{Answer, Envelope, shown};
+use crate::excerpt::Shown;
 
 /// Where a command talks to.
 pub(crate) struct Console {
@@ -39,12 +39,13 @@ impl Console {
     }
 
     /// Prints the answer and gives the exit status.
-    pub(crate) fn finish(self, command: &str, answer: &Answer) -> ExitCode {
+    pub(crate) fn finish(self, command: &str, mut answer: Answer) -> ExitCode {
+        answer.bound();
         // A reader that is gone needs no answer.
         let _ = if self.json {
-            print_json(command, answer)
+            print_json(command, &answer)
         } else {
-            print_text(answer)
+            print_text(&answer)
         };
         ExitCode::from(answer.status.code())
     }
@@ -144,8 +145,8 @@ fn print_text(answer: &Answer) -> io::Result<()> {
     if answer.counts_warnings && !has_errors {
         print_count(&answer.reports)?;
     } else {
-        for report in &answer.reports {
-            print_report(report)?;
+        for (report, found) in shown(&answer.reports) {
+            print_report(report, &found)?;
         }
     }
     let mut output = io::stdout().lock();
@@ -206,9 +207,9 @@ fn print_count(reports: &[Report]) -> io::Result<()> {
     )
 }
 
-/// There may be thousands of diagnostics of one file: its lines are counted once, and all goes out together.
-fn print_report(report: &Report) -> io::Result<()> {
-    if report.diagnostics.is_empty() {
+/// The lines of a file are counted once, and all goes out together.
+fn print_report(report: &Report, found: &[Diagnostic]) -> io::Result<()> {
+    if found.is_empty() {
         return Ok(());
     }
     let choice = if io::stderr().is_terminal() {
@@ -216,36 +217,23 @@ fn print_report(report: &Report) -> io::Result<()> {
     } else {
         ColorChoice::Never
     };
-    let file = SimpleFile::new(&report.name, &report.text);
+    let lines = Lines::new(&report.text);
     let config = Config::default();
     let mut errors = BufferedStandardStream::stderr(choice);
-    for diagnostic in &report.diagnostics {
-        term::emit_to_write_style(&mut errors, &config, &file, &drawn(diagnostic))
+    for diagnostic in found {
+        let shown = Shown::new(&report.name, &report.text, &lines, diagnostic);
+        let drawn = match diagnostic.severity {
+            Severity::Error => Drawn::error(),
+            Severity::Warning => Drawn::warning(),
+        };
+        let help = diagnostic.help.iter().map(|help| format!("help: {help}"));
+        let drawn = drawn
+            .with_code(diagnostic.code)
+            .with_message(&diagnostic.message)
+            .with_labels(shown.labels)
+            .with_notes(shown.notes.into_iter().chain(help).collect());
+        term::emit_to_write_style(&mut errors, &config, &shown.excerpt, &drawn)
             .map_err(io::Error::other)?;
     }
     errors.flush()
-}
-
-fn drawn(diagnostic: &Diagnostic) -> Drawn<()> {
-    let drawn = match diagnostic.severity {
-        Severity::Error => Drawn::error(),
-        Severity::Warning => Drawn::warning(),
-    };
-    let mut label = Label::primary((), diagnostic.span.clone());
-    label.message = diagnostic.label.clone().unwrap_or_default();
-    let related = diagnostic
-        .related
-        .iter()
-        .map(|related| Label::secondary((), related.span.clone()).with_message(&related.message));
-    drawn
-        .with_code(diagnostic.code)
-        .with_message(&diagnostic.message)
-        .with_labels(std::iter::once(label).chain(related).collect())
-        .with_notes(
-            diagnostic
-                .help
-                .iter()
-                .map(|help| format!("help: {help}"))
-                .collect(),
-        )
 }

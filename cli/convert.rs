@@ -6,9 +6,11 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
-use understudy_diagnostic::Report;
+use understudy_diagnostic::{Lines, MAXIMUM_SHOWN, Report, shortened};
 use understudy_interchange::plcopen::Fidelity;
-use understudy_interchange::{Compared, Format, WriteError, Written, read, write};
+use understudy_interchange::{
+    Compared, Format, Reading, WriteError, Written, read, unknown_form, write,
+};
 use understudy_ladder::parse_time;
 
 use crate::answer::{Answer, Status};
@@ -90,9 +92,14 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         Err(answer) => return answer,
     };
     let name = arguments.from_file.display().to_string();
-    let format = arguments.from.map(Form::format);
-    let format = format.unwrap_or_else(|| Format::of(&name, &source));
-    let reading = read(format, &name, &source, arguments.unit.as_deref());
+    let form = arguments.from.map(Form::format);
+    let reading = match form.or_else(|| Format::of(&name, &source)) {
+        Some(format) => read(format, &name, &source, arguments.unit.as_deref()),
+        None => Reading {
+            diagnostics: vec![unknown_form(&source)],
+            ..Reading::default()
+        },
+    };
     let mut report = Report {
         name,
         text: source,
@@ -160,18 +167,20 @@ fn form_of_output(arguments: &Arguments) -> Result<Form, (&'static str, String)>
 
 /// By the ending of the file.
 fn form_of(path: &Path) -> Result<Form, String> {
-    let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
-    match ending.to_str() {
-        Some("ladder") => Ok(Form::Ladder),
-        Some("xml") => Ok(Form::Plcopen),
-        Some("st") => Ok(Form::St),
-        Some("ld") => Ok(Form::Ldmicro),
-        _ => Err(format!(
+    match Format::of_ending(&path.to_string_lossy()) {
+        Some(Format::Ladder) => Ok(Form::Ladder),
+        Some(Format::PlcOpen | Format::Digraph) => Ok(Form::Plcopen),
+        Some(Format::StructuredText) => Ok(Form::St),
+        Some(Format::LdMicro) => Ok(Form::Ldmicro),
+        None => Err(format!(
             "{}: a program is written as .ladder, .xml or .st; --to says the form of a file with another ending",
             path.display()
         )),
     }
 }
+
+/// The longest note that is shown, in characters.
+const MAXIMUM_NOTE: usize = 300;
 
 fn fidelity_text(fidelity: &Fidelity, report: &Report) -> String {
     let mut text = String::from("\n");
@@ -182,9 +191,17 @@ fn fidelity_text(fidelity: &Fidelity, report: &Report) -> String {
             count.what, count.in_file, count.in_program
         );
     }
-    for note in &fidelity.notes {
-        let place = report.line_and_column(note.span.start);
-        let _ = writeln!(text, "{}:{place}: {}", report.name, note.message);
+    let lines = Lines::new(&report.text);
+    for note in fidelity.notes.iter().take(MAXIMUM_SHOWN) {
+        let place = lines.position(note.span.start);
+        let message = shortened(&note.message, MAXIMUM_NOTE);
+        let _ = writeln!(text, "{}:{place}: {message}", report.name);
+    }
+    match fidelity.notes.len().saturating_sub(MAXIMUM_SHOWN) {
+        0 => {}
+        more => {
+            let _ = writeln!(text, "and {more} more");
+        }
     }
     text
 }
@@ -217,9 +234,11 @@ fn fidelity_value(fidelity: &Fidelity, report: &Report, written: Option<&Written
     let counts = fidelity.counts.iter().map(|count| {
         json!({ "what": count.what, "in_file": count.in_file, "in_program": count.in_program })
     });
-    let notes = fidelity.notes.iter().map(|note| {
-        let place = report.line_and_column(note.span.start);
-        json!({ "line": place.line, "column": place.column, "message": note.message })
+    let lines = Lines::new(&report.text);
+    let notes = fidelity.notes.iter().take(MAXIMUM_SHOWN).map(|note| {
+        let place = lines.position(note.span.start);
+        let message = shortened(&note.message, MAXIMUM_NOTE);
+        json!({ "line": place.line, "column": place.column, "message": message })
     });
     let written = written.map(|written| {
         let losses = written.losses.iter().map(|found| found.message.as_str());
@@ -232,9 +251,12 @@ fn fidelity_value(fidelity: &Fidelity, report: &Report, written: Option<&Written
             "proved": written.compared.proved,
         })
     });
+    let notes: Vec<Value> = notes.collect();
+    let more = fidelity.notes.len() - notes.len();
     json!({
         "counts": counts.collect::<Vec<_>>(),
-        "notes": notes.collect::<Vec<_>>(),
+        "notes": notes,
+        "more_notes": more,
         "written": written,
     })
 }

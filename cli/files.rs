@@ -5,8 +5,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use understudy_cluster::{Cluster, Loaded, Overrides, TemplateFile};
-use understudy_diagnostic::Report;
 use understudy_diagnostic::spelling::nearest;
+use understudy_diagnostic::{Report, decode};
 use understudy_scenarios::{Parties, Scenario, named_file, read as read_scenario};
 
 use crate::answer::{Answer, Status};
@@ -14,8 +14,12 @@ use crate::kind::{self, Kind};
 
 /// The text of a file; a failure names it and says why not.
 pub(crate) fn text(path: &Path) -> Result<String, Answer> {
-    fs::read_to_string(path)
-        .map_err(|error| Answer::failed(Status::BadInput, "U0601", unreadable(path, &error)))
+    let failed = |code, message| Answer::failed(Status::BadInput, code, message);
+    let bytes = fs::read(path).map_err(|error| failed("U0601", unreadable(path, &error)))?;
+    decode(bytes).map_err(|error| {
+        let message = format!("{} is not a text file: {error}", path.display());
+        failed("U0618", message)
+    })
 }
 
 /// The text of a file that has to be of one kind.
@@ -36,8 +40,10 @@ pub(crate) fn unreadable(path: &Path, error: &io::Error) -> String {
             "it is a folder".to_owned(),
             first.into_iter().find(|file| file.exists()),
         )
-    } else {
+    } else if error.kind() == io::ErrorKind::NotFound {
         (error.to_string(), nearest_file(path))
+    } else {
+        (error.to_string(), None)
     };
     let meant = meant.map(|file| format!("; did you mean {}?", file.display()));
     format!(

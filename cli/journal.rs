@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use clap::Args;
 use serde_json::json;
+use understudy_diagnostic::MAXIMUM_SHOWN;
 use understudy_view::{Filter, JournalLine, Listing, Run, Trouble};
 
 use crate::answer::{Answer, Status};
@@ -70,7 +71,17 @@ fn answered(arguments: &Arguments, json: bool) -> Result<Answer, Answer> {
         return Ok(followed(&run, listing, json));
     }
     let mut lines = Vec::new();
-    let troubles = read(&run, listing, &mut |line| lines.push(line));
+    let (mut troubles, mut more) = (Vec::new(), 0_usize);
+    for trouble in read(&run, listing, &mut |line| lines.push(line)) {
+        if troubles.len() < MAXIMUM_SHOWN {
+            troubles.push(trouble.to_string());
+        } else {
+            more += 1;
+        }
+    }
+    if more > 0 {
+        troubles.push(format!("{more} more lines of the journal cannot be read"));
+    }
     let mut text: String = lines.iter().map(|line| line.to_text() + "\n").collect();
     if lines.is_empty() {
         text += "Nothing else happened there than what every party says in every cycle, which --all shows.\n";
@@ -78,7 +89,6 @@ fn answered(arguments: &Arguments, json: bool) -> Result<Answer, Answer> {
     for trouble in &troubles {
         text += &format!("       -  {trouble}\n");
     }
-    let troubles: Vec<String> = troubles.iter().map(Trouble::to_string).collect();
     Ok(Answer::done(
         text,
         json!({ "lines": lines, "troubles": troubles }),

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use understudy_interchange::Format;
 use understudy_reconfiguration::project::looks_like_a_project;
 use understudy_scenarios::looks_like_a_scenario;
 use understudy_supervisor::FileKind;
@@ -19,18 +20,23 @@ pub(crate) enum Kind {
     Map,
     Ads,
     Ladder,
+    /// Neither the name nor the contents tell it.
+    Unknown,
 }
 
 impl Kind {
-    /// By the ending, and for TOML by keys that only one kind has. What could be anything is taken for a cluster file where it ends in
-    /// `.toml`, and else for a ladder.
+    /// By the ending, for TOML by keys that only one kind has, and for programs by what they begin with. TOML that could be anything is
+    /// taken for a cluster file.
     pub(crate) fn of(path: &Path, text: &str) -> Self {
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
         if ending == "ads" {
             return Self::Ads;
         }
         if ending != "toml" {
-            return Self::Ladder;
+            return match Format::of(&path.to_string_lossy(), text) {
+                Some(_) => Self::Ladder,
+                None => Self::Unknown,
+            };
         }
         match FileKind::of(text) {
             Some(FileKind::Net) => Self::Net,
@@ -53,6 +59,7 @@ impl Kind {
             Self::Map => "map",
             Self::Ads => "ADS",
             Self::Ladder => "ladder",
+            Self::Unknown => "unknown",
         }
     }
 
@@ -66,19 +73,17 @@ impl Kind {
             Self::Map => "a map of signals",
             Self::Ads => "an automaton of TCT",
             Self::Ladder => "a ladder",
+            Self::Unknown => "a file of unknown form",
         }
     }
 }
 
-/// A failure where a file is of another kind than `wanted`. Files whose ending says nothing pass: their own reader says what is wrong.
+/// A failure where a file is of another kind than `wanted`. Files of unknown form pass: their own reader says what is wrong.
 pub(crate) fn expect(wanted: Kind, path: &Path, text: &str) -> Result<(), Answer> {
     let found = Kind::of(path, text);
-    let ladders = ["ladder", "st", "xml", "ld"];
     let is_sure = match found {
         Kind::Cluster => text.lines().any(|line| line.trim() == "[cluster]"),
-        Kind::Ladder => path
-            .extension()
-            .is_some_and(|ending| ladders.iter().any(|known| ending == *known)),
+        Kind::Unknown => false,
         _ => true,
     };
     if found == wanted || !is_sure {
@@ -122,6 +127,9 @@ mod tests {
         check(Kind::Cluster, "SUPER.ADS", "SUPER\n", false);
         check(Kind::Cluster, "cluster.txt", cluster, true);
         check(Kind::Cluster, "empty.toml", "", true);
+        check(Kind::Cluster, "a.scl", "", false);
+        check(Kind::Cluster, "a.txt", "program a\n", false);
+        check(Kind::Ladder, "a.clp", "_FILES_CLASSICLADDER\n", true);
         check(Kind::Scenario, "a.toml", scenario, true);
         check(Kind::Scenario, "a.toml", cluster, false);
         check(Kind::Scenario, "empty.toml", "", true);

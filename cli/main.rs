@@ -21,6 +21,7 @@ mod diff;
 mod doctor;
 mod draw;
 mod endurance;
+mod excerpt;
 mod explain;
 mod failover;
 mod field;
@@ -234,7 +235,7 @@ fn main() -> ExitCode {
     let mut console = Console::new(json);
     let name = command.name();
     let answer = command.run(&mut console);
-    console.finish(name, &answer)
+    console.finish(name, answer)
 }
 
 /// The answer to wrong arguments: a code like that of any other failure, and a document where one was asked for. Help and the
@@ -249,5 +250,5 @@ fn misused(error: &clap::Error) -> ExitCode {
     let message = text.strip_prefix("error: ").unwrap_or(&text).trim_end();
     let command = std::env::args().nth(1).unwrap_or_default();
     let answer = Answer::failed(Status::BadInput, "U0600", message);
-    Console::new(json).finish(&command, &answer)
+    Console::new(json).finish(&command, answer)
 }

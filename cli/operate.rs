@@ -117,7 +117,7 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
             let message = format!(
                 "`{word}` is for a member on another machine: name the folder of the operator's keys with --keys; a laboratory takes kill, restart, release, cold-start and accept-state"
             );
-            return Err(Answer::failed(Status::BadInput, "U0617", message));
+            return Err(Answer::failed(Status::BadInput, "U0621", message));
         }
     };
     let run = written(arguments)?;

@@ -70,10 +70,12 @@ fn counted(programs: &Programs, with_instructions: bool) -> Answer {
 
 /// A column a program, a line a count.
 fn table(counted: &[(String, Program)]) -> String {
-    let found: Vec<_> = counted
+    let resources: Vec<Resources> = counted
         .iter()
-        .map(|(name, program)| (name.as_str(), Resources::of(program).rows()))
+        .map(|(_, program)| Resources::of(program))
         .collect();
+    let names = counted.iter().map(|(name, _)| name.as_str());
+    let found: Vec<_> = names.zip(Resources::table(&resources)).collect();
     let Some((_, rows)) = found.first() else {
         return String::new();
     };

@@ -49,6 +49,10 @@ pub enum Dimension {
     DigitalInputs,
     /// Terminals.
     DigitalOutputs,
+    /// Terminals.
+    AnalogInputs,
+    /// Terminals.
+    AnalogOutputs,
     /// Of the program.
     Timers,
     /// Of the program.
@@ -130,6 +134,16 @@ pub fn fit(controller: &Controller, family: Option<&Family>, need: &Need, terms:
         Quantity::DigitalOutputs,
         need.outputs,
         Dimension::DigitalOutputs,
+    );
+    judge.points(
+        Quantity::AnalogIn,
+        need.analog_inputs,
+        Dimension::AnalogInputs,
+    );
+    judge.points(
+        Quantity::AnalogOut,
+        need.analog_outputs,
+        Dimension::AnalogOutputs,
     );
     let mut scan_ns = None;
     if let Some(program) = &need.program {

@@ -20,6 +20,10 @@ pub struct Need {
     pub inputs: u64,
     /// Digital outputs that are wired to it.
     pub outputs: u64,
+    /// Analog inputs that are wired to it.
+    pub analog_inputs: u64,
+    /// Analog outputs that are wired to it.
+    pub analog_outputs: u64,
     /// The program that it runs; a remote I/O runs none.
     pub program: Option<Resources>,
     /// Time in which a scan has to be over, where it matters.

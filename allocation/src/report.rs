@@ -11,6 +11,7 @@ use crate::allocate::{Allocation, BoxOnPlan, Candidate, Placed};
 use crate::csv::line;
 use crate::fit::{Dimension, Verdict};
 use crate::need::Terms;
+use crate::resources::Resources;
 
 const TEMPLATE: &str = include_str!("report/report.html");
 
@@ -146,9 +147,9 @@ fn escaped(text: &str) -> String {
 /// Counts of each program by name, in the order of the items; nothing for remote I/Os.
 fn counts(allocation: &Allocation) -> Vec<(&str, Vec<(&'static str, u64)>)> {
     let items = allocation.items.iter();
-    items
-        .filter_map(|item| Some((item.name.as_str(), item.program?.rows().to_vec())))
-        .collect()
+    let programs = items.filter_map(|item| Some((item.name.as_str(), item.program?)));
+    let (names, programs): (Vec<&str>, Vec<Resources>) = programs.unzip();
+    names.into_iter().zip(Resources::table(&programs)).collect()
 }
 
 /// The number of the box that an item is on.
@@ -327,6 +328,8 @@ fn dimension_words(dimension: Dimension) -> &'static str {
     match dimension {
         Dimension::DigitalInputs => "inputs",
         Dimension::DigitalOutputs => "outputs",
+        Dimension::AnalogInputs => "analog inputs",
+        Dimension::AnalogOutputs => "analog outputs",
         Dimension::Timers => "timers",
         Dimension::Counters => "counters",
         Dimension::ProgramMemory => "program memory",

@@ -4,18 +4,24 @@
 //! the [`elements`](Resources::elements), its "Number of inputs" are the [`contacts`](Resources::contacts), its "Number of outputs"
 //! the [`coils`](Resources::coils). Here a thing is counted under its own name, and the terminals that have to be wired are apart.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
-use understudy_ladder::{BlockKind, CoilKind, ContactKind, Element, Program, visit};
+use understudy_ladder::{BlockKind, CoilKind, ContactKind, Element, Program, Signal, visit};
 
 use crate::instructions::instructions;
 
 /// Counts of one program.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Resources {
-    /// Distinct inputs: terminals to be wired.
+    /// Distinct inputs of one bit: terminals to be wired.
     pub inputs: u64,
-    /// Distinct outputs: terminals to be wired.
+    /// Distinct outputs of one bit: terminals to be wired.
     pub outputs: u64,
+    /// Distinct inputs that are numbers, such as one at `%IW0`: analog channels.
+    pub analog_inputs: u64,
+    /// Distinct outputs that are numbers: analog channels.
+    pub analog_outputs: u64,
     /// Internal bits that are declared.
     pub memory_bits: u64,
     /// Rungs.
@@ -43,9 +49,13 @@ pub struct Resources {
 impl Resources {
     /// Counts a program.
     pub fn of(program: &Program) -> Self {
+        let (inputs, analog_inputs) = channels(&program.inputs);
+        let (outputs, analog_outputs) = channels(&program.outputs);
         let mut found = Self {
-            inputs: program.inputs.len() as u64,
-            outputs: program.outputs.len() as u64,
+            inputs,
+            outputs,
+            analog_inputs,
+            analog_outputs,
             memory_bits: program.memory.len() as u64,
             rungs: program.rungs.len() as u64,
             data_bits: program.memory.len() as u64,
@@ -100,14 +110,16 @@ impl Resources {
 
     /// Inputs and outputs: what has to be wired.
     pub fn points(&self) -> u64 {
-        self.inputs + self.outputs
+        self.inputs + self.outputs + self.analog_inputs + self.analog_outputs
     }
 
     /// Each count with what it is called, in the order in which a person reads them.
-    pub fn rows(&self) -> [(&'static str, u64); 14] {
+    fn rows(&self) -> [(&'static str, u64); 16] {
         [
             ("inputs", self.inputs),
             ("outputs", self.outputs),
+            ("analog inputs", self.analog_inputs),
+            ("analog outputs", self.analog_outputs),
             ("rungs", self.rungs),
             ("elements", self.elements()),
             ("contacts", self.contacts),
@@ -122,4 +134,36 @@ impl Resources {
             ("instructions", self.instructions),
         ]
     }
+
+    /// The counts of each program, the same for all; analog channels only where a program has some.
+    pub fn table(programs: &[Self]) -> Vec<Vec<(&'static str, u64)>> {
+        let has_analog = programs
+            .iter()
+            .any(|program| program.analog_inputs + program.analog_outputs > 0);
+        let rows = programs.iter().map(|program| {
+            let mut rows = program.rows().to_vec();
+            rows.retain(|(what, _)| has_analog || !what.starts_with("analog"));
+            rows
+        });
+        rows.collect()
+    }
+}
+
+/// How many of the signals are bits of their own, and of how many numbers the others are the bits: a number `level` stands as
+/// `level.0`, `level.1` and so on, without addresses.
+fn channels(signals: &[Signal]) -> (u64, u64) {
+    let mut numbers: BTreeMap<&str, Vec<u32>> = BTreeMap::new();
+    for signal in signals.iter().filter(|signal| signal.address.is_none()) {
+        if let Some((name, bit)) = signal.name.rsplit_once('.')
+            && let Ok(bit) = bit.parse()
+        {
+            numbers.entry(name).or_default().push(bit);
+        }
+    }
+    numbers.retain(|_, bits| {
+        bits.sort_unstable();
+        bits.len() > 1 && bits.iter().copied().eq(0..bits.len() as u32)
+    });
+    let bits: usize = numbers.values().map(Vec::len).sum();
+    ((signals.len() - bits) as u64, numbers.len() as u64)
 }

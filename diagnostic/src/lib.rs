@@ -4,13 +4,20 @@
 //! wrong. A diagnostic has a stable code (`U0123`), a place in its source and, where one can be named, the way out. This
 //! crate only holds the data; the command line draws it. [`pages`] holds what is to be known about each code.
 
+mod encoding;
+mod lines;
 pub mod pages;
+mod shown;
 pub mod spelling;
 
 use std::fmt;
 use std::ops::Range;
 
 use serde::Serialize;
+
+pub use encoding::{NotText, decode};
+pub use lines::Lines;
+pub use shown::{MAXIMUM_FINDINGS, MAXIMUM_MESSAGE, MAXIMUM_SHOWN, shortened};
 
 /// How bad it is: an error stops whatever was asked for, a warning does not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
@@ -115,18 +122,9 @@ impl Report {
         has_errors(&self.diagnostics)
     }
 
-    /// 1-based line and column (in characters) of a byte offset; an offset past the end is taken as the end.
+    /// 1-based line and column (in characters) of one byte offset; [`Lines`] is for many.
     pub fn line_and_column(&self, offset: usize) -> Position {
-        let mut offset = offset.min(self.text.len());
-        while !self.text.is_char_boundary(offset) {
-            offset -= 1;
-        }
-        let before = &self.text[..offset];
-        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-        Position {
-            line: before.matches('\n').count() + 1,
-            column: before[line_start..].chars().count() + 1,
-        }
+        Lines::new(&self.text).position(offset)
     }
 }
 
@@ -149,28 +147,5 @@ pub struct Position {
 impl fmt::Display for Position {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(formatter, "{}:{}", self.line, self.column)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn check(text: &str, offset: usize, expected: &str) {
-        let report = Report {
-            name: "a".into(),
-            text: text.into(),
-            diagnostics: Vec::new(),
-        };
-        assert_eq!(report.line_and_column(offset).to_string(), expected);
-    }
-
-    #[test]
-    fn places_are_counted_from_one_in_characters() {
-        check("", 0, "1:1");
-        check("ab\ncd", 4, "2:2");
-        check("é!\n", 2, "1:2");
-        check("é", 1, "1:1");
-        check("ab", 99, "1:3");
     }
 }

@@ -13,7 +13,10 @@ pub use value::{Placed, Value};
 
 use toml::Spanned;
 use toml::de::DeTable;
-use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS};
+
+/// The largest file; readers of one kind may have a smaller bound.
+pub const MAXIMUM_TEXT_BYTES: usize = 16 << 20;
 
 /// The stable codes of one kind of file for what can be wrong with its form.
 #[derive(Debug)]
@@ -39,8 +42,16 @@ pub fn parse<'t>(
     codes: &Codes,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<Spanned<DeTable<'t>>> {
+    if text.len() > MAXIMUM_TEXT_BYTES {
+        let message = format!(
+            "the file has {} bytes; at most {MAXIMUM_TEXT_BYTES} are read",
+            text.len()
+        );
+        diagnostics.push(Diagnostic::error(codes.no_toml, message, 0..0));
+        return None;
+    }
     let (table, errors) = DeTable::parse_recoverable(text);
-    for error in &errors {
+    for error in errors.iter().take(MAXIMUM_FINDINGS) {
         let span = error.span().unwrap_or(text.len()..text.len());
         let message = format!("this is no TOML: {}", error.message().trim_end());
         diagnostics.push(Diagnostic::error(codes.no_toml, message, span));

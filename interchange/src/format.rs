@@ -36,6 +36,16 @@ pub struct Reading {
     pub fidelity: Fidelity,
 }
 
+/// The endings of files that hold programs. XML has several forms, which its root tells apart.
+const ENDINGS: [(&str, Format); 6] = [
+    ("ladder", Format::Ladder),
+    ("xml", Format::PlcOpen),
+    ("st", Format::StructuredText),
+    ("iecst", Format::StructuredText),
+    ("scl", Format::StructuredText),
+    ("ld", Format::LdMicro),
+];
+
 impl Format {
     /// What it is called.
     pub fn title(self) -> &'static str {
@@ -48,32 +58,73 @@ impl Format {
         }
     }
 
-    /// The form of a file, by its beginning where the end of its name says too little.
-    pub fn of(name: &str, text: &str) -> Self {
-        let ending = name.rsplit_once('.').map_or("", |(_, ending)| ending);
+    /// The form of a file, by the ending of its name and its beginning; none where neither tells it.
+    pub fn of(name: &str, text: &str) -> Option<Self> {
         let start = text.trim_start_matches('\u{feff}').trim_start();
-        let xml = || {
-            let root = start
-                .split('<')
-                .map(str::trim_start)
-                .find(|tag| tag.starts_with(|letter: char| letter.is_alphabetic()));
-            match root {
-                Some(root) if root.starts_with("LadderDiagram") => Self::Digraph,
-                _ => Self::PlcOpen,
-            }
+        match Self::of_ending(name) {
+            Some(Self::StructuredText) => Some(Self::StructuredText),
+            Some(Self::PlcOpen) => Some(Self::of_xml(start)),
+            _ if start.starts_with('<') => Some(Self::of_xml(start)),
+            Some(known) => Some(known),
+            None => Self::of_text(start),
+        }
+    }
+
+    /// The form that the ending of a name stands for.
+    pub fn of_ending(name: &str) -> Option<Self> {
+        let (_, ending) = name.rsplit_once('.')?;
+        let mut endings = ENDINGS.into_iter();
+        let found = endings.find(|(known, _)| known.eq_ignore_ascii_case(ending));
+        found.map(|(_, format)| format)
+    }
+
+    fn of_xml(start: &str) -> Self {
+        let mut tags = start.split('<').map(str::trim_start);
+        match tags.find(|tag| tag.starts_with(|letter: char| letter.is_alphabetic())) {
+            Some(root) if root.starts_with("LadderDiagram") => Self::Digraph,
+            _ => Self::PlcOpen,
+        }
+    }
+
+    /// By words that only one form has.
+    fn of_text(start: &str) -> Option<Self> {
+        let ends = |word: &str| {
+            let words = ["END_PROGRAM", "END_FUNCTION_BLOCK", "END_FUNCTION"];
+            words.iter().any(|end| end.eq_ignore_ascii_case(word))
         };
-        match ending.to_ascii_lowercase().as_str() {
-            "st" | "iecst" | "scl" => Self::StructuredText,
-            "xml" => xml(),
-            _ if start.starts_with('<') => xml(),
-            "ld" => Self::LdMicro,
-            _ => Self::Ladder,
+        let mut words = start.split(|letter: char| !letter.is_alphanumeric() && letter != '_');
+        let mut lines = start.lines().map(str::trim);
+        let first = lines.find(|line| !line.is_empty() && !line.starts_with("--"));
+        let first = first.and_then(|line| line.split_whitespace().next());
+        if start.starts_with("LDmicro") {
+            Some(Self::LdMicro)
+        } else if words.any(ends) {
+            Some(Self::StructuredText)
+        } else {
+            (first == Some("program")).then_some(Self::Ladder)
         }
     }
 }
 
 /// Reads the program of the file `name`; `unit` chooses one where there are several.
 pub fn read(format: Format, name: &str, text: &str, unit: Option<&str>) -> Reading {
+    let mut reading = read_form(format, name, text, unit);
+    // Who writes a ladder sees what it has; from another form, it may have been lost on the way.
+    if let Some(program) = &reading.program
+        && format != Format::Ladder
+        && program.rungs.is_empty()
+    {
+        let message = format!(
+            "the program `{}` has no rungs: it does nothing",
+            program.name
+        );
+        let found = Diagnostic::warning("U1023", message, program.name.span());
+        reading.diagnostics.push(found);
+    }
+    reading
+}
+
+fn read_form(format: Format, name: &str, text: &str, unit: Option<&str>) -> Reading {
     match format {
         Format::Ladder => {
             let parsed = parse(text);
@@ -159,13 +210,70 @@ fn one(
 
 /// Reads a program wherever a ladder is asked for, whatever its form.
 pub fn parse_program(name: &str, text: &str) -> Parsed {
-    let format = Format::of(name, text);
-    if format == Format::Ladder {
-        return parse(text);
-    }
-    let reading = read(format, name, text, None);
+    let reading = match Format::of(name, text) {
+        Some(Format::Ladder) => return parse(text),
+        Some(format) => read(format, name, text, None),
+        None => Reading {
+            diagnostics: vec![unknown_form(text)],
+            ..Reading::default()
+        },
+    };
     Parsed {
         program: reading.program.unwrap_or_default(),
         diagnostics: reading.diagnostics,
+    }
+}
+
+/// The finding on a file of which neither name nor contents tell the form.
+pub fn unknown_form(text: &str) -> Diagnostic {
+    let endings: Vec<String> = ENDINGS.iter().map(|(end, _)| format!(".{end}")).collect();
+    let message = format!(
+        "the form of this program is unknown: its name does not end in {}, and it does not begin as any of these forms",
+        endings.join(", ")
+    );
+    let start = text.len() - text.trim_start().len();
+    Diagnostic::error("U0619", message, start..start)
+        .with_help("`understudy convert --from FORM` reads a file with another ending")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_form_is_told_by_ending_and_beginning() {
+        let check = |name: &str, text: &str, expected: Option<Format>| {
+            assert_eq!(Format::of(name, text), expected, "{name} {text:?}");
+        };
+        check("a.ladder", "", Some(Format::Ladder));
+        check("A.LADDER", "nonsense", Some(Format::Ladder));
+        check("a.st", "<", Some(Format::StructuredText));
+        check("a.scl", "", Some(Format::StructuredText));
+        check("a.ld", "LDmicro0.1", Some(Format::LdMicro));
+        check("a.ld", "\u{feff}<project/>", Some(Format::PlcOpen));
+        check(
+            "a.xml",
+            "<?xml?><!-- a --><LadderDiagram>",
+            Some(Format::Digraph),
+        );
+        check("a.xml", "", Some(Format::PlcOpen));
+        check("a.clp", "_FILES_CLASSICLADDER\n", None);
+        check("a", "", None);
+        check("a.txt", "-- a pump\n\nprogram pump\n", Some(Format::Ladder));
+        check(
+            "a.txt",
+            "program p VAR END_VAR end_program",
+            Some(Format::StructuredText),
+        );
+        check("a.txt", "LDmicro0.2\n", Some(Format::LdMicro));
+        check("a.txt", "programs of all kinds\n", None);
+        check("a.b/c", "", None);
+    }
+
+    #[test]
+    fn a_file_of_no_known_form_is_one_error() {
+        let found = parse_program("a.clp", "_FILES_CLASSICLADDER\n_FILE-a\n#1\n").diagnostics;
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert_eq!(found[0].code, "U0619");
     }
 }

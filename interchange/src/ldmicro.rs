@@ -25,13 +25,10 @@ mod statements;
 
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, Severity, has_errors};
+use understudy_diagnostic::{Diagnostic, has_errors};
 use understudy_ladder::{Name, Program};
 
 use crate::structured_text;
-
-/// Findings past which no more are said.
-const MAXIMUM_FINDINGS: usize = 200;
 
 /// What was read.
 #[derive(Debug, Clone, Default)]
@@ -62,11 +59,7 @@ pub fn read(name: &str, text: &str) -> Reading {
     }
     diagnostics.sort_by_key(|found| found.span.start);
     diagnostics.dedup();
-    diagnostics.truncate(MAXIMUM_FINDINGS);
-    let is_right = diagnostics
-        .iter()
-        .all(|found| found.severity != Severity::Error);
-    let mut program = program.filter(|_| is_right);
+    let mut program = program.filter(|_| !has_errors(&diagnostics));
     if let Some(program) = &mut program {
         let legal = |letter: char| {
             if letter.is_alphanumeric() {

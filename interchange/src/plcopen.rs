@@ -19,6 +19,7 @@ mod units;
 mod write;
 pub(crate) mod xml;
 
+use std::collections::HashSet;
 use std::ops::Range;
 use std::time::Duration;
 
@@ -30,7 +31,7 @@ pub use write::write;
 pub use xml::{MAXIMUM_BYTES, MAXIMUM_DEPTH, MAXIMUM_NODES};
 
 use crate::written::USUAL_PERIOD;
-use document::{Body, Language, Pou, PouKind, Project};
+use document::{ActionContent, Body, Condition, Instance, Kind, Language, Pou, PouKind, Project};
 
 /// The namespaces of 2.01 and 2.0.
 const NAMESPACES: [&str; 2] = [
@@ -141,6 +142,7 @@ fn chosen<'a>(
     }
     for instance in &project.instances {
         if let Some(pou) = find(&instance.type_name) {
+            others(project, instance, diagnostics);
             return Some(pou);
         }
         let message = format!("the file has no unit `{}`", instance.type_name);
@@ -166,6 +168,54 @@ fn chosen<'a>(
     }
 }
 
+/// Says which programs the tasks run beside the one that is read.
+fn others(project: &Project, read: &Instance, diagnostics: &mut Vec<Diagnostic>) {
+    for other in &project.instances {
+        if !std::ptr::eq(other, read) {
+            let message = format!(
+                "a task runs `{}` too, and only `{}` is read",
+                other.type_name, read.type_name
+            );
+            let found = Diagnostic::warning("U1023", message, other.type_name.span());
+            let help = "`--unit NAME` of `understudy convert` reads another program; each controller runs one";
+            diagnostics.push(found.with_help(help));
+        }
+    }
+}
+
+/// Says which actions and transitions of a unit its sequence does not name.
+fn unnamed_parts(pou: &Pou, diagnostics: &mut Vec<Diagnostic>) {
+    let mut named = HashSet::new();
+    if let Some(Body::Graph(graph)) = &pou.body {
+        for object in &graph.objects {
+            match &object.kind {
+                Kind::Actions(actions) => {
+                    named.extend(actions.iter().filter_map(|action| match &action.content {
+                        ActionContent::Reference(name) => Some(name.to_uppercase()),
+                        _ => None,
+                    }))
+                }
+                Kind::Transition(transition) => {
+                    if let Condition::Reference(name) = &transition.condition {
+                        named.insert(name.to_uppercase());
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+    let parts = [("action", &pou.actions), ("transition", &pou.transitions)];
+    for (what, parts) in parts {
+        for part in parts
+            .iter()
+            .filter(|part| !named.contains(&part.name.to_uppercase()))
+        {
+            let message = format!("the {what} `{}` is not used by `{}`", part.name, pou.name);
+            diagnostics.push(Diagnostic::warning("U1023", message, part.name.span()));
+        }
+    }
+}
+
 /// A ladder of bits and standard blocks stays the ladder that it is; all else goes by way of Structured Text.
 fn translate(project: &Project, pou: &Pou, reading: &mut Reading) {
     let runs = project
@@ -174,13 +224,16 @@ fn translate(project: &Project, pou: &Pou, reading: &mut Reading) {
         .find(|instance| instance.type_name.eq_ignore_ascii_case(&pou.name));
     reading.period = runs.and_then(|instance| instance.interval);
     reading.fidelity.ignored(project.ignored.clone());
+    for used in units::used(project, pou) {
+        unnamed_parts(used, &mut reading.diagnostics);
+    }
     if let Some(Body::Graph(graph)) = &pou.body
         && graph.language != Language::Sequence
     {
         let mut found = Vec::new();
         let period = reading.period.unwrap_or(USUAL_PERIOD);
         let plan = plan::plan(graph, &|name| units::is_block(project, name), &mut found);
-        let drawn = ladder::draw(pou, &project.globals, &plan, period);
+        let drawn = ladder::draw(project, pou, &plan, period);
         let is_wrong = has_errors(&found) || has_errors(&drawn.diagnostics);
         if drawn.general.is_empty() || is_wrong {
             for general in drawn.general {

@@ -28,7 +28,8 @@ mod resolve;
 mod syntax;
 mod timers;
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 use std::rc::Rc;
 use std::time::Duration;
 
@@ -37,12 +38,14 @@ use understudy_ladder::{Name, Program};
 
 pub(crate) use self::parser::is_keyword;
 pub use self::syntax::Class;
-use self::syntax::{Declaration, File, Unit, UnitKind};
+use self::syntax::{Declaration, File, TypeMeaning, Unit, UnitKind};
 
 /// The most programs of a text.
 const MAXIMUM_PROGRAMS: usize = 16;
 /// The most function blocks and functions of a text.
 const MAXIMUM_CALLABLE: usize = 1_000;
+/// Names that one finding lists.
+const MAXIMUM_LISTED: usize = 20;
 
 /// What was read.
 #[derive(Debug, Clone, Default)]
@@ -92,6 +95,8 @@ pub fn read(text: &str) -> Reading {
     }
     if has_errors(&diagnostics) {
         programs.clear();
+    } else {
+        diagnostics.extend(unused(text, &file));
     }
     if programs.is_empty() && !has_errors(&diagnostics) {
         let help = "a text needs a PROGRAM … END_PROGRAM";
@@ -101,12 +106,70 @@ pub fn read(text: &str) -> Reading {
     let mut seen = HashSet::new();
     diagnostics.retain(|found| seen.insert((found.code, found.span.clone())));
     diagnostics.sort_by_key(|found| found.span.start);
-    diagnostics.truncate(parser::MAXIMUM_FINDINGS);
     Reading {
         programs,
         period: file.period,
         diagnostics,
     }
+}
+
+/// What is declared beside the programs and named nowhere else in the text.
+fn unused(text: &str, file: &File) -> Option<Diagnostic> {
+    let belongs = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
+    let mut places: HashMap<String, Vec<usize>> = HashMap::new();
+    for word in text
+        .split(|letter| !belongs(letter))
+        .filter(|word| !word.is_empty())
+    {
+        let place = word.as_ptr() as usize - text.as_ptr() as usize;
+        places
+            .entry(word.to_ascii_uppercase())
+            .or_default()
+            .push(place);
+    }
+    let is_named = |name: &Name, own: Range<usize>| {
+        let found = places.get(&name.to_ascii_uppercase());
+        found.is_some_and(|found| found.iter().any(|place| !own.contains(place)))
+    };
+    let mut starts: Vec<usize> = file
+        .units
+        .iter()
+        .map(|unit| unit.name.span().start)
+        .collect();
+    starts.sort_unstable();
+    let mut unused: Vec<&Name> = Vec::new();
+    for unit in &file.units {
+        let start = unit.name.span().start;
+        let next = starts.iter().copied().find(|next| *next > start);
+        let own = start..next.unwrap_or(text.len());
+        if unit.kind != UnitKind::Program && !is_named(&unit.name, own) {
+            unused.push(&unit.name);
+        }
+    }
+    for definition in &file.types {
+        let names = match &definition.meaning {
+            TypeMeaning::Enumeration(values) => values.as_slice(),
+            TypeMeaning::Alias(_) => &[],
+        };
+        let mut names = names.iter().chain([&definition.name]);
+        if !names.any(|name| is_named(name, name.span())) {
+            unused.push(&definition.name);
+        }
+    }
+    let globals = file.globals.iter().map(|global| &global.name);
+    unused.extend(globals.filter(|name| !is_named(name, name.span())));
+    let first = unused.first()?;
+    let listed: Vec<String> = unused
+        .iter()
+        .take(MAXIMUM_LISTED)
+        .map(|name| format!("`{name}`"))
+        .collect();
+    let more = match unused.len() - listed.len() {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    let message = format!("nothing uses {}{more}: not kept", listed.join(", "));
+    Some(Diagnostic::warning("U1055", message, first.span()))
 }
 
 /// A variable whose declaration comes from elsewhere, such as the interface of a block in XML.
@@ -181,7 +244,6 @@ pub fn lower_body(
     );
     diagnostics.extend(found);
     diagnostics.sort_by_key(|found| found.span.start);
-    diagnostics.truncate(parser::MAXIMUM_FINDINGS);
     (program, diagnostics)
 }
 

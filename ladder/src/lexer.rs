@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::str::CharIndices;
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS};
 
 use crate::program::{Address, Area};
 
@@ -55,6 +55,10 @@ pub(crate) fn lex(text: &str) -> (Vec<Placed>, Vec<Diagnostic>) {
     let mut lexemes = Vec::new();
     let mut starts_line = true;
     while let Some(&(start, character)) = lexer.characters.peek() {
+        if lexer.diagnostics.len() >= MAXIMUM_FINDINGS {
+            lexer.diagnostics.push(Diagnostic::too_many(start));
+            break;
+        }
         if character.is_whitespace() || (start == 0 && character == '\u{feff}') {
             starts_line |= character == '\n';
             lexer.characters.next();

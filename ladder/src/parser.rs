@@ -10,7 +10,7 @@ pub use rung::MAXIMUM_PRESET_VALUE;
 use std::ops::Range;
 
 use understudy_diagnostic::spelling::nearest;
-use understudy_diagnostic::{Diagnostic, has_errors};
+use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS, has_errors};
 
 use crate::check::check;
 use crate::lexer::{Lexeme, Placed, lex};
@@ -279,8 +279,14 @@ impl Parser {
     }
 
     fn advance(&mut self) {
-        if *self.lexeme() != Lexeme::End {
-            self.position += 1;
+        if *self.lexeme() == Lexeme::End {
+            return;
+        }
+        self.position += 1;
+        if self.diagnostics.len() >= MAXIMUM_FINDINGS {
+            let place = self.span().start;
+            self.diagnostics.push(Diagnostic::too_many(place));
+            self.position = self.lexemes.len() - 1;
         }
     }
 

@@ -1,12 +1,23 @@
 //! What is wrong with a question about reliability. Every error carries the value concerned and has a code for people.
 
+/// A number in a message: very large and very small ones with an exponent.
+fn written(value: f64) -> String {
+    let size = value.abs();
+    if size == 0.0 || !size.is_finite() || (1e-6..1e16).contains(&size) {
+        value.to_string()
+    } else {
+        format!("{value:e}")
+    }
+}
+
 /// A question that has no answer, or none of the precision asked for.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ReliabilityError {
     /// A time that is zero, negative, infinite, not a number, or beyond [`MINIMUM_HOURS`](crate::MINIMUM_HOURS) and
     /// [`MAXIMUM_HOURS`](crate::MAXIMUM_HOURS).
     #[error(
-        "U0701: {what} is {hours} hours; a time must be positive and between 1e-12 and 1e15 hours"
+        "U0701: {what} is {} hours; a time must be positive and between 1e-12 and 1e15 hours",
+        written(*hours)
     )]
     Time {
         /// Which one.
@@ -15,7 +26,10 @@ pub enum ReliabilityError {
         hours: f64,
     },
     /// A rate that is zero, negative, infinite or not a number.
-    #[error("U0702: {what} is {per_hour} per hour; a rate must be positive and finite")]
+    #[error(
+        "U0702: {what} is {} per hour; a rate must be positive and finite",
+        written(*per_hour)
+    )]
     Rate {
         /// Which one.
         what: String,
@@ -23,7 +37,7 @@ pub enum ReliabilityError {
         per_hour: f64,
     },
     /// A probability outside [0, 1].
-    #[error("U0703: {what} is {value}; a probability lies between 0 and 1")]
+    #[error("U0703: {what} is {}; a probability lies between 0 and 1", written(*value))]
     Probability {
         /// Which one.
         what: String,
@@ -190,5 +204,22 @@ impl ReliabilityError {
             Self::Report { .. } => "U0719",
             Self::BoxText { .. } => "U0720",
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::written;
+
+    #[test]
+    fn numbers_of_any_size_are_short() {
+        let check = |value: f64, expected: &str| assert_eq!(written(value), expected);
+        check(-4.0, "-4");
+        check(0.0, "0");
+        check(1e300, "1e300");
+        check(-2.5e-200, "-2.5e-200");
+        check(1e15, "1000000000000000");
+        check(f64::NAN, "NaN");
+        check(f64::INFINITY, "inf");
     }
 }

@@ -11,10 +11,10 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use understudy_cluster::{Cluster, Link, Overrides, Security, read_with};
-use understudy_diagnostic::Report;
+use understudy_diagnostic::{Report, decode};
 use understudy_wire::Mode;
 
-use crate::named_files::named_file;
+use crate::named_files::{named_bytes, named_file};
 use crate::run_directory::RunDirectoryError;
 
 const FOLDER: &str = "cluster";
@@ -71,23 +71,26 @@ pub fn keep_cluster(run: &Path, file: &Path, cluster: &Cluster) -> Result<(), Ru
         mode: Some(cluster.agreement().mode),
     };
     let folder = run.join(FOLDER);
-    let write = |name: &str, text: &str| {
+    let write = |name: &str, bytes: &[u8]| {
         let path = folder.join(name);
-        let written = fs::create_dir_all(&folder).and_then(|()| fs::write(&path, text));
+        let written = fs::create_dir_all(&folder).and_then(|()| fs::write(&path, bytes));
         written.map_err(|source| RunDirectoryError::Write { path, source })
     };
-    let text = fs::read_to_string(file).map_err(|source| RunDirectoryError::Write {
+    let failed = |source| RunDirectoryError::Write {
         path: file.to_owned(),
         source,
-    })?;
+    };
+    let bytes = fs::read(file).map_err(failed)?;
+    let text = decode(bytes.clone()).map_err(|error| failed(io::Error::other(error)))?;
     let beside = file.parent().unwrap_or(Path::new(""));
-    let mut ladders: BTreeMap<String, String> = BTreeMap::new();
+    // As they are: XML says its encoding itself.
+    let mut ladders: BTreeMap<String, Vec<u8>> = BTreeMap::new();
     let _ = read_with(CLUSTER_FILE, &text, overrides, &mut |name| {
-        let ladder = named_file(beside, name)?;
+        let ladder = named_bytes(beside, name)?;
         ladders.insert(name.to_owned(), ladder.clone());
-        Ok(ladder)
+        decode(ladder).map_err(|error| error.to_string())
     });
-    write(CLUSTER_FILE, &text)?;
+    write(CLUSTER_FILE, &bytes)?;
     let mut kept = Kept {
         format: 1,
         ladders: BTreeMap::new(),
@@ -104,7 +107,7 @@ pub fn keep_cluster(run: &Path, file: &Path, cluster: &Cluster) -> Result<(), Ru
         kept.ladders.insert(name.clone(), file);
     }
     let json = serde_json::to_string_pretty(&kept)? + "\n";
-    write(KEPT_FILE, &json)
+    write(KEPT_FILE, json.as_bytes())
 }
 
 /// The cluster that was kept with a run.
@@ -119,8 +122,11 @@ pub fn kept_cluster(run: &Path) -> Result<Cluster, KeptError> {
         return Err(KeptError::NotKept { run });
     }
     let unreadable = |path: PathBuf, reason: String| KeptError::Read { path, reason };
-    let text =
-        fs::read_to_string(&file).map_err(|error| unreadable(file.clone(), error.to_string()))?;
+    let text = |path: &Path| {
+        let bytes = fs::read(path).map_err(|error| error.to_string())?;
+        decode(bytes).map_err(|error| error.to_string())
+    };
+    let cluster = text(&file).map_err(|reason| unreadable(file.clone(), reason))?;
     let kept_file = folder.join(KEPT_FILE);
     let kept: Kept = match fs::read(&kept_file) {
         Ok(bytes) => serde_json::from_slice(&bytes)
@@ -135,7 +141,8 @@ pub fn kept_cluster(run: &Path) -> Result<Cluster, KeptError> {
         security: kept.security,
         mode: kept.mode,
     };
-    let loaded = read_with(&file.display().to_string(), &text, overrides, &mut |name| {
+    let name = file.display().to_string();
+    let loaded = read_with(&name, &cluster, overrides, &mut |name| {
         let file = kept.ladders.get(name).map_or(name, String::as_str);
         named_file(&folder, file)
     });

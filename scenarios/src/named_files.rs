@@ -8,6 +8,8 @@ use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf, absolute};
 
+use understudy_diagnostic::decode;
+
 /// Environment variable with more folders that named files may lie in, separated as in `PATH`.
 pub const ALLOWED_FOLDERS: &str = "UNDERSTUDY_ALLOW_FILES";
 
@@ -16,6 +18,11 @@ pub const ALLOWED_FOLDERS: &str = "UNDERSTUDY_ALLOW_FILES";
 /// # Errors
 /// A file outside the folders that are allowed, or one that cannot be read.
 pub fn named_file(folder: &Path, name: &str) -> Result<String, String> {
+    decode(named_bytes(folder, name)?).map_err(|error| error.to_string())
+}
+
+/// As [`named_file`], the bytes as they are.
+pub(crate) fn named_bytes(folder: &Path, name: &str) -> Result<Vec<u8>, String> {
     let more = env::var_os(ALLOWED_FOLDERS).unwrap_or_default();
     let more: Vec<PathBuf> = env::split_paths(&more)
         .filter(|folder| !folder.as_os_str().is_empty())
@@ -23,7 +30,7 @@ pub fn named_file(folder: &Path, name: &str) -> Result<String, String> {
     read_below(folder, &more, name)
 }
 
-fn read_below(folder: &Path, more: &[PathBuf], name: &str) -> Result<String, String> {
+fn read_below(folder: &Path, more: &[PathBuf], name: &str) -> Result<Vec<u8>, String> {
     let folder = if folder.as_os_str().is_empty() {
         Path::new(".")
     } else {
@@ -48,7 +55,7 @@ fn read_below(folder: &Path, more: &[PathBuf], name: &str) -> Result<String, Str
     if !below(&real, |place| fs::canonicalize(place)) {
         return refused();
     }
-    fs::read_to_string(real).map_err(said)
+    fs::read(real).map_err(said)
 }
 
 /// A path from the root without `.` and `..`, as it is written.
@@ -83,6 +90,7 @@ mod tests {
         std::os::unix::fs::symlink(root.join("secret"), cell.join("link")).expect("a link");
         std::os::unix::fs::symlink("own", cell.join("inner")).expect("a link");
         let read = |name: &str| read_below(&cell, &[], name);
+        let bytes = |text: &str| Ok(text.as_bytes().to_vec());
         for (name, text) in [
             ("own", "cell/own"),
             ("ladders/deep", "cell/ladders/deep"),
@@ -90,7 +98,7 @@ mod tests {
             ("../cell/own", "cell/own"),
             ("inner", "cell/own"),
         ] {
-            assert_eq!(read(name).as_deref(), Ok(text), "{name}");
+            assert_eq!(read(name), bytes(text), "{name}");
         }
         let secret = root.join("secret").display().to_string();
         for name in [
@@ -107,7 +115,7 @@ mod tests {
         assert!(read("gone").expect_err("no file").contains("No such file"));
         let allowed = [root.join("cell-two")];
         let other = read_below(&cell, &allowed, "../cell-two/other");
-        assert_eq!(other.as_deref(), Ok("cell-two/other"));
+        assert_eq!(other, bytes("cell-two/other"));
         assert!(read_below(&cell, &allowed, "../secret").is_err());
         fs::remove_dir_all(root).expect("removed");
     }

@@ -3,6 +3,7 @@
 mod allocate;
 mod bench;
 mod book;
+mod bounded;
 mod campaign;
 mod check;
 mod convert;

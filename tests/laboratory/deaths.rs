@@ -110,7 +110,7 @@ fn every_kind_of_member_is_killed_from_outside_and_started_again_by_an_operator(
         }
     }
     let (status, document) = operate(&run, "robot", "status");
-    assert_eq!((status, code(&document)), (2, "U0617"), "{document:#}");
+    assert_eq!((status, code(&document)), (2, "U0621"), "{document:#}");
     signal(child.id(), Signal::SIGINT);
     let mut said = String::new();
     errors.read_to_string(&mut said).expect("text");

@@ -40,6 +40,8 @@ fn program(name: &str, group: Option<usize>, role: Role) -> Item {
             role,
             inputs: if role == Role::RemoteIo { 2 } else { 0 },
             outputs: if role == Role::RemoteIo { 1 } else { 0 },
+            analog_inputs: 0,
+            analog_outputs: 0,
             program,
             scan_within: None,
             ethernet: false,

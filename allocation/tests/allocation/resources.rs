@@ -26,6 +26,8 @@ rung {R_TRIG edge} (S m )
     let expected = Resources {
         inputs: 3,
         outputs: 2,
+        analog_inputs: 0,
+        analog_outputs: 0,
         memory_bits: 1,
         rungs: 4,
         contacts: 8,
@@ -99,4 +101,24 @@ fn the_vents_beside_the_paper() {
         });
     assert_eq!(third.collect::<Vec<_>>(), ["/v1", "/v2", "/v3"]);
     assert_eq!(program.rungs[2].coils[0].target, "no_vent".into());
+}
+
+/// As `level AT %IW0 : INT` and `speed AT %QW2 : INT` become.
+#[test]
+fn a_number_is_an_analog_channel_and_not_its_bits() {
+    let mut text = String::from(
+        "program tank\ninput full at %IX0.0\ninput tank.7\ninput tank.9\ninput one.0\n",
+    );
+    for bit in 0..32 {
+        text += &format!("input level.{bit}\noutput speed.{bit}\n");
+    }
+    for bit in 0..32 {
+        text += &format!("rung full tank.7 tank.9 one.0 level.{bit} ( speed.{bit} )\n");
+    }
+    let found = resources(&text);
+    assert_eq!((found.inputs, found.analog_inputs), (4, 1));
+    assert_eq!((found.outputs, found.analog_outputs), (0, 1));
+    assert_eq!(found.points(), 6);
+    let table = &Resources::table(&[found])[0];
+    assert!(table.contains(&("analog inputs", 1)), "{table:?}");
 }

@@ -114,6 +114,35 @@ pub(super) fn signals(used: &[Use], program: &mut Program, diagnostics: &mut Vec
     }
 }
 
+/// Says where the address of an edge is not the one that its symbol is declared with.
+pub(super) fn contradictions(used: &[Use], program: &Program, diagnostics: &mut Vec<Diagnostic>) {
+    let signals = program
+        .inputs
+        .iter()
+        .chain(&program.outputs)
+        .chain(&program.memory);
+    let declared: HashMap<&str, Option<&Address>> = signals
+        .map(|signal| (signal.name.as_str(), signal.address.as_ref()))
+        .collect();
+    for used in used {
+        let (Some(name), Some(text)) = (&used.name, &used.address) else {
+            continue;
+        };
+        let Some(known) = declared.get(name.as_str()) else {
+            continue;
+        };
+        let area = known.map_or(Area::Input, |known| known.area);
+        if address(text, area).as_ref() != *known {
+            let message = format!(
+                "the address `{}` is not kept: `{name}` is declared with {}",
+                text.as_str(),
+                known.map_or("no address".to_owned(), Address::to_string)
+            );
+            diagnostics.push(Diagnostic::warning("U1068", message, text.span()));
+        }
+    }
+}
+
 /// The paper's `000.02`, word and bit, or an address of the standard.
 fn address(text: &str, area: Area) -> Option<Address> {
     if let Some(text) = text.strip_prefix('%') {

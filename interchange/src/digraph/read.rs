@@ -12,12 +12,9 @@ use understudy_ladder::{
 };
 
 use super::Reading;
-use super::infer::{Names, Use, signals};
+use super::infer::{Names, Use, contradictions, signals};
 use super::network::{Network, network};
 use crate::plcopen::xml;
-
-/// Findings past which no more are said.
-const MAXIMUM_FINDINGS: usize = 200;
 
 /// By block and input.
 type Feeds = HashMap<(String, String), (Network, Range<usize>)>;
@@ -38,7 +35,6 @@ pub(super) fn read(text: &str) -> Reading {
     }
     let mut diagnostics = reader.diagnostics;
     diagnostics.sort_by_key(|found| found.span.start);
-    diagnostics.truncate(MAXIMUM_FINDINGS);
     Reading {
         program: (!has_errors(&diagnostics)).then_some(program),
         diagnostics,
@@ -54,10 +50,8 @@ struct Reader {
 
 impl Reader {
     fn error(&mut self, code: &'static str, message: impl Into<String>, span: Range<usize>) {
-        if self.diagnostics.len() < MAXIMUM_FINDINGS {
-            self.diagnostics
-                .push(Diagnostic::error(code, message, span));
-        }
+        self.diagnostics
+            .push(Diagnostic::error(code, message, span));
     }
 
     /// Says which children and attributes of `node` nobody reads.
@@ -82,10 +76,8 @@ impl Reader {
             }
         }
         for (message, span) in found {
-            if self.diagnostics.len() < MAXIMUM_FINDINGS {
-                self.diagnostics
-                    .push(Diagnostic::warning("U1066", message, span));
-            }
+            self.diagnostics
+                .push(Diagnostic::warning("U1066", message, span));
         }
     }
 
@@ -137,6 +129,8 @@ impl Reader {
         }
         if xml::child(root, "Signals").is_none() {
             signals(&used, &mut program, &mut self.diagnostics);
+        } else {
+            contradictions(&used, &program, &mut self.diagnostics);
         }
         program
     }
@@ -325,6 +319,7 @@ fn comments(node: Node<'_, '_>, name: &str) -> Vec<String> {
     xml::children(node, name)
         .map(|comment| {
             xml::text(comment)
+                .as_str()
                 .split_whitespace()
                 .collect::<Vec<_>>()
                 .join(" ")

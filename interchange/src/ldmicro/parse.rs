@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS, shortened};
 
 /// The largest file.
 const MAXIMUM_BYTES: usize = 16 << 20;
@@ -18,6 +18,8 @@ pub(super) struct File {
     pub(super) period: Option<Duration>,
     /// Names and pins, in the order of the list.
     pub(super) pins: Vec<(String, String)>,
+    /// Where each of them stands.
+    pub(super) pin_places: Vec<Range<usize>>,
     pub(super) rungs: Vec<Vec<Element>>,
 }
 
@@ -105,6 +107,11 @@ const COMPARISONS: [(&str, &str); 6] = [
     ("LEQ", "<="),
 ];
 
+/// Lines above the program that say how LDmicro compiles it.
+const SETTINGS: [&str; 7] = [
+    "CRYSTAL", "BAUD", "COMPILED", "MICRO", "VERSION", "RATE", "CONFIG",
+];
+
 const CALCULATIONS: [(&str, char); 4] = [("ADD", '+'), ("SUB", '-'), ("MUL", '*'), ("DIV", '/')];
 
 /// Everything that can be read, and everything that is wrong.
@@ -150,15 +157,18 @@ struct Parser<'a> {
 
 impl<'a> Parser<'a> {
     fn error(&mut self, code: &'static str, message: impl Into<String>, span: Range<usize>) {
-        if self.diagnostics.len() < super::MAXIMUM_FINDINGS {
-            self.diagnostics
-                .push(Diagnostic::error(code, message, span));
-        }
+        self.diagnostics
+            .push(Diagnostic::error(code, message, span));
     }
 
     fn next(&mut self) -> Option<(&'a str, Range<usize>)> {
         let &(start, line) = self.lines.get(self.place)?;
         self.place += 1;
+        if self.diagnostics.len() >= MAXIMUM_FINDINGS {
+            self.diagnostics.push(Diagnostic::too_many(start));
+            self.place = self.lines.len();
+            return None;
+        }
         Some((line, start..start + line.len()))
     }
 
@@ -190,10 +200,15 @@ impl<'a> Parser<'a> {
                 break;
             } else if let Some(cycle) = line.strip_prefix("CYCLE=") {
                 file.period = self.cycle(cycle, span);
-            } else if !line.contains('=') {
+            } else if line
+                .split_once('=')
+                .is_some_and(|(name, _)| SETTINGS.contains(&name.trim()))
+            {
+                // For the compiler of the microcontroller.
+            } else {
                 self.error(
                     "U1071",
-                    format!("`{}` is not understood here", shortened(line)),
+                    format!("`{}` is not understood here", shortened(line, 60)),
                     span,
                 );
             }
@@ -208,7 +223,10 @@ impl<'a> Parser<'a> {
             } else {
                 self.error(
                     "U1071",
-                    format!("a RUNG is expected, and `{}` stands here", shortened(line)),
+                    format!(
+                        "a RUNG is expected, and `{}` stands here",
+                        shortened(line, 60)
+                    ),
                     span,
                 );
             }
@@ -227,7 +245,7 @@ impl<'a> Parser<'a> {
         if period.is_none() {
             self.error(
                 "U1072",
-                format!("`{}` is no cycle time in microseconds", shortened(text)),
+                format!("`{}` is no cycle time in microseconds", shortened(text, 60)),
                 span,
             );
         }
@@ -240,12 +258,18 @@ impl<'a> Parser<'a> {
                 return;
             }
             match line.split_once(" at ") {
-                Some((name, pin)) => file
-                    .pins
-                    .push((name.trim().to_owned(), pin.trim().to_owned())),
+                Some((name, pin)) => {
+                    let (name, pin) = (name.trim(), pin.trim());
+                    if file.pins.iter().any(|(known, _)| known == name) {
+                        self.error("U1074", format!("`{name}` is twice in the list"), span);
+                        continue;
+                    }
+                    file.pins.push((name.to_owned(), pin.to_owned()));
+                    file.pin_places.push(span);
+                }
                 None => self.error(
                     "U1071",
-                    format!("`{}` is no name with its pin", shortened(line)),
+                    format!("`{}` is no name with its pin", shortened(line, 60)),
                     span,
                 ),
             }
@@ -327,7 +351,11 @@ impl<'a> Parser<'a> {
         }
         let words: Vec<&str> = line.split_whitespace().collect();
         let own = |place: usize| words.get(place).map(|word| (*word).to_owned());
-        let flag = |place: usize| words.get(place).map(|word| *word == "1");
+        let flag = |place: usize| match words.get(place) {
+            Some(&"1") => Some(true),
+            Some(&"0") => Some(false),
+            _ => None,
+        };
         let found = match words[0] {
             "COMMENT" => {
                 let text = line["COMMENT".len()..]
@@ -342,14 +370,15 @@ impl<'a> Parser<'a> {
                 .map(|(name, negated)| Kind::Contacts(name, negated)),
             "COIL" => own(1)
                 .zip(flag(2).zip(flag(3).zip(flag(4))))
-                .map(|(name, flags)| {
+                .and_then(|(name, flags)| {
                     let coil = match flags {
-                        (true, _) => Coil::Negated,
-                        (false, (true, _)) => Coil::Set,
+                        (true, (false, false)) => Coil::Negated,
+                        (false, (true, false)) => Coil::Set,
                         (false, (false, true)) => Coil::Reset,
                         (false, (false, false)) => Coil::Plain,
+                        _ => return None,
                     };
-                    Kind::Coil(name, coil)
+                    Some(Kind::Coil(name, coil))
                 }),
             "SHORT" => Some(Kind::Wire(true)),
             "OPEN" => Some(Kind::Wire(false)),
@@ -365,7 +394,11 @@ impl<'a> Parser<'a> {
             "RES" => own(1).map(Kind::Reset),
             "MOVE" => own(1).zip(own(2)).map(|(to, from)| Kind::Move(to, from)),
             "PERSIST" => {
-                let message = "PERSIST is not kept: the state of a circuit is kept by its copies";
+                let what = words.get(1).copied().unwrap_or_default();
+                let message = format!(
+                    "PERSIST of `{}` is not kept: the state of a circuit is kept by its copies",
+                    shortened(what, 60)
+                );
                 self.diagnostics
                     .push(Diagnostic::warning("U1075", message, span.clone()));
                 return None;
@@ -387,17 +420,34 @@ impl<'a> Parser<'a> {
                     let message = if is_known {
                         format!("{word} is not taken")
                     } else {
-                        format!("`{}` is no element that is known here", shortened(word))
+                        format!("`{}` is no element that is known here", shortened(word, 60))
                     };
                     self.error("U1073", message, span.clone());
                     return None;
                 }
             }
         };
+        // Later versions have further flags; 0 is what there was before.
+        let wanted = match &found {
+            None | Some(Kind::Comment(_)) => usize::MAX,
+            Some(Kind::Wire(_) | Kind::Edge(_) | Kind::MasterRelay | Kind::Parallel(_)) => 1,
+            Some(Kind::Reset(_)) => 2,
+            Some(Kind::Calculate(..)) => 4,
+            Some(Kind::Coil(..)) => 5,
+            Some(_) => 3,
+        };
+        if let Some(more) = words.iter().skip(wanted).find(|word| **word != "0") {
+            let message = format!(
+                "`{}` has more than its kind has: `{}`",
+                shortened(line, 60),
+                shortened(more, 60)
+            );
+            self.error("U1072", message, span.clone());
+        }
         if found.is_none() {
             self.error(
                 "U1072",
-                format!("`{}` has not what its kind needs", shortened(line)),
+                format!("`{}` has not what its kind needs", shortened(line, 60)),
                 span.clone(),
             );
         }
@@ -425,8 +475,4 @@ fn counter(counter: Counter, name: Option<String>, value: Option<String>) -> Opt
         .ok()
         .filter(|value| (-0x8000..0x8000).contains(value))?;
     Some(Kind::Counter(counter, name?, value))
-}
-
-fn shortened(text: &str) -> String {
-    text.chars().take(60).collect()
 }

@@ -211,6 +211,13 @@ impl Writer {
 
     /// The power behind the elements; nobody needs it where they are `last` on their rung.
     fn series(&mut self, series: &[Element], mut power: String, last: bool) -> String {
+        let acting = series.iter().rposition(acts).map_or(0, |place| place + 1);
+        let behind = series[acting..].iter();
+        for element in behind.filter(|element| last && !matches!(element.kind, Kind::Comment(_))) {
+            let message = "it has no effect: nothing that acts is behind it";
+            let found = Diagnostic::warning("U1075", message, element.span.clone());
+            self.diagnostics.push(found);
+        }
         for (place, element) in series.iter().enumerate() {
             let is_last = last && place + 1 == series.len();
             power = self.element(element, power, is_last);
@@ -298,7 +305,10 @@ impl Writer {
         }
     }
 
-    fn finish(self, file: &File) -> (Written, Vec<Diagnostic>) {
+    fn finish(mut self, file: &File) -> (Written, Vec<Diagnostic>) {
+        if !self.comments.is_empty() {
+            self.line(";", &(0..0));
+        }
         let mut diagnostics = self.diagnostics;
         let mut head = String::from("PROGRAM ldmicro\n");
         let pins: HashMap<&str, &str> = file
@@ -348,15 +358,12 @@ impl Writer {
             }
             head.push_str("  END_VAR\n");
         }
-        for (name, _) in file
-            .pins
-            .iter()
-            .filter(|(name, _)| !name.starts_with(['X', 'Y']))
-        {
+        let pins = file.pins.iter().zip(&file.pin_places);
+        for ((name, _), place) in pins.filter(|((name, _), _)| !name.starts_with(['X', 'Y'])) {
             let message = format!(
                 "`{name}` of the list is neither an input (X) nor an output (Y), and is not kept"
             );
-            diagnostics.push(Diagnostic::warning("U1075", message, 0..0));
+            diagnostics.push(Diagnostic::warning("U1075", message, place.clone()));
         }
         let shift = head.len();
         let places = self

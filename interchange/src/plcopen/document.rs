@@ -9,6 +9,8 @@ use std::time::Duration;
 
 use understudy_ladder::Name;
 
+use super::xml::Passage;
+
 pub(crate) use objects::CONDITION;
 pub(crate) use read::read;
 
@@ -22,6 +24,8 @@ pub(crate) struct Project {
     pub(crate) instances: Vec<Instance>,
     /// What the file has and nobody here asks for.
     pub(crate) ignored: Vec<Ignored>,
+    /// Written by a tool that declares no instances of blocks; it puts units where the schema has none.
+    pub(crate) lacks_instances: bool,
 }
 
 /// Something that is not kept, and does not change what the program does.
@@ -107,6 +111,15 @@ pub(crate) enum VariableType {
 }
 
 impl VariableType {
+    /// As it is written in Structured Text.
+    pub(crate) fn text(&self) -> String {
+        match self {
+            Self::Elementary(name) | Self::Foreign(name) => name.clone(),
+            Self::Range(name, lower, upper) => format!("{name} ({lower}..{upper})"),
+            Self::Derived(name) => name.to_string(),
+        }
+    }
+
     pub(crate) fn is_bool(&self) -> bool {
         matches!(self, Self::Elementary(name) if name == "BOOL")
     }
@@ -117,10 +130,8 @@ impl VariableType {
 pub(crate) enum Body {
     /// LD and FBD, and the networks of an SFC.
     Graph(Graph),
-    /// ST, with the place of its first letter.
-    StructuredText(Name),
-    /// IL, likewise.
-    InstructionList(Name),
+    StructuredText(Passage),
+    InstructionList(Passage),
 }
 
 /// Objects and the wires between them.
@@ -219,6 +230,7 @@ pub(crate) enum Condition {
 /// What a step does.
 #[derive(Debug)]
 pub(crate) struct Action {
+    pub(crate) span: Range<usize>,
     pub(crate) qualifier: Name,
     /// Of the qualifiers that take their time.
     pub(crate) duration: Option<Name>,

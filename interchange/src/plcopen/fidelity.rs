@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use understudy_ladder::{Element, Program, visit};
 
-use super::document::{ActionContent, Body, Condition, Ignored, Kind, Pou, Project};
+use super::document::{ActionContent, Body, Condition, Ignored, Kind, Pou, Project, Section};
 use super::units::used;
 
 /// What was kept, and what was not.
@@ -121,6 +121,22 @@ impl Fidelity {
                 self.notes.push(Note {
                     message,
                     span: other.name.span(),
+                });
+            }
+        }
+        for global in &project.globals {
+            let is_used = used.iter().flat_map(|pou| &pou.variables).any(|variable| {
+                variable.section == Section::External
+                    && variable.name.eq_ignore_ascii_case(&global.name)
+            });
+            if !is_used {
+                let message = format!(
+                    "the global variable `{}`, which `{}` does not declare as external, is not kept",
+                    global.name, pou.name
+                );
+                self.notes.push(Note {
+                    message,
+                    span: global.name.span(),
                 });
             }
         }

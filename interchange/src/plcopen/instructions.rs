@@ -15,10 +15,10 @@ use std::collections::HashSet;
 use std::ops::Range;
 
 use understudy_diagnostic::Diagnostic;
-use understudy_ladder::Name;
 
 use super::plan::MAXIMUM_JUMPS;
 use super::statements::{OPERATORS, Statements};
+use super::xml::Passage;
 
 /// Operators in each other past which a result is held.
 const MAXIMUM_DEPTH: usize = 12;
@@ -85,7 +85,7 @@ struct List<'s, 'a> {
 
 impl Statements<'_> {
     /// The statements of an instruction list.
-    pub(crate) fn instruction_list(&mut self, text: &Name, diagnostics: &mut Vec<Diagnostic>) {
+    pub(crate) fn instruction_list(&mut self, text: &Passage, diagnostics: &mut Vec<Diagnostic>) {
         let mut list = List {
             own: self,
             result: None,
@@ -97,7 +97,8 @@ impl Statements<'_> {
         for instruction in instructions(text) {
             list.instruction(&instruction);
         }
-        let end = text.span().end..text.span().end;
+        let end = text.span().end;
+        let end = end..end;
         if !list.open.is_empty() {
             list.error(
                 "U1017",
@@ -383,10 +384,10 @@ fn called(operand: &str) -> String {
 }
 
 /// The lines of a list; a call goes on until its bracket is closed.
-fn instructions(text: &Name) -> Vec<Instruction> {
-    let clear = without_comments(text);
+fn instructions(text: &Passage) -> Vec<Instruction> {
+    let clear = without_comments(text.as_str());
     let mut found: Vec<Instruction> = Vec::new();
-    let mut at = text.span().start;
+    let mut at = 0;
     let mut open = 0_usize;
     for line in clear.split_inclusive('\n') {
         let start = at + (line.len() - line.trim_start().len());
@@ -395,7 +396,7 @@ fn instructions(text: &Name) -> Vec<Instruction> {
         if line.is_empty() {
             continue;
         }
-        let span = start..start + line.len();
+        let span = text.place(start..start + line.len());
         let count = |letter| line.matches(letter).count();
         if let Some(call) = found.last_mut().filter(|_| open > 0) {
             call.operand.push(' ');

@@ -18,7 +18,7 @@ use understudy_ladder::{
 
 use self::calls::Pending;
 use self::scope::{Binding, Scope};
-use super::document::{Edge, Ignored, Modifier, Pou, Storage, Variable};
+use super::document::{Edge, Ignored, Modifier, Pou, Project, Storage};
 use super::plan::{Action, Plan};
 use super::power::Power;
 
@@ -36,9 +36,10 @@ pub(crate) struct Drawn {
 }
 
 /// Draws the plan of a program that runs every `period`.
-pub(crate) fn draw(pou: &Pou, globals: &[Variable], plan: &Plan, period: Duration) -> Drawn {
+pub(crate) fn draw(project: &Project, pou: &Pou, plan: &Plan, period: Duration) -> Drawn {
     let mut drawing = Drawing {
-        scope: Scope::new(pou, globals),
+        project,
+        scope: Scope::new(pou, &project.globals),
         plan,
         period,
         program: Program {
@@ -95,6 +96,7 @@ pub(crate) fn draw(pou: &Pou, globals: &[Variable], plan: &Plan, period: Duratio
 }
 
 struct Drawing<'a> {
+    project: &'a Project,
     scope: Scope<'a>,
     plan: &'a Plan,
     /// From one scan to the next.

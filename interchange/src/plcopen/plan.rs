@@ -72,6 +72,8 @@ pub(crate) enum Action {
 pub(crate) struct Call {
     pub(crate) type_name: Name,
     pub(crate) instance: Name,
+    /// The file names the instance.
+    pub(crate) is_named: bool,
     pub(crate) inputs: Vec<Input>,
     /// The power at EN; without it the block does not act.
     pub(crate) enable: Option<Power>,

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use std::sync::LazyLock;
 
 use roxmltree::Node;
-use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::{Diagnostic, shortened};
 
 use self::rules::{Particle, Rules, Type};
 use super::xml::{attribute, elements, start_tag};
@@ -146,7 +146,7 @@ impl<'a> Validator<'a> {
                 let message = format!(
                     "the attribute `{}` of `{name}` is {:?}, and that is not {kind}",
                     given.name(),
-                    shortened(given.value())
+                    shortened(given.value(), 40)
                 );
                 self.find(message, node);
             } else if expected.kind == "ID" {
@@ -246,12 +246,4 @@ impl<'a> Validator<'a> {
             *place += 1;
         }
     }
-}
-
-fn shortened(text: &str) -> String {
-    let mut short: String = text.chars().take(40).collect();
-    if short.len() < text.len() {
-        short.push('…');
-    }
-    short
 }

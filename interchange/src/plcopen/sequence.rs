@@ -16,8 +16,9 @@ use self::structure::{Structure, structure};
 use super::document::{
     Action, ActionContent, Body, Condition, Graph, Kind, Part, Pou, Project, Transition,
 };
-use super::statements::{Statements, Text};
+use super::statements::Statements;
 use super::units::{Lowered, network};
+use super::xml::Passage;
 
 /// Writes the statements of a chart.
 pub(super) fn write(
@@ -237,16 +238,13 @@ impl Chart<'_, '_, '_> {
                 }
             }
             Body::StructuredText(text) => {
-                let bare = text
-                    .trim()
-                    .trim_start_matches(":=")
-                    .trim_end_matches(';')
-                    .trim();
-                let offset = text.find(bare).unwrap_or(0);
-                let start = text.span().start + offset;
+                let whole = text.as_str();
+                let bare = whole.trim().trim_start_matches(":=").trim_start();
+                let start = whole.trim_end().len() - bare.len();
+                let bare = bare.trim_end_matches(|end: char| end == ';' || end.is_whitespace());
                 self.line(&format!("{bit} := ("), place);
                 self.statements
-                    .verbatim(&Name::at(bare, start..start + bare.len()));
+                    .verbatim(&text.slice(start..start + bare.len()));
                 self.line(");\n", place);
             }
             Body::InstructionList(text) => {
@@ -271,7 +269,12 @@ impl Chart<'_, '_, '_> {
             };
             for action in actions {
                 let (name, body) = match &action.content {
-                    ActionContent::Missing => continue,
+                    ActionContent::Missing => {
+                        let message = "the action does nothing: it names no action and no variable";
+                        let found = Diagnostic::warning("U1023", message, action.span.clone());
+                        self.lowered.diagnostics.push(found);
+                        continue;
+                    }
                     ActionContent::Inline(body) => (None, Some(body)),
                     ActionContent::Reference(name) => {
                         let part = find(&self.pou.actions, name);
@@ -404,26 +407,18 @@ impl Chart<'_, '_, '_> {
 
 impl Statements<'_> {
     /// A text of the file as it stands, but for the names of steps.
-    fn verbatim(&mut self, text: &Name) {
-        let taken = Text::verbatim(text);
-        let mut rest = text.span().start;
-        for line in taken.body.split_inclusive('\n') {
-            self.words(line, rest);
-            rest += line.len();
-        }
-    }
-
-    fn words(&mut self, line: &str, start: usize) {
+    fn verbatim(&mut self, text: &Passage) {
         let is_word = |letter: char| letter.is_alphanumeric() || matches!(letter, '_' | '.');
+        let whole = text.as_str();
         let mut from = 0;
-        while from < line.len() {
-            let first = line[from..].chars().next().is_some_and(is_word);
-            let length = line[from..]
-                .find(|letter| is_word(letter) != first)
-                .unwrap_or(line.len() - from);
-            let word = &line[from..from + length];
-            self.name(&Name::at(word, start + from..start + from + length));
-            from += length;
+        while from < whole.len() {
+            let first = whole[from..].chars().next().is_some_and(is_word);
+            let length = whole[from..].find(|letter| is_word(letter) != first);
+            let next = length.map_or(whole.len(), |length| from + length);
+            let word = &whole[from..next];
+            let place = text.place(from..next);
+            self.name(&Name::at(word, place));
+            from = next;
         }
     }
 }

@@ -336,8 +336,10 @@ impl<'a> Statements<'a> {
 
     /// A variable as it is called here.
     pub(crate) fn name(&mut self, name: &Name) {
-        let renamed = self.renamed.get(&name.to_uppercase()).cloned();
-        self.push(renamed.as_deref().unwrap_or(name), &name.span());
+        match self.renamed.get(&name.to_uppercase()).cloned() {
+            Some(renamed) => self.push(&renamed, &name.span()),
+            None => self.text.copy(name, name.span()),
+        }
     }
 
     pub(crate) fn value(&mut self, power: &Power, span: &Range<usize>) {

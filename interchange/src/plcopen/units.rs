@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use understudy_diagnostic::{Diagnostic, Severity, has_errors};
-use understudy_ladder::Program;
+use understudy_ladder::{Name, Program};
 
 use super::document::{
     Body, Graph, Ignored, Language, Pou, PouKind, Project, Section, Variable, VariableType,
@@ -61,10 +61,11 @@ pub(crate) fn lower(project: &Project, pou: &Pou) -> Lowered {
             .cloned()
             .collect();
         let (_, found) = lower_body(&unit.callable, "", &rest);
-        let errors = found
+        // Beside errors, what is not kept: the program is not as the file has it.
+        let told = found
             .into_iter()
-            .filter(|found| found.severity == Severity::Error);
-        lowered.diagnostics.extend(placed(unit, errors));
+            .filter(|found| found.severity == Severity::Error || found.code == "U1055");
+        lowered.diagnostics.extend(placed(unit, told));
     }
     if has_errors(&lowered.diagnostics) {
         return lowered;
@@ -130,7 +131,7 @@ fn mentions(pou: &Pou, name: &str) -> bool {
             matches!(&object.kind, super::document::Kind::Block(block) if block.type_name.eq_ignore_ascii_case(name))
         }),
         Body::StructuredText(text) | Body::InstructionList(text) => {
-            words(text).any(|word| word.eq_ignore_ascii_case(name))
+            words(text.as_str()).any(|word| word.eq_ignore_ascii_case(name))
         }
     })
 }
@@ -185,10 +186,11 @@ fn unit<'a>(project: &'a Project, pou: &'a Pou, lowered: &mut Lowered) -> Option
     // An instance that only its block names.
     for (name, kind) in instances(pou) {
         if declared.insert(name.to_uppercase(), ()).is_none() {
+            lowered.diagnostics.push(undeclared(project, &name, &kind));
             variables.push(local(&name, &kind));
         }
     }
-    let result = pou.result.as_ref().map(type_text);
+    let result = pou.result.as_ref().map(VariableType::text);
     let callable = Callable {
         name: pou.name.to_string(),
         result: if pou.kind == PouKind::Function {
@@ -228,7 +230,24 @@ pub(crate) fn is_block(project: &Project, name: &str) -> bool {
             .any(|pou| pou.kind == PouKind::FunctionBlock && pou.name.eq_ignore_ascii_case(name))
 }
 
-fn instances(pou: &Pou) -> Vec<(String, String)> {
+/// The finding on an instance of a block that no variable declares.
+pub(crate) fn undeclared(project: &Project, instance: &Name, kind: &str) -> Diagnostic {
+    let message = format!("the block `{instance}` is not declared");
+    let (found, help) = if project.lacks_instances {
+        let message = format!("{message}; it is taken as a {kind} of its own");
+        (Diagnostic::warning("U1012", message, instance.span()), "")
+    } else {
+        (
+            Diagnostic::error("U1012", message, instance.span()),
+            ", or leave the name out",
+        )
+    };
+    found.with_help(format!(
+        "declare the variable `{instance}` of type {kind}{help}"
+    ))
+}
+
+fn instances(pou: &Pou) -> Vec<(Name, String)> {
     let parts = pou
         .actions
         .iter()
@@ -241,7 +260,7 @@ fn instances(pou: &Pou) -> Vec<(String, String)> {
             if let super::document::Kind::Block(block) = &object.kind
                 && let Some(instance) = &block.instance
             {
-                found.push((instance.to_string(), block.type_name.to_string()));
+                found.push((instance.clone(), block.type_name.to_string()));
             }
         }
     }
@@ -288,7 +307,7 @@ fn declaration(
         ignore(format!(
             "`{}`, a {} that nothing uses,",
             variable.name,
-            type_text(&declared.kind)
+            declared.kind.text()
         ));
         return None;
     }
@@ -311,7 +330,7 @@ fn declaration(
     Some(structured_text::Variable {
         name: variable.name.to_string(),
         class,
-        type_name: type_text(&declared.kind),
+        type_name: declared.kind.text(),
         initial: initial.map(|initial| match (&declared.kind, initial.as_str()) {
             (kind, "0") if kind.is_bool() => "FALSE".to_owned(),
             (kind, "1") if kind.is_bool() => "TRUE".to_owned(),
@@ -321,14 +340,6 @@ fn declaration(
         constant: declared.constant,
         description: declared.documentation.clone(),
     })
-}
-
-fn type_text(kind: &VariableType) -> String {
-    match kind {
-        VariableType::Elementary(name) | VariableType::Foreign(name) => name.clone(),
-        VariableType::Range(name, lower, upper) => format!("{name} ({lower}..{upper})"),
-        VariableType::Derived(name) => name.to_string(),
-    }
 }
 
 /// The type of a variable, of an output of an instance, or of what a function answers.
@@ -341,7 +352,7 @@ fn type_of(project: &Project, pou: &Pou, name: &str) -> Option<String> {
         variable.map(|variable| variable.kind.clone())
     };
     if let Some(kind) = find(pou, name) {
-        return Some(type_text(&kind));
+        return Some(kind.text());
     }
     let unit = |kind: &str| {
         project
@@ -350,7 +361,7 @@ fn type_of(project: &Project, pou: &Pou, name: &str) -> Option<String> {
             .find(|pou| pou.name.eq_ignore_ascii_case(kind))
     };
     if let Some(function) = unit(name) {
-        return function.result.as_ref().map(type_text);
+        return function.result.as_ref().map(VariableType::text);
     }
     let (instance, pin) = name.split_once('.')?;
     let VariableType::Derived(kind) = find(pou, instance)? else {
@@ -364,5 +375,5 @@ fn type_of(project: &Project, pou: &Pou, name: &str) -> Option<String> {
         };
         return Some(kind.to_owned());
     }
-    find(unit(&kind)?, pin).map(|kind| type_text(&kind))
+    find(unit(&kind)?, pin).map(|kind| kind.text())
 }

@@ -1,10 +1,14 @@
 //! XML with bounds: no document type, so no entities but the five of XML itself; at most so many bytes, nodes and levels.
 
+mod passage;
+
 use std::ops::Range;
 
 use roxmltree::{Document, Node, ParsingOptions};
 use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Name;
+
+pub(crate) use passage::Passage;
 
 /// The largest file in bytes.
 pub const MAXIMUM_BYTES: usize = 16 << 20;
@@ -122,34 +126,19 @@ pub(crate) fn attribute(node: Node<'_, '_>, name: &str) -> Option<Name> {
     Some(Name::at(attribute.value().trim(), attribute.range_value()))
 }
 
-/// The text of an element and of those in it, with the place of its first letter.
-pub(crate) fn text(node: Node<'_, '_>) -> Name {
-    let mut text = String::new();
-    let mut span = None;
-    for part in node.descendants().filter(Node::is_text) {
-        let content = part.text().unwrap_or_default();
-        if !content.trim().is_empty() && span.is_none() {
-            let range = part.range();
-            let raw = &node.document().input_text()[range.clone()];
-            let lead = raw.find(content).unwrap_or(0);
-            span = Some(range.start + lead..range.start + lead + content.len().min(raw.len()));
-        }
-        text.push_str(content);
-    }
-    let span = span.unwrap_or_else(|| start_tag(node));
-    Name::at(text, span)
+/// The text of an element and of those in it.
+pub(crate) fn text(node: Node<'_, '_>) -> Passage {
+    Passage::of(node)
 }
 
-/// The text of an element without white space around it, with its exact place.
+/// The text of an element without white space around it; where there is none, at the element.
 pub(crate) fn word(node: Node<'_, '_>) -> Name {
     let whole = text(node);
-    let trimmed = whole.trim();
-    let lead = whole.len() - whole.trim_start().len();
-    let start = whole.span().start + lead;
-    let end = if trimmed.is_empty() {
-        whole.span().end
-    } else {
-        start + trimmed.len()
-    };
-    Name::at(trimmed, start..end)
+    let trimmed = whole.as_str().trim();
+    if trimmed.is_empty() {
+        return Name::at("", start_tag(node));
+    }
+    let lead = whole.as_str().len() - whole.as_str().trim_start().len();
+    let span = whole.place(lead..lead + trimmed.len());
+    Name::at(trimmed, span)
 }

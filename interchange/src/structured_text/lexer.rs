@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS};
 use understudy_ladder::MAXIMUM_NAME_LENGTH;
 
 /// What one lexeme is.
@@ -57,6 +57,10 @@ pub(super) fn lex(text: &str) -> (Vec<Placed>, Vec<Diagnostic>) {
     let mut comments = Vec::new();
     let mut line_broken = true;
     loop {
+        if lexer.diagnostics.len() >= MAXIMUM_FINDINGS {
+            lexer.diagnostics.push(Diagnostic::too_many(lexer.place));
+            break;
+        }
         let rest = lexer.rest();
         let Some(character) = rest.chars().next() else {
             break;

@@ -8,7 +8,7 @@ mod statement;
 use std::collections::HashSet;
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS};
 use understudy_ladder::Name;
 
 use super::lexer::{Lexeme, Placed, lex};
@@ -19,9 +19,6 @@ pub(super) const MAXIMUM_TEXT_BYTES: usize = 16 << 20;
 
 /// The deepest nesting of brackets and statements.
 pub(super) const MAXIMUM_NESTING: usize = 48;
-
-/// Findings of one text past which no more are said.
-pub(super) const MAXIMUM_FINDINGS: usize = 200;
 
 /// Words of the language that no variable can have for its name.
 const KEYWORDS: [&str; 52] = [
@@ -177,7 +174,6 @@ impl Parser {
         let mut diagnostics = self.diagnostics;
         diagnostics.retain(|found| seen.insert((found.code, found.span.clone())));
         diagnostics.sort_by_key(|found| found.span.start);
-        diagnostics.truncate(MAXIMUM_FINDINGS);
         diagnostics
     }
 
@@ -208,8 +204,14 @@ impl Parser {
 
     /// Steps over a lexeme, never over the end.
     fn skip(&mut self) {
-        if *self.peek() != Lexeme::End {
-            self.place += 1;
+        if *self.peek() == Lexeme::End {
+            return;
+        }
+        self.place += 1;
+        if self.diagnostics.len() >= MAXIMUM_FINDINGS {
+            let place = self.span().start;
+            self.diagnostics.push(Diagnostic::too_many(place));
+            self.place = self.lexemes.len() - 1;
         }
     }
 

@@ -17,13 +17,13 @@ use std::ops::Range;
 use std::rc::Rc;
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS};
 use understudy_ladder::{KEYWORDS, MAXIMUM_NAME_LENGTH, Name};
 
 use self::leave::Left;
 use self::types::Types;
 use self::uses::UsesByName;
-use super::parser::{MAXIMUM_FINDINGS, parse};
+use super::parser::parse;
 use super::program::{Cell, Resolved, Step};
 use super::syntax::{Declaration, Unit};
 
@@ -168,8 +168,15 @@ impl Resolver {
             finding.span = place.clone();
         }
         let known = (finding.code, finding.span.start, finding.message.clone());
-        if self.diagnostics.len() < MAXIMUM_FINDINGS && self.findings.insert(known) {
-            self.diagnostics.push(finding);
+        if self.diagnostics.len() < MAXIMUM_FINDINGS {
+            if self.findings.insert(known) {
+                self.diagnostics.push(finding);
+            }
+        } else if self.diagnostics.len() == MAXIMUM_FINDINGS {
+            // An error, so that nothing is made of what nobody was told about.
+            let place = finding.span.start;
+            self.diagnostics.push(Diagnostic::too_many(place));
+            self.is_full = true;
         }
     }
 

@@ -1,5 +1,6 @@
 //! PLCopen XML, from outside.
 
+mod ablation;
 mod bad_input;
 mod instruction_lists;
 mod jumps;

@@ -1,7 +1,7 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
+use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS, shortened};
 
 use super::{MAXIMUM_LABEL, MAXIMUM_STATES, Vocal};
 use crate::alphabet::Label;
@@ -22,6 +22,10 @@ pub struct Read {
 pub fn read_ads(text: &str) -> Read {
     let mut reader = Reader::default();
     for line in lines(text) {
+        if reader.diagnostics.len() >= MAXIMUM_FINDINGS {
+            reader.diagnostics.push(Diagnostic::too_many(line.start));
+            break;
+        }
         reader.line(text, line);
     }
     reader.finish(text)
@@ -106,6 +110,9 @@ fn words(text: &str, line: Range<usize>) -> Vec<Range<usize>> {
         })
         .collect()
 }
+
+/// The longest line that is quoted, in characters; a heading is shorter.
+const MAXIMUM_QUOTE: usize = 120;
 
 /// A number with the place where it stands.
 type Placed<T> = (T, Range<usize>);
@@ -198,10 +205,11 @@ impl Reader {
             Section::Vocal => "a state and its output",
             Section::Transitions => "exit state, label, entrance state",
         };
+        let line = shortened(line, MAXIMUM_QUOTE);
         let message = format!("\"{line}\" is neither a heading nor a list of numbers from 0 up");
         let mut diagnostic =
             Diagnostic::error("U0812", message, word).with_label(format!("expected {expected}"));
-        if let Some(near) = Section::nearest(line) {
+        if let Some(near) = Section::nearest(&line) {
             diagnostic = diagnostic.with_help(format!("perhaps \"{}\" is meant", near.heading()));
             // So that what follows is not taken for what it is not.
             self.section = Some(near);

@@ -13,6 +13,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use understudy_bus::closed_segments;
+use understudy_diagnostic::shortened;
 use understudy_scenarios::Record;
 
 use super::Trouble;
@@ -22,6 +23,9 @@ const PIECE: usize = 1 << 20;
 
 /// A line without an end is left out when it has so many bytes.
 const LONGEST_LINE: usize = 1 << 20;
+
+/// Characters of the reason why a line is no record.
+const LONGEST_REASON: usize = 200;
 
 #[derive(Debug)]
 pub(super) struct Follower {
@@ -236,8 +240,9 @@ impl Follower {
             }
             if !std::mem::take(&mut self.skipping) && self.line.len() > 1 {
                 let record = serde_json::from_slice(&self.line);
+                // The message may quote the line.
                 take(record.map_err(|error: serde_json::Error| Trouble::Line {
-                    reason: error.to_string(),
+                    reason: shortened(&error.to_string(), LONGEST_REASON).into_owned(),
                 }));
                 taken += 1;
             }

@@ -81,22 +81,44 @@ fn object(reader: &mut Reader, node: Node<'_, '_>) -> Option<Object> {
                 inputs.push(input(reader, part, Name::default(), Modifier::default()))
             }
             "connectionPointOut" => {
+                unread_expression(reader, part);
                 let name = attribute(part, "formalParameter").unwrap_or_default();
                 outputs.push(Pin {
                     name,
                     ..Pin::default()
                 });
             }
-            "inputVariables" => inputs.extend(pins(reader, part)),
+            "inputVariables" => {
+                let pins = pins(reader, part);
+                inputs.extend(pins.into_iter().map(|(pin, node)| {
+                    if pin.modifier.storage.is_some() {
+                        changed(reader, "an input that is set or reset", node);
+                    }
+                    pin
+                }));
+            }
             "inOutVariables" => {
-                let both = pins(reader, part);
+                let both = pins(reader, part).into_iter();
+                let both: Vec<Pin> = both.map(|(pin, _)| pin).collect();
                 outputs.extend(both.iter().map(|pin| Pin {
                     wires: Vec::new(),
                     ..pin.clone()
                 }));
                 inputs.extend(both);
             }
-            "outputVariables" => outputs.extend(pins(reader, part)),
+            "outputVariables" => {
+                let pins = pins(reader, part);
+                outputs.extend(pins.into_iter().map(|(pin, node)| {
+                    if pin.modifier.storage.is_some() || pin.modifier.edge.is_some() {
+                        changed(
+                            reader,
+                            "an output that is set or reset, or sees edges,",
+                            node,
+                        );
+                    }
+                    pin
+                }));
+            }
             "addData" => reader.ignore("additional data of a tool", part),
             "documentation" => reader.ignore("the documentation of an object", part),
             _ => {}
@@ -107,7 +129,12 @@ fn object(reader: &mut Reader, node: Node<'_, '_>) -> Option<Object> {
     let kind = match name {
         "leftPowerRail" => Kind::LeftRail,
         "rightPowerRail" => Kind::RightRail,
-        "contact" => Kind::Contact(variable(), modifier(node, "")),
+        "contact" => {
+            if modifier(node, "").storage.is_some() {
+                changed(reader, "a contact that sets or resets", node);
+            }
+            Kind::Contact(variable(), modifier(node, ""))
+        }
         "coil" => Kind::Coil(variable(), modifier(node, "")),
         "block" => Kind::Block(Block {
             type_name: reader.needed(node, "typeName")?,
@@ -124,6 +151,7 @@ fn object(reader: &mut Reader, node: Node<'_, '_>) -> Option<Object> {
             child(node, "content")
                 .map(text)
                 .unwrap_or_default()
+                .as_str()
                 .trim()
                 .to_owned(),
         ),
@@ -163,26 +191,45 @@ fn object(reader: &mut Reader, node: Node<'_, '_>) -> Option<Object> {
     })
 }
 
-fn pins(reader: &mut Reader, list: Node<'_, '_>) -> Vec<Pin> {
+/// The pins of a list with their elements.
+fn pins<'a, 'i>(reader: &mut Reader, list: Node<'a, 'i>) -> Vec<(Pin, Node<'a, 'i>)> {
     let mut pins = Vec::new();
     for node in children(list, "variable") {
         let name =
             attribute(node, "formalParameter").unwrap_or_else(|| Name::at("", start_tag(node)));
         let modifier = modifier(node, "");
-        match child(node, "connectionPointIn") {
-            Some(point) => pins.push(input(reader, point, name, modifier)),
-            None => pins.push(Pin {
+        if let Some(point) = child(node, "connectionPointOut") {
+            unread_expression(reader, point);
+        }
+        let pin = match child(node, "connectionPointIn") {
+            Some(point) => input(reader, point, name, modifier),
+            None => Pin {
                 name,
                 modifier,
                 wires: Vec::new(),
-            }),
-        }
+            },
+        };
+        pins.push((pin, node));
     }
     pins
 }
 
+/// A variable at a connection point, in place of an object of its own.
+fn unread_expression(reader: &mut Reader, point: Node<'_, '_>) {
+    if let Some(expression) = child(point, "expression") {
+        let message = "an expression at a connection point is not taken".to_owned();
+        reader.error("U1010", message, expression);
+    }
+}
+
+/// A modifier that the object cannot have here.
+fn changed(reader: &mut Reader, what: &str, node: Node<'_, '_>) {
+    reader.error("U1010", format!("{what} is not supported"), node);
+}
+
 fn input(reader: &mut Reader, point: Node<'_, '_>, name: Name, modifier: Modifier) -> Pin {
     let mut wires = Vec::new();
+    unread_expression(reader, point);
     for node in elements(point) {
         match node.tag_name().name() {
             "connection" => match attribute(node, "refLocalId").and_then(|id| id.parse().ok()) {
@@ -197,11 +244,6 @@ fn input(reader: &mut Reader, point: Node<'_, '_>, name: Name, modifier: Modifie
                     node,
                 ),
             },
-            "expression" => reader.error(
-                "U1010",
-                "an expression at a connection point is not taken".to_owned(),
-                node,
-            ),
             _ => {}
         }
     }
@@ -301,7 +343,15 @@ fn actions(reader: &mut Reader, node: Node<'_, '_>) -> Vec<Action> {
                 _ => {}
             }
         }
+        if attribute(action, "indicator").is_some_and(|name| !name.is_empty()) {
+            reader.error(
+                "U1010",
+                "an action with an indicator is not supported".to_owned(),
+                action,
+            );
+        }
         actions.push(Action {
+            span: start_tag(action),
             qualifier,
             duration: attribute(action, "duration"),
             content,

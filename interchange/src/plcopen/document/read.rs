@@ -1,8 +1,11 @@
 //! From elements to a [`Project`]: projects, units, variables, types.
 
+use std::collections::HashMap;
+use std::time::Duration;
+
 use roxmltree::Node;
 use understudy_diagnostic::Diagnostic;
-use understudy_ladder::Name;
+use understudy_ladder::{Name, PERIODS};
 
 use super::objects::graph;
 use super::{
@@ -39,12 +42,16 @@ pub(crate) fn read(root: Node<'_, '_>) -> (Project, Vec<Diagnostic>) {
                 }
             }
             // Some tools leave the types out.
-            "pous" => reader.pous(part),
+            "pous" => {
+                reader.project.lacks_instances = true;
+                reader.pous(part);
+            }
             "instances" => reader.instances(part),
             "addData" => reader.ignore("additional data of a tool", part),
             _ => {}
         }
     }
+    reader.unique(&reader.project.globals.clone());
     (reader.project, reader.diagnostics)
 }
 
@@ -139,7 +146,30 @@ impl Reader {
                 _ => {}
             }
         }
+        self.unique(&unit.variables);
         unit
+    }
+
+    /// Reports variables of one scope whose names are the same but for their case.
+    fn unique(&mut self, variables: &[Variable]) {
+        let mut known: HashMap<String, &Name> = HashMap::new();
+        for variable in variables {
+            let name = &variable.name;
+            if let Some(first) = known.insert(name.to_uppercase(), name) {
+                let error = Diagnostic::error(
+                    "U1003",
+                    format!("the variables `{first}` and `{name}` have one name"),
+                    name.span(),
+                );
+                self.diagnostics.push(
+                    error
+                        .with_related(first.span(), "the first is here")
+                        .with_help(
+                            "names of IEC 61131-3 do not distinguish case; rename one of the two",
+                        ),
+                );
+            }
+        }
     }
 
     fn parts(&mut self, list: Node<'_, '_>, element: &str) -> Vec<Part> {
@@ -154,6 +184,16 @@ impl Reader {
     }
 
     pub(super) fn body(&mut self, body: Node<'_, '_>) -> Option<Body> {
+        let is_language = |part: &Node<'_, '_>| {
+            matches!(part.tag_name().name(), "LD" | "FBD" | "SFC" | "ST" | "IL")
+        };
+        if let Some(second) = elements(body).filter(is_language).nth(1) {
+            let message = "a body in more than one language is not supported".to_owned();
+            self.error("U1010", message, second);
+        }
+        for part in elements(body).filter(|part| part.tag_name().name() == "addData") {
+            self.ignore("additional data of a tool", part);
+        }
         for language in elements(body) {
             let found = match language.tag_name().name() {
                 "LD" => Body::Graph(graph(self, language, Language::Ladder)),
@@ -218,6 +258,9 @@ impl Reader {
                 }
                 simple
             });
+            for part in elements(node).filter(|part| part.tag_name().name() == "addData") {
+                self.ignore(format!("additional data of a tool on `{name}`"), part);
+            }
             into.push(Variable {
                 name,
                 section,
@@ -288,7 +331,8 @@ impl Reader {
                         .filter(|task| task.tag_name().name() == "task");
                     let interval = task
                         .and_then(|task| attribute(task, "interval"))
-                        .and_then(|interval| time(&interval));
+                        .filter(|interval| !interval.is_empty())
+                        .and_then(|interval| self.interval(&interval));
                     self.project.instances.push(Instance {
                         type_name,
                         interval,
@@ -304,6 +348,24 @@ impl Reader {
                 _ => {}
             }
         }
+    }
+}
+
+impl Reader {
+    /// The time from one scan to the next.
+    fn interval(&mut self, text: &Name) -> Option<Duration> {
+        let interval = time(text).filter(|interval| PERIODS.contains(interval));
+        if interval.is_none() {
+            let message = format!(
+                "the interval `{text}` of the task is not a time from {:?} to {:?}",
+                PERIODS.start(),
+                PERIODS.end()
+            );
+            let error = Diagnostic::error("U1011", message, text.span());
+            self.diagnostics
+                .push(error.with_help("write it as a literal such as T#20ms"));
+        }
+        interval
     }
 }
 

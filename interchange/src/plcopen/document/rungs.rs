@@ -37,6 +37,38 @@ pub(super) fn rung(
             ..Pin::default()
         };
         let variable = attribute(part, "variable").unwrap_or_default();
+        let known = match part.tag_name().name() {
+            "block" => &["localId", "lineNumber", "typeName", "instanceName"][..],
+            _ => &[
+                "localId",
+                "lineNumber",
+                "variable",
+                "negated",
+                "edge",
+                "storage",
+                "kind",
+            ],
+        };
+        for given in part
+            .attributes()
+            .filter(|given| !known.contains(&given.name()))
+        {
+            let message = format!(
+                "the attribute `{}` in a rung is not supported",
+                given.name()
+            );
+            reader.error("U1010", message, part);
+        }
+        let mut inner = elements(part);
+        let foreign = match part.tag_name().name() {
+            "block" => inner.find(|inner| inner.tag_name().name() != "variable"),
+            "addData" => None,
+            _ => inner.next(),
+        };
+        if let Some(foreign) = foreign {
+            let name = foreign.tag_name().name();
+            reader.error("U1010", format!("`{name}` in a rung is not known"), foreign);
+        }
         match part.tag_name().name() {
             "contact" => {
                 let kind = Kind::Contact(variable, modifier(part, ""));
@@ -50,7 +82,15 @@ pub(super) fn rung(
                 let Some(type_name) = reader.needed(part, "typeName") else {
                     continue;
                 };
-                power = rung.block(part, type_name, &power);
+                let Some(standard) = StandardBlock::of(&type_name) else {
+                    // Nothing says which of its variables it writes.
+                    let message = format!(
+                        "the block {type_name} in a rung is not supported: only the standard function blocks are"
+                    );
+                    reader.error("U1010", message, part);
+                    continue;
+                };
+                power = rung.block(part, type_name, standard, &power);
             }
             "addData" => reader.ignore("additional data of a tool", part),
             other => reader.error("U1010", format!("`{other}` in a rung is not known"), part),
@@ -81,15 +121,19 @@ impl Rung<'_> {
     }
 
     /// A block with its variables; the power that stands before it enters at its first input, if no variable does.
-    fn block(&mut self, node: Node<'_, '_>, type_name: Name, power: &Wire) -> Wire {
-        let standard = StandardBlock::of(&type_name);
+    fn block(
+        &mut self,
+        node: Node<'_, '_>,
+        type_name: Name,
+        standard: StandardBlock,
+        power: &Wire,
+    ) -> Wire {
         let mut inputs = Vec::new();
         let mut outputs = Vec::new();
         let mut taken = Vec::new();
         for pin in children(node, "variable") {
             let name = attribute(pin, "formalParameter").unwrap_or_default();
-            let is_output = standard.is_some_and(|block| block.has_output(&name));
-            if is_output {
+            if standard.has_output(&name) {
                 outputs.push(Pin {
                     name: name.clone(),
                     ..Pin::default()
@@ -117,10 +161,8 @@ impl Rung<'_> {
             .objects
             .iter()
             .any(|object| object.id == power.from && !matches!(object.kind, Kind::LeftRail));
-        if let Some(first) = standard.map(StandardBlock::wire_input)
-            && fed
-            && !inputs.iter().any(|pin| pin.name.as_str() == first)
-        {
+        let first = standard.wire_input();
+        if fed && !inputs.iter().any(|pin| pin.name.as_str() == first) {
             let name = Name::at(first, start_tag(node));
             inputs.push(Pin {
                 name,
@@ -154,7 +196,7 @@ impl Rung<'_> {
         }
         Wire {
             from: id,
-            pin: standard.map(|block| Name::at(block.wire_output(), start_tag(node))),
+            pin: Some(Name::at(standard.wire_output(), start_tag(node))),
             span: start_tag(node),
         }
     }

@@ -15,6 +15,7 @@ use crate::plcopen::literal::{integer, time};
 use crate::plcopen::plan::{Action, Call, Input};
 use crate::plcopen::power::Power;
 use crate::plcopen::standard::StandardBlock;
+use crate::plcopen::units::undeclared;
 
 /// A block that waits for the wire behind it.
 pub(super) struct Pending {
@@ -82,7 +83,13 @@ impl Drawing<'_> {
             self.general("a block with EN", span.clone());
         }
         match self.scope.find(&call.instance) {
-            Some(Binding::Instance(_)) | None => {}
+            Some(Binding::Instance(_)) => {}
+            None if call.is_named => {
+                let found = undeclared(self.project, &call.instance, standard.word);
+                self.diagnostics.push(found);
+            }
+            // The file gives no name.
+            None => {}
             Some(_) => {
                 let message = format!("`{}` is not declared as a {}", call.instance, standard.word);
                 self.error("U1012", message, call.instance.span());

@@ -40,6 +40,8 @@ pub(super) struct Scope<'a> {
     taken: RefCell<HashSet<String>>,
     /// Second names of one address: they need no signal.
     aliases: HashSet<String>,
+    /// Names in capitals that something has asked for.
+    used: RefCell<HashSet<String>>,
 }
 
 impl<'a> Scope<'a> {
@@ -51,6 +53,7 @@ impl<'a> Scope<'a> {
             direct: RefCell::default(),
             taken: RefCell::default(),
             aliases: HashSet::new(),
+            used: RefCell::default(),
         };
         for variable in &pou.variables {
             let global = globals
@@ -128,7 +131,9 @@ impl<'a> Scope<'a> {
     /// What a name stands for; an address stands for a bit.
     pub(super) fn find(&self, name: &Name) -> Option<Binding> {
         let name_text = name.trim();
-        if let Some(binding) = self.bindings.get(&name_text.to_uppercase()) {
+        let key = name_text.to_uppercase();
+        if let Some(binding) = self.bindings.get(&key) {
+            self.used.borrow_mut().insert(key);
             return Some(binding.clone());
         }
         let address = bit_address(name_text)?;
@@ -219,8 +224,16 @@ impl<'a> Scope<'a> {
                 ));
             }
             let key = variable.name.to_uppercase();
-            let Some(Binding::Bit(name)) = self.bindings.get(&key) else {
-                continue;
+            let name = match self.bindings.get(&key) {
+                Some(Binding::Bit(name)) => name,
+                None => continue,
+                Some(_) => {
+                    if !self.used.borrow().contains(&key) {
+                        let kind = variable.kind.text();
+                        ignore(format!("`{}`, a {kind} that nothing uses,", variable.name));
+                    }
+                    continue;
+                }
             };
             if self.aliases.contains(&key) {
                 ignore(format!(

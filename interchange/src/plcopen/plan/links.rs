@@ -60,8 +60,13 @@ impl Links {
         let mut connectors = HashMap::new();
         for (place, object) in graph.objects.iter().enumerate() {
             places.entry(object.id).or_insert(place);
-            if let Kind::Connector(name) = &object.kind {
-                connectors.entry(name.as_str()).or_insert(place);
+            if let Kind::Connector(name) = &object.kind
+                && let Some(first) = connectors.insert(name.as_str(), place)
+            {
+                let message = format!("two connectors are called `{name}`");
+                let error = Diagnostic::error("U1003", message, object.span.clone());
+                let first = graph.objects[first].span.clone();
+                diagnostics.push(error.with_related(first, "the first is here"));
             }
         }
         let resolver = Resolver {
@@ -122,6 +127,13 @@ impl Links {
             fan_out,
             is_block: blocks,
         }
+    }
+
+    /// How many connections name an object, whatever becomes of them.
+    pub(super) fn fan_out_of(&self, graph: &Graph, object: &Object) -> usize {
+        let pins = graph.objects.iter().flat_map(|other| &other.inputs);
+        let wires = pins.flat_map(|pin| &pin.wires);
+        wires.filter(|wire| wire.from == object.id).count()
     }
 }
 

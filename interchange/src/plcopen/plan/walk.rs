@@ -9,7 +9,7 @@ use understudy_ladder::Name;
 
 use super::Plan;
 use super::links::{Links, Source};
-use crate::plcopen::document::{Condition, Graph, Kind, Object};
+use crate::plcopen::document::{Condition, Graph, Kind, Language, Object};
 use crate::plcopen::power::Power;
 use crate::plcopen::standard::StandardBlock;
 
@@ -78,22 +78,59 @@ impl<'a> Walk<'a> {
             self.visit(place, diagnostics);
         }
         for (place, object) in objects.iter().enumerate() {
-            let what = match &object.kind {
-                Kind::Other(what) => {
-                    let message = format!("{what} is not taken");
-                    diagnostics.push(Diagnostic::error("U1010", message, object.span.clone()));
-                    continue;
-                }
-                Kind::Contact(..) | Kind::InVariable(..) | Kind::Block(_)
-                    if self.states[place] == State::New =>
-                {
-                    "nothing that acts is behind it"
-                }
-                _ => continue,
-            };
-            self.plan.notes.push((what.to_owned(), object.span.clone()));
+            diagnostics.extend(self.left_out(place, object));
         }
         (self.plan, self.trace)
+    }
+
+    /// The finding on an object that no step comes from.
+    fn left_out(&self, place: usize, object: &Object) -> Option<Diagnostic> {
+        let lost = |what: &str| {
+            let message = format!("{what} has no effect: no coil and no variable is behind it");
+            let found = Diagnostic::warning("U1023", message, object.span.clone());
+            Some(found.with_help("connect it to what it drives, or remove it"))
+        };
+        let foreign = |what: &str| {
+            let message = format!("{what} is not taken");
+            Some(Diagnostic::error("U1010", message, object.span.clone()))
+        };
+        match &object.kind {
+            Kind::Other(what) => foreign(what),
+            Kind::Step(..)
+            | Kind::Transition(_)
+            | Kind::SelectionDivergence
+            | Kind::SelectionConvergence
+            | Kind::SimultaneousDivergence
+            | Kind::SimultaneousConvergence
+            | Kind::JumpStep(_)
+            | Kind::Actions(_)
+                if self.graph.language != Language::Sequence =>
+            {
+                foreign("an object of a sequence in another language")
+            }
+            // The way through a connector is taken by its continuations.
+            Kind::Connector(name) => {
+                let mut objects = self.graph.objects.iter();
+                let is_used = objects.any(
+                    |object| matches!(&object.kind, Kind::Continuation(other) if other == name),
+                );
+                if is_used {
+                    None
+                } else {
+                    lost(&format!("the connector `{name}`"))
+                }
+            }
+            Kind::Continuation(name) if self.links.fan_out_of(self.graph, object) == 0 => {
+                lost(&format!("the continuation `{name}`"))
+            }
+            _ if self.states[place] != State::New => None,
+            Kind::Contact(variable, _) => lost(&format!("the contact `{variable}`")),
+            Kind::InVariable(variable, _) | Kind::InOutVariable(variable, ..) => {
+                lost(&format!("`{variable}`"))
+            }
+            Kind::Block(block) => lost(&format!("the function {}", block.type_name)),
+            _ => None,
+        }
     }
 
     /// When an object acts; a label without an order, just before what stands below it.

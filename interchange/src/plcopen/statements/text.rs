@@ -2,49 +2,72 @@
 
 use std::ops::Range;
 
-use understudy_ladder::Name;
+use crate::plcopen::xml::Passage;
 
 /// A text that grows, with its places.
 #[derive(Debug, Default)]
 pub(crate) struct Text {
     pub(crate) body: String,
-    /// Ascending: from which byte on, and where that comes from.
-    places: Vec<(usize, Range<usize>)>,
+    /// In the order of the text.
+    pieces: Vec<Piece>,
+}
+
+/// A piece of the text, up to the next one.
+#[derive(Debug)]
+struct Piece {
+    start: usize,
+    /// Where it comes from.
+    place: Range<usize>,
+    /// It stands there letter for letter.
+    is_copy: bool,
 }
 
 impl Text {
     /// A text that stands in the file as it is.
-    pub(crate) fn verbatim(text: &Name) -> Self {
+    pub(crate) fn verbatim(passage: &Passage) -> Self {
         let mut verbatim = Self::default();
-        let mut at = text.span().start;
-        for line in text.split_inclusive('\n') {
-            verbatim.push(line, at..at + line.len());
-            at += line.len();
+        for (text, place) in passage.pieces() {
+            verbatim.copy(text, place);
         }
         verbatim
     }
 
+    /// Adds what was made for something at `place`.
     pub(crate) fn push(&mut self, text: &str, place: Range<usize>) {
-        self.places.push((self.body.len(), place));
+        self.add(text, place, false);
+    }
+
+    /// Adds what stands in the file at `place`.
+    pub(crate) fn copy(&mut self, text: &str, place: Range<usize>) {
+        self.add(text, place, true);
+    }
+
+    fn add(&mut self, text: &str, place: Range<usize>, is_copy: bool) {
+        self.pieces.push(Piece {
+            start: self.body.len(),
+            place,
+            is_copy,
+        });
         self.body.push_str(text);
     }
 
     /// The place in the file of a place in the text.
     pub(crate) fn place(&self, span: &Range<usize>) -> Range<usize> {
         let next = self
-            .places
-            .partition_point(|(start, _)| *start <= span.start);
-        match next.checked_sub(1).and_then(|last| self.places.get(last)) {
-            None => self.places.first().map_or(0..0, |(_, place)| place.clone()),
-            Some((start, place)) => {
-                let within = span.start - start;
-                // Whole lines and names were taken as they are; of the rest the whole is meant.
-                if within < place.len() && within > 0 {
-                    place.start + within..(place.start + within + span.len()).min(place.end)
-                } else {
-                    place.clone()
-                }
+            .pieces
+            .partition_point(|piece| piece.start <= span.start);
+        let piece = self.pieces.get(next.saturating_sub(1));
+        match piece {
+            None => 0..0,
+            Some(Piece {
+                start,
+                place,
+                is_copy: true,
+            }) if *start <= span.start => {
+                let begin = (place.start + span.start - start).min(place.end);
+                begin..(begin + span.len()).min(place.end)
             }
+            Some(piece) => piece.place.clone(),
         }
     }
 }

@@ -7,7 +7,7 @@ use super::super::syntax::{
 };
 use super::Parser;
 use understudy_diagnostic::Diagnostic;
-use understudy_ladder::Name;
+use understudy_ladder::{Name, PERIODS};
 
 impl Parser {
     /// The unit that begins here, and the word that ends it.
@@ -240,21 +240,82 @@ impl Parser {
         Some(TypeDefinition { name, meaning })
     }
 
-    /// Of a configuration only its global variables and the interval of its first task are of interest.
+    /// Of a configuration its global variables and the interval of its first task are kept.
     pub(super) fn configuration(&mut self, file: &mut File) {
+        self.name("a name");
         while !self.at_word("END_CONFIGURATION") && *self.peek() != Lexeme::End {
+            let span = self.span();
             if self.take_word("VAR_GLOBAL") {
                 self.declarations(Class::External, false, &mut file.globals);
-            } else if self.take_word("INTERVAL") && self.take_sign(":=") {
-                let Expression { kind, .. } = self.expression();
-                if let ExpressionKind::Time(period) = kind {
-                    file.period = file.period.or(Some(period));
+            } else if self.take_word("INTERVAL") {
+                if self.need_sign(":=") {
+                    self.interval(file);
                 }
+                // The rest of the task.
+                self.recover(&["END_CONFIGURATION", "END_RESOURCE"]);
+            } else if self.at_any(&["VAR_ACCESS", "VAR_CONFIG"]) {
+                let message = "access paths and values of a configuration are not kept";
+                self.diagnostics
+                    .push(Diagnostic::warning("U1055", message, span));
+                self.recover_to("END_VAR");
+                self.take_word("END_VAR");
+            } else if self.take_word("RESOURCE") || self.take_word("ON") {
+                self.name("a name");
+            } else if !self.at_any(&["TASK", "PROGRAM", "END_RESOURCE"]) {
+                let message = "this part of the configuration is not read";
+                self.diagnostics
+                    .push(Diagnostic::warning("U1055", message, span));
+                self.recover(&["END_CONFIGURATION", "END_RESOURCE"]);
+            } else if self.take_word("END_RESOURCE") {
+                self.take_sign(";");
             } else {
-                self.skip();
+                // Its name and priority have no meaning here.
+                while !self.take_sign(";")
+                    && !self.at_any(&["END_CONFIGURATION", "END_RESOURCE", "INTERVAL"])
+                    && *self.peek() != Lexeme::End
+                {
+                    self.skip();
+                }
             }
         }
         self.need_word("END_CONFIGURATION");
         self.take_sign(";");
+    }
+
+    /// Skips to a word, which is not taken.
+    fn recover_to(&mut self, word: &str) {
+        while !self.at_word(word) && *self.peek() != Lexeme::End {
+            self.skip();
+        }
+    }
+
+    /// The interval of a task; that of the first one counts.
+    fn interval(&mut self, file: &mut File) {
+        let before = self.diagnostics.len();
+        let Expression { kind, span } = self.expression();
+        match (kind, file.period) {
+            (ExpressionKind::Time(period), None) if PERIODS.contains(&period) => {
+                file.period = Some(period);
+            }
+            (ExpressionKind::Time(period), Some(first)) if period != first => {
+                let message = format!(
+                    "the interval {period:?} of a further task is not kept: the first is {first:?}"
+                );
+                self.diagnostics
+                    .push(Diagnostic::warning("U1055", message, span));
+            }
+            (ExpressionKind::Time(_), Some(_)) => {}
+            _ if self.diagnostics.len() > before => {}
+            _ => {
+                let message = format!(
+                    "the interval of a task is a time from {:?} to {:?}",
+                    PERIODS.start(),
+                    PERIODS.end()
+                );
+                let finding = Diagnostic::error("U1043", message, span);
+                self.diagnostics
+                    .push(finding.with_help("write it as a literal such as T#20ms"));
+            }
+        }
     }
 }

@@ -80,7 +80,17 @@ impl Resolver {
         if is_block != blocks {
             return;
         }
-        let entity = match self.type_of(&declaration.type_name) {
+        let found = self.type_of(&declaration.type_name);
+        if let (Some(address), Some(Type::Time | Type::Block(_) | Type::Standard(_))) =
+            (&declaration.address, &found)
+        {
+            let message = format!(
+                "the address `%{address}` of `{}` is not kept",
+                declaration.name
+            );
+            self.say(Diagnostic::warning("U1055", message, address.span()));
+        }
+        let entity = match found {
             None => Entity::Broken,
             Some(Type::Time) => Entity::Time(self.initial_time(instance, declaration)),
             Some(Type::Elementary(kind)) => self.declare_variable(instance, declaration, kind),
@@ -92,9 +102,33 @@ impl Resolver {
 
     fn define(&mut self, instance: usize, name: &Name, entity: Entity) {
         let entities = &mut self.instances[instance].entities;
-        if entities.insert(name.to_ascii_uppercase(), entity).is_some() {
-            self.error("U1042", format!("`{name}` is declared twice"), name.span());
+        if entities.insert(name.to_ascii_uppercase(), entity).is_none() {
+            return;
         }
+        let unit = &self.units[self.instances[instance].unit];
+        let first = unit
+            .declarations
+            .iter()
+            .map(|declaration| &declaration.name);
+        let mut first =
+            first.filter(|first| first.eq_ignore_ascii_case(name) && first.span() != name.span());
+        let finding = match first.next() {
+            Some(first) if first.as_str() != name.as_str() => {
+                let message = format!("`{first}` and `{name}` are one name, and both are declared");
+                Diagnostic::error("U1042", message, name.span())
+                    .with_related(first.span(), "the other one")
+                    .with_help(
+                        "names of IEC 61131-3 do not distinguish case; rename one of the two",
+                    )
+            }
+            Some(first) => {
+                let message = format!("`{name}` is declared twice");
+                Diagnostic::error("U1042", message, name.span())
+                    .with_related(first.span(), "the other one")
+            }
+            None => Diagnostic::error("U1042", format!("`{name}` is declared twice"), name.span()),
+        };
+        self.say(finding);
     }
 
     fn declare_external(&mut self, instance: usize, declaration: &Declaration) {

@@ -209,6 +209,7 @@ impl Walk<'_> {
         let call = Call {
             type_name: block.type_name.clone(),
             instance: instance(object),
+            is_named: block.instance.is_some(),
             inputs: self.inputs(place),
             enable: self.enable(place),
             in_wire: self.links.fan_out[place] == 1,
