@@ -164,9 +164,7 @@ impl Model {
 
     fn shift(&mut self, by: i64) {
         self.stations.iter_mut().for_each(|track| track.shift(by));
-        self.programs
-            .iter_mut()
-            .for_each(|track| track.shift(by));
+        self.programs.iter_mut().for_each(|track| track.shift(by));
         self.histories
             .iter_mut()
             .for_each(|history| history.shift(by));

@@ -49,7 +49,11 @@ impl Protection {
             return "protected".to_owned();
         }
         let texts: Vec<&str> = self.lacking.iter().map(|one| one.text.as_str()).collect();
-        format!("NOT protected since cycle {}: {}", self.since, texts.join(", "))
+        format!(
+            "NOT protected since cycle {}: {}",
+            self.since,
+            texts.join(", ")
+        )
     }
 }
 

@@ -155,8 +155,15 @@ impl Screen {
         let programs = rows(snapshot.programs.len(), area.height);
         let protected = tables::protection(&snapshot);
         let lines = u16::try_from(protected.len()).unwrap_or(u16::MAX);
-        let [head, station_area, program_area, protection, survives, timing, bottom] =
-            Layout::vertical([
+        let [
+            head,
+            station_area,
+            program_area,
+            protection,
+            survives,
+            timing,
+            bottom,
+        ] = Layout::vertical([
             Constraint::Length(1),
             Constraint::Length(stations),
             Constraint::Length(programs),

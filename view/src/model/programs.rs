@@ -44,7 +44,10 @@ impl ProgramTrack {
     pub(crate) fn shift(&mut self, by: i64) {
         let protection = self.protection.as_mut().map(|of| &mut of.since);
         let lost = self.lost.as_mut().map(|of| &mut of.since);
-        for since in [Some(&mut self.since), protection, lost].into_iter().flatten() {
+        for since in [Some(&mut self.since), protection, lost]
+            .into_iter()
+            .flatten()
+        {
             *since = since.saturating_add(by);
         }
     }

@@ -51,7 +51,7 @@ impl Model {
             }
             RemoteIoEvent::Unprotected { since, lacking, .. } => {
                 let since = self.cycles.of_known(*since).unwrap_or(cycle);
-                let lacking = lacking.iter().map(|one| self.lacking(program, since, one));
+                let lacking = lacking.iter().map(|one| self.lacking(program, one));
                 let protection = Protection {
                     protected: false,
                     since,
@@ -70,7 +70,9 @@ impl Model {
             } => {
                 let known = |moment| self.cycles.of_known(moment);
                 let until = applied.map_or(Some(cycle), known);
-                let age = until.zip(known(*newest)).map(|(until, newest)| until - newest);
+                let age = until
+                    .zip(known(*newest))
+                    .map(|(until, newest)| until - newest);
                 let lost = LostState {
                     since: cycle,
                     newest: newest.cycle.0,
@@ -103,7 +105,7 @@ impl Model {
     }
 
     /// Why a station cannot stand in for a program: itself, or a link, as far as others say how it is.
-    fn lacking(&self, program: ProgramId, since: i64, lacking: &Lacking) -> LackingStation {
+    fn lacking(&self, program: ProgramId, lacking: &Lacking) -> LackingStation {
         let station = lacking.station;
         let name = self.parties.name(Party::Station(station));
         let remote_io = self.parties.name(Party::RemoteIo(program));
@@ -116,25 +118,29 @@ impl Model {
                     .any(|(other, track)| other != program && track.hears().contains(station));
                 let text = match state {
                     Some(
-                        state @ (StationState::Killed | StationState::Stopped | StationState::Ended),
+                        state
+                        @ (StationState::Killed | StationState::Stopped | StationState::Ended),
                     ) => format!("{name} is {}", state.word()),
                     _ if is_heard => {
                         link = Some(format!("{name} → {remote_io}"));
                         format!("the link {name} → {remote_io} is broken")
                     }
-                    _ => format!("{name} is not received: it is down, or the link {name} → {remote_io}"),
+                    _ => format!(
+                        "{name} is not received: it is down, or the link {name} → {remote_io}"
+                    ),
                 };
                 ("not-received", text)
             }
             LackingReason::Joining => ("joining", format!("{name} asks for the state")),
             LackingReason::Behind { stepped } => {
                 link = Some(format!("{remote_io} → {name}"));
-                let behind = self.cycles.of_known(stepped).map(|stepped| since - stepped);
-                let behind = behind.filter(|behind| *behind > 0).map_or_else(
-                    || "another one".to_owned(),
-                    |behind| format!("{behind} cycles too old"),
+                let last = self.cycles.of_known(stepped).map_or_else(
+                    || "yet".to_owned(),
+                    |stepped| format!("since cycle {stepped}"),
                 );
-                let text = format!("the state of {name} is {behind} (link {remote_io} → {name})");
+                let text = format!(
+                    "the state of {name} is too old: no sample received {last} (link {remote_io} → {name})"
+                );
                 ("behind", text)
             }
             LackingReason::Excluded => (
