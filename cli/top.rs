@@ -189,7 +189,7 @@ fn show(
                 break;
             }
         }
-        let progress = source.progress();
+        let progress = source.progress().of_ended(model.is_finished());
         terminal.draw(|frame| screen.draw_live(frame, &model, progress, Instant::now()))?;
         let wait = if progress.is_at_end() || screen.is_paused() {
             LOOK

@@ -219,7 +219,7 @@ impl Reader {
                 self.model.end();
                 unshown = true;
             }
-            let progress = self.source.progress();
+            let progress = self.source.progress().of_ended(self.model.is_finished());
             // What is at the end is shown before it is said to be the present.
             if unshown && (progress.is_at_end() || shown.elapsed() >= SHOW) {
                 self.show(progress);

@@ -183,7 +183,11 @@ fn metrics_are_served_over_http_and_nothing_else_is() {
             "GET {path} HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n"
         ))
     };
-    let answer = get("/metrics");
+    let deadline = std::time::Instant::now() + Duration::from_secs(60);
+    let mut answer = get("/metrics");
+    while answer.starts_with("HTTP/1.1 503 ") && std::time::Instant::now() < deadline {
+        answer = get("/metrics");
+    }
     assert!(answer.starts_with("HTTP/1.1 200 OK\r\n"), "{answer}");
     assert!(answer.contains("application/openmetrics-text; version=1.0.0"));
     assert!(answer.contains("understudy_deadlines"), "{answer}");
@@ -215,19 +219,19 @@ fn the_process_image_is_read_by_modbus_and_not_written() {
     let folder = finished_run("gateway_modbus");
     let gateway = Gateway::start(&folder, "modbus");
     let mut stream = gateway.connect();
-    // The journal is read beside the server: its last cycle comes when it was.
+    // Until the journal was read, the server is busy; the first answer is of the last cycle.
     let deadline = std::time::Instant::now() + Duration::from_secs(60);
-    loop {
+    let answer = loop {
         let answer = modbus(&mut stream, &[4, 0, 0, 0, 10]);
-        assert_eq!(answer[..4], [4, 20, 0, 1], "the version of the map");
-        if answer[6..10] == 699_u32.to_be_bytes() {
-            assert_eq!(answer[18..20], [0, 2], "two programs");
-            assert_eq!(answer[20..22], [0, 3], "three stations");
-            break;
+        if answer != [0x84, 6] {
+            break answer;
         }
-        assert!(std::time::Instant::now() < deadline, "{answer:?}");
-        std::thread::sleep(Duration::from_millis(20));
-    }
+        assert!(std::time::Instant::now() < deadline, "busy for ever");
+    };
+    assert_eq!(answer[..4], [4, 20, 0, 1], "the version of the map");
+    assert_eq!(answer[6..10], 699_u32.to_be_bytes(), "the last cycle");
+    assert_eq!(answer[18..20], [0, 2], "two programs");
+    assert_eq!(answer[20..22], [0, 3], "three stations");
     let source = modbus(&mut stream, &[3, 0, 96, 0, 1]);
     assert_eq!(source, [3, 2, 0, 1], "direct at the end");
     assert_eq!(modbus(&mut stream, &[1, 0, 0, 0, 2])[..2], [1, 1]);
@@ -288,8 +292,10 @@ fn the_dashboard_and_the_page_name_metrics_that_there_are() {
         assert!(exposed.contains(name.as_str()), "{name} is not exposed");
     }
     for name in metric_names(&read("docs/monitoring.md")) {
-        let is_there =
-            exposed.contains(name.as_str()) || exposed.contains(format!("{name}_count").as_str());
+        // Some have a sample only while something is wrong.
+        let is_there = exposed.contains(name.as_str())
+            || exposed.contains(format!("{name}_count").as_str())
+            || answer.output.contains(&format!("# TYPE {name} "));
         assert!(is_there, "{name} is not exposed");
     }
 }

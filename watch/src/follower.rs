@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use tokio::sync::watch;
 use understudy_view::{Progress, Run};
 
-use crate::model::Model;
+use crate::model::{Known, Model};
 use crate::shown::{NOTHING, newest_state};
 
 /// Between two looks at a journal that says nothing new.
@@ -64,10 +64,8 @@ pub(crate) fn follow(
         // Read first, so that nobody who asks waits for a disk.
         let mut found = Vec::new();
         let taken = source.poll(&mut |record| found.push(record));
-        let progress = source.progress();
         lock(model, |model| {
-            found.into_iter().for_each(|found| model.note(found));
-            model.progress = progress;
+            found.into_iter().for_each(|found| model.note(found))
         });
         unsaid |= taken > 0;
         // A simulated run has no last record; it has results when it is over.
@@ -76,6 +74,11 @@ pub(crate) fn follow(
             unsaid = true;
             lock(model, Model::end);
         }
+        let progress = lock(model, |model| {
+            let has_ended = model.known().is_some_and(Known::has_ended);
+            model.progress = source.progress().of_ended(has_ended);
+            model.progress
+        });
         let now = Instant::now();
         let was_current = newest.borrow().progress.current(now).is_ok();
         let is_due = said.elapsed() >= SAY || !was_current;

@@ -3,7 +3,7 @@
 //! ```text
 //!   opened ──► Reading { percent } ──(end of the journal reached)──► current
 //!                       ▲                                              │
-//!                       └──(end not reached again within BEHIND)───────┘
+//!                       └──(end not reached again within BEHIND)───────┘      (a run that has ended does not grow old)
 //! ```
 //!
 //! Invariant: what is current contains every record that was in the journal [`BEHIND`] ago. Every view asks here before it shows a value.
@@ -22,6 +22,8 @@ pub struct Progress {
     pub(super) percent: u8,
     /// When the journal last grew, as far as this is known.
     pub(super) grew: Option<Instant>,
+    /// The run has ended and all of it was read: this does not grow old.
+    over: bool,
 }
 
 /// The journal is still being read: what is known so far is the past.
@@ -43,6 +45,9 @@ impl Progress {
     /// # Errors
     /// [`Reading`].
     pub fn current(&self, now: Instant) -> Result<(), Reading> {
+        if self.over {
+            return Ok(());
+        }
         let behind = |end: Instant| now.saturating_duration_since(end) > BEHIND;
         if self.at_end.is_none_or(behind) {
             return Err(Reading {
@@ -50,6 +55,13 @@ impl Progress {
             });
         }
         Ok(())
+    }
+
+    /// The same, where the run is known to have ended.
+    #[must_use]
+    pub fn of_ended(mut self, has_ended: bool) -> Self {
+        self.over = has_ended && self.is_at_end();
+        self
     }
 
     /// Whether the last poll reached the end of the journal, so that all that was read is to be shown.
@@ -96,8 +108,11 @@ mod tests {
         progress.polled(after(1_000), 1_000_000, 1_000_000);
         assert_eq!(percent(&progress, 2_030), Ok(()));
         assert_eq!(percent(&progress, 2_031), Err(50), "it fell behind");
+        assert_eq!(percent(&progress.of_ended(true), 20_000), Err(50));
         progress.polled(after(9_000), 2_000_000, 0);
         assert_eq!(percent(&progress, 9_000), Ok(()));
         assert_eq!(percent(&progress, 20_000), Err(100), "it was suspended");
+        assert_eq!(percent(&progress.of_ended(false), 20_000), Err(100));
+        assert_eq!(percent(&progress.of_ended(true), 20_000), Ok(()));
     }
 }
