@@ -13,6 +13,7 @@ mod boiler;
 mod campaigns;
 mod deaths;
 mod field;
+mod handshake;
 mod hosts;
 #[allow(dead_code, reason = "each test uses its part")]
 #[path = "../shared/mod.rs"]
