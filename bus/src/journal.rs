@@ -80,6 +80,14 @@ pub enum HostEvent {
         /// The same in words.
         reason: String,
     },
+    /// Others are received, and none of them receives this member: another process runs with its keys, its number of starts has gone back with
+    /// its disk, or the network carries one direction only. It begins another life.
+    NotReceived {
+        /// For so many milliseconds.
+        silent_ms: u64,
+        /// Why there is no other life.
+        error: Option<String>,
+    },
     /// Operators can call, by mutual TLS.
     ChannelOpened {
         /// Where.
@@ -136,6 +144,8 @@ pub enum RefusedAs {
     Forged,
     /// It counted before, or is too late.
     Replayed,
+    /// Two processes run as this member with the same keys; the one that started first is refused.
+    TwoLives,
     /// The sender's keys are revoked.
     Revoked,
 }

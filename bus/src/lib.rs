@@ -24,6 +24,7 @@ mod operator;
 mod orders;
 mod party;
 mod ports;
+mod reception;
 mod rights;
 mod segments;
 mod trouble;

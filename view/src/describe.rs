@@ -24,7 +24,7 @@ pub struct Description {
 }
 
 /// Every word that [`Description::event`] can be.
-pub(crate) const EVENTS: [&str; 55] = [
+pub(crate) const EVENTS: [&str; 56] = [
     "acknowledged",
     "adopted",
     "adopted-lineage",
@@ -53,6 +53,7 @@ pub(crate) const EVENTS: [&str; 55] = [
     "interrupted",
     "joins",
     "journal-lost",
+    "not-received",
     "origin",
     "paces",
     "protected",
