@@ -53,6 +53,8 @@ pub(crate) const EVENTS: [&str; 55] = [
     "interrupted",
     "joins",
     "journal-lost",
+    "link-failed",
+    "link-reopened",
     "origin",
     "paces",
     "protected",
