@@ -17,7 +17,7 @@ use crate::error::BusError;
 use crate::field::{FieldDriver, Look};
 use crate::guard::Guard;
 use crate::journal::{EventSink, HostEvent, Noted};
-use crate::link::{Link, LinkCounters};
+use crate::link::{Link, LinkCounters, Reopening};
 use crate::observer::Observer;
 use crate::orders::{Order, Orders};
 use crate::reception::Reception;
@@ -138,6 +138,7 @@ impl<M: Machine> Host<'_, M> {
                 self.sleep(now, until)?;
                 round.wakeups_in_a_row = 0;
             }
+            self.report_reopenings(now);
             self.report_trouble(now, TROUBLE_PERIOD, &mut round);
             self.live_on(now, &mut round);
         }
@@ -296,6 +297,17 @@ impl<M: Machine> Host<'_, M> {
             error: self.guard.begin_next_life().err(),
         };
         self.sink.record(now, Noted::Host(event));
+    }
+
+    fn report_reopenings(&mut self, now: Time) {
+        while let Some(Reopening { silence, failure }) = self.link.reopening() {
+            let silence_ms = u64::try_from(silence.as_millis()).unwrap_or(u64::MAX);
+            let event = match failure {
+                None => HostEvent::LinkReopened { silence_ms },
+                Some(reason) => HostEvent::LinkFailed { silence_ms, reason },
+            };
+            self.sink.record(now, Noted::Host(event));
+        }
     }
 
     fn report_trouble(&mut self, now: Time, period: Duration, round: &mut Round) {

@@ -45,7 +45,7 @@ pub use interruption::interruption;
 pub use journal::{
     EventSink, HostEvent, JOURNAL_RECORDS, Journal, JournalSender, Noted, Record, RefusedAs,
 };
-pub use link::{Link, LinkCounters, LinkKind, NoSuchLink};
+pub use link::{Link, LinkCounters, LinkKind, NoSuchLink, Reopening, ZENOH_PORT_OFFSET};
 pub use observer::{NoObserver, Observer};
 pub use operator::{Call, Request};
 pub use orders::{Control, Cuts, Order, Orders, orders};

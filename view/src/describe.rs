@@ -53,7 +53,12 @@ pub(crate) const EVENTS: [&str; 56] = [
     "interrupted",
     "joins",
     "journal-lost",
+<<<<<<< HEAD
     "not-received",
+=======
+    "link-failed",
+    "link-reopened",
+>>>>>>> h-zenoh
     "origin",
     "paces",
     "protected",

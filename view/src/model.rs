@@ -283,6 +283,14 @@ impl Model {
                 self.alarms
                     .over(&(record.name.clone(), "field-lost"), cycle);
             }
+            (HostEvent::LinkFailed { reason, .. }, _) => {
+                let subject = (record.name.clone(), "link-failed");
+                self.alarms.raise(subject, cycle, reason.clone());
+            }
+            (HostEvent::LinkReopened { .. }, _) => {
+                self.alarms
+                    .over(&(record.name.clone(), "link-failed"), cycle);
+            }
             (HostEvent::JournalLost { .. }, Party::RemoteIo(program)) => {
                 self.misses_records(program)
             }
