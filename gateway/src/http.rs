@@ -1,16 +1,15 @@
 //! Metrics over HTTP: `GET /metrics`, and nothing else.
 
 use std::net::SocketAddr;
-use std::sync::Arc;
 
 use axum::Router;
 use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
 use axum::routing::get;
+use understudy_view::Reading;
 
 use crate::error::GatewayError;
 use crate::followed::Followed;
-use crate::metrics::Metrics;
 use crate::serve_until_asked;
 
 /// What OpenMetrics 1.0 wants to be called.
@@ -25,16 +24,24 @@ pub fn serve_metrics(
     address: SocketAddr,
     ready: impl FnOnce(SocketAddr),
 ) -> Result<(), GatewayError> {
-    let metrics = Arc::clone(run.metrics());
+    let exposition = run.exposition();
     serve_until_asked(address, ready, |listener| async move {
-        axum::serve(listener, router(metrics)).await
+        axum::serve(listener, router(exposition)).await
     })
 }
 
-fn router(metrics: Arc<Metrics>) -> Router {
+fn router(
+    exposition: impl Fn() -> Result<String, Reading> + Clone + Send + Sync + 'static,
+) -> Router {
     let exposed = move || {
-        let text = metrics.exposition();
-        async move { ([(header::CONTENT_TYPE, CONTENT_TYPE)], text).into_response() }
+        let answer = match exposition() {
+            Ok(text) => ([(header::CONTENT_TYPE, CONTENT_TYPE)], text).into_response(),
+            Err(reading) => {
+                let body = format!("{}: {reading}\n", Reading::CODE);
+                (StatusCode::SERVICE_UNAVAILABLE, body).into_response()
+            }
+        };
+        async move { answer }
     };
     Router::new()
         .route("/metrics", get(exposed))

@@ -3,7 +3,8 @@
 //! Counters count records, so they begin at the first record of the journal that is still there, and never go back.
 
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicI64, Ordering};
+use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
+use std::time::Duration;
 
 use prometheus_client::encoding::text::encode;
 use prometheus_client::metrics::counter::Counter;
@@ -58,7 +59,7 @@ pub struct Metrics {
     flagged: Family<OfParty, Counter>,
     refused_frames: Family<OfParty, Counter>,
     stalls: Family<OfParty, Counter>,
-    stall_seconds: Family<OfParty, Counter<f64, std::sync::atomic::AtomicU64>>,
+    stall_seconds: Family<OfParty, Counter<f64, AtomicU64>>,
     records_lost: Family<OfParty, Counter>,
     margin: Histogram,
     late_turns: Counter,
@@ -74,6 +75,7 @@ pub struct Metrics {
     mishaps: Family<OfProgram, Gauge>,
     records: Gauge,
     left_out: Gauge,
+    journal_age: Gauge<f64, AtomicU64>,
 }
 
 impl Metrics {
@@ -115,6 +117,7 @@ impl Metrics {
             mishaps: Family::default(),
             records: Gauge::default(),
             left_out: Gauge::default(),
+            journal_age: Gauge::default(),
         };
         metrics.register(cluster.name());
         metrics.begin(cluster);
@@ -197,6 +200,7 @@ impl Metrics {
             "host_stall" stall_seconds "By how much the wake-ups of the party came too late, in all";
             "cycle_margin" margin "From the last turn of a cycle to its deadline; 0 where it came later";
             "token" token "From the first sample of a cycle to its last turn";
+            "journal_age" journal_age "Age of the newest record: a live run whose journal does not grow is not seen any more";
             "cycle_time" cycle_times "From the start of a cycle to that of the next";
         }
         self.registry = Mutex::new(all);
@@ -349,6 +353,11 @@ impl Metrics {
         }
     }
 
+    /// Sets the age of the newest record.
+    pub(crate) fn aged(&self, age: Option<Duration>) {
+        self.journal_age.set(age.unwrap_or_default().as_secs_f64());
+    }
+
     /// All of them in the OpenMetrics text format.
     pub fn exposition(&self) -> String {
         let registry = self
@@ -394,5 +403,6 @@ pub fn exposition_of(run: &Run) -> Result<String, GatewayError> {
         return Err(GatewayError::Journal(trouble));
     }
     metrics.state(&model.snapshot());
+    metrics.aged(source.progress().age(std::time::Instant::now()));
     Ok(metrics.exposition())
 }

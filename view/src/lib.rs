@@ -45,7 +45,7 @@ pub use snapshot::{
     MarginSnapshot, OutcomeSnapshot, ProgramSnapshot, RunState, Snapshot, StationSnapshot,
     TimingSnapshot,
 };
-pub use source::{Feed, Source, Trouble};
+pub use source::{BEHIND, Feed, Progress, Reading, Source, Trouble};
 pub use station::StationState;
 pub use terminal::{Key, Screen};
 pub use timeline::{Span, Timeline};

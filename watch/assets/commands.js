@@ -2,7 +2,7 @@
 
 import { act, tell, toast } from "/ask.js";
 import { el } from "/element.js";
-import { isLive, state } from "/time.js";
+import { isLive, stale, state } from "/time.js";
 
 let run = null;
 
@@ -25,7 +25,7 @@ function obstacle() {
   if (!isLive()) {
     return "this is a replay: go live to command";
   }
-  return state()?.finished ? "the run has ended" : null;
+  return state()?.finished ? "the run has ended" : stale();
 }
 
 const DOWN = "it is down";

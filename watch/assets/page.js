@@ -45,6 +45,15 @@ function head(run, state, live) {
   setText(button, open === 1 ? "⚠ 1 alarm" : `⚠ ${open} alarms`);
 }
 
+// Values that are not the present are greyed out, and it is said why.
+function showStale() {
+  const why = time.stale();
+  const place = document.getElementById("stale");
+  place.hidden = !why;
+  setText(place, why ? `⚠ ${why}` : "");
+  document.body.toggleAttribute("data-stale", Boolean(why));
+}
+
 // What is run is known when its directory says it.
 async function facts() {
   for (;;) {
@@ -76,10 +85,13 @@ async function begin() {
   time.onState((state, live) => {
     head(run, state, live);
     VIEWS[currentView()].show(state, live);
+    showStale();
   });
+  setInterval(showStale, 250);
+  addEventListener("visibilitychange", showStale);
   addEventListener("hashchange", showView);
   showView();
-  time.start();
+  time.start(run);
 }
 
 addEventListener("unhandledrejection", (event) => toast(String(event.reason?.message ?? event.reason)));

@@ -1,9 +1,10 @@
 //! What the page knows of the run: the model of its journal, and what was done to its parties.
 
 use std::path::Path;
+use std::time::Instant;
 
 use understudy_scenarios::Record;
-use understudy_view::{Bounds, Margin, Model as RunModel, Run, Source, Trouble};
+use understudy_view::{Bounds, Margin, Model as RunModel, Progress, Reading, Run, Source, Trouble};
 use understudy_wire::{Party, ProgramId, StationId, StationSet};
 
 use crate::changes::Changes;
@@ -17,6 +18,8 @@ const LAG_CYCLES: i64 = 3;
 pub(crate) struct Model {
     name: String,
     known: Option<Known>,
+    /// Of the follower, when it had folded what is known.
+    pub(crate) progress: Progress,
     /// Why nothing is known, while that is so.
     pub(crate) waits_for: String,
 }
@@ -38,6 +41,7 @@ impl Model {
         Self {
             name: name.map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
             known: None,
+            progress: Progress::default(),
             waits_for: "the run has not begun".to_owned(),
         }
     }
@@ -47,8 +51,17 @@ impl Model {
         &self.name
     }
 
+    /// What runs, however it is now.
     pub(crate) fn known(&self) -> Option<&Known> {
         self.known.as_ref()
+    }
+
+    /// How the run is now; nothing before it has begun.
+    pub(crate) fn present(&self) -> Result<Option<&Known>, Reading> {
+        if self.known.is_some() {
+            self.progress.current(Instant::now())?;
+        }
+        Ok(self.known.as_ref())
     }
 
     /// The programs of the run are known from now on; its records are to be read.

@@ -2,6 +2,8 @@
 
 mod parties;
 
+use std::time::Instant;
+
 use serde::Serialize;
 use understudy_remote_io::Missing;
 use understudy_scenarios::source_word;
@@ -18,6 +20,8 @@ const LISTED_FAILURES: usize = 40;
 /// One cycle.
 #[derive(Debug, Serialize)]
 pub(crate) struct State {
+    /// Of the newest record, in milliseconds, when this was written.
+    age_ms: u64,
     pub(crate) cycle: i64,
     pub(crate) oldest: i64,
     pub(crate) newest: i64,
@@ -104,9 +108,13 @@ pub(crate) const NOTHING: &str = "null";
 
 /// The newest state as JSON; [`NOTHING`] where nothing is known yet.
 pub(crate) fn newest_state(model: &Model) -> String {
-    let state = model
+    let mut state = model
         .known()
         .and_then(|known| state(known, known.newest()?));
+    if let Some(state) = &mut state {
+        let age = model.progress.age(Instant::now()).unwrap_or_default();
+        state.age_ms = u64::try_from(age.as_millis()).unwrap_or(u64::MAX);
+    }
     serde_json::to_string(&state).unwrap_or_else(|_| NOTHING.to_owned())
 }
 
@@ -134,6 +142,7 @@ pub(crate) fn state(known: &Known, cycle: i64) -> Option<State> {
         .programs()
         .filter_map(|program| parties::plant(known, &standing, program));
     Some(State {
+        age_ms: 0,
         cycle,
         oldest,
         newest,
