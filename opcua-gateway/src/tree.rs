@@ -284,8 +284,9 @@ impl Tree {
             "the newest 20, in words, the newest last",
             |seen| {
                 let recent = seen.observation.recent.iter();
-                let recent = recent
-                    .map(|event| format!("cycle {}: {}: {}", event.cycle, event.name, message(event)));
+                let recent = recent.map(|event| {
+                    format!("cycle {}: {}: {}", event.cycle, event.name, message(event))
+                });
                 seen.counted(Some(texts(&recent.collect::<Vec<_>>())))
             },
         );

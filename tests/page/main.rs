@@ -26,7 +26,10 @@ use shared::{answer, empty_folder, one_at_a_time, understudy};
 
 /// A simulated run in which the robot's station is killed in cycle 50 and started again in cycle 150: its directory.
 fn simulated_run(folder: &Path) -> PathBuf {
-    simulated_run_of(folder, "title = \"kill and restart\"\ncycles = 300\n\n[[step]]\nat = 50\naction = \"crash\"\nstation = \"robot\"\n\n[[step]]\nat = 150\naction = \"restart\"\nstation = \"robot\"\n")
+    simulated_run_of(
+        folder,
+        "title = \"kill and restart\"\ncycles = 300\n\n[[step]]\nat = 50\naction = \"crash\"\nstation = \"robot\"\n\n[[step]]\nat = 150\naction = \"restart\"\nstation = \"robot\"\n",
+    )
 }
 
 /// The directory of a simulated run of the press cell.

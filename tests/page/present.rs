@@ -160,7 +160,12 @@ fn the_page_shows_no_past() {
         let answer: serde_json::Value = serde_json::from_str(&body).expect("JSON");
         if status == 503 {
             assert_eq!(answer["error"]["code"], "U0688");
-            for path in ["/api/events", "/api/ladder/0", "/api/why/0/0", "/api/state?cycle=1"] {
+            for path in [
+                "/api/events",
+                "/api/ladder/0",
+                "/api/why/0/0",
+                "/api/state?cycle=1",
+            ] {
                 // It may have caught up between the two questions.
                 assert!([503, 200].contains(&reader.get(path).0), "{path}");
             }
@@ -179,33 +184,41 @@ fn the_page_shows_no_past() {
 
 #[test]
 fn metrics_tell_no_past() {
-    check("present-metrics", &["gateway", "metrics"], "--listen", |reader| {
-        let (status, body) = reader.get("/metrics");
-        if status == 503 {
-            assert!(body.starts_with("U0688: reading the journal: "), "{body}");
-            return None;
-        }
-        assert_eq!(status, 200, "{body}");
-        let killed = body.lines().find(|line| {
-            let names = ["understudy_station_state{", "\"robot\"", "\"killed\""];
-            names.iter().all(|name| line.contains(name))
-        });
-        let dead = killed.is_some_and(|line| line.ends_with(" 1"));
-        Some((metric(&body, "understudy_cycle{").expect("a cycle"), dead))
-    });
+    check(
+        "present-metrics",
+        &["gateway", "metrics"],
+        "--listen",
+        |reader| {
+            let (status, body) = reader.get("/metrics");
+            if status == 503 {
+                assert!(body.starts_with("U0688: reading the journal: "), "{body}");
+                return None;
+            }
+            assert_eq!(status, 200, "{body}");
+            let killed = body.lines().find(|line| {
+                let names = ["understudy_station_state{", "\"robot\"", "\"killed\""];
+                names.iter().all(|name| line.contains(name))
+            });
+            let dead = killed.is_some_and(|line| line.ends_with(" 1"));
+            Some((metric(&body, "understudy_cycle{").expect("a cycle"), dead))
+        },
+    );
 }
 
 #[test]
 fn modbus_tells_no_past() {
-    check("present-modbus", &["gateway", "modbus"], "--listen", |reader| {
-        match reader.registers() {
+    check(
+        "present-modbus",
+        &["gateway", "modbus"],
+        "--listen",
+        |reader| match reader.registers() {
             Ok((cycle, robot)) => Some((cycle, robot == 8)),
             Err(exception) => {
                 assert_eq!(exception, 6, "server device busy");
                 None
             }
-        }
-    });
+        },
+    );
 }
 
 /// A viewer of a page whose run is suspended is told how old the newest record is; the page itself is not suspended.
@@ -214,7 +227,9 @@ fn a_viewer_is_told_how_old_the_newest_record_is() {
     let _turn = one_at_a_time();
     let run = simulated_run_of(&empty_folder("present-age"), SCENARIO);
     fs::remove_file(run.join("summary.json")).expect("it was there");
-    let journal = OpenOptions::new().append(true).open(run.join("journal.jsonl"));
+    let journal = OpenOptions::new()
+        .append(true)
+        .open(run.join("journal.jsonl"));
     let long_ago = std::time::SystemTime::now() - Duration::from_secs(3600);
     journal
         .and_then(|journal| journal.set_modified(long_ago))
@@ -223,5 +238,9 @@ fn a_viewer_is_told_how_old_the_newest_record_is() {
     command.arg(&run);
     let page = Page::start(command);
     let state = page.wait_for("a state", |state| state["cycle"].is_i64());
-    assert!(state["age_ms"].as_u64() >= Some(3_600_000), "{}", state["age_ms"]);
+    assert!(
+        state["age_ms"].as_u64() >= Some(3_600_000),
+        "{}",
+        state["age_ms"]
+    );
 }

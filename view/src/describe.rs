@@ -24,7 +24,7 @@ pub struct Description {
 }
 
 /// Every word that [`Description::event`] can be.
-pub(crate) const EVENTS: [&str; 56] = [
+pub(crate) const EVENTS: [&str; 58] = [
     "acknowledged",
     "adopted",
     "adopted-lineage",
@@ -53,12 +53,9 @@ pub(crate) const EVENTS: [&str; 56] = [
     "interrupted",
     "joins",
     "journal-lost",
-<<<<<<< HEAD
-    "not-received",
-=======
     "link-failed",
     "link-reopened",
->>>>>>> h-zenoh
+    "not-received",
     "origin",
     "paces",
     "protected",

@@ -148,7 +148,11 @@ impl Follower {
     fn age(&self) -> Option<Duration> {
         let written = self.open.as_ref()?.file.metadata().ok()?.modified().ok()?;
         // A clock that was set back makes no age.
-        Some(SystemTime::now().duration_since(written).unwrap_or_default())
+        Some(
+            SystemTime::now()
+                .duration_since(written)
+                .unwrap_or_default(),
+        )
     }
 
     fn try_poll(&mut self, take: &mut dyn FnMut(Result<Record, Trouble>)) -> io::Result<usize> {

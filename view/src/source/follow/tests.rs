@@ -154,7 +154,10 @@ fn only_the_end_is_taken_for_the_end() {
             for _ in 0..random.random_range(0..4) {
                 follower.poll(&mut |found| seen += u64::from(found.is_ok()));
                 let is_at_end = follower.progress().is_at_end();
-                assert!(!(flushed && is_at_end) || seen == complete, "seed {seed}: {seen}");
+                assert!(
+                    !(flushed && is_at_end) || seen == complete,
+                    "seed {seed}: {seen}"
+                );
             }
             let mut rest = &bytes[cut..];
             while !rest.is_empty() {
