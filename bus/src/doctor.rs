@@ -17,11 +17,11 @@ use crate::endpoints::Endpoints;
 use crate::error::BusError;
 use crate::guard::Guard;
 use crate::link::LinkKind;
-use crate::rights::{CYCLE_PRIORITY, lock_memory, run_in_real_time, sleep_exactly};
+use crate::rights::{CYCLE_PRIORITY, lock_memory, run_in_real_time};
+use crate::wakefulness::Wakefulness;
 
-/// Sleeps that are timed.
-const SLEEPS: u32 = 200;
-const SLEEP: Duration = Duration::from_millis(1);
+/// For so long wake-ups are measured.
+const SPAN: Duration = Duration::from_secs(1);
 
 /// Clocks that take long to read, or are too coarse.
 const SLOW_CLOCKS: [&str; 4] = ["hpet", "acpi_pm", "jiffies", "refined-jiffies"];
@@ -137,36 +137,21 @@ fn memory() -> Finding {
     }
 }
 
-/// How late a sleeper is woken, which is what a cycle feels of everything above.
+/// How late sleepers are woken, which is what a cycle feels of everything above.
 fn sleeps(period: Duration) -> Finding {
-    let timed = std::thread::spawn(|| {
-        sleep_exactly();
-        // Whether it was granted is said elsewhere.
-        let _ = run_in_real_time(CYCLE_PRIORITY);
-        let clock = Clock::start();
-        let mut latest = Duration::ZERO;
-        for _ in 0..SLEEPS {
-            let due = clock.now() + SLEEP;
-            // Interrupted or not, what counts is when it comes back.
-            let _ = ppoll(&mut [], Some(TimeSpec::from_duration(SLEEP)), None);
-            latest = latest.max(clock.now().since(due));
-        }
-        latest
-    });
-    let latest = timed.join().unwrap_or(Duration::MAX);
-    let found = format!(
-        "of {SLEEPS} sleeps of 1 ms the latest ended {} µs late; a cycle has {} µs",
-        latest.as_micros(),
-        period.as_micros()
-    );
-    if latest < period / 5 {
+    let measured = Wakefulness::measure(SPAN, true);
+    let found = format!("{measured}; a cycle has {} ms", period.as_secs_f64() * 1e3);
+    if measured.keeps(period) {
         Finding::good("clock", found)
     } else {
         Finding::trouble(
             "clock",
             Health::Warning,
             found,
-            "a longer `period`, a kernel with PREEMPT_RT, processors kept free of other work (`isolcpus`), or a machine that is not virtual",
+            format!(
+                "a `period` of {} ms, real-time rights, a kernel with PREEMPT_RT, processors kept free of other work (`isolcpus`), or a machine that is not virtual",
+                measured.period().as_millis()
+            ),
         )
     }
 }

@@ -29,6 +29,7 @@ mod rights;
 mod segments;
 mod trouble;
 mod udp;
+mod wakefulness;
 mod watchdog;
 mod zenoh_link;
 
@@ -53,4 +54,5 @@ pub use party::{PartySettings, run_party};
 pub use ports::free_addresses;
 pub use rights::Rights;
 pub use segments::{Segments, closed_segments, segments_of};
+pub use wakefulness::Wakefulness;
 pub use zenoh_link::ZENOH_RUNTIME;
