@@ -117,6 +117,8 @@ fn values(program: &ProgramSnapshot, inputs: &[&str], outputs: &[&str]) -> Value
         "missing": program.missing,
         "awaits_release": program.awaits_release,
         "forced": program.forced,
+        "protection": program.protection,
+        "lost": program.lost,
         "deadlines": {
             "direct": program.direct,
             "reconstructed": program.reconstructed,

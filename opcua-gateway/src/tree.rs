@@ -378,6 +378,45 @@ impl Tree {
             "signals that are forced, by whom and why",
             of(|program| Some(texts(&program.forced))),
         );
+        self.add(
+            "Protected",
+            Kind::Boolean,
+            "whether the failure of one station would be masked",
+            of(|program| Some(program.protection.as_ref()?.protected.into())),
+        );
+        self.add(
+            "Protection",
+            Kind::String,
+            "protected, or since which cycle not, and why",
+            of(|program| Some(text(&program.protection.as_ref()?.text()))),
+        );
+        self.add(
+            "StateLost",
+            Kind::Boolean,
+            "whether no living station can prove its state",
+            of(|program| Some(program.lost.is_some().into())),
+        );
+        self.add(
+            "LostState",
+            Kind::String,
+            "the newest available state of a lost one, or nothing",
+            of(|program| {
+                let lost = program.lost.as_ref().map(understudy_view::LostState::text);
+                Some(text(&lost.unwrap_or_default()))
+            }),
+        );
+        self.add(
+            "LostStateCycle",
+            Kind::UInt64,
+            "the cycle of that state, as the operator's choice names it",
+            of(|program| Some(program.lost.as_ref()?.newest.into())),
+        );
+        self.add(
+            "LostStateAge",
+            Kind::UInt64,
+            "by how many cycles that state is too old",
+            of(|program| Some(program.lost.as_ref()?.age_cycles?.into())),
+        );
         let deadlines = "deadlines";
         self.add(
             "Direct",

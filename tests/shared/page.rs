@@ -151,6 +151,10 @@ impl Page {
         self.signal(Signal::SIGINT);
     }
 
+    pub(crate) fn id(&self) -> u32 {
+        self.process.id()
+    }
+
     pub(crate) fn signal(&self, signal: Signal) {
         let id = i32::try_from(self.process.id()).expect("a process id");
         kill(Pid::from_raw(id), signal).expect("it runs");

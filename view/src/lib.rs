@@ -20,6 +20,7 @@ mod history;
 mod listing;
 mod margin;
 mod model;
+mod protection;
 mod run;
 mod series;
 mod snapshot;
@@ -39,6 +40,7 @@ pub use history::{Driven, History, Sampled, Step};
 pub use listing::{Filter, JournalLine, Listing};
 pub use margin::{Holders, Loss, Margin, Outcome};
 pub use model::{Bounds, Model, Spoken};
+pub use protection::{LackingStation, LostState, Protection};
 pub use run::{Run, find_run, find_run_of, find_running, find_running_of};
 pub use series::Series;
 pub use snapshot::{

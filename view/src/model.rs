@@ -2,6 +2,7 @@
 
 mod asked;
 mod programs;
+mod protection;
 mod turns;
 
 use std::sync::{Arc, OnceLock};
@@ -10,7 +11,7 @@ use understudy_bus::{HostEvent, RefusedAs};
 use understudy_cluster::Cluster;
 use understudy_ladder::Observer;
 use understudy_node::Event as StationEvent;
-use understudy_scenarios::{Happening, Parties, Record, RunEvent, moment};
+use understudy_scenarios::{Action, Happening, Parties, Record, RunEvent, moment};
 use understudy_wire::{Moment, Party, ProgramId, StationId};
 
 use crate::alarm::Alarms;
@@ -163,9 +164,7 @@ impl Model {
 
     fn shift(&mut self, by: i64) {
         self.stations.iter_mut().for_each(|track| track.shift(by));
-        self.programs
-            .iter_mut()
-            .for_each(|track| track.since = track.since.saturating_add(by));
+        self.programs.iter_mut().for_each(|track| track.shift(by));
         self.histories
             .iter_mut()
             .for_each(|history| history.shift(by));
@@ -261,6 +260,7 @@ impl Model {
                     track.ready();
                 }
             }
+            (HostEvent::Ready { .. }, Party::RemoteIo(program)) => self.forget_protection(program),
             (HostEvent::FieldLost { reason }, Party::RemoteIo(_)) => {
                 let subject = (record.name.clone(), "field-lost");
                 self.alarms.raise(subject, cycle, reason.clone());
@@ -331,6 +331,10 @@ impl Model {
                 self.alarms.over(&(name, "ended"), cycle);
             }
             RunEvent::Fault { action, party, .. } => {
+                if let (Action::Crash | Action::Restart, Party::RemoteIo(program)) = (action, party)
+                {
+                    self.forget_protection(*program);
+                }
                 let text = fault_text(*action, *party, &self.parties);
                 if let Party::Station(station) = party
                     && let Some(track) = self.stations.get_mut(station.index())
@@ -339,6 +343,9 @@ impl Model {
                 }
             }
             RunEvent::Ended { party, how, .. } => {
+                if let Party::RemoteIo(program) = party {
+                    self.forget_protection(*program);
+                }
                 let name = self.parties.name(*party).to_owned();
                 let text = format!("{name} ended unexpectedly: {how}");
                 if let Party::Station(station) = party

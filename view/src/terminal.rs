@@ -153,10 +153,21 @@ impl Screen {
         let area = frame.area();
         let stations = rows(snapshot.stations.len(), area.height);
         let programs = rows(snapshot.programs.len(), area.height);
-        let [head, station_area, program_area, survives, timing, bottom] = Layout::vertical([
+        let protected = tables::protection(&snapshot);
+        let lines = u16::try_from(protected.len()).unwrap_or(u16::MAX);
+        let [
+            head,
+            station_area,
+            program_area,
+            protection,
+            survives,
+            timing,
+            bottom,
+        ] = Layout::vertical([
             Constraint::Length(1),
             Constraint::Length(stations),
             Constraint::Length(programs),
+            Constraint::Length(lines.min((area.height / 6).max(1))),
             Constraint::Length(2),
             Constraint::Length(2),
             Constraint::Min(3),
@@ -165,6 +176,7 @@ impl Screen {
         frame.render_widget(self.head(&snapshot, head.width), head);
         frame.render_widget(tables::stations(&snapshot, self.above), station_area);
         frame.render_widget(tables::programs(&snapshot, model, self.above), program_area);
+        frame.render_widget(Paragraph::new(protected), protection);
         frame.render_widget(tables::survives(&snapshot), survives);
         draw_timing(frame, timing, model, &snapshot);
         if self.help {

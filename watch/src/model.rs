@@ -3,11 +3,12 @@
 use std::path::Path;
 use std::time::Instant;
 
-use understudy_scenarios::Record;
+use understudy_remote_io::Event as RemoteIoEvent;
+use understudy_scenarios::{Happening, Record};
 use understudy_view::{Bounds, Margin, Model as RunModel, Progress, Reading, Run, Source, Trouble};
 use understudy_wire::{Party, ProgramId, StationId, StationSet};
 
-use crate::changes::Changes;
+use crate::changes::{Changes, Protected};
 use crate::foreseen::Foresight;
 
 /// Cycles by which a remote I/O that is alive may be behind the newest deadline.
@@ -29,6 +30,8 @@ pub(crate) struct Model {
 pub(crate) struct Known {
     pub(crate) run: RunModel,
     pub(crate) changes: Changes,
+    /// By program, as it was noted last among the changes.
+    protected: Vec<Protected>,
     foresight: Foresight,
     /// Nothing more will come, and all of it is read.
     ended: bool,
@@ -66,12 +69,7 @@ impl Model {
 
     /// The programs of the run are known from now on; its records are to be read.
     pub(crate) fn begin(&mut self, run: &Run) -> Source {
-        self.known = Some(Known {
-            run: run.model(Bounds::default()),
-            changes: Changes::default(),
-            foresight: Foresight::default(),
-            ended: false,
-        });
+        self.known = Some(Known::nothing_of(run, false));
         run.follow()
     }
 
@@ -94,14 +92,20 @@ impl Model {
 }
 
 impl Known {
-    /// All that a journal holds up to a cycle.
-    pub(crate) fn of_journal(run: &Run, until: i64) -> Self {
-        let mut known = Self {
+    /// Before the first record.
+    fn nothing_of(run: &Run, ended: bool) -> Self {
+        Self {
             run: run.model(Bounds::default()),
             changes: Changes::default(),
+            protected: vec![Protected::default(); run.cluster().controllers().len()],
             foresight: Foresight::default(),
-            ended: run.is_finished(),
-        };
+            ended,
+        }
+    }
+
+    /// All that a journal holds up to a cycle.
+    pub(crate) fn of_journal(run: &Run, until: i64) -> Self {
+        let mut known = Self::nothing_of(run, run.is_finished());
         let mut source = run.follow();
         while source.poll(&mut |found| known.note(found)) > 0 {
             let past = known.run.cycle().is_some_and(|newest| newest > until);
@@ -127,6 +131,33 @@ impl Known {
         }
         let felt = self.run.cycle().map_or(i64::MIN, |cycle| cycle + 1);
         self.changes.note(&record, felt);
+        let is_ordinary = matches!(
+            record.event,
+            Happening::Station(_)
+                | Happening::Plant(_)
+                | Happening::RemoteIo(
+                    RemoteIoEvent::Sampled { .. } | RemoteIoEvent::Applied { .. }
+                )
+        );
+        if !is_ordinary {
+            self.note_protection();
+        }
+    }
+
+    /// What a remote I/O reports of its deadline is so in the cycle of that deadline.
+    fn note_protection(&mut self) {
+        let cycle = self.run.cycle().unwrap_or(i64::MIN);
+        for (program, known) in (0..).map(ProgramId).zip(&mut self.protected) {
+            let protection = self.run.protection(program);
+            let lost = self.run.lost_state(program);
+            if (known.protection.as_ref(), known.lost.as_ref()) != (protection, lost) {
+                *known = Protected {
+                    protection: protection.cloned(),
+                    lost: lost.cloned(),
+                };
+                self.changes.protection(program, known.clone(), cycle);
+            }
+        }
     }
 
     pub(crate) fn has_ended(&self) -> bool {

@@ -7,7 +7,7 @@ use std::time::Instant;
 use serde::Serialize;
 use understudy_remote_io::Missing;
 use understudy_scenarios::source_word;
-use understudy_view::{Alarm, Margin, Outcome};
+use understudy_view::{Alarm, LostState, Margin, Outcome, Protection};
 use understudy_wire::{Party, ProgramId, ProgramSet, SignalPlace, Source, StationId};
 
 use self::parties::{ShownParty, words_of};
@@ -48,7 +48,24 @@ struct ShownProgram {
     /// What its own controller said.
     said: Option<String>,
     forced: Vec<ShownForce>,
+    /// Nothing while the remote I/O has not reported it.
+    protection: Option<ShownProtection>,
+    lost: Option<ShownLost>,
     counts: Counts,
+}
+
+#[derive(Debug, Serialize)]
+struct ShownProtection {
+    #[serde(flatten)]
+    protection: Protection,
+    words: String,
+}
+
+#[derive(Debug, Serialize)]
+struct ShownLost {
+    #[serde(flatten)]
+    lost: LostState,
+    words: String,
 }
 
 #[derive(Debug, Serialize)]
@@ -191,6 +208,7 @@ fn shown_program(
     let driven = step.and_then(|step| step.driven.as_ref());
     let sampled = step.and_then(|step| step.sampled.as_ref());
     let own = words_of(known, StationId(program.0), cycle);
+    let protected = standing.protection(program);
     ShownProgram {
         index: program.index(),
         name: program_name(known, program),
@@ -219,6 +237,14 @@ fn shown_program(
                 }
             })
             .collect(),
+        protection: protected.protection.map(|protection| ShownProtection {
+            words: protection.text(),
+            protection,
+        }),
+        lost: protected.lost.map(|lost| ShownLost {
+            words: lost.text(),
+            lost,
+        }),
         counts: counts(known, program, cycle),
     }
 }

@@ -124,6 +124,33 @@ fn last_sources(model: &Model, program: ProgramId, cycle: Option<i64>) -> String
     (last.saturating_sub(LAST - 1)..=last).map(letter).collect()
 }
 
+/// Programs whose state is lost or that are not protected, a line each; one line where there is none.
+pub(super) fn protection(snapshot: &Snapshot) -> Vec<Line<'static>> {
+    let alarm = Style::new().fg(BAD).add_modifier(Modifier::BOLD);
+    let programs = snapshot.programs.iter();
+    let texts = programs.filter_map(|program| {
+        let text = match (&program.lost, &program.protection) {
+            (Some(lost), _) => lost.text(),
+            (None, Some(protection)) if !protection.protected => protection.text(),
+            _ => return None,
+        };
+        Some(format!("{}: {text}", program.program))
+    });
+    let mut lines: Vec<Line<'static>> = texts
+        .map(|text| Line::from(vec![label("protected"), text.into()]).style(alarm))
+        .collect();
+    if lines.is_empty() {
+        let mut programs = snapshot.programs.iter();
+        let text = if programs.all(|program| program.protection.is_some()) {
+            "all programs"
+        } else {
+            "not known of all programs yet"
+        };
+        lines.push(Line::from(vec![label("protected"), text.into()]));
+    }
+    lines
+}
+
 /// The margin of survival in a sentence.
 pub(super) fn survives(snapshot: &Snapshot) -> Paragraph<'static> {
     let line = Line::from(vec![label("survives"), sentence(&snapshot.margin).into()]);
