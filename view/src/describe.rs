@@ -24,7 +24,7 @@ pub struct Description {
 }
 
 /// Every word that [`Description::event`] can be.
-pub(crate) const EVENTS: [&str; 55] = [
+pub(crate) const EVENTS: [&str; 57] = [
     "acknowledged",
     "adopted",
     "adopted-lineage",
