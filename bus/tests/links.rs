@@ -254,7 +254,7 @@ fn restarts_beside_busy_processes_are_received_over_zenoh() {
         text.map_or(otherwise, |text| text.parse().expect("a number"))
     };
     let count = number("UNDERSTUDY_RESTARTS", 14);
-    let busy = number("UNDERSTUDY_BUSY", 3);
+    let busy = number("UNDERSTUDY_BUSY", 24);
     let times = restarts(LinkKind::Zenoh, count, busy as usize);
     let share = |percent: usize| times[(times.len() - 1) * percent / 100];
     println!(
