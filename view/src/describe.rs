@@ -24,7 +24,7 @@ pub struct Description {
 }
 
 /// Every word that [`Description::event`] can be.
-pub(crate) const EVENTS: [&str; 55] = [
+pub(crate) const EVENTS: [&str; 56] = [
     "acknowledged",
     "adopted",
     "adopted-lineage",
@@ -61,6 +61,7 @@ pub(crate) const EVENTS: [&str; 55] = [
     "recalled-exclusion",
     "refused",
     "refused-bytes",
+    "refused-connections",
     "refused-frames",
     "released",
     "sampled",
