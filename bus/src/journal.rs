@@ -6,7 +6,7 @@
 
 use std::borrow::Cow;
 use std::io::{self, BufWriter, Write};
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -99,6 +99,14 @@ pub enum HostEvent {
     ChannelFailed {
         /// Why.
         reason: String,
+    },
+    /// Connections to the operators' port were closed at once, since the last such record: there were too many, in all or from one
+    /// address.
+    RefusedConnections {
+        /// How many.
+        connections: u64,
+        /// Where the last one came from.
+        address: IpAddr,
     },
     /// The party said frames that break a bound of the wire, since the last such record: a mistake in this program.
     UnsendableFrames {

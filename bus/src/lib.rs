@@ -7,6 +7,7 @@
 mod announcer;
 mod channel;
 mod clock;
+mod connections;
 mod control;
 pub mod doctor;
 mod doorbell;
@@ -36,6 +37,10 @@ mod zenoh_link;
 pub use announcer::Announcer;
 pub use channel::{Admitted, ChannelSettings, DONE, TlsKeys};
 pub use clock::Clock;
+pub use connections::{
+    Connection, Connections, Listener, RESERVED_DESCRIPTORS, RefusedConnections, Slot,
+    inner_address, relay,
+};
 pub use control::{Commands, Interruption, hold_back_signals};
 pub use endpoints::{Endpoints, Peer};
 pub use error::BusError;

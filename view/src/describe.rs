@@ -24,7 +24,7 @@ pub struct Description {
 }
 
 /// Every word that [`Description::event`] can be.
-pub(crate) const EVENTS: [&str; 58] = [
+pub(crate) const EVENTS: [&str; 59] = [
     "acknowledged",
     "adopted",
     "adopted-lineage",
@@ -64,6 +64,7 @@ pub(crate) const EVENTS: [&str; 58] = [
     "recalled-exclusion",
     "refused",
     "refused-bytes",
+    "refused-connections",
     "refused-frames",
     "released",
     "sampled",

@@ -52,6 +52,16 @@ pub(super) fn host(event: &HostEvent) -> Words {
             Warning,
             format!("operators cannot call: {reason}"),
         ),
+        HostEvent::RefusedConnections {
+            connections,
+            address,
+        } => (
+            "refused-connections",
+            Warning,
+            format!(
+                "{connections} connections to the operators' port were refused: too many at once, the last from {address}"
+            ),
+        ),
         HostEvent::UnsendableFrames { frames, reason } => (
             "unsendable-frames",
             Warning,
