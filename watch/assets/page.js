@@ -35,8 +35,8 @@ function showView() {
   }
 }
 
-function head(run, state, live) {
-  const when = live ? (state.finished ? "finished" : "live") : "replay";
+function head(state, live) {
+  const when = !live ? "replay" : state.finished ? "finished" : time.stale() ? "old" : "live";
   setText(document.getElementById("status"), `${when} · cycle ${state.cycle} of ${state.newest}`);
   document.body.dataset.when = when;
   const open = state.alarms.filter((alarm) => !alarm.acknowledged).length;
@@ -48,6 +48,9 @@ function head(run, state, live) {
 // Values that are not the present are greyed out, and it is said why.
 function showStale() {
   const why = time.stale();
+  if (time.state() && Boolean(why) !== document.body.hasAttribute("data-stale")) {
+    head(time.state(), time.isLive());
+  }
   const place = document.getElementById("stale");
   place.hidden = !why;
   setText(place, why ? `⚠ ${why}` : "");
@@ -83,7 +86,7 @@ async function begin() {
   }
   document.getElementById("alarm-count").addEventListener("click", () => (location.hash = "events"));
   time.onState((state, live) => {
-    head(run, state, live);
+    head(state, live);
     VIEWS[currentView()].show(state, live);
     showStale();
   });

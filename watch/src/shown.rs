@@ -322,6 +322,21 @@ fn survival(known: &Known, margin: &Margin) -> Survival {
             "any two further failures of stations would be masked".to_owned(),
         ),
     };
+    // A program that has lost its outputs already is no good sign, whatever else would be masked.
+    let lost = known
+        .programs()
+        .filter(|program| !margin.served.contains(*program));
+    let lost = program_names(known, lost.collect());
+    let (level, words) = match (lost.is_empty(), level) {
+        (true, _) | (_, "none") => (level, words),
+        _ => (
+            "some",
+            format!(
+                "{} has no true outputs now; of the others: {words}",
+                lost.join(" and ")
+            ),
+        ),
+    };
     let unmasked_pairs = margin.pairs.iter().filter(|pair| !pair.is_masked());
     let failures = singles.into_iter().chain(unmasked_pairs);
     Survival {

@@ -153,7 +153,21 @@ pub(super) fn protection(snapshot: &Snapshot) -> Vec<Line<'static>> {
 
 /// The margin of survival in a sentence.
 pub(super) fn survives(snapshot: &Snapshot) -> Paragraph<'static> {
-    let line = Line::from(vec![label("survives"), sentence(&snapshot.margin).into()]);
+    let margin = &snapshot.margin;
+    let programs = snapshot.programs.iter().map(|program| &program.program);
+    let lost: Vec<&str> = programs
+        .filter(|program| !margin.served.contains(program))
+        .map(String::as_str)
+        .collect();
+    let sentence = match (margin.served.is_empty(), lost.is_empty()) {
+        (true, _) | (_, true) => sentence(margin),
+        _ => format!(
+            "{} has no true outputs; of the others: {}",
+            lost.join(" and "),
+            sentence(margin)
+        ),
+    };
+    let line = Line::from(vec![label("survives"), sentence.into()]);
     Paragraph::new(line).wrap(Wrap { trim: false })
 }
 
