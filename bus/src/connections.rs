@@ -22,6 +22,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use nix::sys::resource::{Resource, getrlimit, setrlimit};
+use nix::sys::socket::{Backlog, listen};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf, copy, split};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::oneshot;
@@ -40,6 +41,9 @@ const ADDRESSES: usize = 4;
 
 /// From an `accept` that failed to the next.
 const REFUSAL_PAUSE: Duration = Duration::from_millis(200);
+
+/// Connections that wait to be accepted: past them the system lets callers wait for a second and more. They take no descriptors.
+const WAITING: i32 = 1024;
 
 /// Descriptors that the listeners of this process have not taken yet; unknown until the first asks.
 static DESCRIPTORS: Mutex<Option<usize>> = Mutex::new(None);
@@ -251,6 +255,8 @@ pub struct Listener {
 impl Listener {
     /// Closes a connection over which nothing was sent for `patience`.
     pub fn new(listener: TcpListener, connections: Connections, patience: Duration) -> Self {
+        // Where it fails, fewer wait.
+        let _ = Backlog::new(WAITING).and_then(|waiting| listen(&listener, waiting));
         Self {
             listener,
             connections,
