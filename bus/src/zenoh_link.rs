@@ -53,6 +53,9 @@ const OPEN_TIMEOUT_MS: u32 = 2_000;
 /// this is for a machine or a cable that fails.
 const LEASE_MS: u32 = 2_000;
 
+/// A longer frame goes in parts. What waits for a peer takes eight batches of this size, at most.
+const BATCH_BYTES: u16 = 16 * 1024;
+
 /// How Zenoh's own threads are to be set up, as a variable of the environment of every process that opens a Zenoh link. Zenoh
 /// reads it once, when its first session opens, and takes nothing else; without it there are six threads where two do.
 pub const ZENOH_RUNTIME: (&str, &str) = (
@@ -426,8 +429,13 @@ fn settings(endpoints: &Endpoints) -> zenoh::Result<zenoh::Config> {
         ("scouting/gossip/enabled", "false".into()),
         // The low-latency transport sends on the calling thread, and would wait there for a peer that is suspended.
         ("transport/unicast/lowlatency", "false".into()),
-        // One queue for each peer in place of eight.
-        ("transport/unicast/qos/enabled", "false".into()),
+        // Not to be switched off: with one queue for all priorities Zenoh 1.10.2 marks that queue as full under one priority and as free
+        // under another one (`TransmissionPipelineProducer::push_network_message` and `TransmissionPipelineConsumer::refill`), so that
+        // it drops every frame to this peer from the first full queue on.
+        ("transport/unicast/qos/enabled", "true".into()),
+        // Each frame is a batch of its own, and a member sends some in a row.
+        ("transport/link/tx/queue/size/real_time", "8".into()),
+        ("transport/link/tx/batch_size", BATCH_BYTES.to_string()),
         (
             "transport/unicast/open_timeout",
             OPEN_TIMEOUT_MS.to_string(),
