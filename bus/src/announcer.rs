@@ -5,12 +5,23 @@
 use std::collections::BTreeMap;
 use std::net::{SocketAddr, TcpListener};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use zenoh::Wait;
 use zenoh::bytes::Encoding;
 use zenoh::query::Queryable;
 
+use crate::connections::{Connections, Relay, inner_address};
 use crate::error::{BusError, reason};
+
+/// Connections at once, each of which takes three descriptors.
+const MOST_CONNECTIONS: usize = 64;
+
+/// A caller who has not opened a session by then is gone.
+const HANDSHAKE_TIMEOUT_MS: u32 = 3_000;
+
+/// An open session gives signs of life more often.
+const PATIENCE: Duration = Duration::from_secs(30);
 
 /// The newest text under each key.
 type Newest = Arc<Mutex<BTreeMap<String, String>>>;
@@ -18,6 +29,8 @@ type Newest = Arc<Mutex<BTreeMap<String, String>>>;
 /// Says texts to whoever has called its address.
 pub struct Announcer {
     root: String,
+    // No call comes to a session that ends.
+    _relay: Relay,
     session: zenoh::Session,
     newest: Newest,
     _queryable: Queryable<()>,
@@ -29,14 +42,14 @@ impl Announcer {
     /// # Errors
     /// The port is in use, or Zenoh does not start.
     pub fn open(address: SocketAddr, root: &str) -> Result<Self, BusError> {
-        TcpListener::bind(address)
-            .map(drop)
-            .map_err(|source| BusError::listen(address, source))?;
+        let listen = |source| BusError::listen(address, source);
+        let listener = TcpListener::bind(address).map_err(listen)?;
+        let inner = inner_address().map_err(listen)?;
         let failed = |error: zenoh::Error| BusError::Zenoh {
             address,
             reason: reason(&error),
         };
-        let session = settings(address)
+        let session = settings(inner)
             .and_then(|config| zenoh::open(config).wait())
             .map_err(failed)?;
         let newest = Newest::default();
@@ -59,8 +72,11 @@ impl Announcer {
             })
             .wait()
             .map_err(failed)?;
+        let connections = Connections::new(MOST_CONNECTIONS, 3);
+        let relay = Relay::start(listener, connections, PATIENCE, inner).map_err(listen)?;
         Ok(Self {
             root: root.to_owned(),
+            _relay: relay,
             session,
             newest,
             _queryable: queryable,
@@ -101,6 +117,10 @@ fn settings(address: SocketAddr) -> zenoh::Result<zenoh::Config> {
         ("connect/endpoints", "[]".to_owned()),
         ("scouting/multicast/enabled", "false".to_owned()),
         ("scouting/gossip/enabled", "false".to_owned()),
+        (
+            "transport/unicast/accept_timeout",
+            HANDSHAKE_TIMEOUT_MS.to_string(),
+        ),
     ] {
         config
             .insert_json5(setting, &value)

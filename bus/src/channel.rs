@@ -33,6 +33,7 @@ use zenoh::qos::CongestionControl;
 use zenoh::query::{Query, Queryable};
 
 use crate::clock::Clock;
+use crate::connections::{Connections, Relay, inner_address};
 use crate::control::{LINE_BYTES, order};
 use crate::endpoints::Endpoints;
 use crate::error::{BusError, reason};
@@ -57,6 +58,18 @@ const GATHERED_BYTES: usize = 64 * 1024;
 
 /// After a channel could not be opened.
 const TRY_AGAIN_AFTER: Duration = Duration::from_secs(5);
+
+/// Connections at once, each of which takes three descriptors.
+const MOST_CONNECTIONS: usize = 64;
+
+/// A caller who has not shown a certificate by then, or has not opened a session, is gone.
+const HANDSHAKE_TIMEOUT_MS: u32 = 3_000;
+
+/// An open session gives signs of life more often.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// Refused connections are reported together, so often at most.
+const REFUSALS_EVERY: Duration = Duration::from_secs(1);
 
 /// A party that ends waits so long for its channel to end, at most.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(1);
@@ -113,6 +126,7 @@ pub(crate) struct Channel<E> {
     telemetry: Telemetry,
     sink: JournalSender<E>,
     clock: Clock,
+    connections: Connections,
     stop: Arc<AtomicBool>,
     /// An operator wants the party to end.
     stop_wanted: Arc<AtomicBool>,
@@ -121,6 +135,7 @@ pub(crate) struct Channel<E> {
 /// What is open.
 struct Opened {
     session: zenoh::Session,
+    relay: Relay,
     journal: Publisher<'static>,
     _answers: Vec<Queryable<()>>,
 }
@@ -150,6 +165,7 @@ impl<E: Send + 'static> Channel<E> {
             telemetry,
             sink,
             clock,
+            connections: Connections::new(MOST_CONNECTIONS, 3),
             stop: Arc::clone(&stop),
             stop_wanted: Arc::default(),
         };
@@ -172,6 +188,7 @@ impl<E: Send + 'static> Channel<E> {
         let mut opened: Option<Opened> = None;
         let mut next_try = Time::default();
         let mut looked = self.clock.now();
+        let mut reported = looked;
         let mut stopping = false;
         loop {
             let now = self.clock.now();
@@ -208,6 +225,16 @@ impl<E: Send + 'static> Channel<E> {
                 admitted = newly;
                 close(opened.take());
                 next_try = now;
+            }
+            if now.since(reported) >= REFUSALS_EVERY
+                && let Some(refused) = self.connections.take_refused()
+            {
+                reported = now;
+                let event = HostEvent::RefusedConnections {
+                    connections: refused.connections,
+                    address: refused.address,
+                };
+                self.sink.record(now, Noted::Host(event));
             }
             let lost = self.telemetry.lost.swap(0, Ordering::Relaxed);
             if lost > 0 {
@@ -254,11 +281,17 @@ impl<E: Send + 'static> Channel<E> {
     }
 
     fn listen(&self, admitted: &Admitted) -> zenoh::Result<Opened> {
-        // Zenoh only has words for why it cannot listen; this asks the system first.
-        TcpListener::bind(self.address)
-            .map_err(|source| BusError::listen(self.address, source).to_string())?;
-        let listen = format!("tls/{}", self.address);
+        // Zenoh accepts whatever calls, and where that takes all descriptors it closes none of them again. So it gets no more than has a place.
+        let listen = |source| BusError::listen(self.address, source).to_string();
+        let listener = TcpListener::bind(self.address).map_err(listen)?;
+        let inner = inner_address()?;
+        let listen = format!("tls/{inner}#tls_handshake_timeout_ms={HANDSHAKE_TIMEOUT_MS}");
         let mut config = tls_config("peer", &self.settings.keys)?;
+        insert(
+            &mut config,
+            "transport/unicast/accept_timeout",
+            &json!(HANDSHAKE_TIMEOUT_MS),
+        )?;
         insert(&mut config, "listen/endpoints", &json!([listen]))?;
         let rules = access_control(&self.prefix, &hash_key(&self.name), admitted);
         insert(&mut config, "access_control", &rules)?;
@@ -304,8 +337,10 @@ impl<E: Send + 'static> Channel<E> {
             let key = format!("{}/command/{word}", self.prefix);
             answers.push(answer(&session, key, force)?);
         }
+        let relay = Relay::start(listener, self.connections.clone(), PATIENCE, inner)?;
         Ok(Opened {
             session,
+            relay,
             journal,
             _answers: answers,
         })
@@ -324,9 +359,12 @@ fn forcing(word: &str, query: &Query) -> Result<Order, String> {
 }
 
 fn close(opened: Option<Opened>) {
-    if let Some(opened) = opened
-        && let Err(error) = opened.session.close().wait()
-    {
+    let Some(opened) = opened else {
+        return;
+    };
+    // No call comes to a session that ends.
+    drop(opened.relay);
+    if let Err(error) = opened.session.close().wait() {
         tracing::debug!(%error, "the channel was not closed");
     }
 }

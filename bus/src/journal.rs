@@ -6,7 +6,7 @@
 
 use std::borrow::Cow;
 use std::io::{self, BufWriter, Write};
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -80,6 +80,14 @@ pub enum HostEvent {
         /// The same in words.
         reason: String,
     },
+    /// Others are received, and none of them receives this member: another process runs with its keys, its number of starts has gone back with
+    /// its disk, or the network carries one direction only. It begins another life.
+    NotReceived {
+        /// For so many milliseconds.
+        silent_ms: u64,
+        /// Why there is no other life.
+        error: Option<String>,
+    },
     /// Operators can call, by mutual TLS.
     ChannelOpened {
         /// Where.
@@ -92,11 +100,31 @@ pub enum HostEvent {
         /// Why.
         reason: String,
     },
+    /// Connections to the operators' port were closed at once, since the last such record: there were too many, in all or from one
+    /// address.
+    RefusedConnections {
+        /// How many.
+        connections: u64,
+        /// Where the last one came from.
+        address: IpAddr,
+    },
     /// The party said frames that break a bound of the wire, since the last such record: a mistake in this program.
     UnsendableFrames {
         /// How many.
         frames: u64,
         /// Which bound, for the last one.
+        reason: String,
+    },
+    /// No configured peer was received for so long that the link was closed and opened anew.
+    LinkReopened {
+        /// How long, in milliseconds.
+        silence_ms: u64,
+    },
+    /// The same, and the link could not be opened: no frame is sent or received. It is tried again.
+    LinkFailed {
+        /// How long no peer was received, in milliseconds.
+        silence_ms: u64,
+        /// Why it cannot be opened.
         reason: String,
     },
     /// The equipment of a remote I/O cannot be seen any more.
@@ -136,6 +164,8 @@ pub enum RefusedAs {
     Forged,
     /// It counted before, or is too late.
     Replayed,
+    /// Two processes run as this member with the same keys; the one that started first is refused.
+    TwoLives,
     /// The sender's keys are revoked.
     Revoked,
 }

@@ -1,11 +1,15 @@
 //! Metrics over HTTP: `GET /metrics`, and nothing else.
 
+use std::io;
 use std::net::SocketAddr;
+use std::time::Duration;
 
 use axum::Router;
 use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
 use axum::routing::get;
+use tokio::net::TcpListener;
+use understudy_bus::{Connection, Connections, Listener};
 use understudy_view::Reading;
 
 use crate::error::GatewayError;
@@ -14,6 +18,12 @@ use crate::serve_until_asked;
 
 /// What OpenMetrics 1.0 wants to be called.
 const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+
+/// Connections at once.
+const MOST_CONNECTIONS: usize = 64;
+
+/// Who has not sent a whole request by then, or does not take the answer, is gone.
+const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Serves the metrics of `run` until SIGINT or SIGTERM; `ready` is told where.
 ///
@@ -26,8 +36,30 @@ pub fn serve_metrics(
 ) -> Result<(), GatewayError> {
     let exposition = run.exposition();
     serve_until_asked(address, ready, |listener| async move {
-        axum::serve(listener, router(exposition)).await
+        axum::serve(Limited::new(listener), router(exposition)).await
     })
+}
+
+struct Limited(Listener);
+
+impl Limited {
+    fn new(listener: TcpListener) -> Self {
+        let connections = Connections::new(MOST_CONNECTIONS, 1);
+        Self(Listener::new(listener, connections, PATIENCE))
+    }
+}
+
+impl axum::serve::Listener for Limited {
+    type Io = Connection;
+    type Addr = SocketAddr;
+
+    async fn accept(&mut self) -> (Connection, SocketAddr) {
+        self.0.accept().await
+    }
+
+    fn local_addr(&self) -> io::Result<SocketAddr> {
+        self.0.local_addr()
+    }
 }
 
 fn router(

@@ -2,22 +2,26 @@
 //! every request is answered by exception 6, *server device busy*.
 
 use std::future::{Ready, ready};
-use std::net::SocketAddr;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
+use std::time::Duration;
 
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio_modbus::server::Service;
 use tokio_modbus::server::tcp::Server;
 use tokio_modbus::{ExceptionCode, Request, Response};
+use understudy_bus::{Connections, Listener, relay};
 
 use crate::error::GatewayError;
 use crate::followed::Followed;
 use crate::register_map::{ProcessImage, RegisterMap};
 use crate::serve_until_asked;
 
-/// Who calls when so many are connected is sent away.
+/// Connections at once.
 const MOST_CLIENTS: usize = 64;
+
+/// Who asks nothing for so long, or does not take the answer, is gone.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// By the standard, in one answer.
 const MOST_BITS: u16 = 2000;
@@ -44,27 +48,26 @@ async fn serve(
     run: Arc<Followed>,
     map: Arc<RegisterMap>,
 ) -> std::io::Result<()> {
-    let places = Arc::new(Semaphore::new(MOST_CLIENTS));
+    let inner = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await?;
+    let address = inner.local_addr()?;
+    let connections = Connections::new(MOST_CLIENTS, 3);
+    let relayed = relay(Listener::new(listener, connections, PATIENCE), address);
     let connected = move |stream: TcpStream, _: SocketAddr| {
         let (run, map) = (Arc::clone(&run), Arc::clone(&map));
-        let place = Arc::clone(&places).try_acquire_owned().ok();
-        async move {
-            let client = place.map(|place| Client {
-                run,
-                map,
-                _place: place,
-            });
-            Ok(client.map(|client| (client, stream)))
-        }
+        async move { Ok(Some((Client { run, map }, stream))) }
     };
-    // A client that breaks its connection off, or says what is no request, is gone; the others stay.
-    Server::new(listener).serve(&connected, |_| {}).await
+    // The library ends with the first connection that the system refuses, and all clients with it; so it gets those that have a place.
+    let server = Server::new(inner);
+    tokio::select! {
+        // A client that breaks its connection off, or says what is no request, is gone; the others stay.
+        ended = server.serve(&connected, |_| {}) => ended,
+        never = relayed => match never {},
+    }
 }
 
 struct Client {
     run: Arc<Followed>,
     map: Arc<RegisterMap>,
-    _place: OwnedSemaphorePermit,
 }
 
 impl Service for Client {

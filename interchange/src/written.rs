@@ -360,10 +360,15 @@ impl<'a> Comparison<'a> {
             let written = self.written(&output.name, blocks)?;
             Some((place, *places.get(written.as_str())?))
         });
+        let counters = self.program.blocks().into_iter().filter_map(|block| {
+            let preset = block.kind.preset_value()?;
+            Some((format!("{}.CV", block.name), preset))
+        });
         Ok(Pair {
             before,
             after,
             outputs: outputs.collect(),
+            counters: counters.collect(),
         })
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::io;
-use std::net::SocketAddr;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -21,6 +21,7 @@ use opcua::types::{
     ObjectTypeId, QualifiedName, VariableTypeId, Variant,
 };
 use tokio::net::TcpListener;
+use understudy_bus::{Connections, Listener, relay};
 use understudy_gateway::{Followed, serve_until_asked};
 use understudy_view::{Event, Level, Run};
 
@@ -31,6 +32,15 @@ use crate::trust::{self, Feed};
 
 /// Between two looks at what is newest; a run is followed no faster.
 const LOOK: Duration = Duration::from_millis(100);
+
+/// At once, each of which takes three descriptors.
+const MOST_CONNECTIONS: usize = 64;
+
+/// A caller who has not said hello by then, in seconds, is gone.
+const HELLO_TIMEOUT_S: u32 = 3;
+
+/// A connection over which the server sends nothing for so long is closed; a subscription is kept alive more often.
+const PATIENCE: Duration = Duration::from_secs(300);
 
 /// At once; whoever comes then is refused.
 const MOST_SESSIONS: usize = 64;
@@ -125,8 +135,14 @@ async fn listen(listener: TcpListener, settings: &Settings, shown: Shown) -> io:
             showing.look();
         }
     };
+    // The library accepts whatever calls.
+    let inner = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await?;
+    let address = inner.local_addr()?;
+    let connections = Connections::new(MOST_CONNECTIONS, 3);
+    let listener = Listener::new(listener, connections, PATIENCE);
     tokio::select! {
-        ended = server.run_with(listener) => ended.map_err(io::Error::other),
+        ended = server.run_with(inner) => ended.map_err(io::Error::other),
+        never = relay(listener, address) => match never {},
         () = again => Ok(()),
     }
 }
@@ -158,6 +174,7 @@ fn server(
             },
             "understudy",
         ));
+    builder = builder.hello_timeout(HELLO_TIMEOUT_S);
     builder.limits_mut().max_sessions = MOST_SESSIONS;
     builder
         .limits_mut()

@@ -12,7 +12,9 @@
 mod boiler;
 mod campaigns;
 mod deaths;
+mod duplicates;
 mod field;
+mod handshake;
 mod hosts;
 #[allow(dead_code, reason = "each test uses its part")]
 #[path = "../shared/mod.rs"]

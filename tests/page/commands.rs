@@ -99,7 +99,7 @@ fn process_of(runs: &Path, name: &str) -> Pid {
         .map(|line| serde_json::from_str::<Value>(line).expect("a record"))
         .filter(|record| record["name"] == name && record["event"]["event"] == "ready")
         .filter_map(|record| record["event"]["process"].as_i64())
-        .last();
+        .next_back();
     let process = process.expect("it is ready");
     Pid::from_raw(i32::try_from(process).expect("a process id"))
 }

@@ -5,6 +5,7 @@
     reason = "what is waited for has a deadline on the real clock"
 )]
 
+mod crowd;
 mod deployment;
 mod keys;
 mod parties;

@@ -24,7 +24,7 @@ pub struct Description {
 }
 
 /// Every word that [`Description::event`] can be.
-pub(crate) const EVENTS: [&str; 55] = [
+pub(crate) const EVENTS: [&str; 59] = [
     "acknowledged",
     "adopted",
     "adopted-lineage",
@@ -53,6 +53,9 @@ pub(crate) const EVENTS: [&str; 55] = [
     "interrupted",
     "joins",
     "journal-lost",
+    "link-failed",
+    "link-reopened",
+    "not-received",
     "origin",
     "paces",
     "protected",
@@ -61,6 +64,7 @@ pub(crate) const EVENTS: [&str; 55] = [
     "recalled-exclusion",
     "refused",
     "refused-bytes",
+    "refused-connections",
     "refused-frames",
     "released",
     "sampled",

@@ -7,7 +7,7 @@ mod turns;
 
 use std::sync::{Arc, OnceLock};
 
-use understudy_bus::HostEvent;
+use understudy_bus::{HostEvent, RefusedAs};
 use understudy_cluster::Cluster;
 use understudy_ladder::Observer;
 use understudy_node::Event as StationEvent;
@@ -265,9 +265,31 @@ impl Model {
                 let subject = (record.name.clone(), "field-lost");
                 self.alarms.raise(subject, cycle, reason.clone());
             }
+            (
+                HostEvent::RefusedFrames {
+                    refused_as: RefusedAs::TwoLives,
+                    sender: Some(sender),
+                    ..
+                },
+                _,
+            ) => {
+                let name = self.parties.name(*sender).to_owned();
+                let text = format!(
+                    "two processes run as {name} with the same keys; the one that started first is refused: end the wrong one, or issue it keys of its own"
+                );
+                self.alarms.raise((name, "two-lives"), cycle, text);
+            }
             (HostEvent::FieldRegained, Party::RemoteIo(_)) => {
                 self.alarms
                     .over(&(record.name.clone(), "field-lost"), cycle);
+            }
+            (HostEvent::LinkFailed { reason, .. }, _) => {
+                let subject = (record.name.clone(), "link-failed");
+                self.alarms.raise(subject, cycle, reason.clone());
+            }
+            (HostEvent::LinkReopened { .. }, _) => {
+                self.alarms
+                    .over(&(record.name.clone(), "link-failed"), cycle);
             }
             (HostEvent::JournalLost { .. }, Party::RemoteIo(program)) => {
                 self.misses_records(program)

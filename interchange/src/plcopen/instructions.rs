@@ -76,6 +76,8 @@ struct Open {
 struct List<'s, 'a> {
     own: &'s mut Statements<'a>,
     result: Option<Value>,
+    /// Whether something was made of the result.
+    is_used: bool,
     open: Vec<Open>,
     /// Those on their way, with the bits that say whether they are done.
     jumps: Vec<(Option<String>, String)>,
@@ -89,6 +91,7 @@ impl Statements<'_> {
         let mut list = List {
             own: self,
             result: None,
+            is_used: true,
             open: Vec::new(),
             jumps: Vec::new(),
             passed: HashSet::new(),
@@ -99,6 +102,7 @@ impl Statements<'_> {
         }
         let end = text.span().end;
         let end = end..end;
+        list.forget(&end);
         if !list.open.is_empty() {
             list.error(
                 "U1017",
@@ -144,8 +148,32 @@ impl List<'_, '_> {
         }
     }
 
+    /// A new result.
+    fn load(&mut self, value: Value, span: &Range<usize>) {
+        self.forget(span);
+        self.result = Some(value);
+        self.is_used = false;
+    }
+
+    /// The result is not known any more. One that nothing was made of is held, so that what it names is looked at all the same.
+    fn forget(&mut self, span: &Range<usize>) {
+        let result = self.result.take();
+        if let Some(value) = result.filter(|_| !self.is_used) {
+            let message = format!(
+                "the result `{}` has no effect: nothing stores it",
+                value.text
+            );
+            let warning = Diagnostic::warning("U1023", message, span.clone());
+            self.diagnostics
+                .push(warning.with_help("store it with ST, or remove what makes it"));
+            self.held(value, span);
+        }
+        self.is_used = true;
+    }
+
     /// The result, which must be known.
     fn taken(&mut self, span: &Range<usize>) -> Option<Value> {
+        self.is_used = true;
         if self.result.is_none() {
             let message = "there is no result here: an LD is missing before it";
             self.error("U1017", message.into(), span.clone());
@@ -217,7 +245,7 @@ impl List<'_, '_> {
         if let Some(label) = &instruction.label {
             self.jumps
                 .retain(|(target, _)| target.as_ref() != Some(label));
-            self.result = None;
+            self.forget(span);
             if !self.passed.insert(label.clone()) {
                 self.error(
                     "U1016",
@@ -227,15 +255,22 @@ impl List<'_, '_> {
             }
         }
         let (word, operand) = (instruction.operator.as_str(), instruction.operand.as_str());
+        let needs_operand = matches!(word, "LD" | "LDN" | "ST" | "STN" | "S" | "R")
+            || operator(word.strip_suffix('N').unwrap_or(word)).is_some();
+        if needs_operand && operand.is_empty() {
+            self.error("U1017", format!("{word} has no operand"), span.clone());
+            return;
+        }
         match word {
             "" => {}
             "LD" | "LDN" => {
                 let value = self.read(operand);
-                self.result = Some(if word == "LDN" {
+                let value = if word == "LDN" {
                     value.negated()
                 } else {
                     value
-                });
+                };
+                self.load(value, span);
             }
             "ST" | "STN" => {
                 let Some(value) = self.taken(span) else {
@@ -262,12 +297,12 @@ impl List<'_, '_> {
             "NOT" => {
                 if let Some(value) = self.taken(span) {
                     let negated = self.settled(value.negated(), span);
-                    self.result = Some(negated);
+                    self.load(negated, span);
                 }
             }
             ")" => self.close(span),
             "CAL" => {
-                self.result = None;
+                self.forget(span);
                 self.write(&format!("{}\n", called(operand)), span);
             }
             "CALC" | "CALCN" => {
@@ -313,7 +348,7 @@ impl List<'_, '_> {
         self.write(&format!("{done} := {condition};\n"), span);
         self.jumps.push((label, done));
         if condition == "TRUE" {
-            self.result = None;
+            self.forget(span);
         }
     }
 
@@ -324,7 +359,7 @@ impl List<'_, '_> {
         };
         if let Some(right) = self.taken(span) {
             let joined = self.joined(&open.before, open.operator, open.negated, right, span);
-            self.result = Some(joined);
+            self.load(joined, span);
         }
     }
 
@@ -345,13 +380,14 @@ impl List<'_, '_> {
                 depth: left.depth + 1,
                 kind,
             };
-            self.result = Some(self.settled(answer, span));
+            let answer = self.settled(answer, span);
+            self.load(answer, span);
             return;
         };
         let Some(inner) = operand.strip_prefix('(') else {
             let right = self.read(operand);
             let joined = self.joined(&left, operator, negated, right, span);
-            self.result = Some(joined);
+            self.load(joined, span);
             return;
         };
         if self.open.len() >= MAXIMUM_OPEN {
@@ -367,7 +403,11 @@ impl List<'_, '_> {
         });
         let closed = inner.trim_end().strip_suffix(')');
         let first = closed.unwrap_or(inner).trim();
-        self.result = (!first.is_empty()).then(|| self.read(first));
+        self.forget(span);
+        if !first.is_empty() {
+            let first = self.read(first);
+            self.load(first, span);
+        }
         if closed.is_some() {
             self.close(span);
         }

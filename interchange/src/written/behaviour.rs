@@ -1,7 +1,8 @@
 //! Whether two circuits do the same: a proof by induction where their registers correspond, and scans.
 //!
 //! The proof: corresponding registers begin with the same value, and as long as they hold the same, every output is the same and so are their
-//! next values, whatever the inputs are. It covers every state, also those that no scan of a test would reach.
+//! next values, whatever the inputs are. It covers every state in which no counter is above its preset, which is proved of them besides; also
+//! states that no scan of a test would reach.
 
 use std::collections::{HashMap, HashSet};
 
@@ -26,6 +27,8 @@ pub(super) struct Pair<'a> {
     pub(super) after: &'a Circuit,
     /// Places of the same output in both.
     pub(super) outputs: Vec<(usize, usize)>,
+    /// What each counter of `before` holds, such as `parts.CV`, and its preset.
+    pub(super) counters: Vec<(String, u16)>,
 }
 
 impl Pair<'_> {
@@ -53,9 +56,7 @@ impl Pair<'_> {
     ///
     /// The registers that are left, those of edge contacts and edge coils, correspond in the order of the scan.
     pub(super) fn is_proved(&self, written: impl Fn(&str) -> Option<String>) -> bool {
-        let Some(places) = self.registers(written) else {
-            return false;
-        };
+        let places = self.registers(written);
         let (before, after) = (self.before.registers(), self.after.registers());
         if places
             .iter()
@@ -88,28 +89,72 @@ impl Pair<'_> {
                 Variable::Register(place) => back[place as usize],
             })
         });
-        // What is the same function in another form is decided by its diagram.
+        // What is the same function in another form is decided by its diagram, where no counter is above its preset.
         let other_form: HashSet<(Expression, Expression)> = left
-            .into_iter()
+            .iter()
+            .copied()
             .zip(right)
             .filter(|(left, right)| left != right)
             .collect();
-        let roots: Vec<Expression> = other_form
+        if other_form.is_empty() {
+            return true;
+        }
+        let now: Vec<Expression> = places
+            .iter()
+            .map(|&(place, _)| graph.variable(register(place)))
+            .collect();
+        let bounded = self.bounded(&mut graph, &places, &now);
+        let stays = self.bounded(&mut graph, &places, &left);
+        let mut equal: Vec<(Expression, Expression)> = other_form
+            .into_iter()
+            .map(|(left, right)| (graph.and(left, bounded), graph.and(right, bounded)))
+            .collect();
+        equal.push((graph.and(stays, bounded), bounded));
+        let roots: Vec<Expression> = equal
             .iter()
             .flat_map(|&(left, right)| [left, right])
             .collect();
-        if roots.is_empty() {
-            return true;
-        }
         let diagrams = Diagrams::for_roots(&graph, &roots, MAXIMUM_NODES);
-        other_form.into_iter().all(|(left, right)| {
+        equal.into_iter().all(|(left, right)| {
             let diagram = |root| diagrams.of(&graph, root).ok();
             diagram(left).is_some_and(|left| Some(left) == diagram(right))
         })
     }
 
-    /// The places of corresponding registers, of those that the outputs depend on.
-    fn registers(&self, written: impl Fn(&str) -> Option<String>) -> Option<Vec<(usize, usize)>> {
+    /// That no counter is above its preset, where the registers at `places` hold `values`.
+    fn bounded(
+        &self,
+        graph: &mut Graph,
+        places: &[(usize, usize)],
+        values: &[Expression],
+    ) -> Expression {
+        let names = places.iter().map(|&(place, _)| place);
+        let value_of: HashMap<&str, Expression> = names
+            .map(|place| self.before.registers()[place].name.as_str())
+            .zip(values.iter().copied())
+            .collect();
+        let mut all = graph.constant(true);
+        for (counter, preset) in &self.counters {
+            // From the lowest bit on: at most the preset, so far.
+            let mut at_most = graph.constant(true);
+            for bit in 0..u16::BITS {
+                let Some(&value) = value_of.get(format!("{counter}.{bit}").as_str()) else {
+                    break;
+                };
+                let off = graph.not(value);
+                at_most = if preset >> bit & 1 == 1 {
+                    graph.any([off, at_most])
+                } else {
+                    graph.and(off, at_most)
+                };
+            }
+            all = graph.and(all, at_most);
+        }
+        all
+    }
+
+    /// The places of corresponding registers, of those that the outputs depend on. One without a counterpart may hold anything in the proof.
+    fn registers(&self, written: impl Fn(&str) -> Option<String>) -> Vec<(usize, usize)> {
         let (before, after) = (self.before.registers(), self.after.registers());
         let known: HashMap<&str, usize> = after
             .iter()
@@ -126,16 +171,17 @@ impl Pair<'_> {
             }
             match written(&before[place].name) {
                 Some(name) => {
-                    let other = *known.get(name.as_str())?;
-                    free[other] = false;
-                    pairs.push((place, other));
+                    if let Some(&other) = known.get(name.as_str()) {
+                        free[other] = false;
+                        pairs.push((place, other));
+                    }
                 }
                 None => edges.push(place),
             }
         }
         let free: Vec<usize> = (0..free.len()).filter(|&place| free[place]).collect();
         pairs.extend(edges.iter().copied().zip(free.iter().copied()));
-        (edges.len() == free.len()).then_some(pairs)
+        pairs
     }
 }
 

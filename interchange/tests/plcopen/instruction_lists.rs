@@ -258,3 +258,10 @@ fn what_is_wrong_with_a_list_is_said() {
     let text = unit(&declared(), list);
     insta::assert_snapshot!(findings(&text, &read(&text, None)).join("\n"));
 }
+
+#[test]
+fn a_result_that_nothing_stores_is_said_and_looked_at() {
+    let list = "LD i0\nNONSENSE ghost\nLD i1\nAND\nST q0\nLD i2\n";
+    let text = unit(&declared(), list);
+    insta::assert_snapshot!(findings(&text, &read(&text, None)).join("\n"));
+}

@@ -29,6 +29,19 @@ pub(super) fn host(event: &HostEvent) -> Words {
             Warning,
             format!("{datagrams} frames did not count: {reason}"),
         ),
+        HostEvent::NotReceived { silent_ms, error } => {
+            let next = match error {
+                None => "it begins another life".to_owned(),
+                Some(error) => format!("it has no other life: {error}"),
+            };
+            (
+                "not-received",
+                Warning,
+                format!(
+                    "no member has received it for {silent_ms} ms, though it receives them: {next}"
+                ),
+            )
+        }
         HostEvent::ChannelOpened { address, .. } => (
             "channel-opened",
             Info,
@@ -39,10 +52,32 @@ pub(super) fn host(event: &HostEvent) -> Words {
             Warning,
             format!("operators cannot call: {reason}"),
         ),
+        HostEvent::RefusedConnections {
+            connections,
+            address,
+        } => (
+            "refused-connections",
+            Warning,
+            format!(
+                "{connections} connections to the operators' port were refused: too many at once, the last from {address}"
+            ),
+        ),
         HostEvent::UnsendableFrames { frames, reason } => (
             "unsendable-frames",
             Warning,
             format!("{frames} frames could not be sent: {reason}"),
+        ),
+        HostEvent::LinkReopened { silence_ms } => (
+            "link-reopened",
+            Warning,
+            format!("received no member for {silence_ms} ms and opened its link anew"),
+        ),
+        HostEvent::LinkFailed { silence_ms, reason } => (
+            "link-failed",
+            Alarm,
+            format!(
+                "received no member for {silence_ms} ms and cannot open its link anew: {reason}"
+            ),
         ),
         HostEvent::FieldLost { reason } => (
             "field-lost",
