@@ -5,7 +5,6 @@ use std::net::SocketAddr;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::Args;
@@ -276,17 +275,12 @@ fn read_keys(arguments: &Arguments, cluster: &Cluster, party: Party) -> Result<H
     hold_back_signals()
         .map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))?;
     let keys = PartyKeys::load(folder, cluster, party, now);
-    let keys = Arc::new(keys.map_err(|errors| crate::keys::failed(&errors))?);
+    let keys = keys.map_err(|errors| crate::keys::failed(&errors))?;
     let seal = keys.begin_life(now);
-    let for_next_life = Arc::clone(&keys);
-    let next_life = move || {
-        let begun = for_next_life.begin_life(Date::of(SystemTime::now()));
-        begun.map_err(|error| error.to_string())
-    };
     let watch = keys.watch();
     match (seal, watch) {
         (Ok(seal), Ok(watch)) => Ok(Held {
-            guard: Guard::with_keys(seal, keys.opener()).with_next_life(next_life),
+            guard: Guard::with_keys(seal, keys.opener()),
             // In a laboratory standard input is the operator.
             channel: (!arguments.in_laboratory).then(|| channel(keys, cluster)),
             _watch: Some(watch),
@@ -295,7 +289,7 @@ fn read_keys(arguments: &Arguments, cluster: &Cluster, party: Party) -> Result<H
     }
 }
 
-fn channel(keys: Arc<PartyKeys>, cluster: &Cluster) -> ChannelSettings {
+fn channel(keys: PartyKeys, cluster: &Cluster) -> ChannelSettings {
     let tls = keys.tls().clone();
     ChannelSettings {
         keys: crate::operate::tls_keys(&tls),

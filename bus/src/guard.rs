@@ -16,25 +16,11 @@ pub enum Guard {
 }
 
 /// Both sides of one party.
+#[derive(Debug)]
 pub struct Keys {
     seal: Seal,
     opener: Opener,
     datagram: Vec<u8>,
-    next_life: Option<NextLife>,
-}
-
-/// Begins another life of the same party.
-type NextLife = Box<dyn FnMut() -> Result<Seal, String> + Send>;
-
-impl std::fmt::Debug for Keys {
-    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { seal, opener, .. } = self;
-        formatter
-            .debug_struct("Keys")
-            .field("seal", seal)
-            .field("opener", opener)
-            .finish_non_exhaustive()
-    }
 }
 
 /// Why a datagram is not passed on to the party.
@@ -53,38 +39,7 @@ impl Guard {
             seal,
             opener,
             datagram: Vec::new(),
-            next_life: None,
         }))
-    }
-
-    /// The same, with what begins another life where nobody receives this one.
-    #[must_use]
-    pub fn with_next_life(
-        mut self,
-        next_life: impl FnMut() -> Result<Seal, String> + Send + 'static,
-    ) -> Self {
-        if let Self::Keys(keys) = &mut self {
-            keys.next_life = Some(Box::new(next_life));
-        }
-        self
-    }
-
-    /// Whose frames it closes, where that party could begin another life.
-    pub(crate) fn mortal(&self) -> Option<Party> {
-        match self {
-            Self::Keys(keys) if keys.next_life.is_some() => Some(keys.seal.own()),
-            _ => None,
-        }
-    }
-
-    /// Closes frames in another life from now on.
-    pub(crate) fn begin_next_life(&mut self) -> Result<(), String> {
-        if let Self::Keys(keys) = self
-            && let Some(next_life) = &mut keys.next_life
-        {
-            keys.seal = next_life()?;
-        }
-        Ok(())
     }
 
     /// The datagram of `frame`, which `encoded` are the bytes of.
@@ -130,7 +85,6 @@ impl From<Refusal> for Refused {
             Refusal::Foreign { sender } => (RefusedAs::Foreign, Some(sender)),
             Refusal::Forged { sender } => (RefusedAs::Forged, Some(sender)),
             Refusal::Replayed { sender } => (RefusedAs::Replayed, Some(sender)),
-            Refusal::TwoLives { sender } => (RefusedAs::TwoLives, Some(sender)),
             Refusal::Revoked { sender } => (RefusedAs::Revoked, Some(sender)),
             Refusal::Broken { sender, .. } => (RefusedAs::NoFrame, Some(sender)),
         };

@@ -20,7 +20,6 @@ use crate::journal::{EventSink, HostEvent, Noted};
 use crate::link::{Link, LinkCounters, Reopening};
 use crate::observer::Observer;
 use crate::orders::{Order, Orders};
-use crate::reception::Reception;
 use crate::trouble::Refusals;
 
 /// Datagrams taken before the party's own times are looked at again.
@@ -99,7 +98,6 @@ struct Round {
     refused: Refusals,
     unsendable: Unsendable,
     reported: Time,
-    reception: Option<Reception>,
     summary: Summary,
 }
 
@@ -109,10 +107,7 @@ impl<M: Machine> Host<'_, M> {
     /// # Errors
     /// [`BusError::System`] where the system refuses to let it sleep.
     pub fn run(mut self) -> Result<Summary, BusError> {
-        let mut round = Round {
-            reception: self.guard.mortal().map(Reception::new),
-            ..Round::default()
-        };
+        let mut round = Round::default();
         self.drain(self.clock.now(), &mut round);
         loop {
             if self.obey(&mut round) || self.observer.satisfied() {
@@ -140,7 +135,6 @@ impl<M: Machine> Host<'_, M> {
             }
             self.report_reopenings(now);
             self.report_trouble(now, TROUBLE_PERIOD, &mut round);
-            self.live_on(now, &mut round);
         }
         let now = self.clock.now();
         self.report_trouble(now, Duration::ZERO, &mut round);
@@ -208,9 +202,6 @@ impl<M: Machine> Host<'_, M> {
                     let frame = Arc::new(frame);
                     round.summary.frames_heard += 1;
                     self.observer.frame(now, &frame);
-                    if let Some(reception) = &mut round.reception {
-                        reception.receives(now, &frame);
-                    }
                     // Which epoch counts is for the party to say, by its own frames; another's Sync only moves it on in that one.
                     let (known, said) = (round.moment, frame.header.moment);
                     let moves_on = said.epoch == known.epoch && said > known;
@@ -259,9 +250,6 @@ impl<M: Machine> Host<'_, M> {
             Ok(datagram) => {
                 round.summary.frames_said += 1;
                 self.observer.frame(now, frame);
-                if let Some(reception) = &mut round.reception {
-                    reception.sends(now, frame);
-                }
                 self.link.send(frame, datagram);
             }
             Err(reason) => {
@@ -284,19 +272,6 @@ impl<M: Machine> Host<'_, M> {
             Ok(_) | Err(Errno::EINTR) => Ok(()),
             Err(error) => Err(BusError::system("to sleep until something arrives")(error)),
         }
-    }
-
-    /// Begins another life where nobody receives this one.
-    fn live_on(&mut self, now: Time, round: &mut Round) {
-        let reception = round.reception.as_mut();
-        let Some(silence) = reception.and_then(|reception| reception.is_refused(now)) else {
-            return;
-        };
-        let event = HostEvent::NotReceived {
-            silent_ms: u64::try_from(silence.as_millis()).unwrap_or(u64::MAX),
-            error: self.guard.begin_next_life().err(),
-        };
-        self.sink.record(now, Noted::Host(event));
     }
 
     fn report_reopenings(&mut self, now: Time) {

@@ -80,14 +80,6 @@ pub enum HostEvent {
         /// The same in words.
         reason: String,
     },
-    /// Others are received, and none of them receives this member: another process runs with its keys, its number of starts has gone back with
-    /// its disk, or the network carries one direction only. It begins another life.
-    NotReceived {
-        /// For so many milliseconds.
-        silent_ms: u64,
-        /// Why there is no other life.
-        error: Option<String>,
-    },
     /// Operators can call, by mutual TLS.
     ChannelOpened {
         /// Where.
@@ -164,8 +156,6 @@ pub enum RefusedAs {
     Forged,
     /// It counted before, or is too late.
     Replayed,
-    /// Two processes run as this member with the same keys; the one that started first is refused.
-    TwoLives,
     /// The sender's keys are revoked.
     Revoked,
 }

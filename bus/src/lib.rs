@@ -25,7 +25,6 @@ mod operator;
 mod orders;
 mod party;
 mod ports;
-mod reception;
 mod rights;
 mod segments;
 mod trouble;

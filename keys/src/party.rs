@@ -7,7 +7,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use understudy_cluster::Cluster;
 use understudy_seal::{FrameKey, KEY_BYTES, Opener, Revocations, Seal, TransferKey};
-use understudy_wire::{ConfigurationHash, Party, StationId, Topic};
+use understudy_wire::{Party, StationId, Topic};
 
 use crate::certificate;
 use crate::date::Date;
@@ -78,7 +78,6 @@ pub struct TlsFiles {
 pub struct PartyKeys {
     folder: PathBuf,
     own: Party,
-    configuration: ConfigurationHash,
     expires: Date,
     key: FrameKey,
     heard: Vec<HeardSender>,
@@ -164,7 +163,6 @@ impl PartyKeys {
         Ok(Self {
             folder: folder.to_owned(),
             own,
-            configuration: cluster.agreement().configuration,
             expires: file.expires,
             key: own_key,
             heard,
@@ -201,7 +199,6 @@ impl PartyKeys {
         let revoked = Arc::clone(&self.revoked);
         let senders = self.heard_keys.iter().cloned();
         Opener::new(self.own, senders, self.from.iter().cloned(), revoked)
-            .of_configuration(self.configuration)
     }
 
     /// What seals its own frames, in a life that it never had: one more than the last that was noted, and never before the clock,

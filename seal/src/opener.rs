@@ -4,16 +4,14 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use ring::aead::{Aad, LessSafeKey, Nonce};
-use understudy_wire::{
-    Body, ConfigurationHash, Frame, FrameError, MAXIMUM_FRAME_BYTES, Party, StationId, decode,
-};
+use understudy_wire::{Body, Frame, FrameError, MAXIMUM_FRAME_BYTES, Party, StationId, decode};
 
 use crate::envelope::{
     AUTHENTICATOR_BYTES, Envelope, HEADER_BYTES, OVERHEAD_BYTES, TAG_BYTES, UNSEALED_MAGIC,
 };
 use crate::key::{FrameKey, TransferKey};
 use crate::revocations::Revocations;
-use crate::window::{Standing, Window};
+use crate::window::Window;
 
 /// Why a datagram does not count.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -45,14 +43,6 @@ pub enum Refusal {
         /// Who said it when it was new.
         sender: Party,
     },
-    /// The sender started again somewhere, and its earlier life goes on as well: two processes run with the same keys.
-    #[error(
-        "two processes run as {sender:?} with the same keys: one started later and is received, the earlier one goes on and is refused"
-    )]
-    TwoLives {
-        /// Who.
-        sender: Party,
-    },
     /// By a party whose keys were revoked.
     #[error("the keys of {sender:?} are revoked")]
     Revoked {
@@ -72,7 +62,6 @@ pub enum Refusal {
 /// Opens what arrives at one party.
 pub struct Opener {
     own: Party,
-    configuration: Option<ConfigurationHash>,
     senders: BTreeMap<Party, (FrameKey, Window)>,
     transfers: BTreeMap<StationId, LessSafeKey>,
     revoked: Arc<Revocations>,
@@ -92,21 +81,12 @@ impl Opener {
             .map(|(from, key)| (from, key.cipher()));
         Self {
             own,
-            configuration: None,
             senders: senders
                 .map(|(party, key)| (party, (key, Window::default())))
                 .collect(),
             transfers: ciphers.collect(),
             revoked,
         }
-    }
-
-    /// Takes over a later life of a sender only from a frame of this configuration, so that a copy of a member with an older disk does not
-    /// shut out the rightful one. Frames of other configurations are opened all the same, for others to report.
-    #[must_use]
-    pub fn of_configuration(mut self, configuration: ConfigurationHash) -> Self {
-        self.configuration = Some(configuration);
-        self
     }
 
     /// The frame in a datagram, which is decrypted in place; nothing where it is authentic and for another station.
@@ -138,11 +118,8 @@ impl Opener {
         if self.revoked.holds(sender) {
             return Err(Refusal::Revoked { sender });
         }
-        let standing = window.standing(envelope.life, envelope.number);
-        match standing {
-            Standing::Past => return Err(Refusal::Replayed { sender }),
-            Standing::EarlierLife => return Err(Refusal::TwoLives { sender }),
-            Standing::New | Standing::NextLife => {}
+        if !window.take(envelope.life, envelope.number) {
+            return Err(Refusal::Replayed { sender });
         }
         let text = &mut sealed[HEADER_BYTES..];
         let encoded = match envelope.to {
@@ -161,11 +138,6 @@ impl Opener {
             return Err(broken(FrameError::Promise(
                 "sender and receiver are those of its envelope",
             )));
-        }
-        let own = self.configuration;
-        let fits = own.is_none_or(|own| own == frame.header.configuration);
-        if fits || standing == Standing::New {
-            window.take(envelope.life, envelope.number);
         }
         Ok(Some(frame))
     }

@@ -54,11 +54,6 @@ impl Seal {
         }
     }
 
-    /// Whose frames it seals.
-    pub fn own(&self) -> Party {
-        self.own
-    }
-
     /// Puts the datagram of `frame`, which `encoded` are the bytes of, in place of what is in `datagram`. A copy of a frame is sealed
     /// anew: it has a number of its own.
     ///

@@ -3,19 +3,6 @@
 /// How far a number may lie behind the newest: copies and reordering of a network fit in many times over.
 pub const WINDOW_FRAMES: u64 = 64;
 
-/// How a number stands to those that were taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Standing {
-    /// It may be taken.
-    New,
-    /// The first of a later life.
-    NextLife,
-    /// It was taken, or is too late.
-    Past,
-    /// The life before this one goes on: it says numbers that no delay explains.
-    EarlierLife,
-}
-
 /// The numbers of one sender that were taken.
 ///
 /// Invariant: bit k of `taken` says whether `newest - k` was taken; nothing at or before `newest - 64` is taken any more.
@@ -24,48 +11,23 @@ pub(crate) struct Window {
     life: u32,
     newest: u64,
     taken: u64,
-    /// The life before this one and its newest number.
-    earlier: (u32, u64),
 }
 
 impl Window {
-    /// Whether a number may be taken.
-    pub(crate) fn standing(&self, life: u32, number: u64) -> Standing {
-        if number == 0 {
-            return Standing::Past;
-        }
-        if life < self.life {
-            let (earlier, newest) = self.earlier;
-            let goes_on = life == earlier && number > newest.saturating_add(WINDOW_FRAMES);
-            return if goes_on {
-                Standing::EarlierLife
-            } else {
-                Standing::Past
-            };
+    /// Takes a number, once; false where it must not count.
+    pub(crate) fn take(&mut self, life: u32, number: u64) -> bool {
+        if life < self.life || number == 0 {
+            return false;
         }
         if life > self.life {
-            return Standing::NextLife;
-        }
-        let behind = self.newest.saturating_sub(number);
-        let is_past =
-            number <= self.newest && (behind >= WINDOW_FRAMES || self.taken & (1 << behind) != 0);
-        if is_past {
-            Standing::Past
-        } else {
-            Standing::New
-        }
-    }
-
-    /// Takes a number that stands as [`Standing::New`] or [`Standing::NextLife`].
-    pub(crate) fn take(&mut self, life: u32, number: u64) {
-        if life != self.life {
             *self = Self {
                 life,
                 newest: number,
                 taken: 1,
-                earlier: (self.life, self.newest),
             };
-        } else if number > self.newest {
+            return true;
+        }
+        if number > self.newest {
             let ahead = number - self.newest;
             self.taken = if ahead < WINDOW_FRAMES {
                 (self.taken << ahead) | 1
@@ -73,9 +35,14 @@ impl Window {
                 1
             };
             self.newest = number;
-        } else {
-            self.taken |= 1 << (self.newest - number);
+            return true;
         }
+        let behind = self.newest - number;
+        if behind >= WINDOW_FRAMES || self.taken & (1 << behind) != 0 {
+            return false;
+        }
+        self.taken |= 1 << behind;
+        true
     }
 }
 
@@ -107,17 +74,6 @@ mod tests {
         }
     }
 
-    fn takes(window: &mut Window, life: u32, number: u64) -> bool {
-        let is_free = matches!(
-            window.standing(life, number),
-            Standing::New | Standing::NextLife
-        );
-        if is_free {
-            window.take(life, number);
-        }
-        is_free
-    }
-
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -127,7 +83,7 @@ mod tests {
         ) {
             let (mut window, mut memory) = (Window::default(), Memory::default());
             for (life, number) in said {
-                prop_assert_eq!(takes(&mut window, life, number), memory.take(life, number));
+                prop_assert_eq!(window.take(life, number), memory.take(life, number));
             }
         }
     }
@@ -135,11 +91,11 @@ mod tests {
     #[test]
     fn the_ends_of_the_numbers_are_no_ends_of_the_window() {
         let mut window = Window::default();
-        assert!(takes(&mut window, 1, u64::MAX));
-        assert!(!takes(&mut window, 1, u64::MAX));
-        assert!(takes(&mut window, 1, u64::MAX - 63));
-        assert!(!takes(&mut window, 1, u64::MAX - 64));
-        assert!(takes(&mut window, u32::MAX, 1));
-        assert!(!takes(&mut window, 1, u64::MAX));
+        assert!(window.take(1, u64::MAX));
+        assert!(!window.take(1, u64::MAX));
+        assert!(window.take(1, u64::MAX - 63));
+        assert!(!window.take(1, u64::MAX - 64));
+        assert!(window.take(u32::MAX, 1));
+        assert!(!window.take(1, u64::MAX));
     }
 }

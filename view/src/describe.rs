@@ -24,7 +24,7 @@ pub struct Description {
 }
 
 /// Every word that [`Description::event`] can be.
-pub(crate) const EVENTS: [&str; 59] = [
+pub(crate) const EVENTS: [&str; 58] = [
     "acknowledged",
     "adopted",
     "adopted-lineage",
@@ -55,7 +55,6 @@ pub(crate) const EVENTS: [&str; 59] = [
     "journal-lost",
     "link-failed",
     "link-reopened",
-    "not-received",
     "origin",
     "paces",
     "protected",

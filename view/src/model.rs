@@ -7,7 +7,7 @@ mod turns;
 
 use std::sync::{Arc, OnceLock};
 
-use understudy_bus::{HostEvent, RefusedAs};
+use understudy_bus::HostEvent;
 use understudy_cluster::Cluster;
 use understudy_ladder::Observer;
 use understudy_node::Event as StationEvent;
@@ -264,20 +264,6 @@ impl Model {
             (HostEvent::FieldLost { reason }, Party::RemoteIo(_)) => {
                 let subject = (record.name.clone(), "field-lost");
                 self.alarms.raise(subject, cycle, reason.clone());
-            }
-            (
-                HostEvent::RefusedFrames {
-                    refused_as: RefusedAs::TwoLives,
-                    sender: Some(sender),
-                    ..
-                },
-                _,
-            ) => {
-                let name = self.parties.name(*sender).to_owned();
-                let text = format!(
-                    "two processes run as {name} with the same keys; the one that started first is refused: end the wrong one, or issue it keys of its own"
-                );
-                self.alarms.raise((name, "two-lives"), cycle, text);
             }
             (HostEvent::FieldRegained, Party::RemoteIo(_)) => {
                 self.alarms

@@ -29,19 +29,6 @@ pub(super) fn host(event: &HostEvent) -> Words {
             Warning,
             format!("{datagrams} frames did not count: {reason}"),
         ),
-        HostEvent::NotReceived { silent_ms, error } => {
-            let next = match error {
-                None => "it begins another life".to_owned(),
-                Some(error) => format!("it has no other life: {error}"),
-            };
-            (
-                "not-received",
-                Warning,
-                format!(
-                    "no member has received it for {silent_ms} ms, though it receives them: {next}"
-                ),
-            )
-        }
         HostEvent::ChannelOpened { address, .. } => (
             "channel-opened",
             Info,
