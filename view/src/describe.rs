@@ -24,7 +24,7 @@ pub struct Description {
 }
 
 /// Every word that [`Description::event`] can be.
-pub(crate) const EVENTS: [&str; 56] = [
+pub(crate) const EVENTS: [&str; 62] = [
     "acknowledged",
     "adopted",
     "adopted-lineage",
@@ -39,12 +39,16 @@ pub(crate) const EVENTS: [&str; 56] = [
     "diagnosed",
     "digest-differs",
     "disputed",
+    "duplicate-found",
+    "duplicate-gone",
     "ended",
     "exchange",
     "excluded",
     "fault",
+    "field-contested",
     "field-lost",
     "field-regained",
+    "field-uncontested",
     "finished",
     "flagged",
     "forced",
@@ -53,6 +57,8 @@ pub(crate) const EVENTS: [&str; 56] = [
     "interrupted",
     "joins",
     "journal-lost",
+    "new-life",
+    "no-new-life",
     "origin",
     "paces",
     "protected",
@@ -89,7 +95,7 @@ pub fn describe(record: &Record, names: &Parties) -> Description {
         Happening::Station(event) => parties::station(event, names),
         Happening::RemoteIo(event) => parties::remote_io(event, names),
         Happening::Plant(event) => parties::plant(event, names),
-        Happening::Host(event) => processes::host(event),
+        Happening::Host(event) => processes::host(event, names),
         Happening::Run(event) => processes::run(event, names),
     };
     Description {
