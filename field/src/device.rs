@@ -10,6 +10,7 @@
 //! When the remote I/O ends in order, the device is driven to the fail-safe values; when it dies, that is for the device's own
 //! watchdog to do.
 
+use std::cell::Cell;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -36,6 +37,9 @@ const FIRST_PAUSE: Duration = Duration::from_millis(50);
 
 /// At most; the outputs wait for it when the device is there again.
 const LONGEST_PAUSE: Duration = Duration::from_millis(400);
+
+/// A device that breaks off so often in a row, or does not answer, when its outputs are read is not asked for them any more.
+const UNREAD: u8 = 2;
 
 /// What the cycle sees of the device.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -117,6 +121,7 @@ impl Device {
                         settings,
                         fail_safe,
                         period,
+                        unread: Cell::new(0),
                         shared: worker,
                     }
                     .run(),
@@ -213,6 +218,8 @@ struct Worker {
     outputs: Plan,
     fail_safe: Image,
     period: Duration,
+    /// How often in a row its outputs could not be read; [`UNREAD`] where it does not let them be read.
+    unread: Cell<u8>,
     shared: Arc<Shared>,
 }
 
@@ -246,7 +253,6 @@ impl Worker {
         // What this connection wrote last: what was there before may be what the device starts with.
         let mut written: Option<Image> = None;
         let mut contest = Contest::default();
-        let mut reads_back = true;
         let mut read_at = Instant::now();
         loop {
             let (outputs, ending) = {
@@ -260,7 +266,7 @@ impl Worker {
             let driven = outputs.as_ref().map(|outputs| (&self.outputs, outputs));
             let patience = self.settings.timeout;
             if let Some(written) = &written
-                && reads_back
+                && self.unread.get() < UNREAD
                 && !ending
                 && read_at.elapsed() >= READ_BACK_EVERY
             {
@@ -268,11 +274,17 @@ impl Worker {
                 let read = timeout(patience, read_back(&mut device, &self.outputs)).await;
                 match read {
                     Ok(Ok(Some(read))) => {
+                        self.unread.set(0);
                         self.shared.lock().contested = contest.compare(written, &read);
                     }
-                    Ok(Ok(None)) => reads_back = false,
-                    // The exchange says what it is.
-                    Ok(Err(_)) | Err(_) => {}
+                    Ok(Ok(None)) => self.unread.set(UNREAD),
+                    Ok(Err(_)) | Err(_) => {
+                        // An answer that is still to come would be taken for that to the next request.
+                        self.unread.set(self.unread.get() + 1);
+                        let address = self.settings.address;
+                        self.lose(format!("{address} breaks off when its outputs are read"));
+                        return was_of_use;
+                    }
                 }
             }
             let exchanged = timeout(patience, exchange(&mut device, driven, &self.inputs)).await;
