@@ -37,4 +37,8 @@ impl FieldDriver for Equipment {
             DeviceLook::Lost(reason) => Look::Lost(reason),
         })
     }
+
+    fn contested(&mut self) -> Option<bool> {
+        self.0.contested()
+    }
 }

@@ -5,13 +5,14 @@ use std::net::SocketAddr;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::Args;
 use serde::Serialize;
 use serde_json::json;
 use understudy_bus::{
-    Admitted, ChannelSettings, Commands, Endpoints, FieldDriver, Guard, LinkKind, NoField,
+    Admitted, ChannelSettings, Commands, Endpoints, FieldDriver, Guard, LinkKind, NewLife, NoField,
     NoObserver, PartySettings, Peer, Segments, SimulatedField, ZENOH_RUNTIME, hold_back_signals,
     run_party,
 };
@@ -276,11 +277,12 @@ fn read_keys(arguments: &Arguments, cluster: &Cluster, party: Party) -> Result<H
         .map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))?;
     let keys = PartyKeys::load(folder, cluster, party, now);
     let keys = keys.map_err(|errors| crate::keys::failed(&errors))?;
+    let keys = Arc::new(keys);
     let seal = keys.begin_life(now);
     let watch = keys.watch();
     match (seal, watch) {
         (Ok(seal), Ok(watch)) => Ok(Held {
-            guard: Guard::with_keys(seal, keys.opener()),
+            guard: Guard::with_keys(seal, keys.opener()).with_lives(new_life(&keys)),
             // In a laboratory standard input is the operator.
             channel: (!arguments.in_laboratory).then(|| channel(keys, cluster)),
             _watch: Some(watch),
@@ -289,7 +291,16 @@ fn read_keys(arguments: &Arguments, cluster: &Cluster, party: Party) -> Result<H
     }
 }
 
-fn channel(keys: PartyKeys, cluster: &Cluster) -> ChannelSettings {
+/// A life of now, noted where the lives before it are.
+fn new_life(keys: &Arc<PartyKeys>) -> NewLife {
+    let keys = Arc::clone(keys);
+    Arc::new(move || {
+        let life = keys.begin_life(Date::of(SystemTime::now()));
+        life.map_err(|error| error.to_string())
+    })
+}
+
+fn channel(keys: Arc<PartyKeys>, cluster: &Cluster) -> ChannelSettings {
     let tls = keys.tls().clone();
     ChannelSettings {
         keys: crate::operate::tls_keys(&tls),

@@ -16,6 +16,11 @@ pub trait FieldDriver: Send {
     fn look(&mut self) -> Option<Look> {
         None
     }
+
+    /// Whether somebody else drives the outputs too, where that is new.
+    fn contested(&mut self) -> Option<bool> {
+        None
+    }
 }
 
 /// What is new of a field that is not reached over the link.

@@ -1,9 +1,13 @@
 //! What frames wear on the network: an authenticator, or nothing where the cluster file says so.
 
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+
 use understudy_seal::{Opener, Refusal, Seal};
 use understudy_wire::{Frame, FrameError, Party, decode};
 
 use crate::journal::RefusedAs;
+use crate::rights::run_in_background;
 
 /// Closes what a party says and opens what it hears.
 #[derive(Debug, Default)]
@@ -15,12 +19,26 @@ pub enum Guard {
     Keys(Box<Keys>),
 }
 
+/// Begins a life that the party never had; it may take its time.
+pub type NewLife = Arc<dyn Fn() -> Result<Seal, String> + Send + Sync>;
+
 /// Both sides of one party.
-#[derive(Debug)]
 pub struct Keys {
     seal: Seal,
     opener: Opener,
     datagram: Vec<u8>,
+    new_life: Option<NewLife>,
+    awaited: Option<Receiver<Result<Seal, String>>>,
+}
+
+impl std::fmt::Debug for Keys {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter
+            .debug_struct("Keys")
+            .field("seal", &self.seal)
+            .field("opener", &self.opener)
+            .finish_non_exhaustive()
+    }
 }
 
 /// Why a datagram is not passed on to the party.
@@ -39,6 +57,51 @@ impl Guard {
             seal,
             opener,
             datagram: Vec::new(),
+            new_life: None,
+            awaited: None,
+        }))
+    }
+
+    /// The same, and the party may begin a further life while it runs.
+    #[must_use]
+    pub fn with_lives(mut self, new_life: NewLife) -> Self {
+        if let Self::Keys(keys) = &mut self {
+            keys.new_life = Some(new_life);
+        }
+        self
+    }
+
+    /// Asks for a new life, which a thread of its own prepares: a life is noted on the disk before it is used.
+    pub(crate) fn ask_for_life(&mut self) {
+        let Self::Keys(keys) = self else {
+            return;
+        };
+        let (Some(new_life), None) = (keys.new_life.clone(), &keys.awaited) else {
+            return;
+        };
+        let (sender, awaited) = channel();
+        let begun = std::thread::Builder::new()
+            .name("new-life".into())
+            .spawn(move || {
+                run_in_background();
+                // The party may have ended meanwhile.
+                let _ = sender.send(new_life());
+            });
+        if begun.is_ok() {
+            keys.awaited = Some(awaited);
+        }
+    }
+
+    /// Goes on in the life that was asked for, once it is there: its number, or why there is none.
+    pub(crate) fn begin_life(&mut self) -> Option<Result<u32, String>> {
+        let Self::Keys(keys) = self else {
+            return None;
+        };
+        let begun = keys.awaited.as_ref()?.try_recv().ok()?;
+        keys.awaited = None;
+        Some(begun.map(|seal| {
+            keys.seal = seal;
+            keys.seal.life()
         }))
     }
 
@@ -85,6 +148,7 @@ impl From<Refusal> for Refused {
             Refusal::Foreign { sender } => (RefusedAs::Foreign, Some(sender)),
             Refusal::Forged { sender } => (RefusedAs::Forged, Some(sender)),
             Refusal::Replayed { sender } => (RefusedAs::Replayed, Some(sender)),
+            Refusal::OfAnotherLife { sender } => (RefusedAs::OfAnotherLife, Some(sender)),
             Refusal::Revoked { sender } => (RefusedAs::Revoked, Some(sender)),
             Refusal::Broken { sender, .. } => (RefusedAs::NoFrame, Some(sender)),
         };

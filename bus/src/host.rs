@@ -20,7 +20,8 @@ use crate::journal::{EventSink, HostEvent, Noted};
 use crate::link::{Link, LinkCounters, Reopening};
 use crate::observer::Observer;
 use crate::orders::{Order, Orders};
-use crate::trouble::Refusals;
+use crate::trouble::{Duplicates, Refusals};
+use crate::unreceived::Unreceived;
 
 /// Datagrams taken before the party's own times are looked at again.
 const INPUTS_IN_A_ROW: usize = 64;
@@ -96,6 +97,8 @@ struct Round {
     wakeups_in_a_row: u32,
     field_lost: bool,
     refused: Refusals,
+    duplicates: Duplicates,
+    unreceived: Option<Unreceived>,
     unsendable: Unsendable,
     reported: Time,
     summary: Summary,
@@ -168,6 +171,14 @@ impl<M: Machine> Host<'_, M> {
 
     /// Tells the party what its field shows, where that comes by another way than the link.
     fn look(&mut self, round: &mut Round) {
+        if let Some(contested) = self.field.contested() {
+            let event = if contested {
+                HostEvent::FieldContested
+            } else {
+                HostEvent::FieldUncontested
+            };
+            self.sink.record(self.clock.now(), Noted::Host(event));
+        }
         let Some(look) = self.field.look() else {
             return;
         };
@@ -202,6 +213,11 @@ impl<M: Machine> Host<'_, M> {
                     let frame = Arc::new(frame);
                     round.summary.frames_heard += 1;
                     self.observer.frame(now, &frame);
+                    if let Some(unreceived) = &mut round.unreceived
+                        && unreceived.shown_by(now, &frame)
+                    {
+                        self.guard.ask_for_life();
+                    }
                     // Which epoch counts is for the party to say, by its own frames; another's Sync only moves it on in that one.
                     let (known, said) = (round.moment, frame.header.moment);
                     let moves_on = said.epoch == known.epoch && said > known;
@@ -218,6 +234,10 @@ impl<M: Machine> Host<'_, M> {
                 }
                 Err(refused) => {
                     round.summary.refused += 1;
+                    let now = self.clock.now();
+                    if let Some(event) = round.duplicates.note(now, &refused) {
+                        self.sink.record(now, Noted::Host(event));
+                    }
                     round.refused.note(refused);
                 }
             }
@@ -243,6 +263,11 @@ impl<M: Machine> Host<'_, M> {
     }
 
     fn say(&mut self, now: Time, frame: &Frame, round: &mut Round) {
+        // Who sends for the first time says by it who it is.
+        let sender = frame.header.sender;
+        round
+            .unreceived
+            .get_or_insert_with(|| Unreceived::new(sender));
         round.encoded.clear();
         let encoded = encode(frame, &mut round.encoded).map_err(|error| error.to_string());
         let datagram = encoded.and_then(|()| self.guard.close(frame, &round.encoded));
@@ -286,6 +311,16 @@ impl<M: Machine> Host<'_, M> {
     }
 
     fn report_trouble(&mut self, now: Time, period: Duration, round: &mut Round) {
+        for event in round.duplicates.over(now) {
+            self.sink.record(now, Noted::Host(event));
+        }
+        if let Some(begun) = self.guard.begin_life() {
+            let event = match begun {
+                Ok(life) => HostEvent::NewLife { life },
+                Err(reason) => HostEvent::NoNewLife { reason },
+            };
+            self.sink.record(now, Noted::Host(event));
+        }
         if now.since(round.reported) < period {
             return;
         }

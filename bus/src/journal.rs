@@ -92,6 +92,26 @@ pub enum HostEvent {
         /// Why.
         reason: String,
     },
+    /// Frames of two lives of a member arrive in turn: two processes run with its keys, for example one of an old disk image.
+    DuplicateFound {
+        /// Whose keys they have.
+        member: Party,
+    },
+    /// The earlier life of the member has sent nothing for some seconds.
+    DuplicateGone {
+        /// Whose keys they had.
+        member: Party,
+    },
+    /// The others do not receive this member, so it goes on in a new life.
+    NewLife {
+        /// Its number.
+        life: u32,
+    },
+    /// The others do not receive this member, and it cannot go on in a new life.
+    NoNewLife {
+        /// Why.
+        reason: String,
+    },
     /// Connections to the operators' port were closed at once, since the last such record: there were too many, in all or from one
     /// address.
     RefusedConnections {
@@ -126,6 +146,10 @@ pub enum HostEvent {
     },
     /// The equipment can be seen again.
     FieldRegained,
+    /// The equipment of a remote I/O holds other outputs than the remote I/O wrote, again and again: another master writes them too.
+    FieldContested,
+    /// The equipment holds what the remote I/O wrote.
+    FieldUncontested,
     /// Records were lost because the journal was too slow, since the last such record.
     JournalLost {
         /// How many.
@@ -156,6 +180,8 @@ pub enum RefusedAs {
     Forged,
     /// It counted before, or is too late.
     Replayed,
+    /// New, and of a life before the newest: two processes have the sender's keys.
+    OfAnotherLife,
     /// The sender's keys are revoked.
     Revoked,
 }

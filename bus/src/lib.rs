@@ -29,6 +29,7 @@ mod rights;
 mod segments;
 mod trouble;
 mod udp;
+mod unreceived;
 mod wakefulness;
 mod watchdog;
 mod zenoh_link;
@@ -44,7 +45,7 @@ pub use control::{Commands, Interruption, hold_back_signals};
 pub use endpoints::{Endpoints, Peer};
 pub use error::BusError;
 pub use field::{FieldDriver, Look, NoField, SimulatedField};
-pub use guard::{Guard, Keys};
+pub use guard::{Guard, Keys, NewLife};
 pub use host::{Host, Summary};
 pub use interruption::interruption;
 pub use journal::{

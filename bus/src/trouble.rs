@@ -3,13 +3,44 @@
 //! Bounded, whoever sends what: one entry for each kind and sender, at most [`MAXIMUM_ENTRIES`]; what comes on top of them is
 //! counted under its kind alone. The journal gets one record an entry, so often as the caller asks for them.
 
-use understudy_wire::Party;
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use understudy_wire::{Party, Time};
 
 use crate::guard::Refused;
 use crate::journal::{HostEvent, RefusedAs};
 
 /// Kinds and senders told apart in one report.
 const MAXIMUM_ENTRIES: usize = 32;
+
+/// A duplicate that sent nothing for so long is gone.
+const DUPLICATE_GONE_AFTER: Duration = Duration::from_secs(5);
+
+/// Members that two processes run as, and when each was last seen to. Bounded by the number of members: only they have keys.
+#[derive(Debug, Default)]
+pub(crate) struct Duplicates {
+    seen: BTreeMap<Party, Time>,
+}
+
+impl Duplicates {
+    /// The event where it is new.
+    pub(crate) fn note(&mut self, now: Time, refused: &Refused) -> Option<HostEvent> {
+        let member = refused
+            .sender
+            .filter(|_| refused.kind == RefusedAs::OfAnotherLife)?;
+        let is_new = self.seen.insert(member, now).is_none();
+        is_new.then_some(HostEvent::DuplicateFound { member })
+    }
+
+    /// The events of those that are over.
+    pub(crate) fn over(&mut self, now: Time) -> impl Iterator<Item = HostEvent> + use<> {
+        let gone = |_: &Party, seen: &mut Time| now.since(*seen) >= DUPLICATE_GONE_AFTER;
+        let gone: Vec<(Party, Time)> = self.seen.extract_if(.., gone).collect();
+        gone.into_iter()
+            .map(|(member, _)| HostEvent::DuplicateGone { member })
+    }
+}
 
 /// Datagrams that were refused.
 #[derive(Debug, Default)]

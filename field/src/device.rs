@@ -10,6 +10,7 @@
 //! When the remote I/O ends in order, the device is driven to the fail-safe values; when it dies, that is for the device's own
 //! watchdog to do.
 
+use std::cell::Cell;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -24,14 +25,21 @@ use tokio::time::{sleep, timeout};
 use understudy_cluster::FieldDevice;
 use understudy_wire::Image;
 
-use crate::exchange::{Trouble, connect, exchange};
+use crate::contest::{Contest, READ_BACK_EVERY};
+use crate::exchange::{Trouble, connect, exchange, read_back};
 use crate::plan::Plan;
 
 /// Of SCHED_FIFO: behind the cycle and the link, before programs that are not in real time.
 const PRIORITY: u8 = 20;
 
-/// From a connection that failed to the next try.
-const PAUSE: Duration = Duration::from_millis(50);
+/// From a connection that failed to the next try, and twice as long after each further one: it is tried for as long as the process lives.
+const FIRST_PAUSE: Duration = Duration::from_millis(50);
+
+/// At most; the outputs wait for it when the device is there again.
+const LONGEST_PAUSE: Duration = Duration::from_millis(400);
+
+/// A device that breaks off so often in a row, or does not answer, when its outputs are read is not asked for them any more.
+const UNREAD: u8 = 2;
 
 /// What the cycle sees of the device.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -50,6 +58,8 @@ pub struct Device {
     /// The newest state that was looked at.
     looked_at: u64,
     stale: bool,
+    /// What was told of it.
+    contested: bool,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -67,6 +77,8 @@ struct State {
     seen: Look,
     seen_at: Instant,
     outputs: Option<Image>,
+    /// Another master writes its outputs too.
+    contested: bool,
     ending: bool,
 }
 
@@ -88,6 +100,7 @@ impl Device {
                 seen: Look::Lost("no answer yet".into()),
                 seen_at: Instant::now(),
                 outputs: None,
+                contested: false,
                 ending: false,
             }),
             changed: Notify::new(),
@@ -108,6 +121,7 @@ impl Device {
                         settings,
                         fail_safe,
                         period,
+                        unread: Cell::new(0),
                         shared: worker,
                     }
                     .run(),
@@ -118,6 +132,7 @@ impl Device {
             stale_after,
             looked_at: 0,
             stale: false,
+            contested: false,
             thread: Some(thread),
         })
     }
@@ -144,6 +159,13 @@ impl Device {
         self.looked_at = state.number;
         self.stale = false;
         Some(state.seen.clone())
+    }
+
+    /// Whether another master writes the outputs too, where that is new.
+    pub fn contested(&mut self) -> Option<bool> {
+        let contested = self.shared.lock().contested;
+        let told = std::mem::replace(&mut self.contested, contested);
+        (contested != told).then_some(contested)
     }
 }
 
@@ -196,29 +218,42 @@ struct Worker {
     outputs: Plan,
     fail_safe: Image,
     period: Duration,
+    /// How often in a row its outputs could not be read; [`UNREAD`] where it does not let them be read.
+    unread: Cell<u8>,
     shared: Arc<Shared>,
 }
 
 impl Worker {
     async fn run(self) {
         let address = self.settings.address;
+        let mut pause = FIRST_PAUSE;
         while !self.shared.lock().ending {
             let patience = self.settings.timeout;
             match timeout(patience, connect(address, self.settings.unit)).await {
-                Ok(Ok(device)) => self.serve(device).await,
+                Ok(Ok(device)) => {
+                    if self.serve(device).await {
+                        pause = FIRST_PAUSE;
+                    }
+                }
                 Ok(Err(error)) => {
                     self.lose(format!("{address} does not take a connection: {error}"))
                 }
                 Err(_) => self.lose(format!("{address} takes no connection within {patience:?}")),
             }
             if !self.shared.lock().ending {
-                sleep(PAUSE).await;
+                sleep(pause).await;
+                pause = (2 * pause).min(LONGEST_PAUSE);
             }
         }
     }
 
-    /// Exchanges until the connection is of no use, or it is over.
-    async fn serve(&self, mut device: tokio_modbus::client::Context) {
+    /// Exchanges until the connection is of no use, or it is over; whether it was of use before.
+    async fn serve(&self, mut device: tokio_modbus::client::Context) -> bool {
+        let mut was_of_use = false;
+        // What this connection wrote last: what was there before may be what the device starts with.
+        let mut written: Option<Image> = None;
+        let mut contest = Contest::default();
+        let mut read_at = Instant::now();
         loop {
             let (outputs, ending) = {
                 let state = self.shared.lock();
@@ -230,23 +265,50 @@ impl Worker {
             };
             let driven = outputs.as_ref().map(|outputs| (&self.outputs, outputs));
             let patience = self.settings.timeout;
+            if let Some(written) = &written
+                && self.unread.get() < UNREAD
+                && !ending
+                && read_at.elapsed() >= READ_BACK_EVERY
+            {
+                read_at = Instant::now();
+                let read = timeout(patience, read_back(&mut device, &self.outputs)).await;
+                match read {
+                    Ok(Ok(Some(read))) => {
+                        self.unread.set(0);
+                        self.shared.lock().contested = contest.compare(written, &read);
+                    }
+                    Ok(Ok(None)) => self.unread.set(UNREAD),
+                    Ok(Err(_)) | Err(_) => {
+                        // An answer that is still to come would be taken for that to the next request.
+                        self.unread.set(self.unread.get() + 1);
+                        let address = self.settings.address;
+                        self.lose(format!("{address} breaks off when its outputs are read"));
+                        return was_of_use;
+                    }
+                }
+            }
             let exchanged = timeout(patience, exchange(&mut device, driven, &self.inputs)).await;
             if ending {
-                return;
+                return was_of_use;
             }
             match exchanged {
-                Ok(Ok(sensors)) => self.shared.see(Look::Sensors(sensors)),
+                Ok(Ok(sensors)) => {
+                    was_of_use = true;
+                    written = outputs;
+                    self.shared.see(Look::Sensors(sensors));
+                }
                 Ok(Err(trouble)) => {
+                    written = None;
                     let spared = trouble.spares_the_connection();
                     self.lose(self.said(&trouble));
                     if !spared {
-                        return;
+                        return was_of_use;
                     }
                 }
                 Err(_) => {
                     let address = self.settings.address;
                     self.lose(format!("{address} does not answer within {patience:?}"));
-                    return;
+                    return was_of_use;
                 }
             }
             // Woken early by new outputs and by the end.

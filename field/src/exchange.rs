@@ -58,6 +58,22 @@ pub(crate) async fn exchange(
     })
 }
 
+/// y(i), as the device holds it; nothing where it does not let its outputs be read.
+pub(crate) async fn read_back(
+    device: &mut Context,
+    outputs: &Plan,
+) -> Result<Option<Image>, Trouble> {
+    let mut answers = Vec::with_capacity(outputs.runs.len());
+    for run in &outputs.runs {
+        match read(device, *run).await {
+            Ok(words) => answers.push(words),
+            Err(Trouble::Connection(error)) => return Err(error.into()),
+            Err(Trouble::Exception { .. } | Trouble::Short { .. }) => return Ok(None),
+        }
+    }
+    Ok(outputs.image(&answers))
+}
+
 async fn read(device: &mut Context, run: Run) -> Result<Vec<u16>, Trouble> {
     let Run {
         table,

@@ -9,6 +9,7 @@
     reason = "the age of an answer is counted on the real clock"
 )]
 
+mod contest;
 mod device;
 mod exchange;
 mod plan;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use understudy_cluster::Cluster;
 use understudy_seal::{FrameKey, KEY_BYTES, Opener, Revocations, Seal, TransferKey};
-use understudy_wire::{Party, StationId, Topic};
+use understudy_wire::{ClusterHash, ConfigurationHash, Party, StationId, Topic};
 
 use crate::certificate;
 use crate::date::Date;
@@ -78,6 +78,7 @@ pub struct TlsFiles {
 pub struct PartyKeys {
     folder: PathBuf,
     own: Party,
+    agreed: (ClusterHash, ConfigurationHash),
     expires: Date,
     key: FrameKey,
     heard: Vec<HeardSender>,
@@ -158,11 +159,13 @@ impl PartyKeys {
         if !errors.is_empty() {
             return Err(errors);
         }
+        let agreement = cluster.agreement();
         let revocations = Revocations::default();
         revocations.set(senders(&revoked, &heard));
         Ok(Self {
             folder: folder.to_owned(),
             own,
+            agreed: (agreement.cluster, agreement.configuration),
             expires: file.expires,
             key: own_key,
             heard,
@@ -198,7 +201,9 @@ impl PartyKeys {
     pub fn opener(&self) -> Opener {
         let revoked = Arc::clone(&self.revoked);
         let senders = self.heard_keys.iter().cloned();
+        let (cluster, configuration) = self.agreed;
         Opener::new(self.own, senders, self.from.iter().cloned(), revoked)
+            .of_configuration(cluster, configuration)
     }
 
     /// What seals its own frames, in a life that it never had: one more than the last that was noted, and never before the clock,

@@ -18,7 +18,8 @@
 //! * **Key.** Every sender has its own ([`FrameKey`]), derived from the secret of the cluster. Who hears a sender has its key too, and could
 //!   speak in its name: that is the price of one datagram for all. Nobody else can.
 //! * **Monotone acceptance.** Life and number are the nonce. A receiver takes each number once, none that is more than
-//!   [`WINDOW_FRAMES`] behind the newest, and none of a life before the newest. Epoch and cycle stand in the frame and so under the authenticator, but
+//!   [`WINDOW_FRAMES`] behind the newest, and none of a life before the newest. A new life begins with a frame of the
+//!   receiver's configuration. Where the life before it goes on, two processes have the keys of one sender, and the receiver says so. Epoch and cycle stand in the frame and so under the authenticator, but
 //!   they are not its nonce: a station that founds an epoch alone gives it up when it hears an older cluster, and its cycles then
 //!   run backwards, which a nonce must never.
 //! * **States are confidential.** A Transfer is encrypted for the station that asked, under a key of these two and this

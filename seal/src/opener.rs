@@ -4,14 +4,17 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use ring::aead::{Aad, LessSafeKey, Nonce};
-use understudy_wire::{Body, Frame, FrameError, MAXIMUM_FRAME_BYTES, Party, StationId, decode};
+use understudy_wire::{
+    Body, ClusterHash, ConfigurationHash, Frame, FrameError, Header, MAXIMUM_FRAME_BYTES, Party,
+    StationId, decode,
+};
 
 use crate::envelope::{
     AUTHENTICATOR_BYTES, Envelope, HEADER_BYTES, OVERHEAD_BYTES, TAG_BYTES, UNSEALED_MAGIC,
 };
 use crate::key::{FrameKey, TransferKey};
 use crate::revocations::Revocations;
-use crate::window::Window;
+use crate::window::{Verdict, Window};
 
 /// Why a datagram does not count.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -43,6 +46,14 @@ pub enum Refusal {
         /// Who said it when it was new.
         sender: Party,
     },
+    /// New, and of a life before the newest one: two processes have the keys of its sender.
+    #[error(
+        "{sender:?} sends in two lives at once: two processes have its keys, or its frames were recorded"
+    )]
+    OfAnotherLife {
+        /// Whose keys they have.
+        sender: Party,
+    },
     /// By a party whose keys were revoked.
     #[error("the keys of {sender:?} are revoked")]
     Revoked {
@@ -65,6 +76,7 @@ pub struct Opener {
     senders: BTreeMap<Party, (FrameKey, Window)>,
     transfers: BTreeMap<StationId, LessSafeKey>,
     revoked: Arc<Revocations>,
+    agreed: Option<(ClusterHash, ConfigurationHash)>,
 }
 
 impl Opener {
@@ -86,7 +98,19 @@ impl Opener {
                 .collect(),
             transfers: ciphers.collect(),
             revoked,
+            agreed: None,
         }
+    }
+
+    /// Takes a new life of a sender from a frame of this configuration only: an old copy of a station does not shut out the station.
+    #[must_use]
+    pub fn of_configuration(
+        mut self,
+        cluster: ClusterHash,
+        configuration: ConfigurationHash,
+    ) -> Self {
+        self.agreed = Some((cluster, configuration));
+        self
     }
 
     /// The frame in a datagram, which is decrypted in place; nothing where it is authentic and for another station.
@@ -118,8 +142,9 @@ impl Opener {
         if self.revoked.holds(sender) {
             return Err(Refusal::Revoked { sender });
         }
-        if !window.take(envelope.life, envelope.number) {
-            return Err(Refusal::Replayed { sender });
+        let begins = window.begins(envelope.life);
+        if !begins {
+            take(window, envelope)?;
         }
         let text = &mut sealed[HEADER_BYTES..];
         let encoded = match envelope.to {
@@ -139,7 +164,28 @@ impl Opener {
                 "sender and receiver are those of its envelope",
             )));
         }
+        let Header {
+            cluster,
+            configuration,
+            ..
+        } = frame.header;
+        let agrees = self
+            .agreed
+            .is_none_or(|agreed| agreed == (cluster, configuration));
+        // What does not agree is refused by who gets it, and its life is as if it had never begun.
+        if begins && agrees {
+            take(window, envelope)?;
+        }
         Ok(Some(frame))
+    }
+}
+
+fn take(window: &mut Window, envelope: Envelope) -> Result<(), Refusal> {
+    let sender = envelope.sender;
+    match window.take(envelope.life, envelope.number) {
+        Verdict::Taken => Ok(()),
+        Verdict::Again => Err(Refusal::Replayed { sender }),
+        Verdict::OfAnotherLife => Err(Refusal::OfAnotherLife { sender }),
     }
 }
 

@@ -54,6 +54,11 @@ impl Seal {
         }
     }
 
+    /// In which it seals.
+    pub fn life(&self) -> u32 {
+        self.life
+    }
+
     /// Puts the datagram of `frame`, which `encoded` are the bytes of, in place of what is in `datagram`. A copy of a frame is sealed
     /// anew: it has a number of its own.
     ///

@@ -3,6 +3,17 @@
 /// How far a number may lie behind the newest: copies and reordering of a network fit in many times over.
 pub const WINDOW_FRAMES: u64 = 64;
 
+/// What becomes of a number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Verdict {
+    /// It is taken, for the first time.
+    Taken,
+    /// It was taken before, or is too old.
+    Again,
+    /// It is of a life before the newest, which goes on nevertheless.
+    OfAnotherLife,
+}
+
 /// The numbers of one sender that were taken.
 ///
 /// Invariant: bit k of `taken` says whether `newest - k` was taken; nothing at or before `newest - 64` is taken any more.
@@ -11,21 +22,40 @@ pub(crate) struct Window {
     life: u32,
     newest: u64,
     taken: u64,
+    /// The last life before this one.
+    earlier: Earlier,
+}
+
+/// A life that has ended, unless its numbers go on: what was on its way when it ended is not more than [`WINDOW_FRAMES`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+struct Earlier {
+    life: u32,
+    /// No number up to here shows that it goes on.
+    until: u64,
 }
 
 impl Window {
-    /// Takes a number, once; false where it must not count.
-    pub(crate) fn take(&mut self, life: u32, number: u64) -> bool {
-        if life < self.life || number == 0 {
-            return false;
+    /// Whether `life` would begin with this number.
+    pub(crate) fn begins(&self, life: u32) -> bool {
+        life > self.life
+    }
+
+    /// Takes a number, once.
+    pub(crate) fn take(&mut self, life: u32, number: u64) -> Verdict {
+        if number == 0 {
+            return Verdict::Again;
+        }
+        if life < self.life {
+            return self.earlier.goes_on(life, number);
         }
         if life > self.life {
             *self = Self {
                 life,
                 newest: number,
                 taken: 1,
+                earlier: Earlier::ends(self.life, self.newest),
             };
-            return true;
+            return Verdict::Taken;
         }
         if number > self.newest {
             let ahead = number - self.newest;
@@ -35,14 +65,35 @@ impl Window {
                 1
             };
             self.newest = number;
-            return true;
+            return Verdict::Taken;
         }
         let behind = self.newest - number;
         if behind >= WINDOW_FRAMES || self.taken & (1 << behind) != 0 {
-            return false;
+            return Verdict::Again;
         }
         self.taken |= 1 << behind;
-        true
+        Verdict::Taken
+    }
+}
+
+impl Earlier {
+    fn ends(life: u32, number: u64) -> Self {
+        Self {
+            life,
+            until: number.saturating_add(WINDOW_FRAMES),
+        }
+    }
+
+    fn goes_on(&mut self, life: u32, number: u64) -> Verdict {
+        if life > self.life {
+            *self = Self::ends(life, number);
+        }
+        if life < self.life || number <= self.until {
+            return Verdict::Again;
+        }
+        // Each number shows it once.
+        self.until = number;
+        Verdict::OfAnotherLife
     }
 }
 
@@ -83,7 +134,31 @@ mod tests {
         ) {
             let (mut window, mut memory) = (Window::default(), Memory::default());
             for (life, number) in said {
-                prop_assert_eq!(window.take(life, number), memory.take(life, number));
+                let taken = window.take(life, number) == Verdict::Taken;
+                prop_assert_eq!(taken, memory.take(life, number));
+            }
+        }
+
+        /// A process that was replaced, with what was still on its way; and one that goes on beside its successor.
+        #[test]
+        fn a_life_that_goes_on_is_told_from_one_that_has_ended(
+            before in 1..500_u64,
+            on_its_way in prop::collection::vec(1..=WINDOW_FRAMES, 0..100),
+            goes_on in 1..200_u64,
+        ) {
+            let mut window = Window::default();
+            for number in 1..=before {
+                window.take(1, number);
+            }
+            prop_assert_eq!(window.take(2, 1), Verdict::Taken);
+            for late in on_its_way {
+                prop_assert_eq!(window.take(1, before + late), Verdict::Again);
+            }
+            for number in 1..=goes_on {
+                let expected = if number <= WINDOW_FRAMES { Verdict::Again } else { Verdict::OfAnotherLife };
+                prop_assert_eq!(window.take(1, before + number), expected);
+                prop_assert_eq!(window.take(1, before + number), Verdict::Again, "replayed");
+                prop_assert_eq!(window.take(2, 1 + number), Verdict::Taken);
             }
         }
     }
@@ -91,11 +166,11 @@ mod tests {
     #[test]
     fn the_ends_of_the_numbers_are_no_ends_of_the_window() {
         let mut window = Window::default();
-        assert!(window.take(1, u64::MAX));
-        assert!(!window.take(1, u64::MAX));
-        assert!(window.take(1, u64::MAX - 63));
-        assert!(!window.take(1, u64::MAX - 64));
-        assert!(window.take(u32::MAX, 1));
-        assert!(!window.take(1, u64::MAX));
+        assert_eq!(window.take(1, u64::MAX), Verdict::Taken);
+        assert_eq!(window.take(1, u64::MAX), Verdict::Again);
+        assert_eq!(window.take(1, u64::MAX - 63), Verdict::Taken);
+        assert_eq!(window.take(1, u64::MAX - 64), Verdict::Again);
+        assert_eq!(window.take(u32::MAX, 1), Verdict::Taken);
+        assert_eq!(window.take(1, u64::MAX), Verdict::Again);
     }
 }

@@ -200,7 +200,7 @@ fn a_frame_of_an_earlier_life_never_counts() {
 #[test]
 fn a_later_life_of_another_configuration_shuts_nobody_out() {
     let own = frame(ROBOT, 1).header.configuration;
-    let mut opener = listener().of_configuration(own);
+    let mut opener = listener().of_configuration(ClusterHash(1), own);
     let (mut rightful, mut copy) = (seal(ROBOT, 1), seal(ROBOT, 9));
     for cycle in 0..200 {
         let said = frame(ROBOT, cycle);
@@ -235,7 +235,7 @@ fn two_lives_at_once_are_told_from_late_frames() {
         let expected = if number <= WINDOW_FRAMES {
             Refusal::Replayed { sender: ROBOT }
         } else {
-            Refusal::TwoLives { sender: ROBOT }
+            Refusal::OfAnotherLife { sender: ROBOT }
         };
         assert_eq!(refused, Err(expected), "{number}");
     }

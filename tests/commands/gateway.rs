@@ -206,6 +206,43 @@ fn metrics_are_served_over_http_and_nothing_else_is() {
     gateway.stop();
 }
 
+/// Each sends a byte of a header that never ends.
+#[test]
+fn slow_connections_are_closed_and_others_are_answered() {
+    let folder = finished_run("gateway_slow");
+    let gateway = Gateway::start(&folder, "metrics");
+    let mut slow: Vec<TcpStream> = (0..300).map(|_| gateway.connect()).collect();
+    for stream in &mut slow {
+        let pause = Some(Duration::from_millis(1));
+        stream.set_read_timeout(pause).expect("not zero");
+    }
+    let deadline = std::time::Instant::now() + Duration::from_secs(60);
+    while !slow.is_empty() {
+        assert!(
+            std::time::Instant::now() < deadline,
+            "{} connections are open",
+            slow.len()
+        );
+        slow.retain_mut(|stream| {
+            let is_taken = stream.write_all(b"x").is_ok();
+            let silent = stream.read(&mut [0]).is_err_and(|error| {
+                let waits = [std::io::ErrorKind::WouldBlock, std::io::ErrorKind::TimedOut];
+                waits.contains(&error.kind())
+            });
+            is_taken && silent
+        });
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    let mut stream = gateway.connect();
+    stream
+        .write_all(b"GET /metrics HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n")
+        .expect("it takes it");
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).expect("it answers");
+    assert!(answer.starts_with("HTTP/1.1 200 OK\r\n"), "{answer}");
+    gateway.stop();
+}
+
 /// One request of Modbus TCP; the answer from its function code on.
 fn modbus(stream: &mut TcpStream, request: &[u8]) -> Vec<u8> {
     let mut frame = vec![0, 7, 0, 0, 0, request.len() as u8 + 1, 1];

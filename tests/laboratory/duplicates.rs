@@ -137,8 +137,11 @@ fn refused_as<'a>(kind: &'a str) -> impl Fn(&Value) -> bool + 'a {
 
 #[test]
 fn a_second_process_with_the_same_keys_is_named_and_the_first_one_lives_on() {
-    let two_lives = refused_as("two-lives");
-    let refused = |record: &Value| is(record, "robot", "not-received");
+    let two_lives = |record: &Value| {
+        let event = &record["event"];
+        event["event"] == "duplicate-found" && event["member"]["station"] == 0
+    };
+    let refused = |record: &Value| is(record, "robot", "new-life");
     with_copy(
         "two_lives",
         PERIOD,
@@ -158,10 +161,10 @@ fn a_copy_with_another_configuration_shuts_nobody_out() {
         "60ms",
         &[("the other configuration", &told), ("the same", &again)],
     );
-    for kind in ["replayed", "two-lives"] {
+    for kind in ["replayed", "of-another-life"] {
         let refused = records.iter().find(|record| refused_as(kind)(record));
         assert_eq!(refused, None);
     }
-    let silent = |record: &&Value| is(record, "robot", "not-received");
+    let silent = |record: &&Value| is(record, "robot", "new-life");
     assert_eq!(records.iter().find(silent), None);
 }

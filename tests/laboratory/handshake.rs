@@ -177,6 +177,8 @@ impl Device {
         match request {
             // Read two discrete inputs.
             [2, 0, 0, 0, 2] => Some(vec![2, 1, u8::from(self.asking) | u8::from(self.bit) << 1]),
+            // Its coils cannot be read.
+            [1, ..] => Some(vec![0x81, 1]),
             // Write ten coils.
             [15, 0, 0, 0, 10, 2, low, high] => {
                 let word = u16::from_le_bytes([*low, *high]);

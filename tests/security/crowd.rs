@@ -11,7 +11,7 @@ use std::os::fd::AsRawFd;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, AtomicUsize, Ordering};
 use std::thread::spawn;
 use std::time::{Duration, Instant};
 
@@ -33,16 +33,18 @@ const STRANGER: Ipv4Addr = Ipv4Addr::new(127, 0, 0, 9);
 
 /// A Modbus device: it puts the next question when the last one was answered.
 #[derive(Default)]
-struct Device {
-    is_there: AtomicBool,
+pub(crate) struct Device {
+    pub(crate) is_there: AtomicBool,
     asking: AtomicBool,
     answered: AtomicU64,
     fail_safe: AtomicU64,
-    over: AtomicBool,
+    pub(crate) over: AtomicBool,
+    /// Its coils.
+    coils: AtomicU8,
 }
 
 impl Device {
-    fn run(&self, address: SocketAddr) {
+    pub(crate) fn run(self: &Arc<Self>, address: SocketAddr) {
         while !self.over.load(Ordering::Relaxed) {
             if !self.is_there.load(Ordering::Relaxed) {
                 pause();
@@ -52,8 +54,11 @@ impl Device {
             listener.set_nonblocking(true).expect("a socket");
             while self.is_there.load(Ordering::Relaxed) {
                 match listener.accept() {
-                    // It ends as it likes: the remote I/O makes a new one.
-                    Ok((connection, _)) => drop(self.serve(connection)),
+                    Ok((connection, _)) => {
+                        let device = Arc::clone(self);
+                        // It ends as it likes: the remote I/O makes a new one.
+                        spawn(move || device.serve(connection));
+                    }
                     Err(_) => std::thread::yield_now(),
                 }
             }
@@ -73,8 +78,11 @@ impl Device {
             let answer = match request[..] {
                 // Read one discrete input.
                 [2, 0, 0, 0, 1] => vec![2, 1, u8::from(self.asking.load(Ordering::Relaxed))],
+                // Read two coils.
+                [1, 0, 0, 0, 2] => vec![1, 1, self.coils.load(Ordering::Relaxed)],
                 // Write two coils.
                 [15, 0, 0, 0, 2, 1, coils] => {
+                    self.coils.store(coils & 3, Ordering::Relaxed);
                     self.written(coils & 1 == 1, coils & 2 == 2);
                     vec![15, 0, 0, 0, 2]
                 }
@@ -96,7 +104,7 @@ impl Device {
         }
     }
 
-    fn wait_for_answers(&self, more: u64) {
+    pub(crate) fn wait_for_answers(&self, more: u64) {
         let from = self.answered.load(Ordering::Relaxed);
         until("answers to the device", || {
             self.answered.load(Ordering::Relaxed) >= from + more
@@ -109,7 +117,7 @@ fn pause() {
     std::thread::sleep(Duration::from_millis(2));
 }
 
-fn until(what: &str, mut done: impl FnMut() -> bool) {
+pub(crate) fn until(what: &str, mut done: impl FnMut() -> bool) {
     let started = Instant::now();
     while !done() {
         assert!(started.elapsed() < DEADLINE, "waited for: {what}");
@@ -117,7 +125,7 @@ fn until(what: &str, mut done: impl FnMut() -> bool) {
     }
 }
 
-fn cluster(folder: &Path, addresses: &[SocketAddr]) -> String {
+pub(crate) fn cluster(folder: &Path, addresses: &[SocketAddr]) -> String {
     let program =
         "program valve\ninput req\noutput alive\noutput ack\nrung ( alive )\nrung req ( ack )\n";
     fs::write(folder.join("valve.ladder"), program).expect("it is ours");
@@ -190,7 +198,7 @@ fn descriptors(process: u32) -> usize {
     open.count()
 }
 
-fn count(journal: &Path, event: &str) -> usize {
+pub(crate) fn count(journal: &Path, event: &str) -> usize {
     let text = fs::read_to_string(journal).unwrap_or_default();
     text.matches(&format!("\"event\":\"{event}\"")).count()
 }

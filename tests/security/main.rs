@@ -7,6 +7,7 @@
 
 mod crowd;
 mod deployment;
+mod duplicates;
 mod keys;
 mod parties;
 #[allow(dead_code, reason = "each test uses its part")]

@@ -24,7 +24,7 @@ pub struct Description {
 }
 
 /// Every word that [`Description::event`] can be.
-pub(crate) const EVENTS: [&str; 58] = [
+pub(crate) const EVENTS: [&str; 64] = [
     "acknowledged",
     "adopted",
     "adopted-lineage",
@@ -39,12 +39,16 @@ pub(crate) const EVENTS: [&str; 58] = [
     "diagnosed",
     "digest-differs",
     "disputed",
+    "duplicate-found",
+    "duplicate-gone",
     "ended",
     "exchange",
     "excluded",
     "fault",
+    "field-contested",
     "field-lost",
     "field-regained",
+    "field-uncontested",
     "finished",
     "flagged",
     "forced",
@@ -55,6 +59,8 @@ pub(crate) const EVENTS: [&str; 58] = [
     "journal-lost",
     "link-failed",
     "link-reopened",
+    "new-life",
+    "no-new-life",
     "origin",
     "paces",
     "protected",
@@ -91,7 +97,7 @@ pub fn describe(record: &Record, names: &Parties) -> Description {
         Happening::Station(event) => parties::station(event, names),
         Happening::RemoteIo(event) => parties::remote_io(event, names),
         Happening::Plant(event) => parties::plant(event, names),
-        Happening::Host(event) => processes::host(event),
+        Happening::Host(event) => processes::host(event, names),
         Happening::Run(event) => processes::run(event, names),
     };
     Description {

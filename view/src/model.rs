@@ -263,7 +263,17 @@ impl Model {
             (HostEvent::Ready { .. }, Party::RemoteIo(program)) => self.forget_protection(program),
             (HostEvent::FieldLost { reason }, Party::RemoteIo(_)) => {
                 let subject = (record.name.clone(), "field-lost");
-                self.alarms.raise(subject, cycle, reason.clone());
+                let text = format!("its equipment cannot be read or written: {reason}");
+                self.alarms.raise(subject, cycle, text);
+            }
+            (HostEvent::FieldContested, Party::RemoteIo(_)) => {
+                let text = describe(record, &self.parties).text;
+                let subject = (record.name.clone(), "field-contested");
+                self.alarms.raise(subject, cycle, text);
+            }
+            (HostEvent::FieldUncontested, Party::RemoteIo(_)) => {
+                self.alarms
+                    .over(&(record.name.clone(), "field-contested"), cycle);
             }
             (HostEvent::FieldRegained, Party::RemoteIo(_)) => {
                 self.alarms
@@ -276,6 +286,15 @@ impl Model {
             (HostEvent::LinkReopened { .. }, _) => {
                 self.alarms
                     .over(&(record.name.clone(), "link-failed"), cycle);
+            }
+            (HostEvent::DuplicateFound { member }, _) => {
+                let text = describe(record, &self.parties).text;
+                let subject = (self.parties.name(*member).to_owned(), "duplicate");
+                self.alarms.raise(subject, cycle, text);
+            }
+            (HostEvent::DuplicateGone { member }, _) => {
+                let subject = (self.parties.name(*member).to_owned(), "duplicate");
+                self.alarms.over(&subject, cycle);
             }
             (HostEvent::JournalLost { .. }, Party::RemoteIo(program)) => {
                 self.misses_records(program)

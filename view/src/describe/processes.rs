@@ -7,7 +7,7 @@ use understudy_wire::{Party, StateChoice};
 use super::Words;
 use crate::event::Level;
 
-pub(super) fn host(event: &HostEvent) -> Words {
+pub(super) fn host(event: &HostEvent, names: &Parties) -> Words {
     use Level::{Alarm, Info, Notice, Warning};
     match event {
         HostEvent::Ready {
@@ -39,6 +39,29 @@ pub(super) fn host(event: &HostEvent) -> Words {
             Warning,
             format!("operators cannot call: {reason}"),
         ),
+        HostEvent::DuplicateFound { member } => (
+            "duplicate-found",
+            Alarm,
+            format!(
+                "receives frames of two lives of {}: two processes run with its keys",
+                names.name(*member)
+            ),
+        ),
+        HostEvent::DuplicateGone { member } => (
+            "duplicate-gone",
+            Notice,
+            format!("receives one life of {} only again", names.name(*member)),
+        ),
+        HostEvent::NewLife { life } => (
+            "new-life",
+            Warning,
+            format!("is not received by the others and goes on in a new life, {life}"),
+        ),
+        HostEvent::NoNewLife { reason } => (
+            "no-new-life",
+            Warning,
+            format!("is not received by the others and cannot begin a new life: {reason}"),
+        ),
         HostEvent::RefusedConnections {
             connections,
             address,
@@ -69,12 +92,22 @@ pub(super) fn host(event: &HostEvent) -> Words {
         HostEvent::FieldLost { reason } => (
             "field-lost",
             Alarm,
-            format!("its equipment cannot be seen: {reason}"),
+            format!("its equipment cannot be read or written: {reason}"),
         ),
         HostEvent::FieldRegained => (
             "field-regained",
             Notice,
-            "its equipment can be seen again".to_owned(),
+            "its equipment is read and written again".to_owned(),
+        ),
+        HostEvent::FieldContested => (
+            "field-contested",
+            Alarm,
+            "another master writes the outputs of its equipment too".to_owned(),
+        ),
+        HostEvent::FieldUncontested => (
+            "field-uncontested",
+            Notice,
+            "its equipment holds what it wrote".to_owned(),
         ),
         HostEvent::JournalLost { records } => (
             "journal-lost",

@@ -1,0 +1,184 @@
+//! Two processes that run as one member, as an old disk image starts them, and two remote I/Os on one device.
+
+use std::fs;
+use std::net::SocketAddr;
+use std::path::Path;
+use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::thread::spawn;
+
+use serde_json::json;
+use understudy_bus::free_addresses;
+
+use super::crowd::{Device, cluster, count, until};
+use super::{Running, answer, empty_folder, one_at_a_time, text};
+
+/// All members of the cluster, as processes, and its device.
+struct Plant {
+    folder: std::path::PathBuf,
+    cluster: String,
+    addresses: Vec<SocketAddr>,
+    device: Arc<Device>,
+    _members: [Running; 3],
+}
+
+impl Plant {
+    fn start(name: &str) -> Self {
+        let folder = empty_folder(name);
+        let addresses = free_addresses(5).expect("five free ports");
+        let cluster = cluster(&folder, &addresses[..4]);
+        let keys = folder.join("keys");
+        let (status, made, _) = answer(&["keys", "init", &cluster, "--folder", text(&keys)]);
+        assert_eq!(status, 0, "{made:#}");
+        let device = Arc::new(Device::default());
+        device.is_there.store(true, Ordering::Relaxed);
+        let (running, address) = (Arc::clone(&device), addresses[3]);
+        spawn(move || running.run(address));
+        let start = |command: &str, name: &str| {
+            let own = format!("{}/parties/{name}", text(&keys));
+            let journal = folder.join(format!("{name}.jsonl"));
+            let common = [
+                "--link",
+                "udp",
+                "--no-real-time",
+                "--journal",
+                text(&journal),
+            ];
+            let member = [command, &cluster, "--name", name, "--keys", &own];
+            Running::start(&[&member[..], &common].concat())
+        };
+        let members = [
+            start("node", "valve"),
+            start("node", "understudy"),
+            start("remote-io", "valve-io"),
+        ];
+        device.wait_for_answers(20);
+        Self {
+            folder,
+            cluster,
+            addresses,
+            device,
+            _members: members,
+        }
+    }
+
+    fn journal(&self, name: &str) -> std::path::PathBuf {
+        self.folder.join(format!("{name}.jsonl"))
+    }
+
+    /// A copy of the controller, with its keys and with another address, of a cluster file that differs by `change`.
+    fn copy_of_the_controller(&self, change: [&str; 2]) -> Running {
+        let text_of_cluster = fs::read_to_string(&self.cluster).expect("it is ours");
+        let image = self.folder.join("image");
+        let keys = self.folder.join("keys/parties/valve");
+        let copied = Command::new("cp")
+            .args(["-a", text(&keys), text(&image)])
+            .status();
+        assert!(copied.expect("a cp").success());
+        let changed = text_of_cluster.replace(change[0], change[1]);
+        let cluster = self.folder.join("image.toml");
+        fs::write(&cluster, changed).expect("it is ours");
+        let places = [0, 1, 2].map(|place| self.addresses[place]);
+        let peers = json!([
+            { "party": { "station": 0 }, "name": "valve", "address": self.addresses[4] },
+            { "party": { "station": 1 }, "name": "understudy", "address": places[1] },
+            { "party": { "remote-io": 0 }, "name": "valve-io", "address": places[2] },
+        ]);
+        let endpoints = self.folder.join("endpoints.json");
+        fs::write(&endpoints, peers.to_string()).expect("it is ours");
+        let journal = self.journal("image");
+        Running::start(&[
+            "node",
+            text(&cluster),
+            "--name",
+            "valve",
+            "--keys",
+            text(&image),
+            "--endpoints",
+            text(&endpoints),
+            "--link",
+            "udp",
+            "--no-real-time",
+            "--journal",
+            text(&journal),
+        ])
+    }
+}
+
+impl Drop for Plant {
+    fn drop(&mut self) {
+        self.device.over.store(true, Ordering::Relaxed);
+        self.device.is_there.store(false, Ordering::Relaxed);
+    }
+}
+
+fn is_said(journal: &Path, what: &str) -> bool {
+    let text = fs::read_to_string(journal).unwrap_or_default();
+    text.contains(what)
+}
+
+#[test]
+fn an_old_image_of_another_configuration_shuts_nobody_out() {
+    let _one = one_at_a_time();
+    let plant = Plant::start("old_image");
+    let image = plant.copy_of_the_controller(["period = \"20ms\"", "period = \"30ms\""]);
+    let remote_io = plant.journal("valve-io");
+    until("the refusal of the image", || {
+        is_said(&remote_io, "\"event\":\"refused\"")
+    });
+    plant.device.wait_for_answers(50);
+    let refused = "\"refused_as\":\"replayed\"";
+    assert!(!is_said(&remote_io, refused), "the controller is refused");
+    drop(image);
+}
+
+#[test]
+fn two_processes_of_one_controller_are_named_and_the_controller_is_heard_again() {
+    let _one = one_at_a_time();
+    let plant = Plant::start("duplicate");
+    let image = plant.copy_of_the_controller(["", ""]);
+    let remote_io = plant.journal("valve-io");
+    until("the alarm", || count(&remote_io, "duplicate-found") > 0);
+    assert!(is_said(&remote_io, "\"member\":{\"station\":0}"));
+    let controller = plant.journal("valve");
+    until("a new life", || count(&controller, "new-life") > 0);
+    plant.device.wait_for_answers(20);
+    drop(image);
+    until("the end of the alarm", || {
+        count(&remote_io, "duplicate-gone") > 0
+    });
+    plant.device.wait_for_answers(20);
+    assert_eq!(count(&remote_io, "state-lost"), 0);
+}
+
+#[test]
+fn a_second_remote_io_on_one_device_is_an_alarm() {
+    let _one = one_at_a_time();
+    let plant = Plant::start("second_remote_io");
+    let remote_io = plant.journal("valve-io");
+    assert_eq!(count(&remote_io, "field-contested"), 0);
+    // Of another cluster, of which nothing else runs: it drives the fail-safe outputs.
+    let folder = plant.folder.join("other");
+    fs::create_dir(&folder).expect("it is ours");
+    let mut addresses = free_addresses(3).expect("three free ports");
+    addresses.push(plant.addresses[3]);
+    let other = cluster(&folder, &addresses);
+    let second = Running::start(&[
+        "remote-io",
+        &other,
+        "--name",
+        "valve-io",
+        "--security",
+        "off",
+        "--link",
+        "udp",
+        "--no-real-time",
+    ]);
+    until("the alarm", || count(&remote_io, "field-contested") > 0);
+    drop(second);
+    until("the end of the alarm", || {
+        count(&remote_io, "field-uncontested") > 0
+    });
+    plant.device.wait_for_answers(20);
+}
