@@ -408,14 +408,20 @@ impl Tree {
         self.add(
             "LostStateCycle",
             Kind::UInt64,
-            "the cycle of that state, as the operator's choice names it",
-            of(|program| Some(program.lost.as_ref()?.newest.into())),
+            "the cycle of that state, as the operator's choice names it; 0 where no state is lost",
+            of(|program| Some(program.lost.as_ref().map_or(0, |lost| lost.newest).into())),
         );
         self.add(
             "LostStateAge",
             Kind::UInt64,
-            "by how many cycles that state is too old",
-            of(|program| Some(program.lost.as_ref()?.age_cycles?.into())),
+            "by how many cycles that state is too old; 0 where no state is lost",
+            of(|program| {
+                let age = program
+                    .lost
+                    .as_ref()
+                    .map_or(Some(0), |lost| lost.age_cycles);
+                age.map(Variant::from)
+            }),
         );
         let deadlines = "deadlines";
         self.add(

@@ -110,6 +110,13 @@ fn first_answer(ask: impl Fn() -> Option<(i64, bool)>, present: i64) -> usize {
     }
 }
 
+/// As a run that is being written: there are no results, and nothing says that its writer has ended.
+fn is_live(run: &Path) {
+    for name in ["summary.json", "run.lock"] {
+        fs::remove_file(run.join(name)).expect("it was there");
+    }
+}
+
 fn present_cycle(run: &Path) -> i64 {
     let output = understudy(&["gateway", "metrics", "--once"])
         .arg(run)
@@ -128,8 +135,7 @@ fn metric(text: &str, begins: &str) -> Option<i64> {
 fn check(name: &str, arguments: &[&str], listen: &str, ask: fn(&Reader) -> Option<(i64, bool)>) {
     let _turn = one_at_a_time();
     let run = simulated_run_of(&empty_folder(name), SCENARIO);
-    // As one that is being written: there are no results.
-    fs::remove_file(run.join("summary.json")).expect("it was there");
+    is_live(&run);
     let journal = run.join("journal.jsonl");
     let text = fs::read_to_string(&journal).expect("one segment");
     let third = text.len() / 3;
@@ -226,7 +232,7 @@ fn modbus_tells_no_past() {
 fn a_viewer_is_told_how_old_the_newest_record_is() {
     let _turn = one_at_a_time();
     let run = simulated_run_of(&empty_folder("present-age"), SCENARIO);
-    fs::remove_file(run.join("summary.json")).expect("it was there");
+    is_live(&run);
     let journal = OpenOptions::new()
         .append(true)
         .open(run.join("journal.jsonl"));
