@@ -7,8 +7,8 @@
 //!   for UDP has two more defects (1.10.2, `accept_read_task`): one task hands all datagrams on through a queue of one
 //!   place for each sender, so it waits without end for a sender whose session has just ended, and then no peer is received any more.
 //! * Scouting and gossip are off. A member subscribes to the stations, and to the remote I/Os, by one expression each.
-//! * Each member publishes an empty message from time to time ([`PULSE`]), however long its cycle is. A member that receives none of
-//!   its peers for [`SILENCE`] opens its session anew, whatever the reason; the pause doubles each time.
+//! * A member that publishes no frame for a [`PULSE`] publishes an empty message, however long its cycle is. A member that receives none
+//!   of its peers for [`SILENT_PULSES`] opens its session anew, whatever the reason; the pause doubles each time.
 //! * Callbacks only enqueue, and nothing that the cycle's thread calls waits for a peer: what does not fit into a queue is dropped.
 
 use std::collections::BTreeSet;
@@ -36,14 +36,15 @@ use crate::rights::raise_link_thread;
 /// Datagrams that wait for the cycle's thread, at most; one of 64 stations and 64 remote I/Os hears fewer in a cycle.
 const QUEUE_FRAMES: usize = 1024;
 
-/// How often each member publishes an empty message.
+/// How often each member publishes something.
 const PULSE: Duration = Duration::from_millis(250);
 
-/// A member that receives none of its peers for so long opens its session anew.
-const SILENCE: Duration = Duration::from_secs(1);
+/// A member that receives none of its peers during so many pulses, which take a second, opens its session anew. Not by the clock: on a
+/// machine without time for its pulses, the peers have none for theirs, and new sessions would cost all of them more.
+const SILENT_PULSES: u32 = 4;
 
 /// The longest pause between two openings: a member whose peers are all switched off opens its session no more often.
-const LONGEST_SILENCE: Duration = Duration::from_secs(32);
+const MOST_SILENT_PULSES: u32 = 128;
 
 /// How long it may take to connect to a peer. Long compared with what a busy machine needs, because an attempt that is given up is an
 /// attempt that is begun again.
@@ -72,11 +73,15 @@ enum Never {}
 /// What a member publishes with, by topic.
 type Publishers = [Option<Publisher<'static>>; Topic::ALL.len()];
 
+/// Whether something was published since the last pulse, by topic.
+type Spoke = [AtomicBool; Topic::ALL.len()];
+
 pub(crate) struct ZenohLink {
     address: SocketAddr,
     inbox: Inbox<Vec<u8>>,
     /// Replaced by the keeper with those of a new session.
     publishers: Arc<Mutex<Arc<Publishers>>>,
+    spoke: Arc<Spoke>,
     unsent: u64,
     reopened: Arc<AtomicU64>,
     reopenings: Receiver<Reopening>,
@@ -103,6 +108,7 @@ impl ZenohLink {
         })?;
         let publishers = Arc::new(Mutex::new(Arc::clone(&session.publishers)));
         let reopened = Arc::new(AtomicU64::new(0));
+        let spoke = Arc::new(Spoke::default());
         let (stop, stopped) = channel::<Never>();
         let (closing, closed) = channel();
         let (report, reopenings) = channel();
@@ -111,6 +117,7 @@ impl ZenohLink {
             endpoints: endpoints.clone(),
             session: Some(session),
             publishers: Arc::clone(&publishers),
+            spoke: Arc::clone(&spoke),
             ears,
             silence: Silence::new(clock.now()),
             failed: false,
@@ -134,6 +141,7 @@ impl ZenohLink {
             address,
             inbox,
             publishers,
+            spoke,
             unsent: 0,
             reopened,
             reopenings,
@@ -156,10 +164,12 @@ impl Link for ZenohLink {
                 .lock()
                 .unwrap_or_else(PoisonError::into_inner),
         );
-        if let Some(publisher) = &publishers[Topic::of(&frame.body) as usize]
-            && publisher.put(bytes).wait().is_err()
-        {
-            self.unsent += 1;
+        let topic = Topic::of(&frame.body) as usize;
+        if let Some(publisher) = &publishers[topic] {
+            match publisher.put(bytes).wait() {
+                Ok(()) => self.spoke[topic].store(true, Ordering::Relaxed),
+                Err(_) => self.unsent += 1,
+            }
         }
     }
 
@@ -281,6 +291,7 @@ struct Keeper {
     /// None where it could not be opened anew.
     session: Option<Session>,
     publishers: Arc<Mutex<Arc<Publishers>>>,
+    spoke: Arc<Spoke>,
     ears: Ears,
     silence: Silence,
     /// Whether that it could not be opened is reported.
@@ -291,13 +302,15 @@ struct Keeper {
 
 impl Keeper {
     fn pulse(&mut self, now: Time) {
-        for publisher in self
-            .session
-            .iter()
-            .flat_map(|session| session.publishers.iter().flatten())
-        {
-            // One that is not sent is missed like one that is lost.
-            let _ = publisher.put([]).wait();
+        if let Some(session) = &self.session {
+            for (publisher, spoke) in session.publishers.iter().zip(self.spoke.iter()) {
+                if let Some(publisher) = publisher
+                    && !spoke.swap(false, Ordering::Relaxed)
+                {
+                    // One that is not sent is missed like one that is lost.
+                    let _ = publisher.put([]).wait();
+                }
+            }
         }
         let heard = self.ears.heard.swap(false, Ordering::Relaxed);
         let due = self.silence.look(now, heard);
@@ -334,29 +347,31 @@ impl Keeper {
 /// How long no peer was received, and when that is long enough to open the session anew.
 struct Silence {
     since: Time,
-    /// After it, the session is opened anew.
-    until: Time,
-    patience: Duration,
+    pulses: u32,
+    /// After so many pulses the session is opened anew.
+    patience: u32,
 }
 
 impl Silence {
     fn new(now: Time) -> Self {
         Self {
             since: now,
-            until: now + SILENCE,
-            patience: SILENCE,
+            pulses: 0,
+            patience: SILENT_PULSES,
         }
     }
 
-    /// Whether the session is to be opened anew.
+    /// At each pulse: whether the session is to be opened anew.
     fn look(&mut self, now: Time, heard: bool) -> bool {
         if heard {
             *self = Self::new(now);
+            return false;
         }
-        let due = now >= self.until;
+        self.pulses += 1;
+        let due = self.pulses >= self.patience;
         if due {
-            self.patience = (self.patience * 2).min(LONGEST_SILENCE);
-            self.until = now + self.patience;
+            self.pulses = 0;
+            self.patience = (self.patience * 2).min(MOST_SILENT_PULSES);
         }
         due
     }

@@ -15,7 +15,7 @@ mod parties;
 
 use std::collections::{BTreeSet, HashMap};
 use std::io::{BufRead, BufReader, Write};
-use std::net::UdpSocket;
+use std::net::{TcpListener, UdpSocket};
 use std::process::{Child, ChildStdin, Command, ExitCode, Stdio};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
@@ -408,10 +408,10 @@ fn commands_are_obeyed() {
 }
 
 fn port_in_use() {
-    let taken = UdpSocket::bind(("127.0.0.1", 0)).expect("a free port");
-    let address = taken.local_addr().expect("bound");
-    let mut peers = peers(&[station(0), station(1)]);
-    peers[0].address = address;
+    let peers = peers(&[station(0), station(1)]);
+    let frames = LinkKind::Zenoh.frames_address(peers[0].address);
+    let address = frames.expect("a port");
+    let _taken = TcpListener::bind(address).expect("a free port");
     let part = Part {
         own: station(0),
         life: 1,
