@@ -24,6 +24,8 @@ pub(crate) enum Status {
     Failed,
     /// Exit status 2: nothing was started.
     BadInput,
+    /// Exit status 3: the host woke members too late for a verdict.
+    Inconclusive,
 }
 
 impl Status {
@@ -32,6 +34,7 @@ impl Status {
             Self::Done => 0,
             Self::Failed => 1,
             Self::BadInput => 2,
+            Self::Inconclusive => 3,
         }
     }
 }

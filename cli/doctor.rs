@@ -99,7 +99,7 @@ fn of_party(
     let endpoints = Endpoints::new(agreement.cluster, party, parties, cluster.neighbours());
     let endpoints = endpoints
         .map_err(|error| Answer::failed(Status::BadInput, error.code(), error.to_string()))?;
-    let mut findings = examine_ports(&endpoints);
+    let mut findings = examine_ports(&endpoints, link_kind(cluster));
     let (mut guard, of_keys) = keys(arguments, cluster, party);
     findings.extend(of_keys);
     let Some(guard) = &mut guard else {

@@ -17,6 +17,7 @@ use crate::files;
 use crate::overrides::{OverrideArguments, link_kind, parse_size};
 use crate::proxy::ImpairmentArguments;
 use crate::run::{answer, circumstances, command_line, machine};
+use crate::wakefulness;
 use crate::watch::{BesideArguments, Page};
 
 /// Run a cluster on real processes of this machine, and break it as a scenario says
@@ -124,6 +125,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
         Ok(scenario) => scenario.shortened(arguments.run.cycles),
         Err(answer) => return answer,
     };
+    wakefulness::warn(&cluster, console);
     let directory = match RunDirectory::create(&arguments.run.out, SystemTime::now()) {
         Ok(directory) => directory,
         Err(error) => return Answer::failed(Status::Failed, "U0602", error.to_string()),
@@ -255,6 +257,7 @@ pub(crate) fn judged(
     let (mut summary, account) = Summary::new(run.account, scenario, circumstances, run.journal);
     if run.failure.is_some() {
         summary.passed = false;
+        summary.inconclusive = None;
     }
     let judged = Judged {
         written: directory.write_results(&summary, &account),

@@ -57,6 +57,7 @@ mod synth;
 mod top;
 mod verify;
 mod view;
+mod wakefulness;
 mod watch;
 mod why;
 

@@ -67,6 +67,19 @@ impl OverrideArguments {
         }
     }
 
+    /// Whether the command line says the period.
+    pub(crate) fn has_period(&self) -> bool {
+        self.period.is_some()
+    }
+
+    /// The same with a period.
+    pub(crate) fn with_period(&self, period: Duration) -> Self {
+        Self {
+            period: Some(period),
+            ..self.clone()
+        }
+    }
+
     /// The same over the link that was asked for, or over each of them.
     pub(crate) fn each_link(&self) -> Vec<(LinkKind, Self)> {
         let links = [

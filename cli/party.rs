@@ -12,8 +12,8 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::json;
 use understudy_bus::{
-    Admitted, ChannelSettings, Commands, Endpoints, FieldDriver, Guard, LinkKind, NoField,
-    NewLife, NoObserver, PartySettings, Peer, Segments, SimulatedField, ZENOH_RUNTIME, hold_back_signals,
+    Admitted, ChannelSettings, Commands, Endpoints, FieldDriver, Guard, LinkKind, NewLife, NoField,
+    NoObserver, PartySettings, Peer, Segments, SimulatedField, ZENOH_RUNTIME, hold_back_signals,
     run_party,
 };
 use understudy_cluster::{Cluster, Security, why_unreachable};

@@ -82,10 +82,10 @@ struct Result<'a> {
 
 /// Table II, a verdict for each plant, and what was expected and did not come.
 pub(crate) fn answer(summary: &Summary, directory: Option<&Path>) -> Answer {
-    let status = if summary.passed {
-        Status::Done
-    } else {
-        Status::Failed
+    let status = match (summary.passed, &summary.inconclusive) {
+        (true, _) => Status::Done,
+        (false, Some(_)) => Status::Inconclusive,
+        (false, None) => Status::Failed,
     };
     let result = Result {
         directory: directory.map(|path| path.display().to_string()),
@@ -133,19 +133,20 @@ fn text(summary: &Summary, directory: Option<&Path>) -> String {
             "the journal stopped ({reason}): {lost} records are lost"
         );
     }
-    let verdict = match (summary.passed, summary.interrupted) {
-        (true, _) => "passed: every expectation was met".to_owned(),
-        (false, true) => format!(
+    let verdict = match (&summary.inconclusive, summary.passed, summary.interrupted) {
+        (_, true, _) => "passed: every expectation was met".to_owned(),
+        (Some(why), false, _) => format!("INCONCLUSIVE: {why}; neither passed nor failed"),
+        (None, false, true) => format!(
             "interrupted after {} of {} cycles",
             summary.cycles_run, summary.cycles_asked
         ),
-        (false, false) if summary.cycles_run < summary.cycles_asked => {
+        (None, false, false) if summary.cycles_run < summary.cycles_asked => {
             format!(
                 "FAILED: only {} of {} cycles were run",
                 summary.cycles_run, summary.cycles_asked
             )
         }
-        (false, false) => "FAILED".to_owned(),
+        (None, false, false) => "FAILED".to_owned(),
     };
     let _ = writeln!(text, "{verdict}");
     if !summary.passed && summary.circumstances.seed.is_some() {

@@ -175,6 +175,7 @@ fn show(
     let mut model = run.model(Bounds::default());
     let mut screen = Screen::default();
     loop {
+        let drawn = Instant::now();
         while !screen.is_paused() {
             let taken = source.poll(&mut |found| match found {
                 Ok(record) => model.note(&record),
@@ -183,13 +184,19 @@ fn show(
             if taken == 0 && run.is_finished() {
                 model.end();
             }
-            // A long journal is shown while it is read.
-            if taken == 0 || event::poll(Duration::ZERO)? {
+            // Of a long journal it is shown how much was read.
+            if taken == 0 || drawn.elapsed() >= LOOK || event::poll(Duration::ZERO)? {
                 break;
             }
         }
-        terminal.draw(|frame| screen.draw(frame, &model))?;
-        if !event::poll(LOOK)? {
+        let progress = source.progress().of_ended(model.is_finished());
+        terminal.draw(|frame| screen.draw_live(frame, &model, progress, Instant::now()))?;
+        let wait = if progress.is_at_end() || screen.is_paused() {
+            LOOK
+        } else {
+            Duration::ZERO
+        };
+        if !event::poll(wait)? {
             continue;
         }
         let event::Event::Key(pressed) = event::read()? else {

@@ -19,6 +19,7 @@ use crate::console::Console;
 use crate::files;
 use crate::lab::{RunArguments, judged};
 use crate::overrides::parse_address;
+use crate::wakefulness;
 
 /// Where the page is served where nobody says otherwise.
 pub(crate) const ADDRESS: SocketAddr =
@@ -295,6 +296,7 @@ fn run_and_watch(
         ..Scenario::default()
     };
     let scenario = scenario.shortened(arguments.cycles);
+    wakefulness::warn(cluster, console);
     let directory = match RunDirectory::create(&arguments.out, SystemTime::now()) {
         Ok(directory) => directory,
         Err(error) => return Answer::failed(Status::Failed, "U0602", error.to_string()),

@@ -96,6 +96,12 @@ impl Announcer {
         self.put(&format!("{}/{key}", self.root), text);
     }
 
+    /// Keeps nothing any more for those who ask.
+    pub fn forget(&self) {
+        let mut newest = self.newest.lock().unwrap_or_else(PoisonError::into_inner);
+        newest.clear();
+    }
+
     fn put(&self, key: &str, text: &str) {
         // One that is not sent is replaced by the next.
         let put = self.session.put(key, text);

@@ -3,7 +3,7 @@
 //! Nothing is changed, and no frame is sent: peers are found by listening for as long as they surely speak.
 
 use std::collections::BTreeMap;
-use std::net::{TcpListener, UdpSocket};
+use std::net::{SocketAddr, TcpListener, UdpSocket};
 use std::time::Duration;
 
 use nix::poll::{PollFd, PollFlags, ppoll};
@@ -17,11 +17,11 @@ use crate::endpoints::Endpoints;
 use crate::error::BusError;
 use crate::guard::Guard;
 use crate::link::LinkKind;
-use crate::rights::{CYCLE_PRIORITY, lock_memory, run_in_real_time, sleep_exactly};
+use crate::rights::{CYCLE_PRIORITY, lock_memory, run_in_real_time};
+use crate::wakefulness::Wakefulness;
 
-/// Sleeps that are timed.
-const SLEEPS: u32 = 200;
-const SLEEP: Duration = Duration::from_millis(1);
+/// For so long wake-ups are measured.
+const SPAN: Duration = Duration::from_secs(1);
 
 /// Clocks that take long to read, or are too coarse.
 const SLOW_CLOCKS: [&str; 4] = ["hpet", "acpi_pm", "jiffies", "refined-jiffies"];
@@ -137,48 +137,49 @@ fn memory() -> Finding {
     }
 }
 
-/// How late a sleeper is woken, which is what a cycle feels of everything above.
+/// How late sleepers are woken, which is what a cycle feels of everything above.
 fn sleeps(period: Duration) -> Finding {
-    let timed = std::thread::spawn(|| {
-        sleep_exactly();
-        // Whether it was granted is said elsewhere.
-        let _ = run_in_real_time(CYCLE_PRIORITY);
-        let clock = Clock::start();
-        let mut latest = Duration::ZERO;
-        for _ in 0..SLEEPS {
-            let due = clock.now() + SLEEP;
-            // Interrupted or not, what counts is when it comes back.
-            let _ = ppoll(&mut [], Some(TimeSpec::from_duration(SLEEP)), None);
-            latest = latest.max(clock.now().since(due));
-        }
-        latest
-    });
-    let latest = timed.join().unwrap_or(Duration::MAX);
-    let found = format!(
-        "of {SLEEPS} sleeps of 1 ms the latest ended {} µs late; a cycle has {} µs",
-        latest.as_micros(),
-        period.as_micros()
-    );
-    if latest < period / 5 {
+    let measured = Wakefulness::measure(SPAN, true);
+    let found = format!("{measured}; a cycle has {} ms", period.as_secs_f64() * 1e3);
+    if measured.keeps(period) {
         Finding::good("clock", found)
     } else {
         Finding::trouble(
             "clock",
             Health::Warning,
             found,
-            "a longer `period`, a kernel with PREEMPT_RT, processors kept free of other work (`isolcpus`), or a machine that is not virtual",
+            format!(
+                "a `period` of {} ms, real-time rights, a kernel with PREEMPT_RT, processors kept free of other work (`isolcpus`), or a machine that is not virtual",
+                measured.period().as_millis()
+            ),
         )
     }
 }
 
-/// Whether a party can listen where it should: by UDP for its frames and by TCP for its operators.
-pub fn examine_ports(endpoints: &Endpoints) -> Vec<Finding> {
-    let address = endpoints.own().address;
+/// Whether a party can listen where it should: for its frames over `link`, and by TCP for its operators.
+pub fn examine_ports(endpoints: &Endpoints, link: LinkKind) -> Vec<Finding> {
+    let operators = endpoints.own().address;
+    let frames = match link.frames_address(operators) {
+        Ok(frames) => frames,
+        Err(error) => {
+            return vec![Finding::trouble(
+                "ports",
+                Health::Bad,
+                error.to_string(),
+                "another port in the cluster file, or `link = \"udp\"`",
+            )];
+        }
+    };
+    let bound = match link {
+        LinkKind::Udp => ("UDP", frames, UdpSocket::bind(frames).map(drop)),
+        LinkKind::Zenoh => ("TCP", frames, TcpListener::bind(frames).map(drop)),
+    };
     let bound = [
-        ("UDP", UdpSocket::bind(address).map(drop)),
-        ("TCP", TcpListener::bind(address).map(drop)),
+        bound,
+        ("TCP", operators, TcpListener::bind(operators).map(drop)),
     ];
-    let finding = |(protocol, bound): (&str, std::io::Result<()>)| match bound {
+    let finding = |(protocol, address, bound): (&str, SocketAddr, std::io::Result<()>)| match bound
+    {
         Ok(()) => Finding::good("ports", format!("{address} is free ({protocol})")),
         Err(source) => match BusError::listen(address, source) {
             BusError::PortInUse { .. } => Finding::trouble(
@@ -201,6 +202,16 @@ pub fn examine_ports(endpoints: &Endpoints) -> Vec<Finding> {
     bound.into_iter().map(finding).collect()
 }
 
+/// What a firewall has to let through to the member with this address.
+fn ports_of(link: LinkKind, address: SocketAddr) -> String {
+    match link.frames_address(address) {
+        Ok(frames) if link == LinkKind::Zenoh => {
+            format!("TCP ports {} and {}", address.port(), frames.port())
+        }
+        _ => format!("UDP and TCP port {}", address.port()),
+    }
+}
+
 /// Listens in the place of a party that does not run, for so long, and says of each peer whether it was heard.
 ///
 /// # Errors
@@ -212,7 +223,7 @@ pub fn examine_peers(
     configuration: ConfigurationHash,
     patience: Duration,
 ) -> Result<Vec<Finding>, BusError> {
-    let mut link = link.open(endpoints)?;
+    let mut opened = link.open(endpoints)?;
     let clock = Clock::start();
     let end = clock.now() + patience;
     let mut heard: BTreeMap<Party, ConfigurationHash> = BTreeMap::new();
@@ -220,7 +231,7 @@ pub fn examine_peers(
     let expected = endpoints.heard().count();
     let mut bytes = Vec::new();
     while clock.now() < end && heard.len() < expected {
-        while link.receive(&mut bytes) {
+        while opened.receive(&mut bytes) {
             match guard.open(&mut bytes) {
                 Ok(Some(frame)) if frame.header.cluster == endpoints.cluster() => {
                     heard.insert(frame.header.sender, frame.header.configuration);
@@ -231,7 +242,7 @@ pub fn examine_peers(
                 }
             }
         }
-        let mut descriptors = [PollFd::new(link.readiness(), PollFlags::POLLIN)];
+        let mut descriptors = [PollFd::new(opened.readiness(), PollFlags::POLLIN)];
         let left = TimeSpec::from_duration(end.since(clock.now()));
         ppoll(&mut descriptors, Some(left), None)
             .map(drop)
@@ -264,7 +275,7 @@ pub fn examine_peers(
                     "peer",
                     Health::Warning,
                     format!("{name} was not heard for {} ms", patience.as_millis()),
-                    format!("start it; where it runs, look at the way there (`ping {}`, a firewall for UDP and TCP port {})", peer.address.ip(), peer.address.port()),
+                    format!("start it; where it runs, check the network (`ping {}`) and the firewall ({})", peer.address.ip(), ports_of(link, peer.address)),
                 ),
             }
         })

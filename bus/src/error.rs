@@ -5,6 +5,8 @@ use std::net::SocketAddr;
 
 use understudy_wire::Party;
 
+use crate::link::ZENOH_PORT_OFFSET;
+
 /// What stops a party before or while it runs. The codes are stable.
 #[derive(Debug, thiserror::Error)]
 pub enum BusError {
@@ -29,6 +31,12 @@ pub enum BusError {
         address: SocketAddr,
         /// What Zenoh said.
         reason: String,
+    },
+    /// There is no port for the frames of this address.
+    #[error("U0580: {address} cannot be used over Zenoh: its frames need the TCP port {} higher, and ports end at {}; use a port up to {}", ZENOH_PORT_OFFSET, u16::MAX, u16::MAX - ZENOH_PORT_OFFSET)]
+    NoZenohPort {
+        /// Of the member.
+        address: SocketAddr,
     },
     /// A party is not in the list, so that it has no address.
     #[error("U0504: {party:?} has no address in the cluster")]
@@ -116,6 +124,7 @@ impl BusError {
             Self::PortInUse { .. } => "U0501",
             Self::Listen { .. } => "U0502",
             Self::Zenoh { .. } => "U0503",
+            Self::NoZenohPort { .. } => "U0580",
             Self::NoAddress { .. } => "U0504",
             Self::SharedAddress { .. } => "U0505",
             Self::System { .. } => "U0506",

@@ -17,7 +17,7 @@ use crate::error::BusError;
 use crate::field::{FieldDriver, Look};
 use crate::guard::Guard;
 use crate::journal::{EventSink, HostEvent, Noted};
-use crate::link::{Link, LinkCounters};
+use crate::link::{Link, LinkCounters, Reopening};
 use crate::observer::Observer;
 use crate::orders::{Order, Orders};
 use crate::trouble::{Duplicates, Refusals};
@@ -136,6 +136,7 @@ impl<M: Machine> Host<'_, M> {
                 self.sleep(now, until)?;
                 round.wakeups_in_a_row = 0;
             }
+            self.report_reopenings(now);
             self.report_trouble(now, TROUBLE_PERIOD, &mut round);
         }
         let now = self.clock.now();
@@ -264,7 +265,9 @@ impl<M: Machine> Host<'_, M> {
     fn say(&mut self, now: Time, frame: &Frame, round: &mut Round) {
         // Who sends for the first time says by it who it is.
         let sender = frame.header.sender;
-        round.unreceived.get_or_insert_with(|| Unreceived::new(sender));
+        round
+            .unreceived
+            .get_or_insert_with(|| Unreceived::new(sender));
         round.encoded.clear();
         let encoded = encode(frame, &mut round.encoded).map_err(|error| error.to_string());
         let datagram = encoded.and_then(|()| self.guard.close(frame, &round.encoded));
@@ -293,6 +296,17 @@ impl<M: Machine> Host<'_, M> {
         ) {
             Ok(_) | Err(Errno::EINTR) => Ok(()),
             Err(error) => Err(BusError::system("to sleep until something arrives")(error)),
+        }
+    }
+
+    fn report_reopenings(&mut self, now: Time) {
+        while let Some(Reopening { silence, failure }) = self.link.reopening() {
+            let silence_ms = u64::try_from(silence.as_millis()).unwrap_or(u64::MAX);
+            let event = match failure {
+                None => HostEvent::LinkReopened { silence_ms },
+                Some(reason) => HostEvent::LinkFailed { silence_ms, reason },
+            };
+            self.sink.record(now, Noted::Host(event));
         }
     }
 

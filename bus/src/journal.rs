@@ -127,6 +127,18 @@ pub enum HostEvent {
         /// Which bound, for the last one.
         reason: String,
     },
+    /// No configured peer was received for so long that the link was closed and opened anew.
+    LinkReopened {
+        /// How long, in milliseconds.
+        silence_ms: u64,
+    },
+    /// The same, and the link could not be opened: no frame is sent or received. It is tried again.
+    LinkFailed {
+        /// How long no peer was received, in milliseconds.
+        silence_ms: u64,
+        /// Why it cannot be opened.
+        reason: String,
+    },
     /// The equipment of a remote I/O cannot be seen any more.
     FieldLost {
         /// Why.

@@ -30,6 +30,7 @@ mod segments;
 mod trouble;
 mod udp;
 mod unreceived;
+mod wakefulness;
 mod watchdog;
 mod zenoh_link;
 
@@ -37,7 +38,8 @@ pub use announcer::Announcer;
 pub use channel::{Admitted, ChannelSettings, DONE, TlsKeys};
 pub use clock::Clock;
 pub use connections::{
-    Connection, Connections, Listener, RESERVED_DESCRIPTORS, RefusedConnections, Slot, inner_address, relay,
+    Connection, Connections, Listener, RESERVED_DESCRIPTORS, RefusedConnections, Slot,
+    inner_address, relay,
 };
 pub use control::{Commands, Interruption, hold_back_signals};
 pub use endpoints::{Endpoints, Peer};
@@ -49,7 +51,7 @@ pub use interruption::interruption;
 pub use journal::{
     EventSink, HostEvent, JOURNAL_RECORDS, Journal, JournalSender, Noted, Record, RefusedAs,
 };
-pub use link::{Link, LinkCounters, LinkKind, NoSuchLink};
+pub use link::{Link, LinkCounters, LinkKind, NoSuchLink, Reopening, ZENOH_PORT_OFFSET};
 pub use observer::{NoObserver, Observer};
 pub use operator::{Call, Request};
 pub use orders::{Control, Cuts, Order, Orders, orders};
@@ -57,4 +59,5 @@ pub use party::{PartySettings, run_party};
 pub use ports::free_addresses;
 pub use rights::Rights;
 pub use segments::{Segments, closed_segments, segments_of};
+pub use wakefulness::Wakefulness;
 pub use zenoh_link::ZENOH_RUNTIME;

@@ -4,6 +4,7 @@ use std::fmt;
 use std::net::SocketAddr;
 use std::os::fd::BorrowedFd;
 use std::str::FromStr;
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use understudy_wire::Frame;
@@ -12,6 +13,9 @@ use crate::endpoints::Endpoints;
 use crate::error::BusError;
 use crate::udp::UdpLink;
 use crate::zenoh_link::ZenohLink;
+
+/// From the port of a member's address to the TCP port of its frames over Zenoh.
+pub const ZENOH_PORT_OFFSET: u16 = 8192;
 
 /// Carries frames between this party and its peers. Any frame may be lost, doubled, late or changed; nothing blocks.
 pub trait Link: Send {
@@ -29,6 +33,20 @@ pub trait Link: Send {
 
     /// What happened since the start.
     fn counters(&self) -> LinkCounters;
+
+    /// The next time that the link was opened anew because no peer was received; to be asked again until there is none.
+    fn reopening(&mut self) -> Option<Reopening> {
+        None
+    }
+}
+
+/// A link received none of its peers, and was closed and opened anew.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Reopening {
+    /// How long no peer was received.
+    pub silence: Duration,
+    /// Why the link could not be opened; it is tried again.
+    pub failure: Option<String>,
 }
 
 /// What a link could not do.
@@ -38,38 +56,46 @@ pub struct LinkCounters {
     pub unsent: u64,
     /// Datagrams that found this party's own queue full.
     pub overrun: u64,
-    /// Subscriptions that were made anew because nothing came through them.
-    pub renewed: u64,
+    /// Times that the link was opened anew because no peer was received.
+    pub reopened: u64,
 }
 
 /// The links that there are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LinkKind {
-    /// Zenoh with its low-latency transport over UDP.
+    /// Zenoh over TCP: it loses no frame on its way, and a lost segment delays all frames behind it.
     #[default]
     Zenoh,
-    /// Zenoh over TCP, for networks that let no UDP through; a lost segment costs a cycle or twenty.
-    ZenohTcp,
     /// Plain UDP, one datagram for each receiver.
     Udp,
 }
 
 impl LinkKind {
     /// As it is written in files and on the command line.
-    pub const NAMES: [(&'static str, Self); 3] = [
-        ("zenoh", Self::Zenoh),
-        ("zenoh-tcp", Self::ZenohTcp),
-        ("udp", Self::Udp),
-    ];
+    pub const NAMES: [(&'static str, Self); 2] = [("zenoh", Self::Zenoh), ("udp", Self::Udp)];
+
+    /// Where the member with this address receives frames: at the address itself by UDP; over Zenoh at the TCP port
+    /// [`ZENOH_PORT_OFFSET`] above it, because operators use the TCP port of the address.
+    ///
+    /// # Errors
+    /// [`BusError::NoZenohPort`] where there is no such port.
+    pub fn frames_address(self, address: SocketAddr) -> Result<SocketAddr, BusError> {
+        let port = match self {
+            Self::Udp => Some(address.port()),
+            Self::Zenoh => address.port().checked_add(ZENOH_PORT_OFFSET),
+        };
+        let port = port.ok_or(BusError::NoZenohPort { address })?;
+        Ok(SocketAddr::new(address.ip(), port))
+    }
 
     /// Opens the link of one party.
     ///
     /// # Errors
-    /// [`BusError::PortInUse`], [`BusError::Listen`] or [`BusError::Zenoh`].
+    /// [`BusError::PortInUse`], [`BusError::Listen`], [`BusError::NoZenohPort`] or [`BusError::Zenoh`].
     pub fn open(self, endpoints: &Endpoints) -> Result<Box<dyn Link>, BusError> {
         Ok(match self {
-            Self::Zenoh | Self::ZenohTcp => Box::new(ZenohLink::open(endpoints, self)?),
+            Self::Zenoh => Box::new(ZenohLink::open(endpoints)?),
             Self::Udp => Box::new(UdpLink::open(endpoints)?),
         })
     }
@@ -84,7 +110,7 @@ impl fmt::Display for LinkKind {
 
 /// A name that is no link.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{found:?} is no link: there are zenoh, zenoh-tcp and udp")]
+#[error("{found:?} is no link: there are zenoh and udp")]
 pub struct NoSuchLink {
     found: String,
 }

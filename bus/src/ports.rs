@@ -5,16 +5,18 @@ use std::net::{Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
 use std::ops::Range;
 use std::sync::atomic::{AtomicU16, Ordering};
 
+use crate::link::ZENOH_PORT_OFFSET;
+
 /// Ports that no system gives to outgoing connections of its own accord, so that a party that is restarted finds its port
-/// again: Linux begins at 32768, others at 49152.
-const PORTS: Range<u16> = 16_384..32_768;
+/// again: Linux begins at 32768, others at 49152. So do the ports of their frames over Zenoh.
+const PORTS: Range<u16> = 16_384..32_768 - ZENOH_PORT_OFFSET;
 /// A process that begins here leaves the next process, whose number is one higher, as many ports.
 const PORTS_A_PROCESS: u32 = 61;
 
 /// The port, counted from the first of [`PORTS`], that this process tries next: nobody in it is given one twice before all were tried.
 static NEXT: AtomicU16 = AtomicU16::new(0);
 
-/// So many addresses on 127.0.0.1 that nobody uses, neither by UDP nor by TCP.
+/// So many addresses on 127.0.0.1 that nobody uses, neither by UDP nor by TCP, nor for frames over Zenoh.
 ///
 /// They are only found free: another process may take one before it is used, and the party then says so.
 ///
@@ -32,7 +34,10 @@ pub fn free_addresses(count: usize) -> io::Result<Vec<SocketAddr>> {
         let turn = NEXT.fetch_add(1, Ordering::Relaxed);
         let port = PORTS.start + own.wrapping_add(turn) % span;
         let address = SocketAddr::from((Ipv4Addr::LOCALHOST, port));
-        let free = UdpSocket::bind(address).and_then(|_datagrams| TcpListener::bind(address));
+        let frames = SocketAddr::from((Ipv4Addr::LOCALHOST, port + ZENOH_PORT_OFFSET));
+        let free = UdpSocket::bind(address)
+            .and_then(|_datagrams| TcpListener::bind(address))
+            .and_then(|_operators| TcpListener::bind(frames));
         match free {
             Ok(_) => found.push(address),
             Err(error) => last = Some(error),

@@ -1,53 +1,60 @@
-//! Zenoh 1.10 in peer mode: the only place that names it.
+//! Zenoh 1.10 in peer mode: the only place that names it for frames.
 //!
-//! * Scouting and gossip are off; every party listens on its own address and calls those before it ([`Endpoints::called`]).
-//! * One subscription for each peer. Over UDP Zenoh never sends a lost declaration again, so every party gives a sign of itself
-//!   ([`PULSE`]), however long its cycle is, and a peer of whom nothing comes gets its subscription declared anew until something
-//!   does. That heals, because a subscription here is *one* message: its key starts with a wildcard, so that no separate
-//!   declaration of a key prefix has to arrive before it. To renew the subscription to a peer that has died costs two
-//!   messages to each of the others, and nobody hears less meanwhile.
-//! * Whoever is called is called by a session of its own, and by another one where nothing comes of it: see [`Line`].
-//! * Callbacks only enqueue: one that lingers starves all peers of a UDP listener.
+//! * **One session for each member.** It listens on the member's own address and connects to the peers before it
+//!   ([`Endpoints::called`]), so that no two connects cross. Zenoh itself connects again, with growing pauses, whenever a connection
+//!   fails or ends. A session has a new identity, so that a second life is never taken for the first.
+//! * **TCP.** A session depends on declarations that are sent once, so it needs a transport that delivers them. Zenoh's listener
+//!   for UDP has two more defects (1.10.2, `accept_read_task`): one task hands all datagrams on through a queue of one
+//!   place for each sender, so it waits without end for a sender whose session has just ended, and then no peer is received any more.
+//! * Scouting and gossip are off. A member subscribes to the stations, and to the remote I/Os, by one expression each.
+//! * Each member publishes an empty message from time to time ([`PULSE`]), however long its cycle is. A member that receives none of
+//!   its peers for [`SILENCE`] opens its session anew, whatever the reason; the pause doubles each time.
+//! * Callbacks only enqueue, and nothing that the cycle's thread calls waits for a peer: what does not fit into a queue is dropped.
 
-use std::net::{SocketAddr, TcpListener, UdpSocket};
+use std::collections::BTreeSet;
+use std::net::{SocketAddr, TcpListener};
 use std::os::fd::BorrowedFd;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use understudy_wire::{ClusterHash, Frame, Party, Topic};
+use understudy_wire::{ClusterHash, Frame, Party, Time, Topic};
 use zenoh::Wait;
 use zenoh::key_expr::KeyExpr;
 use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::{CongestionControl, Priority};
+use zenoh::sample::Locality;
 
+use crate::clock::Clock;
 use crate::doorbell::{Inbox, Outbox, doorbell};
-use crate::endpoints::{Endpoints, Peer};
+use crate::endpoints::Endpoints;
 use crate::error::{BusError, reason};
-use crate::link::{Link, LinkCounters, LinkKind};
+use crate::link::{Link, LinkCounters, LinkKind, Reopening};
 use crate::rights::raise_link_thread;
 
 /// Datagrams that wait for the cycle's thread, at most; one of 64 stations and 64 remote I/Os hears fewer in a cycle.
 const QUEUE_FRAMES: usize = 1024;
 
-/// How often each party says an empty message, whatever else it says.
-const PULSE: Duration = Duration::from_millis(50);
+/// How often each member publishes an empty message.
+const PULSE: Duration = Duration::from_millis(250);
 
-/// A peer of whom nothing came during so many pulses gets its subscription declared anew, and again after every so many.
-const RENEW_AFTER_PULSES: u32 = 3;
+/// A member that receives none of its peers for so long opens its session anew.
+const SILENCE: Duration = Duration::from_secs(1);
 
-/// A peer that was called and of whom nothing came during so many pulses is called anew, by a session of a new name.
-const CALL_AFTER_PULSES: u32 = 8;
+/// The longest pause between two openings: a member whose peers are all switched off opens its session no more often.
+const LONGEST_SILENCE: Duration = Duration::from_secs(32);
 
-/// How long a session may take to open. It takes four datagrams, none of which is sent again: of three tries one fails where a
-/// tenth of all datagrams is lost, and each costs this time before the next.
-const OPEN_TIMEOUT_MS: u32 = 100;
+/// How long it may take to connect to a peer. Long compared with what a busy machine needs, because an attempt that is given up is an
+/// attempt that is begun again.
+const OPEN_TIMEOUT_MS: u32 = 2_000;
 
-/// How long a session lives without a sign of the other. Long, because over UDP a session costs nothing and survives whatever
-/// its peer does: one that is stopped for less goes on at once, and one that was killed is called anew as soon as the system says that
-/// nobody listens there. A session that runs out while datagrams wait for it can block Zenoh's UDP listener for ever.
-const LEASE_MS: u32 = 10_000;
+/// A connection on which nothing is received for so long has ended. A process that ends takes its connections with it at once;
+/// this is for a machine or a cable that fails.
+const LEASE_MS: u32 = 2_000;
+
+/// A longer frame goes in parts. What waits for a peer takes eight batches of this size, at most.
+const BATCH_BYTES: u16 = 16 * 1024;
 
 /// How Zenoh's own threads are to be set up, as a variable of the environment of every process that opens a Zenoh link. Zenoh
 /// reads it once, when its first session opens, and takes nothing else; without it there are six threads where two do.
@@ -56,78 +63,80 @@ pub const ZENOH_RUNTIME: (&str, &str) = (
     "(rx: (worker_threads: 1), tx: (handover: rx), acc: (handover: rx), app: (handover: net), net: (worker_threads: 1))",
 );
 
-/// A party that ends waits so long for its session to end, at most.
+/// A session that closes is waited for so long, at most.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Of channels that say only that the other end is gone.
 enum Never {}
 
-/// What one session publishes on, by topic.
-type Mouths = [Option<Publisher<'static>>; Topic::ALL.len()];
-
-/// The same of all sessions; the keeper replaces what it calls anew, and the cycle's thread only looks.
-type AllMouths = Vec<Mutex<Arc<Mouths>>>;
+/// What a member publishes with, by topic.
+type Publishers = [Option<Publisher<'static>>; Topic::ALL.len()];
 
 pub(crate) struct ZenohLink {
     address: SocketAddr,
     inbox: Inbox<Vec<u8>>,
-    mouths: Arc<AllMouths>,
+    /// Replaced by the keeper with those of a new session.
+    publishers: Arc<Mutex<Arc<Publishers>>>,
     unsent: u64,
-    renewed: Arc<AtomicU64>,
-    // Dropping it ends the keeper's thread, and with it the subscriptions and the sessions.
+    reopened: Arc<AtomicU64>,
+    reopenings: Receiver<Reopening>,
+    // Dropping it ends the keeper's thread, and with it the session.
     stop: Option<Sender<Never>>,
     closed: Receiver<Never>,
 }
 
 impl ZenohLink {
-    pub(crate) fn open(endpoints: &Endpoints, kind: LinkKind) -> Result<Self, BusError> {
+    pub(crate) fn open(endpoints: &Endpoints) -> Result<Self, BusError> {
         let address = endpoints.own().address;
-        bindable(address, kind)?;
-        let failed = |error: zenoh::Error| BusError::Zenoh {
-            address,
-            reason: reason(&error),
-        };
+        let frames = LinkKind::Zenoh.frames_address(address)?;
+        // Zenoh only has words for why it cannot listen; this asks the system first.
+        TcpListener::bind(frames).map_err(|source| BusError::listen(frames, source))?;
         let (outbox, inbox) =
             doorbell(QUEUE_FRAMES).map_err(BusError::system("an eventfd for what arrives"))?;
-        let calls = endpoints.called().map(|peer| Some(peer.clone()));
-        let lines = std::iter::once(None).chain(calls);
-        let lines = lines
-            .map(|called| Line::open(endpoints.clone(), kind, called, &outbox))
-            .collect::<zenoh::Result<Vec<Line>>>()
-            .map_err(failed)?;
-        let mouths: AllMouths = lines
-            .iter()
-            .map(|line| Mutex::new(Arc::clone(&line.mouths)))
-            .collect();
-        let mouths = Arc::new(mouths);
-        let renewed = Arc::new(AtomicU64::new(0));
+        let ears = Ears {
+            outbox,
+            heard: Arc::new(AtomicBool::new(false)),
+        };
+        let session = Session::open(endpoints, &ears).map_err(|error| BusError::Zenoh {
+            address: frames,
+            reason: reason(&error),
+        })?;
+        let publishers = Arc::new(Mutex::new(Arc::clone(&session.publishers)));
+        let reopened = Arc::new(AtomicU64::new(0));
         let (stop, stopped) = channel::<Never>();
         let (closing, closed) = channel();
+        let (report, reopenings) = channel();
+        let clock = Clock::start();
         let mut keeper = Keeper {
-            lines,
-            mouths: Arc::clone(&mouths),
-            outbox,
-            renewed: Arc::clone(&renewed),
+            endpoints: endpoints.clone(),
+            session: Some(session),
+            publishers: Arc::clone(&publishers),
+            ears,
+            silence: Silence::new(clock.now()),
+            failed: false,
+            reopened: Arc::clone(&reopened),
+            report,
         };
         std::thread::Builder::new()
             .name("zenoh-keeper".into())
             .spawn(move || {
                 while matches!(stopped.recv_timeout(PULSE), Err(RecvTimeoutError::Timeout)) {
-                    keeper.pulse();
+                    keeper.pulse(clock.now());
                 }
-                keeper.close();
+                keeper.session.take().map(Session::close);
                 drop(closing);
             })
             .map_err(|source| BusError::System {
-                what: "a thread for the Zenoh sessions",
+                what: "a thread for the Zenoh session",
                 source,
             })?;
         Ok(Self {
             address,
             inbox,
-            mouths,
+            publishers,
             unsent: 0,
-            renewed,
+            reopened,
+            reopenings,
             stop: Some(stop),
             closed,
         })
@@ -140,15 +149,17 @@ impl Link for ZenohLink {
     }
 
     fn send(&mut self, frame: &Frame, bytes: &[u8]) {
-        let topic = Topic::of(&frame.body) as usize;
-        for mouths in self.mouths.iter() {
-            // Held only to take what is there, never while something is sent.
-            let mouths = Arc::clone(&mouths.lock().unwrap_or_else(PoisonError::into_inner));
-            if let Some(publisher) = &mouths[topic]
-                && publisher.put(bytes).wait().is_err()
-            {
-                self.unsent += 1;
-            }
+        // Held only to take what is there, never while something is sent.
+        let publishers = Arc::clone(
+            &self
+                .publishers
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner),
+        );
+        if let Some(publisher) = &publishers[Topic::of(&frame.body) as usize]
+            && publisher.put(bytes).wait().is_err()
+        {
+            self.unsent += 1;
         }
     }
 
@@ -168,8 +179,12 @@ impl Link for ZenohLink {
         LinkCounters {
             unsent: self.unsent,
             overrun: self.inbox.dropped(),
-            renewed: self.renewed.load(Ordering::Relaxed),
+            reopened: self.reopened.load(Ordering::Relaxed),
         }
+    }
+
+    fn reopening(&mut self) -> Option<Reopening> {
+        self.reopenings.try_recv().ok()
     }
 }
 
@@ -177,262 +192,250 @@ impl Drop for ZenohLink {
     fn drop(&mut self) {
         self.stop = None;
         // Where Zenoh does not come to an end, the process does.
-        let _ = self.closed.recv_timeout(CLOSE_TIMEOUT);
+        let _ = self.closed.recv_timeout(2 * CLOSE_TIMEOUT);
     }
 }
 
-/// One session: with those who call this party, or with one peer that it calls.
-///
-/// Each call is a session of its own, with a name of its own, because a session can be left half open: where its last datagram
-/// of opening is lost, the one who was called believes in it, and refuses whoever calls again by the same name until the lease is over.
-struct Line {
-    endpoints: Endpoints,
-    kind: LinkKind,
-    called: Option<Peer>,
-    session: zenoh::Session,
-    mouths: Arc<Mouths>,
-    ears: Vec<Ear>,
-    silent_pulses: u32,
+/// Where everything goes that is received, in every session of a member.
+#[derive(Clone)]
+struct Ears {
+    outbox: Outbox<Vec<u8>>,
+    /// Whether a peer was received since it was last asked.
+    heard: Arc<AtomicBool>,
 }
 
-impl Line {
-    fn open(
-        endpoints: Endpoints,
-        kind: LinkKind,
-        called: Option<Peer>,
-        outbox: &Outbox<Vec<u8>>,
-    ) -> zenoh::Result<Self> {
-        let session = zenoh::open(settings(&endpoints, kind, called.as_ref())?).wait()?;
-        let own = endpoints.own().party;
-        // Who calls this party is later in the order than it, and whom it calls is earlier.
-        let belongs = |peer: &Peer| match &called {
-            Some(called) => peer.party == called.party,
-            None => peer.party > own,
-        };
-        let mut mouths = [const { None }; Topic::ALL.len()];
+/// The one session of a member.
+struct Session {
+    session: zenoh::Session,
+    publishers: Arc<Publishers>,
+    subscribers: Vec<Subscriber<()>>,
+    // Known by name, so that Zenoh finds the way of what arrives instead of computing it for each frame.
+    _exact: Vec<KeyExpr<'static>>,
+}
+
+impl Session {
+    fn open(endpoints: &Endpoints, ears: &Ears) -> zenoh::Result<Self> {
+        let session = zenoh::open(settings(endpoints)?).wait()?;
+        let (cluster, own) = (endpoints.cluster(), endpoints.own().party);
+        let mut publishers = [const { None }; Topic::ALL.len()];
         for topic in Topic::ALL {
-            if endpoints.audience(topic).any(belongs) {
+            if endpoints.audience(topic).next().is_some() {
                 let publisher = session
-                    .declare_publisher(key(endpoints.cluster(), topic, own))
+                    .declare_publisher(key(cluster, topic, own))
                     .congestion_control(CongestionControl::Drop)
                     .priority(Priority::RealTime)
                     .express(true)
                     .wait()?;
-                mouths[topic as usize] = Some(publisher);
+                publishers[topic as usize] = Some(publisher);
             }
         }
-        let mut ears = Vec::new();
-        for (peer, topic) in endpoints.heard().filter(|(peer, _)| belongs(peer)) {
-            let key = key(endpoints.cluster(), topic, peer.party);
-            ears.push(Ear::new(&session, &key, outbox)?);
+        let mut exact = Vec::new();
+        for (peer, topic) in endpoints.heard() {
+            let key = key(cluster, topic, peer.party);
+            exact.push(session.declare_keyexpr(key).wait()?);
         }
+        let subscribers = subscriptions(endpoints).into_iter().map(|key| {
+            let ears = ears.clone();
+            session
+                .declare_subscriber(key)
+                // A station's own turns match what it subscribes to.
+                .allowed_origin(Locality::Remote)
+                .callback(move |sample| {
+                    raise_link_thread();
+                    ears.heard.store(true, Ordering::Relaxed);
+                    let payload = sample.payload();
+                    if !payload.is_empty() {
+                        ears.outbox.put(payload.to_bytes().into_owned());
+                    }
+                })
+                .wait()
+        });
         Ok(Self {
-            endpoints,
-            kind,
-            called,
+            subscribers: subscribers.collect::<zenoh::Result<_>>()?,
             session,
-            mouths: Arc::new(mouths),
-            ears,
-            silent_pulses: 0,
+            publishers: Arc::new(publishers),
+            _exact: exact,
         })
     }
 
-    /// Gives a sign, and sees to it that the others are heard; so many subscriptions were renewed.
-    fn pulse(&mut self, outbox: &Outbox<Vec<u8>>) -> u64 {
-        for mouth in self.mouths.iter().flatten() {
-            // One that is not sent is missed like one that is lost.
-            let _ = mouth.put([]).wait();
-        }
-        let heard = self.ears.iter().any(Ear::hears);
-        self.silent_pulses = if heard { 0 } else { self.silent_pulses + 1 };
-        let mut renewed = 0;
-        for ear in &mut self.ears {
-            if ear.is_deaf() && ear.renew(&self.session, outbox) {
-                renewed += 1;
-            }
-        }
-        renewed
-    }
-
-    /// Whether the peer is to be called anew. Of one that says nothing to this party nobody can tell.
-    fn is_deaf(&self) -> bool {
-        self.called.is_some() && !self.ears.is_empty() && self.silent_pulses >= CALL_AFTER_PULSES
-    }
-
-    /// Takes its subscriptions back, and ends it.
+    /// Waits for its end, for [`CLOSE_TIMEOUT`] at most.
     fn close(self) {
-        drop(self.ears);
-        if let Err(error) = self.session.close().wait() {
-            tracing::debug!(%error, "a session was not closed");
+        let (closing, closed) = channel::<Never>();
+        let thread = std::thread::Builder::new().name("zenoh-close".into());
+        let started = thread.spawn(move || {
+            drop(self.subscribers);
+            if let Err(error) = self.session.close().wait() {
+                tracing::debug!(%error, "a session was not closed");
+            }
+            drop(closing);
+        });
+        if started.is_ok() {
+            let _ = closed.recv_timeout(CLOSE_TIMEOUT);
         }
     }
 }
 
-/// Gives signs of this party, and sees to it that the others are heard.
+/// Publishes signs of this member, and opens its session anew where no peer is received.
 struct Keeper {
-    lines: Vec<Line>,
-    mouths: Arc<AllMouths>,
-    outbox: Outbox<Vec<u8>>,
-    renewed: Arc<AtomicU64>,
+    endpoints: Endpoints,
+    /// None where it could not be opened anew.
+    session: Option<Session>,
+    publishers: Arc<Mutex<Arc<Publishers>>>,
+    ears: Ears,
+    silence: Silence,
+    /// Whether that it could not be opened is reported.
+    failed: bool,
+    reopened: Arc<AtomicU64>,
+    report: Sender<Reopening>,
 }
 
 impl Keeper {
-    fn pulse(&mut self) {
-        for (line, mouths) in self.lines.iter_mut().zip(self.mouths.iter()) {
-            let mut renewed = line.pulse(&self.outbox);
-            if line.is_deaf() {
-                line.silent_pulses = 0;
-                let again = Line::open(
-                    line.endpoints.clone(),
-                    line.kind,
-                    line.called.clone(),
-                    &self.outbox,
-                );
-                if let Ok(again) = again {
-                    *mouths.lock().unwrap_or_else(PoisonError::into_inner) =
-                        Arc::clone(&again.mouths);
-                    std::mem::replace(line, again).close();
-                    renewed += 1;
-                }
+    fn pulse(&mut self, now: Time) {
+        for publisher in self
+            .session
+            .iter()
+            .flat_map(|session| session.publishers.iter().flatten())
+        {
+            // One that is not sent is missed like one that is lost.
+            let _ = publisher.put([]).wait();
+        }
+        let heard = self.ears.heard.swap(false, Ordering::Relaxed);
+        let due = self.silence.look(now, heard);
+        // Of one that nobody sends to nothing can be told.
+        let listens = self.endpoints.heard().next().is_some();
+        if listens && (due || self.session.is_none()) {
+            self.reopen(self.silence.lasts(now));
+        }
+    }
+
+    fn reopen(&mut self, silence: Duration) {
+        self.session.take().map(Session::close);
+        let failure = match Session::open(&self.endpoints, &self.ears) {
+            Ok(session) => {
+                *self
+                    .publishers
+                    .lock()
+                    .unwrap_or_else(PoisonError::into_inner) = Arc::clone(&session.publishers);
+                self.session = Some(session);
+                self.reopened.fetch_add(1, Ordering::Relaxed);
+                None
             }
-            self.renewed.fetch_add(renewed, Ordering::Relaxed);
-        }
-    }
-
-    fn close(self) {
-        self.lines.into_iter().for_each(Line::close);
-    }
-}
-
-/// The subscription to one peer.
-struct Ear {
-    key: String,
-    // Known by name, so that Zenoh finds the way of what arrives instead of computing it for each frame. Never leaves the process.
-    _exact: KeyExpr<'static>,
-    heard: Arc<AtomicBool>,
-    silent_pulses: u32,
-    subscriber: Option<Subscriber<()>>,
-}
-
-impl Ear {
-    fn new(session: &zenoh::Session, key: &str, outbox: &Outbox<Vec<u8>>) -> zenoh::Result<Self> {
-        let mut ear = Self {
-            _exact: session.declare_keyexpr(key.to_owned()).wait()?,
-            key: format!("*/{}", key.split_once('/').map_or(key, |(_, rest)| rest)),
-            heard: Arc::new(AtomicBool::new(false)),
-            silent_pulses: 0,
-            subscriber: None,
+            Err(error) => Some(reason(&error)),
         };
-        ear.subscriber = Some(ear.subscribe(session, outbox)?);
-        Ok(ear)
-    }
-
-    fn subscribe(
-        &self,
-        session: &zenoh::Session,
-        outbox: &Outbox<Vec<u8>>,
-    ) -> zenoh::Result<Subscriber<()>> {
-        let (heard, outbox) = (Arc::clone(&self.heard), outbox.clone());
-        session
-            .declare_subscriber(self.key.clone())
-            .callback(move |sample| {
-                raise_link_thread();
-                heard.store(true, Ordering::Relaxed);
-                let payload = sample.payload();
-                if !payload.is_empty() {
-                    outbox.put(payload.to_bytes().into_owned());
-                }
-            })
-            .wait()
-    }
-
-    /// Whether something came since the last pulse.
-    fn hears(&self) -> bool {
-        self.heard.load(Ordering::Relaxed)
-    }
-
-    /// Counts one more pulse; true where it is time to renew.
-    fn is_deaf(&mut self) -> bool {
-        if self.heard.swap(false, Ordering::Relaxed) {
-            self.silent_pulses = 0;
-        } else {
-            self.silent_pulses += 1;
+        let again = failure.is_some() && self.failed;
+        self.failed = failure.is_some();
+        if !again {
+            // A link that is dropped asks no more.
+            let _ = self.report.send(Reopening { silence, failure });
         }
-        let deaf = self.silent_pulses == RENEW_AFTER_PULSES;
-        if deaf {
-            self.silent_pulses = 0;
+    }
+}
+
+/// How long no peer was received, and when that is long enough to open the session anew.
+struct Silence {
+    since: Time,
+    /// After it, the session is opened anew.
+    until: Time,
+    patience: Duration,
+}
+
+impl Silence {
+    fn new(now: Time) -> Self {
+        Self {
+            since: now,
+            until: now + SILENCE,
+            patience: SILENCE,
         }
-        deaf
     }
 
-    fn renew(&mut self, session: &zenoh::Session, outbox: &Outbox<Vec<u8>>) -> bool {
-        // Taken back first, because Zenoh declares one key once only.
-        self.subscriber = None;
-        self.subscriber = self.subscribe(session, outbox).ok();
-        self.subscriber.is_some()
+    /// Whether the session is to be opened anew.
+    fn look(&mut self, now: Time, heard: bool) -> bool {
+        if heard {
+            *self = Self::new(now);
+        }
+        let due = now >= self.until;
+        if due {
+            self.patience = (self.patience * 2).min(LONGEST_SILENCE);
+            self.until = now + self.patience;
+        }
+        due
+    }
+
+    fn lasts(&self, now: Time) -> Duration {
+        now.since(self.since)
     }
 }
 
 fn key(cluster: ClusterHash, topic: Topic, speaker: Party) -> String {
+    let (kind, number) = match speaker {
+        Party::Station(station) => ("station", station.0),
+        Party::RemoteIo(program) => ("remote-io", program.0),
+        Party::Plant(program) => ("plant", program.0),
+    };
+    format!("{}/{kind}-{number}", prefix(cluster, topic))
+}
+
+fn prefix(cluster: ClusterHash, topic: Topic) -> String {
     let topic = match topic {
         Topic::Cycle => "cycle",
         Topic::Field => "field",
         Topic::Actuation => "actuation",
     };
-    match speaker {
-        Party::Station(station) => format!("understudy/{cluster}/{topic}/station-{}", station.0),
-        Party::RemoteIo(program) => format!("understudy/{cluster}/{topic}/remote-io-{}", program.0),
-        Party::Plant(program) => format!("understudy/{cluster}/{topic}/plant-{}", program.0),
-    }
+    format!("understudy/{cluster}/{topic}")
 }
 
-/// Zenoh only has words for why it cannot listen; this asks the system first.
-fn bindable(address: SocketAddr, kind: LinkKind) -> Result<(), BusError> {
-    let bound = match kind {
-        LinkKind::ZenohTcp => TcpListener::bind(address).map(drop),
-        LinkKind::Zenoh | LinkKind::Udp => UdpSocket::bind(address).map(drop),
-    };
-    bound.map_err(|source| BusError::listen(address, source))
+/// What a member subscribes to. Of the cycle it hears all stations, or all remote I/Os, or both; one expression for each costs every
+/// peer one declaration, where one for each peer would cost a cluster of n members n³.
+fn subscriptions(endpoints: &Endpoints) -> BTreeSet<String> {
+    let cluster = endpoints.cluster();
+    let heard = endpoints.heard();
+    heard
+        .map(|(peer, topic)| match (topic, peer.party) {
+            (Topic::Cycle, Party::Station(_)) => format!("{}/station-$*", prefix(cluster, topic)),
+            (Topic::Cycle, Party::RemoteIo(_)) => {
+                format!("{}/remote-io-$*", prefix(cluster, topic))
+            }
+            (_, party) => key(cluster, topic, party),
+        })
+        .collect()
 }
 
-fn settings(
-    endpoints: &Endpoints,
-    kind: LinkKind,
-    called: Option<&Peer>,
-) -> zenoh::Result<zenoh::Config> {
-    let protocol = if kind == LinkKind::ZenohTcp {
-        "tcp"
-    } else {
-        "udp"
+fn settings(endpoints: &Endpoints) -> zenoh::Result<zenoh::Config> {
+    let locator = |address| -> zenoh::Result<String> {
+        Ok(format!("tcp/{}", LinkKind::Zenoh.frames_address(address)?))
     };
-    let (listen, connect) = match called {
-        None => (
-            vec![format!("{protocol}/{}", endpoints.own().address)],
-            Vec::new(),
-        ),
-        Some(peer) => (Vec::new(), vec![format!("{protocol}/{}", peer.address)]),
-    };
-    // The low-latency transport sends on the calling thread, without priorities and batches. Over TCP it would wait there for a
-    // peer that is stopped, so TCP keeps the transport with queues.
-    let low_latency = protocol == "udp";
+    let listen = [locator(endpoints.own().address)?];
+    let connect = endpoints.called().map(|peer| locator(peer.address));
+    let connect = connect.collect::<zenoh::Result<Vec<String>>>()?;
+    let peers = endpoints.others().iter();
+    let peers = peers
+        .filter(|peer| endpoints.talks_with(peer.party))
+        .count();
     let mut config = zenoh::Config::default();
     for (setting, value) in [
         ("mode", "\"peer\"".to_owned()),
         ("listen/endpoints", format!("{listen:?}")),
         ("connect/endpoints", format!("{connect:?}")),
-        // For ever, in the background, and soon: a peer that was restarted is to be heard within a second.
+        // For as long as the session is open, in the background.
         ("connect/timeout_ms", "-1".into()),
         ("connect/exit_on_failure", "false".into()),
         (
             "connect/retry",
-            "{ period_init_ms: 10, period_max_ms: 50, period_increase_factor: 2 }".into(),
+            "{ period_init_ms: 25, period_max_ms: 400, period_increase_factor: 2 }".into(),
         ),
         ("open/return_conditions/connect_scouted", "false".into()),
         ("open/return_conditions/declares", "false".into()),
         ("scouting/multicast/enabled", "false".into()),
         ("scouting/gossip/enabled", "false".into()),
-        ("transport/unicast/lowlatency", low_latency.to_string()),
-        ("transport/unicast/qos/enabled", (!low_latency).to_string()),
+        // The low-latency transport sends on the calling thread, and would wait there for a peer that is suspended.
+        ("transport/unicast/lowlatency", "false".into()),
+        // Not to be switched off: with one queue for all priorities Zenoh 1.10.2 marks that queue as full under one priority and as free
+        // under another one (`TransmissionPipelineProducer::push_network_message` and `TransmissionPipelineConsumer::refill`), so that
+        // it drops every frame to this peer from the first full queue on.
+        ("transport/unicast/qos/enabled", "true".into()),
+        // Each frame is a batch of its own, and a member sends some in a row.
+        ("transport/link/tx/queue/size/real_time", "8".into()),
+        ("transport/link/tx/batch_size", BATCH_BYTES.to_string()),
         (
             "transport/unicast/open_timeout",
             OPEN_TIMEOUT_MS.to_string(),
@@ -441,6 +444,9 @@ fn settings(
             "transport/unicast/accept_timeout",
             OPEN_TIMEOUT_MS.to_string(),
         ),
+        // Every peer, the last life of each, and no more, so that strangers do not take all descriptors.
+        ("transport/unicast/max_sessions", (2 * peers).to_string()),
+        ("transport/unicast/accept_pending", (2 * peers).to_string()),
         ("transport/link/tx/lease", LEASE_MS.to_string()),
         ("transport/link/tx/keep_alive", "4".into()),
         (
@@ -453,4 +459,27 @@ fn settings(
             .map_err(|error| format!("{setting} = {value}: {error}"))?;
     }
     Ok(config)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_session_is_opened_anew_after_a_second_and_then_less_often() {
+        let start = Time::default();
+        let mut silence = Silence::new(start);
+        let mut opened = Vec::new();
+        for tick in 1..=40_u32 {
+            if silence.look(start + PULSE * tick, false) {
+                opened.push(tick);
+            }
+        }
+        // Seconds 1, 3, and 7: pauses of 1, 2 and 4 s.
+        assert_eq!(opened, [4, 12, 28]);
+        assert_eq!(silence.lasts(start + PULSE * 40), PULSE * 40);
+        assert!(!silence.look(start + PULSE * 41, true));
+        let next = (42..60).find(|&tick| silence.look(start + PULSE * tick, false));
+        assert_eq!(next, Some(45));
+    }
 }

@@ -1,12 +1,15 @@
-//! A run that is followed: a thread reads its journal while it is written, and whoever asks gets what is newest.
+//! A run that is followed: a thread reads its journal while it is written, and whoever asks gets the present state. While the journal is
+//! still being read there is none: every question is answered by [`Reading`].
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, PoisonError, RwLock};
+use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
 use understudy_cluster::Cluster;
-use understudy_view::{Bounds, Event, Holders, Margin, Model, Run, Snapshot, Source};
+use understudy_view::{
+    Bounds, Event, Holders, Margin, Model, Progress, Reading, Run, Snapshot, Source,
+};
 use understudy_wire::ProgramId;
 
 use crate::error::GatewayError;
@@ -43,12 +46,17 @@ pub struct Observation {
     pub snapshot: Arc<Snapshot>,
     /// By program: x(i) at its last sample, element 1 first; nothing where the journal does not tell it.
     pub states: Vec<Option<Vec<bool>>>,
-    /// When the last record was read.
+    /// The newest events, oldest first.
+    pub recent: Vec<Event>,
+    /// When the newest record was written.
     pub heard: Instant,
 }
 
+/// In [`Observation::recent`].
+const RECENT: usize = 20;
+
 impl Observation {
-    /// Of what `model` knows, which read its last record at `heard`.
+    /// Of what `model` knows, whose newest record was written at `heard`.
     pub fn new(model: &Model, snapshot: Snapshot, heard: Instant) -> Self {
         let programs = 0..snapshot.programs.len();
         let state = |program: usize| {
@@ -57,9 +65,12 @@ impl Observation {
             let sampled = steps.find_map(|step| step.sampled.as_ref())?;
             Some(sampled.state.bits().collect())
         };
+        let mut recent: Vec<Event> = model.events().rev().take(RECENT).cloned().collect();
+        recent.reverse();
         Self {
             states: programs.map(state).collect(),
             snapshot: Arc::new(snapshot),
+            recent,
             heard,
         }
     }
@@ -68,8 +79,19 @@ impl Observation {
 #[derive(Debug)]
 struct Newest {
     observation: Arc<Observation>,
-    /// Newer ones than were asked for the last time, and the number of the newest.
+    /// Newer ones than were asked for the last time.
     events: Vec<Event>,
+    /// Of the reader, when it had folded the observation.
+    progress: Progress,
+}
+
+impl Newest {
+    /// What is the case now, unless it is not known yet.
+    fn current(newest: &RwLock<Self>) -> Result<RwLockReadGuard<'_, Self>, Reading> {
+        let newest = newest.read().unwrap_or_else(PoisonError::into_inner);
+        newest.progress.current(Instant::now())?;
+        Ok(newest)
+    }
 }
 
 impl Followed {
@@ -84,6 +106,7 @@ impl Followed {
         let newest = Arc::new(RwLock::new(Newest {
             observation: Arc::new(Observation::new(&model, model.snapshot(), heard)),
             events: Vec::new(),
+            progress: Progress::default(),
         }));
         let ends = Arc::new(AtomicBool::new(false));
         let mut reader = Reader {
@@ -91,10 +114,9 @@ impl Followed {
             run: run.clone(),
             model,
             margin: None,
-            heard,
             metrics: Arc::clone(&metrics),
             newest: Arc::clone(&newest),
-            said_events: 0,
+            said_events: None,
         };
         let ended = Arc::clone(&ends);
         let thread = Builder::new()
@@ -118,23 +140,37 @@ impl Followed {
         &self.cluster
     }
 
-    /// Everything that was counted.
-    pub fn metrics(&self) -> &Arc<Metrics> {
-        &self.metrics
+    /// Writes everything that was counted, in the OpenMetrics text format.
+    pub fn exposition(&self) -> impl Fn() -> Result<String, Reading> + Clone + use<> {
+        let (metrics, newest) = (Arc::clone(&self.metrics), Arc::clone(&self.newest));
+        move || {
+            let age = {
+                let newest = Newest::current(&newest)?;
+                newest.progress.age(Instant::now())
+            };
+            metrics.aged(age);
+            Ok(metrics.exposition())
+        }
     }
 
     /// What is the case.
-    pub fn snapshot(&self) -> Arc<Snapshot> {
-        Arc::clone(&self.observation().snapshot)
+    ///
+    /// # Errors
+    /// [`Reading`].
+    pub fn snapshot(&self) -> Result<Arc<Snapshot>, Reading> {
+        Ok(Arc::clone(&self.observation()?.snapshot))
     }
 
     /// The same with the states of programs, and with how fresh it is.
-    pub fn observation(&self) -> Arc<Observation> {
-        let newest = self.newest.read().unwrap_or_else(PoisonError::into_inner);
-        Arc::clone(&newest.observation)
+    ///
+    /// # Errors
+    /// [`Reading`].
+    pub fn observation(&self) -> Result<Arc<Observation>, Reading> {
+        Ok(Arc::clone(&Newest::current(&self.newest)?.observation))
     }
 
-    /// Events since the last time that somebody asked, a thousand at most; the oldest go first.
+    /// Events since the last time that somebody asked, a thousand at most; the oldest go first. Those that were in the journal when the
+    /// present was first known are the past, and are not among them.
     pub fn take_events(&self) -> Vec<Event> {
         let mut newest = self.newest.write().unwrap_or_else(PoisonError::into_inner);
         std::mem::take(&mut newest.events)
@@ -156,10 +192,10 @@ struct Reader {
     model: Model,
     /// Of the same holders it is the same.
     margin: Option<(Holders, Margin)>,
-    heard: Instant,
     metrics: Arc<Metrics>,
     newest: Arc<RwLock<Newest>>,
-    said_events: u64,
+    /// The number of the newest event that was told; nothing before the present is known.
+    said_events: Option<u64>,
 }
 
 impl Reader {
@@ -177,19 +213,20 @@ impl Reader {
                 Err(trouble) => model.trouble(&trouble),
             });
             self.metrics.times(&self.model);
-            if taken > 0 {
-                self.heard = Instant::now();
-                unshown = true;
-            } else if is_finished {
+            unshown |= taken > 0;
+            if taken == 0 && is_finished {
                 // Its results lie beside the journal, which was read to its end since.
                 self.model.end();
                 unshown = true;
             }
-            // A long journal is read through before it is shown often.
-            if unshown && (taken == 0 || shown.elapsed() >= SHOW) {
-                self.show();
+            let progress = self.source.progress().of_ended(self.model.is_finished());
+            // What is at the end is shown before it is said to be the present.
+            if unshown && (progress.is_at_end() || shown.elapsed() >= SHOW) {
+                self.show(progress);
                 shown = Instant::now();
                 unshown = false;
+            } else {
+                self.newest_mut().progress = progress;
             }
             if taken == 0 {
                 std::thread::sleep(LOOK);
@@ -197,7 +234,11 @@ impl Reader {
         }
     }
 
-    fn show(&mut self) {
+    fn newest_mut(&self) -> RwLockWriteGuard<'_, Newest> {
+        self.newest.write().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn show(&mut self, progress: Progress) {
         let holders = self.model.holders();
         let known = self.margin.take().filter(|(of, _)| *of == holders);
         let (holders, margin) = known.unwrap_or_else(|| {
@@ -207,17 +248,18 @@ impl Reader {
         let snapshot = self.model.snapshot_with(&margin);
         self.margin = Some((holders, margin));
         self.metrics.state(&snapshot);
-        let observation = Arc::new(Observation::new(&self.model, snapshot, self.heard));
-        let said = self.said_events;
-        let fresh: Vec<Event> = self
-            .model
-            .events()
-            .filter(|event| event.number > said)
-            .cloned()
-            .collect();
-        self.said_events = fresh.last().map_or(said, |event| event.number);
-        let mut newest = self.newest.write().unwrap_or_else(PoisonError::into_inner);
-        newest.observation = observation;
+        let now = Instant::now();
+        let heard = progress.age(now).and_then(|age| now.checked_sub(age));
+        let observation = Observation::new(&self.model, snapshot, heard.unwrap_or(now));
+        let count = self.model.event_count();
+        let said = self.said_events.unwrap_or(count);
+        let tells = self.said_events.is_some() || progress.is_at_end();
+        self.said_events = tells.then_some(count);
+        let events = self.model.events().filter(|event| event.number > said);
+        let fresh: Vec<Event> = events.cloned().collect();
+        let mut newest = self.newest_mut();
+        newest.observation = Arc::new(observation);
+        newest.progress = progress;
         newest.events.extend(fresh);
         let over = newest.events.len().saturating_sub(BOUNDS.events);
         newest.events.drain(..over);

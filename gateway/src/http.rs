@@ -2,7 +2,6 @@
 
 use std::io;
 use std::net::SocketAddr;
-use std::sync::Arc;
 use std::time::Duration;
 
 use axum::Router;
@@ -11,10 +10,10 @@ use axum::response::IntoResponse;
 use axum::routing::get;
 use tokio::net::TcpListener;
 use understudy_bus::{Connection, Connections, Listener};
+use understudy_view::Reading;
 
 use crate::error::GatewayError;
 use crate::followed::Followed;
-use crate::metrics::Metrics;
 use crate::serve_until_asked;
 
 /// What OpenMetrics 1.0 wants to be called.
@@ -35,9 +34,9 @@ pub fn serve_metrics(
     address: SocketAddr,
     ready: impl FnOnce(SocketAddr),
 ) -> Result<(), GatewayError> {
-    let metrics = Arc::clone(run.metrics());
+    let exposition = run.exposition();
     serve_until_asked(address, ready, |listener| async move {
-        axum::serve(Limited::new(listener), router(metrics)).await
+        axum::serve(Limited::new(listener), router(exposition)).await
     })
 }
 
@@ -63,10 +62,18 @@ impl axum::serve::Listener for Limited {
     }
 }
 
-fn router(metrics: Arc<Metrics>) -> Router {
+fn router(
+    exposition: impl Fn() -> Result<String, Reading> + Clone + Send + Sync + 'static,
+) -> Router {
     let exposed = move || {
-        let text = metrics.exposition();
-        async move { ([(header::CONTENT_TYPE, CONTENT_TYPE)], text).into_response() }
+        let answer = match exposition() {
+            Ok(text) => ([(header::CONTENT_TYPE, CONTENT_TYPE)], text).into_response(),
+            Err(reading) => {
+                let body = format!("{}: {reading}\n", Reading::CODE);
+                (StatusCode::SERVICE_UNAVAILABLE, body).into_response()
+            }
+        };
+        async move { answer }
     };
     Router::new()
         .route("/metrics", get(exposed))

@@ -20,6 +20,15 @@ pub(crate) struct OfTurn {
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+pub(crate) struct OfLacking {
+    pub(crate) program: String,
+    pub(crate) station: String,
+    pub(crate) reason: &'static str,
+    /// As `from → to`; empty where the cause is no link.
+    pub(crate) link: String,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
 pub(crate) struct OfParty {
     pub(crate) party: String,
 }

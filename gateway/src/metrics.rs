@@ -3,7 +3,8 @@
 //! Counters count records, so they begin at the first record of the journal that is still there, and never go back.
 
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicI64, Ordering};
+use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
+use std::time::Duration;
 
 use prometheus_client::encoding::text::encode;
 use prometheus_client::metrics::counter::Counter;
@@ -21,7 +22,7 @@ use understudy_wire::{Party, ProgramId, StationId};
 
 use crate::error::GatewayError;
 use crate::followed::BOUNDS;
-use crate::labels::{OfParty, OfProgram, OfSource, OfState, OfTurn};
+use crate::labels::{OfLacking, OfParty, OfProgram, OfSource, OfState, OfTurn};
 
 /// Shares of a period that bound the buckets of times.
 const SHARES: [f64; 12] = [
@@ -58,7 +59,7 @@ pub struct Metrics {
     flagged: Family<OfParty, Counter>,
     refused_frames: Family<OfParty, Counter>,
     stalls: Family<OfParty, Counter>,
-    stall_seconds: Family<OfParty, Counter<f64, std::sync::atomic::AtomicU64>>,
+    stall_seconds: Family<OfParty, Counter<f64, AtomicU64>>,
     records_lost: Family<OfParty, Counter>,
     margin: Histogram,
     late_turns: Counter,
@@ -70,10 +71,18 @@ pub struct Metrics {
     station_states: Family<OfState, Gauge>,
     awaits_release: Family<OfProgram, Gauge>,
     forced: Family<OfProgram, Gauge>,
+    protected: Family<OfProgram, Gauge>,
+    unprotected_since: Family<OfProgram, Gauge>,
+    lacking: Family<OfLacking, Gauge>,
+    protection_losses: Family<OfProgram, Counter>,
+    state_lost: Family<OfProgram, Gauge>,
+    lost_state_age: Family<OfProgram, Gauge>,
+    state_losses: Family<OfProgram, Counter>,
     finished: Family<OfProgram, Gauge>,
     mishaps: Family<OfProgram, Gauge>,
     records: Gauge,
     left_out: Gauge,
+    journal_age: Gauge<f64, AtomicU64>,
 }
 
 impl Metrics {
@@ -111,10 +120,18 @@ impl Metrics {
             station_states: Family::default(),
             awaits_release: Family::default(),
             forced: Family::default(),
+            protected: Family::default(),
+            unprotected_since: Family::default(),
+            lacking: Family::default(),
+            protection_losses: Family::default(),
+            state_lost: Family::default(),
+            lost_state_age: Family::default(),
+            state_losses: Family::default(),
             finished: Family::default(),
             mishaps: Family::default(),
             records: Gauge::default(),
             left_out: Gauge::default(),
+            journal_age: Gauge::default(),
         };
         metrics.register(cluster.name());
         metrics.begin(cluster);
@@ -144,6 +161,8 @@ impl Metrics {
                 &self.voided_samples,
                 &self.substituted_inputs,
                 &self.value_faults,
+                &self.protection_losses,
+                &self.state_losses,
             ] {
                 let _ = family.get_or_create(&of_program);
             }
@@ -183,6 +202,13 @@ impl Metrics {
             "station_state" station_states "1 for what a station is";
             "awaits_release" awaits_release "1 where an operator has to release the outputs";
             "forced_signals" forced "Signals that are forced";
+            "protected" protected "1 where the failure of one station would be masked, 0 where not; nothing before the remote I/O has reported it";
+            "unprotected_since_cycle" unprotected_since "Since which cycle the failure of one station would not be masked";
+            "lacking" lacking "1 for a station that cannot stand in for a program, with the reason and the broken link";
+            "protection_losses" protection_losses "Times that a program lost its protection";
+            "state_lost" state_lost "1 where no living station can prove the state of the program";
+            "lost_state_age_cycles" lost_state_age "Cycles by which the newest available state of a lost one is too old";
+            "state_losses" state_losses "Times that the state of the program was lost";
             "plant_finished" finished "Parts that the simulated plant has finished";
             "plant_mishaps" mishaps "Things that must not happen to the simulated plant and did";
             "journal_records" records "Records that were read";
@@ -197,6 +223,7 @@ impl Metrics {
             "host_stall" stall_seconds "By how much the wake-ups of the party came too late, in all";
             "cycle_margin" margin "From the last turn of a cycle to its deadline; 0 where it came later";
             "token" token "From the first sample of a cycle to its last turn";
+            "journal_age" journal_age "Age of the newest record: a live run whose journal does not grow is not seen any more";
             "cycle_time" cycle_times "From the start of a cycle to that of the next";
         }
         self.registry = Mutex::new(all);
@@ -268,6 +295,12 @@ impl Metrics {
             RemoteIoEvent::ValueFault { .. } | RemoteIoEvent::Syndrome { .. } => {
                 self.value_faults.get_or_create(&of_program()).inc();
             }
+            RemoteIoEvent::Unprotected { .. } => {
+                self.protection_losses.get_or_create(&of_program()).inc();
+            }
+            RemoteIoEvent::StateLost { .. } => {
+                self.state_losses.get_or_create(&of_program()).inc();
+            }
             RemoteIoEvent::DigestDiffers { .. } => {
                 self.digest_differences.get_or_create(&of(record)).inc();
             }
@@ -328,6 +361,7 @@ impl Metrics {
                     .set(i64::from(state == station.state));
             }
         }
+        self.protection(snapshot);
         for program in &snapshot.programs {
             let of_program = OfProgram {
                 program: program.program.clone(),
@@ -347,6 +381,57 @@ impl Metrics {
                 self.mishaps.get_or_create(&of_program).set(whole(mishaps));
             }
         }
+    }
+
+    /// What is not the case any more is not exposed.
+    fn protection(&self, snapshot: &Snapshot) {
+        // No exposition comes between.
+        let _registry = self
+            .registry
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        self.protected.clear();
+        self.unprotected_since.clear();
+        self.lacking.clear();
+        self.lost_state_age.clear();
+        for program in &snapshot.programs {
+            let of_program = OfProgram {
+                program: program.program.clone(),
+            };
+            let lost = program.lost.as_ref();
+            self.state_lost
+                .get_or_create(&of_program)
+                .set(i64::from(lost.is_some()));
+            if let Some(age) = lost.and_then(|lost| lost.age_cycles) {
+                let age = i64::try_from(age).unwrap_or(i64::MAX);
+                self.lost_state_age.get_or_create(&of_program).set(age);
+            }
+            let Some(protection) = &program.protection else {
+                continue;
+            };
+            self.protected
+                .get_or_create(&of_program)
+                .set(i64::from(protection.protected));
+            if !protection.protected {
+                self.unprotected_since
+                    .get_or_create(&of_program)
+                    .set(protection.since);
+            }
+            for lacking in &protection.lacking {
+                let of_lacking = OfLacking {
+                    program: program.program.clone(),
+                    station: lacking.station.clone(),
+                    reason: lacking.reason,
+                    link: lacking.link.clone().unwrap_or_default(),
+                };
+                self.lacking.get_or_create(&of_lacking).set(1);
+            }
+        }
+    }
+
+    /// Sets the age of the newest record.
+    pub(crate) fn aged(&self, age: Option<Duration>) {
+        self.journal_age.set(age.unwrap_or_default().as_secs_f64());
     }
 
     /// All of them in the OpenMetrics text format.
@@ -394,5 +479,6 @@ pub fn exposition_of(run: &Run) -> Result<String, GatewayError> {
         return Err(GatewayError::Journal(trouble));
     }
     metrics.state(&model.snapshot());
+    metrics.aged(source.progress().age(std::time::Instant::now()));
     Ok(metrics.exposition())
 }

@@ -54,15 +54,21 @@ pub fn mirror(
     runtime.block_on(async {
         tokio::pin!(end);
         loop {
-            for (key, document) in documents(run.cluster(), &run.snapshot()) {
-                let text = document.to_string();
-                if said.get(&key) != Some(&text) {
-                    announcer.say(&key, &text);
-                    said.insert(key, text);
+            if let Ok(present) = run.snapshot() {
+                for (key, document) in documents(run.cluster(), &present) {
+                    let text = document.to_string();
+                    if said.get(&key) != Some(&text) {
+                        announcer.say(&key, &text);
+                        said.insert(key, text);
+                    }
                 }
-            }
-            for event in run.take_events() {
-                announcer.say_once("events", &json!(event).to_string());
+                for event in run.take_events() {
+                    announcer.say_once("events", &json!(event).to_string());
+                }
+            } else if !said.is_empty() {
+                // What was said is not the present any more.
+                announcer.forget();
+                said.clear();
             }
             tokio::select! {
                 () = tokio::time::sleep(rate.0) => {}
@@ -111,6 +117,8 @@ fn values(program: &ProgramSnapshot, inputs: &[&str], outputs: &[&str]) -> Value
         "missing": program.missing,
         "awaits_release": program.awaits_release,
         "forced": program.forced,
+        "protection": program.protection,
+        "lost": program.lost,
         "deadlines": {
             "direct": program.direct,
             "reconstructed": program.reconstructed,

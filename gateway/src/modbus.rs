@@ -1,4 +1,5 @@
-//! The process image over Modbus TCP, read-only: whoever writes is told that there is no such function.
+//! The process image over Modbus TCP, read-only: whoever writes is told that there is no such function. While the journal is being read,
+//! every request is answered by exception 6, *server device busy*.
 
 use std::future::{Ready, ready};
 use std::net::{Ipv4Addr, SocketAddr};
@@ -76,7 +77,10 @@ impl Service for Client {
     type Future = Ready<Result<Response, ExceptionCode>>;
 
     fn call(&self, request: Self::Request) -> Self::Future {
-        ready(answer(&self.map.image(&self.run.snapshot()), &request))
+        // Old values would be taken for the present.
+        let present = self.run.snapshot();
+        let present = present.map_err(|_reading| ExceptionCode::ServerDeviceBusy);
+        ready(present.and_then(|present| answer(&self.map.image(&present), &request)))
     }
 }
 

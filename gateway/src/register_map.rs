@@ -77,6 +77,8 @@ const STATION_STATES: &str = "0 not-started, 1 speaking, 2 silent, 3 flagged, 4 
 
 const SOURCES: &str = "0 nothing yet, 1 direct, 2 reconstructed, 3 held, 4 fail-safe";
 
+const PROTECTION: &str = "0 not known, 1 protected, 2 not protected: the failure of one station would not be masked, 3 the state is lost";
+
 /// Of the run, with address, width and meaning.
 const OF_RUN: [(u16, u16, &str, &str); 8] = [
     (0, 1, "map.version", "1"),
@@ -105,10 +107,11 @@ const OF_RUN: [(u16, u16, &str, &str); 8] = [
 ];
 
 /// Of a program, with its place behind the program's first register.
-const PROGRAM_REGISTERS: [(u16, u16, &str, &str); 9] = [
+const PROGRAM_REGISTERS: [(u16, u16, &str, &str); 10] = [
     (0, 1, "source", SOURCES),
     (1, 1, "awaits_release", "1 where an operator has to release"),
     (2, 1, "forced", "signals that are forced"),
+    (3, 1, "protection", PROTECTION),
     (4, 2, "direct", "deadlines"),
     (6, 2, "reconstructed", "deadlines"),
     (8, 2, "held", "deadlines"),
@@ -249,6 +252,12 @@ impl RegisterMap {
             };
             registers[base + 1] = u16::from(program.awaits_release);
             registers[base + 2] = small(program.forced.len());
+            registers[base + 3] = match (&program.lost, &program.protection) {
+                (Some(_), _) => 3,
+                (None, None) => 0,
+                (None, Some(protection)) if protection.protected => 1,
+                (None, Some(_)) => 2,
+            };
             set(registers, base + 4, program.direct);
             set(registers, base + 6, program.reconstructed);
             set(registers, base + 8, program.held);

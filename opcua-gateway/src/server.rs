@@ -1,6 +1,6 @@
 //! The server: nodes that are made once, and values that are set when they change.
 
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::BTreeSet;
 use std::fs;
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -27,7 +27,7 @@ use understudy_view::{Event, Level, Run};
 
 use crate::error::OpcuaError;
 use crate::security::{Settings, certificate_and_key};
-use crate::tree::{Kind, Reading, Seen, Variable, variables};
+use crate::tree::{Kind, Reading, Seen, Variable, message, variables};
 use crate::trust::{self, Feed};
 
 /// Between two looks at what is newest; a run is followed no faster.
@@ -47,9 +47,6 @@ const MOST_SESSIONS: usize = 64;
 
 /// Of a monitored item, for events that come at once.
 const LONGEST_QUEUE: usize = 1000;
-
-/// In `Events/Recent`.
-const RECENT: usize = 20;
 
 /// Between 1601, where the time of OPC UA begins, and 1970.
 const SECONDS_TO_1970: u64 = 11_644_473_600;
@@ -259,7 +256,6 @@ struct Showing<'a> {
     index: u16,
     nodes: Vec<NodeId>,
     said: Vec<Option<Reading>>,
-    recent: VecDeque<String>,
 }
 
 impl<'a> Showing<'a> {
@@ -280,30 +276,21 @@ impl<'a> Showing<'a> {
             index,
             said: vec![None; nodes.len()],
             nodes,
-            recent: VecDeque::new(),
         }
     }
 
     /// Sets what has changed, and tells the events.
     fn look(&mut self) {
-        let events = self.shown.followed.take_events();
-        let observation = self.shown.followed.observation();
-        self.recent.extend(
-            events
-                .iter()
-                .map(|event| format!("cycle {}: {}: {}", event.cycle, event.name, message(event))),
-        );
-        let over = self.recent.len().saturating_sub(RECENT);
-        self.recent.drain(..over);
-        let seen = Seen {
-            observation: &observation,
-            feed: trust::feed(&observation, Instant::now()),
-            recent: self.recent.make_contiguous(),
-        };
-        let stamp = stamp(self.shown, seen.feed);
+        // Until the journal is read, every variable waits for its first value.
+        let observation = self.shown.followed.observation().ok();
+        let seen = observation.as_deref().map(|observation| Seen {
+            observation,
+            feed: trust::feed(observation, Instant::now()),
+        });
+        let stamp = stamp(self.shown, seen.map_or(Feed::Silent, |seen| seen.feed));
         let mut changed = Vec::new();
         for (place, variable) in self.shown.variables.iter().enumerate() {
-            let reading = variable.read(&seen);
+            let reading = seen.map_or(Reading::WAITING, |seen| variable.read(&seen));
             if self.said[place].as_ref() != Some(&reading) {
                 let value = DataValue {
                     // The library leaves out the status of a value that is not there.
@@ -323,7 +310,10 @@ impl<'a> Showing<'a> {
             .map(|(place, value)| (&nodes[place], None, value));
         // Every one of these nodes is there, and is a variable.
         let _ = self.manager.set_values(self.handle.subscriptions(), values);
-        tell(self.handle, self.index, &events, stamp);
+        if seen.is_some() {
+            let events = self.shown.followed.take_events();
+            tell(self.handle, self.index, &events, stamp);
+        }
     }
 }
 
@@ -360,13 +350,6 @@ fn tell(handle: &ServerHandle, index: u16, events: &[Event], stamp: DateTime) {
             .iter()
             .map(|event| (event as &dyn opcua::nodes::Event, place));
         handle.subscriptions().notify_events(events);
-    }
-}
-
-fn message(event: &Event) -> String {
-    match &event.cause {
-        None => event.text.clone(),
-        Some(cause) => format!("{}: {cause}", event.text),
     }
 }
 

@@ -14,7 +14,7 @@ mod signals;
 use opcua::types::{DataTypeId, StatusCode, UAString, Variant};
 use understudy_cluster::{Cluster, Controller};
 use understudy_gateway::Observation;
-use understudy_view::{ProgramSnapshot, StationSnapshot};
+use understudy_view::{Event, ProgramSnapshot, StationSnapshot};
 
 use crate::trust::{self, Feed};
 
@@ -60,8 +60,6 @@ impl Kind {
 pub(crate) struct Seen<'a> {
     pub(crate) observation: &'a Observation,
     pub(crate) feed: Feed,
-    /// The newest events, in words, oldest first.
-    pub(crate) recent: &'a [String],
 }
 
 impl Seen<'_> {
@@ -100,6 +98,14 @@ impl Seen<'_> {
 pub(crate) struct Reading {
     pub(crate) value: Option<Variant>,
     pub(crate) status: StatusCode,
+}
+
+impl Reading {
+    /// While the journal is being read.
+    pub(crate) const WAITING: Self = Self {
+        value: None,
+        status: StatusCode::BadWaitingForInitialData,
+    };
 }
 
 type Read = Box<dyn Fn(&Seen<'_>) -> Reading + Send + Sync>;
@@ -276,7 +282,13 @@ impl Tree {
             "Recent",
             Kind::Strings,
             "the newest 20, in words, the newest last",
-            |seen| seen.counted(Some(texts(seen.recent))),
+            |seen| {
+                let recent = seen.observation.recent.iter();
+                let recent = recent.map(|event| {
+                    format!("cycle {}: {}: {}", event.cycle, event.name, message(event))
+                });
+                seen.counted(Some(texts(&recent.collect::<Vec<_>>())))
+            },
         );
     }
 
@@ -366,6 +378,45 @@ impl Tree {
             "signals that are forced, by whom and why",
             of(|program| Some(texts(&program.forced))),
         );
+        self.add(
+            "Protected",
+            Kind::Boolean,
+            "whether the failure of one station would be masked",
+            of(|program| Some(program.protection.as_ref()?.protected.into())),
+        );
+        self.add(
+            "Protection",
+            Kind::String,
+            "protected, or since which cycle not, and why",
+            of(|program| Some(text(&program.protection.as_ref()?.text()))),
+        );
+        self.add(
+            "StateLost",
+            Kind::Boolean,
+            "whether no living station can prove its state",
+            of(|program| Some(program.lost.is_some().into())),
+        );
+        self.add(
+            "LostState",
+            Kind::String,
+            "the newest available state of a lost one, or nothing",
+            of(|program| {
+                let lost = program.lost.as_ref().map(understudy_view::LostState::text);
+                Some(text(&lost.unwrap_or_default()))
+            }),
+        );
+        self.add(
+            "LostStateCycle",
+            Kind::UInt64,
+            "the cycle of that state, as the operator's choice names it",
+            of(|program| Some(program.lost.as_ref()?.newest.into())),
+        );
+        self.add(
+            "LostStateAge",
+            Kind::UInt64,
+            "by how many cycles that state is too old",
+            of(|program| Some(program.lost.as_ref()?.age_cycles?.into())),
+        );
         let deadlines = "deadlines";
         self.add(
             "Direct",
@@ -399,6 +450,14 @@ impl Tree {
             count(|of| of.mishaps),
         );
         self.signals(place, controller);
+    }
+}
+
+/// An event in words, with its cause.
+pub(crate) fn message(event: &Event) -> String {
+    match &event.cause {
+        None => event.text.clone(),
+        Some(cause) => format!("{}: {cause}", event.text),
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! | the run | what is now (signals, states, margin) | what is counted |
 //! |---|---|---|
+//! | its journal is still being read | Bad_WaitingForInitialData | Bad_WaitingForInitialData |
 //! | has not begun | Bad_WaitingForInitialData | Good |
 //! | says something | as below | Good |
 //! | is silent for 2 s and 20 cycles | Bad_NoCommunication | Uncertain_NoCommunicationLastUsableValue |

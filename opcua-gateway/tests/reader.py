@@ -2,6 +2,7 @@
 
     reader.py clear URL
     reader.py follow URL
+    reader.py present URL CYCLE
     reader.py secure URL FOLDER USER PASSWORD
 """
 
@@ -152,6 +153,44 @@ async def follow(url):
         print("seen", flush=True)
 
 
+async def present(url, cycle):
+    """From the first moment on: every value waits, or is that of the last cycle."""
+    print("ready", flush=True)
+    async with asyncio.timeout(PATIENCE_S):
+        while True:
+            client = Client(url, timeout=60)
+            try:
+                await client.connect()
+                break
+            except (OSError, asyncio.TimeoutError):
+                await asyncio.sleep(0.01)
+    waited = 0
+    try:
+        paths = ["Run/State", "Run/Cycle", "Margin/Survives", "Alarms/Open", "Stations/robot/State",
+                 "Programs/robot/Source", "Programs/robot/Direct", "Programs/robot/Protected"]
+        ids = [(await node(client, path)).nodeid for path in paths]
+        params = ua.ReadParameters()
+        params.NodesToRead = [ua.ReadValueId(NodeId=id, AttributeId=ua.AttributeIds.Value) for id in ids]
+        async with asyncio.timeout(PATIENCE_S):
+            while True:
+                values = await client.uaclient.read(params)
+                found = dict(zip(paths, values))
+                waits = [value.StatusCode.value == ua.StatusCodes.BadWaitingForInitialData for value in values]
+                if any(waits):
+                    assert all(waits), found
+                    waited += 1
+                    continue
+                assert found["Run/Cycle"].Value.Value == int(cycle), (waited, found)
+                assert found["Stations/robot/State"].Value.Value == "killed", (waited, found)
+                assert found["Margin/Survives"].Value.Value == 0, (waited, found)
+                assert found["Programs/robot/Source"].Value.Value == "reconstructed", (waited, found)
+                assert found["Programs/robot/Protected"].Value.Value is False, (waited, found)
+                break
+        assert waited > 0, "the journal is long enough to be seen read"
+    finally:
+        await client.disconnect()
+
+
 async def secure(url, folder, user, password):
     folder = Path(folder)
     uri = "urn:localhost:understudy:reader"
@@ -192,4 +231,4 @@ async def secure(url, folder, user, password):
             await reads(await client(policy, user, password, mode))
 
 
-asyncio.run({"clear": clear, "follow": follow, "secure": secure}[sys.argv[1]](*sys.argv[2:]))
+asyncio.run({"clear": clear, "follow": follow, "present": present, "secure": secure}[sys.argv[1]](*sys.argv[2:]))

@@ -9,7 +9,7 @@
 
 use std::fs::{self, Permissions};
 use std::io::{BufRead, BufReader, Read, Write};
-use std::net::{SocketAddr, TcpStream};
+use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -20,6 +20,7 @@ use nix::unistd::Pid;
 use serde_json::Value;
 use understudy_cluster::{Cluster, press_cell, read};
 use understudy_scenarios::{Journal, Parties, keep_cluster, read as read_scenario, simulate};
+use understudy_view::{Bounds, Run};
 
 /// What the reader is written for.
 const ASYNCUA: &str = "2.1.0";
@@ -52,6 +53,10 @@ fn cell() -> Cluster {
 
 /// A folder with `run`, a finished one of the press cell in virtual time: the robot's station crashes in cycle 20.
 fn finished_run(name: &str) -> PathBuf {
+    finished_run_of(name, 60)
+}
+
+fn finished_run_of(name: &str, cycles: u64) -> PathBuf {
     let folder = empty_folder(name);
     for file in press_cell() {
         fs::write(folder.join(file.name), file.text).expect("written");
@@ -60,10 +65,12 @@ fn finished_run(name: &str) -> PathBuf {
     fs::create_dir_all(&run).expect("a folder");
     let cluster = cell();
     keep_cluster(&run, &folder.join("cluster.toml"), &cluster).expect("kept");
-    let text = "title = \"A crash\"\ncycles = 60\n[[step]]\nat = 20\naction = \"crash\"\nstation = \"robot\"\n";
-    let scenario = read_scenario("crash.toml", text, Some(&Parties::of(&cluster)));
+    let text = format!(
+        "title = \"A crash\"\ncycles = {cycles}\n[[step]]\nat = 20\naction = \"crash\"\nstation = \"robot\"\n"
+    );
+    let scenario = read_scenario("crash.toml", &text, Some(&Parties::of(&cluster)));
     let scenario = scenario.scenario.expect("it is right");
-    let mut journal = Journal::create(&run.join("journal.jsonl"), 10_000_000).expect("created");
+    let mut journal = Journal::create(&run.join("journal.jsonl"), 1_000_000_000).expect("created");
     simulate(&cluster, &scenario, 1, &mut |record| journal.write(record))
         .expect("the cluster comes into step");
     assert_eq!(journal.finish().lost, 0);
@@ -98,8 +105,12 @@ struct Server {
 
 impl Server {
     fn start(folder: &Path, arguments: &[&str]) -> Self {
+        Self::start_at("127.0.0.1:0", folder, arguments)
+    }
+
+    fn start_at(address: &str, folder: &Path, arguments: &[&str]) -> Self {
         let mut child = Command::new(BINARY)
-            .args(["serve", "run", "--listen", "127.0.0.1:0"])
+            .args(["serve", "run", "--listen", address])
             .args(arguments)
             .current_dir(folder)
             .stdout(Stdio::null())
@@ -340,6 +351,33 @@ fn another_projects_client_follows_a_run_that_is_written() {
         }
         assert_eq!(next(), "seen");
     }
+    assert!(child.wait().expect("it ends").success());
+    server.stop();
+}
+
+/// A client that is there from the start on is told nothing until the journal is read, and then the present: the robot is dead.
+#[test]
+fn another_projects_client_is_told_no_past() {
+    let Some(python) = python() else { return };
+    let folder = finished_run_of("asyncua-present", 3000);
+    fs::remove_file(folder.join("run/summary.json")).expect("it was there");
+    let run = Run::open(&folder.join("run")).expect("a run");
+    let model = run.read(Bounds::default()).expect("readable");
+    let cycle = model.cycle().expect("a cycle").to_string();
+    let free = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = free.local_addr().expect("its address").to_string();
+    drop(free);
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reader.py");
+    let mut child = Command::new("timeout")
+        .args(["300", &python])
+        .arg(script)
+        .args(["present", &format!("opc.tcp://{address}/"), &cycle])
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("a Python");
+    let mut said = BufReader::new(child.stdout.take().expect("piped")).lines();
+    assert_eq!(said.next().and_then(Result::ok).as_deref(), Some("ready"));
+    let server = Server::start_at(&address, &folder, &[]);
     assert!(child.wait().expect("it ends").success());
     server.stop();
 }

@@ -17,6 +17,8 @@ pub struct Summary {
     pub format: u32,
     /// Whether the run was complete and every expectation was met.
     pub passed: bool,
+    /// Why a run of real processes neither passed nor failed: the host woke members too late, with the numbers.
+    pub inconclusive: Option<String>,
     /// The scenario's title.
     pub title: String,
     /// Where and how it was run.
@@ -190,6 +192,9 @@ pub struct ExpectationSummary {
     pub found: String,
     /// Whether that is what was expected.
     pub met: bool,
+    /// Whether a host that wakes members too late can be why it was not met.
+    #[serde(skip)]
+    pub needs_time: bool,
 }
 
 impl Summary {
@@ -236,6 +241,7 @@ impl Summary {
         let mut summary = Self {
             format: 1,
             passed: false,
+            inconclusive: None,
             title: scenario.title.clone(),
             circumstances,
             cycles_asked: scenario.cycles,
@@ -284,7 +290,25 @@ impl Summary {
                 .expectations
                 .iter()
                 .all(|expectation| expectation.met);
+        if complete {
+            summary.inconclusive = summary.late_host();
+        }
         (summary, account)
+    }
+
+    /// What the host did that may be why the run did not pass; nothing where there is another reason, such as a wrong output.
+    fn late_host(&self) -> Option<String> {
+        let mut unmet = self.expectations.iter().filter(|found| !found.met);
+        let may_be_host = !self.passed && unmet.all(|unmet| unmet.needs_time);
+        let latest = self.stalls.iter().map(|stall| stall.late_us).max();
+        let latest = latest.filter(|_| may_be_host)?;
+        let period = self.circumstances.period_us;
+        Some(format!(
+            "the host woke members late {} times, up to {:.1} ms of a period of {:.1} ms",
+            self.stalls.len(),
+            latest as f64 / 1e3,
+            period as f64 / 1e3
+        ))
     }
 
     /// Counts over all remote I/Os.
@@ -313,12 +337,11 @@ fn expectations(
     let expect = &scenario.expect;
     let total = summary.total();
     let mishaps = summary.plants.iter().map(|plant| plant.mishaps).sum();
-    let mut list = vec![at_most(
-        "wrong outputs",
-        expect.wrong,
-        summary.violation_count,
-        0,
-    )];
+    let wrong = at_most("wrong outputs", expect.wrong, summary.violation_count, 0);
+    let mut list = vec![ExpectationSummary {
+        needs_time: false,
+        ..wrong
+    }];
     for (party, records) in &account.unwritten {
         if matches!(party, Party::RemoteIo(_)) {
             list.push(ExpectationSummary {
@@ -327,6 +350,7 @@ fn expectations(
                     "its journal lost {records} records on a host that was too slow to write them; what came after was not judged"
                 ),
                 met: false,
+                needs_time: false,
             });
         }
     }
@@ -336,6 +360,7 @@ fn expectations(
             expected: "no member ends but by a step of the scenario".to_owned(),
             found: format!("ended unexpectedly: {}", each.join(", ")),
             met: false,
+            needs_time: false,
         });
     }
     if let Some(held) = expect.held {
@@ -364,6 +389,7 @@ fn expectations(
             expected: "everybody in step at the end".to_owned(),
             found: if found { "in step" } else { "not in step" }.to_owned(),
             met: found,
+            needs_time: true,
         });
     }
     let plant_name = |program| account.terms.parties.name(Party::Plant(program));
@@ -377,6 +403,7 @@ fn expectations(
             expected: format!("{} functional", plant_name(program)),
             found: if met { "functional" } else { "not functional" }.to_owned(),
             met,
+            needs_time: true,
         });
     }
     for (&program, &least) in &expect.finished {
@@ -385,6 +412,7 @@ fn expectations(
             expected: format!("{} finishes at least {least} parts", plant_name(program)),
             found: finished.to_string(),
             met: finished >= least,
+            needs_time: true,
         });
     }
     let ranges = account.during.iter();
@@ -407,6 +435,7 @@ fn at_most(what: &str, allowed: u64, found: u64, by_stall: u64) -> ExpectationSu
         expected,
         found: format!("{found}{}", apart(by_stall)),
         met: found <= allowed,
+        needs_time: true,
     }
 }
 
@@ -442,5 +471,6 @@ fn range(remote_io: &str, during: &During, finding: RangeFinding) -> Expectation
             ),
         },
         met: finding.missed == 0,
+        needs_time: true,
     }
 }

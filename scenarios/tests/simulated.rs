@@ -288,6 +288,44 @@ source = "reconstructed"
     );
 }
 
+/// A host that woke a member late once may have cost more than the cycle in which that was seen: neither passed nor failed.
+#[test]
+fn a_run_on_a_late_host_is_inconclusive() {
+    use understudy_remote_io::Event;
+    use understudy_scenarios::Happening;
+
+    let text = "title = \"Nobody is left\"\ncycles = 60\n\n[[step]]\nat = 50\naction = \"crash\"\nstation = \"robot\"\n\n[[step]]\nat = 50\naction = \"crash\"\nstation = \"understudy\"\n\n[expect]\nheld = 0\n";
+    let (bytes, summary, _) = run(Mode::Full, text, 3);
+    assert_eq!((summary.passed, summary.inconclusive), (false, None));
+    let judged = |text: &str| {
+        let mut seen = 0;
+        account_of(&bytes, text, |record| {
+            let mut late = None;
+            if let Happening::RemoteIo(Event::Applied { moment, .. }) = &record.event {
+                seen += 1;
+                let late_by = std::time::Duration::from_millis(5);
+                let event = Happening::RemoteIo(Event::Stalled {
+                    moment: *moment,
+                    late: late_by,
+                });
+                late = (seen == 40).then(|| Record {
+                    event,
+                    ..record.clone()
+                });
+            }
+            late.into_iter().chain([record])
+        })
+    };
+    let late = judged(text);
+    assert!(!late.passed);
+    assert_eq!(
+        late.inconclusive.as_deref(),
+        Some("the host woke members late 1 times, up to 5.0 ms of a period of 10.0 ms")
+    );
+    let longer = judged(&text.replace("cycles = 60", "cycles = 70"));
+    assert_eq!(longer.inconclusive, None, "it is not complete");
+}
+
 #[test]
 fn what_is_read_long_after_the_rest_is_counted_all_the_same() {
     use understudy_scenarios::Happening;

@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use ring::aead::{Aad, LessSafeKey, Nonce};
 use understudy_wire::{
-    Body, ClusterHash, ConfigurationHash, Frame, FrameError, Header, MAXIMUM_FRAME_BYTES, Party, StationId, decode,
+    Body, ClusterHash, ConfigurationHash, Frame, FrameError, Header, MAXIMUM_FRAME_BYTES, Party,
+    StationId, decode,
 };
 
 use crate::envelope::{
@@ -46,7 +47,9 @@ pub enum Refusal {
         sender: Party,
     },
     /// New, and of a life before the newest one: two processes have the keys of its sender.
-    #[error("{sender:?} sends in two lives at once: two processes have its keys, or its frames were recorded")]
+    #[error(
+        "{sender:?} sends in two lives at once: two processes have its keys, or its frames were recorded"
+    )]
     OfAnotherLife {
         /// Whose keys they have.
         sender: Party,
@@ -101,7 +104,11 @@ impl Opener {
 
     /// Takes a new life of a sender from a frame of this configuration only: an old copy of a station does not shut out the station.
     #[must_use]
-    pub fn of_configuration(mut self, cluster: ClusterHash, configuration: ConfigurationHash) -> Self {
+    pub fn of_configuration(
+        mut self,
+        cluster: ClusterHash,
+        configuration: ConfigurationHash,
+    ) -> Self {
         self.agreed = Some((cluster, configuration));
         self
     }

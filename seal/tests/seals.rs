@@ -196,6 +196,52 @@ fn a_frame_of_an_earlier_life_never_counts() {
     }
 }
 
+/// A copy of a member with the same keys and another configuration, such as an old disk image.
+#[test]
+fn a_later_life_of_another_configuration_shuts_nobody_out() {
+    let own = frame(ROBOT, 1).header;
+    let mut opener = listener().of_configuration(own.cluster, own.configuration);
+    let (mut rightful, mut copy) = (seal(ROBOT, 1), seal(ROBOT, 9));
+    for cycle in 0..200 {
+        let said = frame(ROBOT, cycle);
+        assert_eq!(
+            open(&mut opener, &sealed(&mut rightful, &said)),
+            Ok(Some(said.clone()))
+        );
+        let mut other = said;
+        other.header.configuration = ConfigurationHash(3);
+        assert_eq!(
+            open(&mut opener, &sealed(&mut copy, &other)),
+            Ok(Some(other)),
+            "for others to report"
+        );
+    }
+    let restarted = frame(ROBOT, 200);
+    let datagram = sealed(&mut seal(ROBOT, 10), &restarted);
+    assert_eq!(open(&mut opener, &datagram), Ok(Some(restarted)));
+    let refused = open(&mut opener, &sealed(&mut rightful, &frame(ROBOT, 201)));
+    assert_eq!(refused, Err(Refusal::Replayed { sender: ROBOT }));
+}
+
+/// What was on its way when a member started again is late; what its earlier life goes on to say is not.
+#[test]
+fn two_lives_at_once_are_told_from_late_frames() {
+    let mut opener = listener();
+    let (mut earlier, mut later) = (seal(ROBOT, 1), seal(ROBOT, 2));
+    assert!(open(&mut opener, &sealed(&mut earlier, &frame(ROBOT, 1))).is_ok());
+    assert!(open(&mut opener, &sealed(&mut later, &frame(ROBOT, 2))).is_ok());
+    for number in 1..=2 * WINDOW_FRAMES {
+        let refused = open(&mut opener, &sealed(&mut earlier, &frame(ROBOT, number)));
+        let expected = if number <= WINDOW_FRAMES {
+            Refusal::Replayed { sender: ROBOT }
+        } else {
+            Refusal::OfAnotherLife { sender: ROBOT }
+        };
+        assert_eq!(refused, Err(expected), "{number}");
+    }
+    assert!(open(&mut opener, &sealed(&mut later, &frame(ROBOT, 3))).is_ok());
+}
+
 #[test]
 fn a_frame_that_is_too_late_does_not_count() {
     let (mut seal, mut opener) = (seal(ROBOT, 1), listener());

@@ -28,8 +28,10 @@ use understudy_logic::{Scan, Scratch};
 use understudy_remote_io::{Event, Settings};
 use understudy_wire::{Image, Lineage, Moment, ProgramHash, Source, StationId};
 
-/// States that are remembered, at most; older ones are forgotten.
+/// States that are remembered, at most, where some of them lie before the floor; the oldest are forgotten.
 const REMEMBERED: usize = 1024;
+/// States that are remembered from the floor on: for ten minutes of 10 ms cycles of which nothing is applied. The floor is never forgotten.
+const REMEMBERED_FROM_FLOOR: usize = 65_536;
 
 /// Different images of a plant that are remembered.
 const SEEN: usize = 16;
@@ -297,9 +299,11 @@ impl Referee {
     }
 
     fn remember(&mut self, stepped: Moment, lineage: Lineage, bits: Image) {
-        if self.states.len() == REMEMBERED {
+        if self.floor > 0 && self.states.len() >= REMEMBERED {
             self.states.pop_front();
-            self.floor = self.floor.saturating_sub(1);
+            self.floor -= 1;
+        } else if self.states.len() >= REMEMBERED_FROM_FLOOR {
+            self.states.remove(1);
         }
         self.states.push_back(State {
             lineage,

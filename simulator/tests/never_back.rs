@@ -76,6 +76,23 @@ fn a_broken_link_of_a_remote_io_costs_no_protection() {
     }
 }
 
+/// The robot's remote I/O receives no station that runs its program for so long that what it samples, and nobody applies, fills every memory:
+/// it goes on from its newest applied output.
+#[test]
+fn a_remote_io_that_receives_nobody_for_long_does_not_forget_its_history() {
+    let mut simulation = Simulation::new(press_cell::parts(Mode::Full, 1), Network::default(), 1);
+    for from in [station(0), Party::Station(UNDERSTUDY)] {
+        simulation.schedule(fault(20, 0.0, from, Action::Cut { to: ROBOT_IO }));
+        simulation.schedule(fault(1_300, 0.0, from, Action::Heal { to: ROBOT_IO }));
+    }
+    simulation
+        .run(1_400, 100, &mut |_, _, _, _| {})
+        .expect("the cluster gets ready");
+    assert_eq!(simulation.violations(), []);
+    let robot = &simulation.tallies()[0];
+    assert!(robot.fail_safe > 1_200 && robot.direct > 90, "{robot:?}");
+}
+
 /// The understudy receives neither the samples of the robot nor any station for `length` cycles, then what
 /// `ends` says happens to the robot's controller.
 fn stale(length: u64, stale_state: StaleState, ends: Action) -> Simulation {

@@ -12,6 +12,7 @@
 mod boiler;
 mod campaigns;
 mod deaths;
+mod duplicates;
 mod field;
 mod handshake;
 mod hosts;

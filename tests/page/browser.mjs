@@ -1,15 +1,15 @@
 // Drives every view of a page with Chromium, takes pictures, and fails where something is not as it has to be.
 //
-//   node tests/page/browser.mjs http://127.0.0.1:7480/ PICTURES [AXE.min.js]
+//   node tests/page/browser.mjs http://127.0.0.1:7480/ PICTURES [PROCESS [AXE.min.js]]
 //
-// The page may command a laboratory of the press cell. Where the browser does not start at all, the exit status is 77. With the file of axe-core, each view is checked for accessibility too.
+// The page may command a laboratory of the press cell. With the process of its server, this is suspended for some seconds. Where the browser does not start at all, the exit status is 77. With the file of axe-core, each view is checked for accessibility too.
 
 import { spawn } from "node:child_process";
 import { mkdirSync, mkdtempSync, readFileSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 
-const [url, pictures, axe] = process.argv.slice(2);
+const [url, pictures, server, axe] = process.argv.slice(2);
 const DEADLINE = 60_000;
 mkdirSync(pictures, { recursive: true });
 
@@ -101,6 +101,13 @@ const text = (selector) => `(document.querySelector(${JSON.stringify(selector)})
 const click = (selector) => evaluate(`(() => { const found = document.querySelector(${JSON.stringify(selector)}); if (!found) throw new Error("nothing is there"); found.dispatchEvent(new MouseEvent("click", { bubbles: true })); })()`);
 const party = (name) => `g.party[data-name="${name}"]`;
 const stateOf = (name) => `document.querySelector('${party(name)}')?.dataset.state`;
+const lampOf = (program) => `[...document.querySelectorAll("#protection-list li")].find((line) => line.textContent.includes(" ${program}: "))?.dataset.protection`;
+const command = async (name, what) => {
+  await click(party(name));
+  await until(what, `document.querySelector("[data-command=${what}]")?.disabled === false`);
+  await click(`[data-command=${what}]`);
+  await until("it is done", "!document.getElementById('command').open");
+};
 const open = (view) => evaluate(`location.hash = ${JSON.stringify(view)}`);
 
 async function accessible(view) {
@@ -143,6 +150,8 @@ async function drive() {
   await accessible("killed, dark");
   await scheme("light");
 
+  await until("a lost protection", `${lampOf("robot")} === "unprotected" && ${text("#protection-list")}.includes("robot is killed")`);
+
   // Why is an output as it is?
   // Asked again where this was a cycle in which a host that stands still held the outputs.
   const asked = `document.querySelector(".signal[data-kind=output]").dispatchEvent(new MouseEvent("click", { bubbles: true }))`;
@@ -156,6 +165,44 @@ async function drive() {
   await until("a reason", `document.querySelector("[data-command=kill]")?.disabled && ${text("#command .actions")}.includes("cannot: it is down")`);
   await click("[data-command=restart]");
   await until("its return", `${stateOf("robot")} === "speaking"`);
+
+  // A state that is lost: the understudy is cut off, then the controller is killed, then the understudy comes back with an old state.
+  await until("protection", `${lampOf("robot")} === "protected" && ${lampOf("press")} === "protected"`);
+  await command("understudy", "isolate");
+  await until("a lost protection", `${lampOf("robot")} === "unprotected"`);
+  await command("robot", "kill");
+  await until("its end", `${stateOf("robot")} === "killed"`);
+  await command("understudy", "rejoin");
+  await until("the question", `${lampOf("robot")} === "lost" && document.querySelector("[data-choice=newest]").offsetParent !== null`);
+  await picture("lost");
+  await accessible("lost");
+  await click("[data-choice=newest]");
+  await until("what it does", `${text("#command")}.includes("The plant has moved on since")`);
+  await picture("choice");
+  await accessible("choice");
+  await click("#confirm-choice");
+  await until("an older state that goes on", `${lampOf("robot")} !== "lost" && document.querySelector(".flow[data-source=reconstructed]") !== null`);
+  await command("robot", "restart");
+  await until("its return", `${stateOf("robot")} === "speaking" && ${lampOf("robot")} === "protected"`);
+
+  // A server that is suspended: its last values are old, and are shown so.
+  if (server) {
+    process.kill(Number(server), "SIGSTOP");
+    try {
+      await until("old values", `document.body.hasAttribute("data-stale") && ${text("#stale")}.includes("no message from the server for")`);
+      await picture("suspended");
+      const opacity = await evaluate("Number(getComputedStyle(document.querySelector('main')).opacity)");
+      if (opacity > 0.6) {
+        problems.push(`old values look as new ones: ${opacity}`);
+      }
+      await click(party("robot"));
+      await until("a reason", `document.querySelector("[data-command=kill]").disabled && ${text("#command .obstacle")}.includes("no message")`);
+      await evaluate("document.getElementById('command').close()");
+    } finally {
+      process.kill(Number(server), "SIGCONT");
+    }
+    await until("the present", `!document.body.hasAttribute("data-stale") && document.body.dataset.when === "live"`);
+  }
 
   // Force an output, and take it back.
   await click(party("robot-io"));

@@ -35,6 +35,7 @@ fn a_browser_sees_a_kill_and_asks_why() {
         .arg("tests/page/browser.mjs")
         .arg(format!("http://{}/", page.address))
         .arg(folder.join("pictures"))
+        .arg(page.id().to_string())
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .output()
         .expect("node runs");

@@ -13,6 +13,7 @@ mod attach;
 mod browser;
 mod commands;
 mod paths;
+mod present;
 #[allow(dead_code, reason = "each test uses its part")]
 #[path = "../shared/mod.rs"]
 mod shared;
@@ -25,8 +26,15 @@ use shared::{answer, empty_folder, one_at_a_time, understudy};
 
 /// A simulated run in which the robot's station is killed in cycle 50 and started again in cycle 150: its directory.
 fn simulated_run(folder: &Path) -> PathBuf {
-    let scenario = folder.join("kill.toml");
-    let text = "title = \"kill and restart\"\ncycles = 300\n\n[[step]]\nat = 50\naction = \"crash\"\nstation = \"robot\"\n\n[[step]]\nat = 150\naction = \"restart\"\nstation = \"robot\"\n";
+    simulated_run_of(
+        folder,
+        "title = \"kill and restart\"\ncycles = 300\n\n[[step]]\nat = 50\naction = \"crash\"\nstation = \"robot\"\n\n[[step]]\nat = 150\naction = \"restart\"\nstation = \"robot\"\n",
+    )
+}
+
+/// The directory of a simulated run of the press cell.
+fn simulated_run_of(folder: &Path, text: &str) -> PathBuf {
+    let scenario = folder.join("scenario.toml");
     fs::write(&scenario, text).expect("written");
     let runs = folder.join("runs");
     let text = |path: &Path| path.to_str().expect("text").to_owned();

@@ -2,7 +2,7 @@
 
 use std::process::Stdio;
 
-use crate::{Page, empty_folder, party, simulated_run, understudy};
+use crate::{Page, empty_folder, party, simulated_run, simulated_run_of, understudy};
 
 #[test]
 fn a_finished_run_answers_every_question() {
@@ -87,6 +87,63 @@ fn a_finished_run_answers_every_question() {
         assert!(asset.head.contains("content-security-policy"), "{path}");
     }
     assert_eq!(page.end(), 0);
+}
+
+#[test]
+fn a_lost_state_is_told_for_each_cycle() {
+    let scenario = include_str!("../../examples/press-cell/lost-state.toml");
+    let run = simulated_run_of(&empty_folder("lost"), scenario);
+    let page = Page::of_run(&run);
+    let robot = |cycle: i64| {
+        let state = page.get(&format!("/api/state?cycle={cycle}")).json();
+        (
+            state["programs"][0].clone(),
+            state["survival"].clone(),
+            party(&state, "robot-io").clone(),
+        )
+    };
+    let (before, ..) = robot(50);
+    assert_eq!(before["protection"]["protected"], true, "{before:#}");
+    assert!(before["lost"].is_null());
+    let (behind, ..) = robot(200);
+    assert_eq!(behind["protection"]["protected"], false, "{behind:#}");
+    assert_eq!(behind["protection"]["since"], 100);
+    let lacking = &behind["protection"]["lacking"][0];
+    assert_eq!(lacking["station"], "understudy");
+    assert_eq!(lacking["reason"], "behind");
+    assert_eq!(lacking["link"], "robot-io → understudy");
+    let (lost, survival, remote_io) = robot(380);
+    assert_eq!(lost["lost"]["holder"], "understudy", "{lost:#}");
+    assert_eq!(lost["lost"]["age_cycles"], 200, "{lost:#}");
+    assert_eq!(lost["lost"]["asks"], true);
+    assert_eq!(remote_io["state"], "state-lost");
+    assert_ne!(survival["level"], "all", "{survival:#}");
+    let (chosen, ..) = robot(450);
+    assert!(chosen["lost"].is_null(), "{chosen:#}");
+    assert_eq!(page.end(), 0);
+    // The same from the other end: what systems are told.
+    let metrics = understudy(&["gateway", "metrics", "--once"])
+        .arg(&run)
+        .output();
+    let text = String::from_utf8(metrics.expect("the binary is built").stdout).expect("text");
+    let of_robot = |name: &str| {
+        let of_robot = |line: &&str| {
+            line.starts_with(&format!("{name}{{")) && line.contains("program=\"robot\"")
+        };
+        text.lines()
+            .find(of_robot)
+            .and_then(|line| line.rsplit(' ').next())
+    };
+    assert_eq!(of_robot("understudy_protected"), Some("0"), "{text}");
+    assert_eq!(of_robot("understudy_unprotected_since_cycle"), Some("100"));
+    assert_eq!(of_robot("understudy_lacking"), Some("1"));
+    assert_eq!(
+        of_robot("understudy_state_lost"),
+        Some("0"),
+        "it was chosen"
+    );
+    assert_eq!(of_robot("understudy_state_losses_total"), Some("1"));
+    assert_eq!(of_robot("understudy_protection_losses_total"), Some("1"));
 }
 
 #[test]

@@ -126,7 +126,8 @@ pub(crate) fn until(what: &str, mut done: impl FnMut() -> bool) {
 }
 
 pub(crate) fn cluster(folder: &Path, addresses: &[SocketAddr]) -> String {
-    let program = "program valve\ninput req\noutput alive\noutput ack\nrung ( alive )\nrung req ( ack )\n";
+    let program =
+        "program valve\ninput req\noutput alive\noutput ack\nrung ( alive )\nrung req ( ack )\n";
     fs::write(folder.join("valve.ladder"), program).expect("it is ours");
     let [valve, understudy, remote_io, device] = addresses else {
         panic!("four addresses");
@@ -293,10 +294,7 @@ fn connections_of_strangers_take_no_plant_out_of_service() {
     let gone = Instant::now();
     until("descriptors", || descriptors(process) <= before + 4);
     let freed = gone.elapsed();
-    assert!(
-        freed < Duration::from_secs(10),
-        "the last after {freed:?}"
-    );
+    assert!(freed < Duration::from_secs(10), "the last after {freed:?}");
     eprintln!("{before} descriptors, {most} with strangers, freed after {freed:?}");
     assert_eq!(operate(), 0);
     assert!(count(&journal, "refused-connections") > 0);

@@ -38,7 +38,13 @@ impl Plant {
         let start = |command: &str, name: &str| {
             let own = format!("{}/parties/{name}", text(&keys));
             let journal = folder.join(format!("{name}.jsonl"));
-            let common = ["--link", "udp", "--no-real-time", "--journal", text(&journal)];
+            let common = [
+                "--link",
+                "udp",
+                "--no-real-time",
+                "--journal",
+                text(&journal),
+            ];
             let member = [command, &cluster, "--name", name, "--keys", &own];
             Running::start(&[&member[..], &common].concat())
         };

@@ -127,10 +127,12 @@ impl Page {
         // In this version of HTTP a stream has no pieces of its own.
         let asked = format!("GET /api/live HTTP/1.0\r\nHost: {host}\r\n\r\n");
         stream.write_all(asked.as_bytes()).expect("sent");
-        let mut last = Value::Null;
+        let (mut last, mut is_state) = (Value::Null, false);
         for line in BufReader::new(stream).lines() {
             let line = line.expect("it tells of states, or that there is nothing new");
-            if let Some(state) = line.strip_prefix("data: ") {
+            if let Some(name) = line.strip_prefix("event: ") {
+                is_state = name == "state";
+            } else if let Some(state) = line.strip_prefix("data: ").filter(|_| is_state) {
                 last = serde_json::from_str(state).expect("JSON");
                 if !last.is_null() && wanted(&last) {
                     return last;
@@ -147,6 +149,10 @@ impl Page {
 
     pub(crate) fn ask_to_end(&self) {
         self.signal(Signal::SIGINT);
+    }
+
+    pub(crate) fn id(&self) -> u32 {
+        self.process.id()
     }
 
     pub(crate) fn signal(&self, signal: Signal) {

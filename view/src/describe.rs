@@ -24,7 +24,7 @@ pub struct Description {
 }
 
 /// Every word that [`Description::event`] can be.
-pub(crate) const EVENTS: [&str; 62] = [
+pub(crate) const EVENTS: [&str; 64] = [
     "acknowledged",
     "adopted",
     "adopted-lineage",
@@ -57,6 +57,8 @@ pub(crate) const EVENTS: [&str; 62] = [
     "interrupted",
     "joins",
     "journal-lost",
+    "link-failed",
+    "link-reopened",
     "new-life",
     "no-new-life",
     "origin",

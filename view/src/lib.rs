@@ -20,6 +20,7 @@ mod history;
 mod listing;
 mod margin;
 mod model;
+mod protection;
 mod run;
 mod series;
 mod snapshot;
@@ -39,13 +40,14 @@ pub use history::{Driven, History, Sampled, Step};
 pub use listing::{Filter, JournalLine, Listing};
 pub use margin::{Holders, Loss, Margin, Outcome};
 pub use model::{Bounds, Model, Spoken};
+pub use protection::{LackingStation, LostState, Protection};
 pub use run::{Run, find_run, find_run_of, find_running, find_running_of};
 pub use series::Series;
 pub use snapshot::{
     MarginSnapshot, OutcomeSnapshot, ProgramSnapshot, RunState, Snapshot, StationSnapshot,
     TimingSnapshot,
 };
-pub use source::{Feed, Source, Trouble};
+pub use source::{BEHIND, Feed, Progress, Reading, Source, Trouble};
 pub use station::StationState;
 pub use terminal::{Key, Screen};
 pub use timeline::{Span, Timeline};

@@ -2,6 +2,7 @@
 
 mod asked;
 mod programs;
+mod protection;
 mod turns;
 
 use std::sync::{Arc, OnceLock};
@@ -10,7 +11,7 @@ use understudy_bus::HostEvent;
 use understudy_cluster::Cluster;
 use understudy_ladder::Observer;
 use understudy_node::Event as StationEvent;
-use understudy_scenarios::{Happening, Parties, Record, RunEvent, moment};
+use understudy_scenarios::{Action, Happening, Parties, Record, RunEvent, moment};
 use understudy_wire::{Moment, Party, ProgramId, StationId};
 
 use crate::alarm::Alarms;
@@ -163,9 +164,7 @@ impl Model {
 
     fn shift(&mut self, by: i64) {
         self.stations.iter_mut().for_each(|track| track.shift(by));
-        self.programs
-            .iter_mut()
-            .for_each(|track| track.since = track.since.saturating_add(by));
+        self.programs.iter_mut().for_each(|track| track.shift(by));
         self.histories
             .iter_mut()
             .for_each(|history| history.shift(by));
@@ -261,6 +260,7 @@ impl Model {
                     track.ready();
                 }
             }
+            (HostEvent::Ready { .. }, Party::RemoteIo(program)) => self.forget_protection(program),
             (HostEvent::FieldLost { reason }, Party::RemoteIo(_)) => {
                 let subject = (record.name.clone(), "field-lost");
                 let text = format!("its equipment cannot be read or written: {reason}");
@@ -287,6 +287,14 @@ impl Model {
             (HostEvent::DuplicateGone { member }, _) => {
                 let subject = (self.parties.name(*member).to_owned(), "duplicate");
                 self.alarms.over(&subject, cycle);
+            }
+            (HostEvent::LinkFailed { reason, .. }, _) => {
+                let subject = (record.name.clone(), "link-failed");
+                self.alarms.raise(subject, cycle, reason.clone());
+            }
+            (HostEvent::LinkReopened { .. }, _) => {
+                self.alarms
+                    .over(&(record.name.clone(), "link-failed"), cycle);
             }
             (HostEvent::JournalLost { .. }, Party::RemoteIo(program)) => {
                 self.misses_records(program)
@@ -328,6 +336,10 @@ impl Model {
                 self.alarms.over(&(name, "ended"), cycle);
             }
             RunEvent::Fault { action, party, .. } => {
+                if let (Action::Crash | Action::Restart, Party::RemoteIo(program)) = (action, party)
+                {
+                    self.forget_protection(*program);
+                }
                 let text = fault_text(*action, *party, &self.parties);
                 if let Party::Station(station) = party
                     && let Some(track) = self.stations.get_mut(station.index())
@@ -336,6 +348,9 @@ impl Model {
                 }
             }
             RunEvent::Ended { party, how, .. } => {
+                if let Party::RemoteIo(program) = party {
+                    self.forget_protection(*program);
+                }
                 let name = self.parties.name(*party).to_owned();
                 let text = format!("{name} ended unexpectedly: {how}");
                 if let Party::Station(station) = party

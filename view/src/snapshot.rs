@@ -9,6 +9,7 @@ use crate::alarm::Alarm;
 use crate::describe::missing_text;
 use crate::margin::{Margin, Outcome};
 use crate::model::Model;
+use crate::protection::{LostState, Protection};
 use crate::station::StationState;
 
 /// How far a run is.
@@ -112,6 +113,10 @@ pub struct ProgramSnapshot {
     pub awaits_release: bool,
     /// Signals that are forced.
     pub forced: Vec<String>,
+    /// Whether the failure of one station would be masked; nothing while its remote I/O has not reported it.
+    pub protection: Option<Protection>,
+    /// What is available where no living station can prove its state.
+    pub lost: Option<LostState>,
     /// Parts that the plant has finished.
     pub finished: Option<u64>,
     /// Things that must not happen to the plant and did.
@@ -268,6 +273,8 @@ impl Model {
                     )
                 })
                 .collect(),
+            protection: track.protection.clone(),
+            lost: track.lost.clone(),
             finished: track.plant.as_ref().map(|field| field.finished),
             mishaps: track.plant.as_ref().map(|field| field.mishaps),
         }

@@ -4,6 +4,7 @@
 
 mod channel;
 mod follow;
+mod progress;
 
 use std::path::{Path, PathBuf};
 
@@ -12,6 +13,7 @@ use understudy_scenarios::Record;
 use channel::Channel;
 pub use channel::Feed;
 use follow::Follower;
+pub use progress::{BEHIND, Progress, Reading};
 
 /// What stands between a reader and the records.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -66,6 +68,14 @@ impl Source {
         match &mut self.0 {
             Kind::Files(follower) => follower.poll(take),
             Kind::Channel(channel) => channel.poll(take),
+        }
+    }
+
+    /// How far the last poll came. Whoever shows what was folded asks this first.
+    pub fn progress(&self) -> Progress {
+        match &self.0 {
+            Kind::Files(follower) => follower.progress(),
+            Kind::Channel(channel) => channel.progress(),
         }
     }
 

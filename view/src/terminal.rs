@@ -14,6 +14,8 @@
 mod lists;
 mod tables;
 
+use std::time::{Duration, Instant};
+
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Modifier, Style};
@@ -24,6 +26,7 @@ use crate::alarm::Alarm;
 use crate::margin::{Holders, Margin};
 use crate::model::Model;
 use crate::snapshot::{RunState, Snapshot};
+use crate::source::{BEHIND, Progress};
 
 /// What a person pressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,6 +74,8 @@ pub struct Screen {
     help: bool,
     /// Calculated when somebody has come or gone.
     margin: Option<(Holders, Margin)>,
+    /// Of the newest record, where a live run has not written one lately.
+    age: Option<Duration>,
 }
 
 const PAGE: usize = 10;
@@ -122,16 +127,47 @@ impl Screen {
         snapshot
     }
 
+    /// Draws the present; while the journal is being read, only how much of it was. A screen that stands still shows what it showed.
+    pub fn draw_live(
+        &mut self,
+        frame: &mut Frame<'_>,
+        model: &Model,
+        progress: Progress,
+        now: Instant,
+    ) {
+        if !self.paused
+            && let Err(reading) = progress.current(now)
+        {
+            let text = format!(" {}  {reading}", model.cluster().name());
+            frame.render_widget(Line::raw(text), frame.area());
+            return;
+        }
+        let age = progress.age(now).filter(|age| *age > BEHIND);
+        self.age = age.filter(|_| !model.is_finished());
+        self.draw(frame, model);
+    }
+
     /// Draws it all.
     pub fn draw(&mut self, frame: &mut Frame<'_>, model: &Model) {
         let snapshot = self.snapshot(model);
         let area = frame.area();
         let stations = rows(snapshot.stations.len(), area.height);
         let programs = rows(snapshot.programs.len(), area.height);
-        let [head, station_area, program_area, survives, timing, bottom] = Layout::vertical([
+        let protected = tables::protection(&snapshot);
+        let lines = u16::try_from(protected.len()).unwrap_or(u16::MAX);
+        let [
+            head,
+            station_area,
+            program_area,
+            protection,
+            survives,
+            timing,
+            bottom,
+        ] = Layout::vertical([
             Constraint::Length(1),
             Constraint::Length(stations),
             Constraint::Length(programs),
+            Constraint::Length(lines.min((area.height / 6).max(1))),
             Constraint::Length(2),
             Constraint::Length(2),
             Constraint::Min(3),
@@ -140,6 +176,7 @@ impl Screen {
         frame.render_widget(self.head(&snapshot, head.width), head);
         frame.render_widget(tables::stations(&snapshot, self.above), station_area);
         frame.render_widget(tables::programs(&snapshot, model, self.above), program_area);
+        frame.render_widget(Paragraph::new(protected), protection);
         frame.render_widget(tables::survives(&snapshot), survives);
         draw_timing(frame, timing, model, &snapshot);
         if self.help {
@@ -166,7 +203,10 @@ impl Screen {
             0 => String::new(),
             left_out => format!("  {left_out} records left out"),
         };
-        let right = format!("{run}  cycle {cycle}{left_out}  h help  q quit ");
+        let age = self.age.map_or(String::new(), |age| {
+            format!("  NO RECORD FOR {} s", age.as_secs())
+        });
+        let right = format!("{run}  cycle {cycle}{age}{left_out}  h help  q quit ");
         let gap = usize::from(width).saturating_sub(left.chars().count() + right.chars().count());
         let text = format!("{left}{}{right}", " ".repeat(gap.max(1)));
         Line::styled(text, Style::new().add_modifier(Modifier::REVERSED))

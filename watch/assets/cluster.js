@@ -2,7 +2,7 @@
 
 import { el, keyed, setText, setAttribute } from "/element.js";
 import { makePicture } from "/picture.js";
-import { openParty } from "/commands.js";
+import { continueWords, openChoice, openParty } from "/commands.js";
 import { SOURCES } from "/sources.js";
 import { openWhy } from "/why.js";
 
@@ -21,6 +21,7 @@ export function prepare(facts) {
   place.append(
     el("div", { class: "picture-frame", tabindex: "0", role: "region", "aria-label": "Picture of the cluster" }, picture.element),
     el("div", { class: "cards" },
+      card("protection", "Protection", el("ul", { id: "protection-list", class: "plain" })),
       card("survival", "What could fail now", el("p", { id: "survival-words", class: "verdict" }), el("ul", { id: "survival-list", class: "plain" })),
       card("timing", "Cycle", el("dl", { id: "timing-list" })),
       card("counts", "Outputs so far", el("div", { class: "wide", tabindex: "0", role: "region", "aria-label": "Table of outputs so far" }, table("counts-table", ["program", "direct", "restored", "held", "fail-safe"]))),
@@ -31,10 +32,45 @@ export function prepare(facts) {
 
 export function show(state) {
   picture.show(state);
+  protection(state.programs);
   survival(state.survival);
   timing(state);
   counts(state);
   signals(state);
+}
+
+// A lamp for each program: whether the failure of one station would be masked, and what the operator chooses where its state is lost.
+function protection(programs) {
+  const look = ({ protection, lost }) => {
+    if (lost) {
+      return ["lost", "✗", lost.words];
+    }
+    if (!protection) {
+      return ["unknown", "?", "not known yet"];
+    }
+    return protection.protected ? ["protected", "●", protection.words] : ["unprotected", "⚠", protection.words];
+  };
+  keyed(
+    document.getElementById("protection-list"),
+    programs,
+    (program) => program.name,
+    ({ index }) => {
+      const remote = run.programs[index].remote_io;
+      const cold = el("button", { type: "button", "data-choice": "cold", click: () => openChoice(remote, "cold") }, "Cold start …");
+      const newest = el("button", { type: "button", "data-choice": "newest", click: () => openChoice(remote, "newest") });
+      return el("li", {}, el("span", { class: "protection-words" }), el("div", { class: "choices", hidden: true }, cold, " ", newest));
+    },
+    (line, program) => {
+      const [level, sign, words] = look(program);
+      setAttribute(line, "data-protection", level);
+      setText(line.querySelector(".protection-words"), `${sign} ${program.name}: ${words}`);
+      const asks = Boolean(program.lost?.asks) && !run.commands.why;
+      line.querySelector(".choices").hidden = !asks;
+      if (asks) {
+        setText(line.querySelector("[data-choice=newest]"), `${continueWords(program.lost)} …`);
+      }
+    },
+  );
 }
 
 function survival(margin) {

@@ -2,7 +2,7 @@
 
 import { act, tell, toast } from "/ask.js";
 import { el } from "/element.js";
-import { isLive, state } from "/time.js";
+import { isLive, stale, state } from "/time.js";
 
 let run = null;
 
@@ -25,7 +25,7 @@ function obstacle() {
   if (!isLive()) {
     return "this is a replay: go live to command";
   }
-  return state()?.finished ? "the run has ended" : null;
+  return state()?.finished ? "the run has ended" : stale();
 }
 
 const DOWN = "it is down";
@@ -60,13 +60,9 @@ function find(wanted) {
   return parties.find((party) => party.kind === wanted.kind && party.program === wanted.program);
 }
 
-export function openParty(wanted, signal) {
-  const party = find(wanted);
-  if (!party) {
-    return;
-  }
+// Who gives a command to a party and why, and a function that gives it.
+function giver(party) {
   const dialog = document.getElementById("command");
-  const because = obstacle();
   const reason = el("input", { id: "command-reason", type: "text", maxlength: "120", value: "try it", required: true });
   const who = el("input", { id: "command-owner", type: "text", maxlength: "40", value: owner(), required: true, disabled: Boolean(run.person) });
   const give = async (command) => {
@@ -78,23 +74,66 @@ export function openParty(wanted, signal) {
       dialog.close();
     }
   };
+  const asked = el("p", { class: "who" }, el("label", {}, "Who ", who), " ", el("label", {}, "Why ", reason));
+  return { asked, give };
+}
+
+function open(content) {
+  const dialog = document.getElementById("command");
+  dialog.replaceChildren(...content.filter(Boolean));
+  dialog.showModal();
+}
+
+export function openParty(wanted, signal) {
+  const party = find(wanted);
+  if (!party) {
+    return;
+  }
+  const because = obstacle();
+  const { asked, give } = giver(party);
   const button = ([name, words, meaning, why]) => {
     const reasonWhy = because ?? run.commands.impossible[name] ?? why;
     return el("li", {},
       el("button", { type: "button", disabled: Boolean(reasonWhy), "data-command": name, click: () => give({ command: name }) }, words),
       " ", el("span", { class: "soft" }, reasonWhy ? `cannot: ${reasonWhy}` : meaning));
   };
-  const content = [
+  open([
     el("h2", { id: "command-title" }, party.name),
     el("p", {}, `${party.kind}: ${party.state}${party.note ? `, ${party.note}` : ""}`),
     because ? el("p", { class: "obstacle" }, because) : null,
-    el("p", { class: "who" }, el("label", {}, "Who ", who), " ", el("label", {}, "Why ", reason)),
+    asked,
     el("ul", { class: "plain actions" }, actions(party).map(button)),
     party.kind === "remote-io" ? forcing(party, signal, because, give) : null,
     el("form", { method: "dialog" }, el("button", { type: "submit", autofocus: true }, "Close")),
-  ];
-  dialog.replaceChildren(...content.filter(Boolean));
-  dialog.showModal();
+  ]);
+}
+
+export const continueWords = (lost) =>
+  `Continue from cycle ${lost.newest}, ${lost.age_cycles === null ? "age not known" : `${lost.age_cycles} cycles old`}`;
+
+// The operator's answer where the state of a program is lost: what it does is said, and it is done when it is confirmed.
+export function openChoice(name, which) {
+  const party = find({ name });
+  const lost = party && state().programs[party.program].lost;
+  if (!lost) {
+    return;
+  }
+  const because = obstacle() ?? run.commands.impossible.choose ?? (party.down ? DOWN : null);
+  const { asked, give } = giver(party);
+  const cold = which === "cold";
+  const command = { command: "choose", choice: cold ? "cold" : { newest: { cycle: lost.newest } } };
+  const warning = cold
+    ? "The program starts from its initial state: counters, steps and timers begin anew. The plant stays as it is."
+    : `Counters, steps and timers of the program are as they were in cycle ${lost.newest}. The plant has moved on since.`;
+  open([
+    el("h2", { id: "command-title" }, `${name}: ${cold ? "Cold start" : continueWords(lost)}`),
+    el("p", {}, lost.words),
+    el("p", {}, `${warning} Compare the plant with the program first.`),
+    because ? el("p", { class: "obstacle" }, `cannot: ${because}`) : null,
+    asked,
+    el("p", {}, el("button", { type: "button", id: "confirm-choice", disabled: Boolean(because), click: () => give(command) }, cold ? "Start cold" : "Continue")),
+    el("form", { method: "dialog" }, el("button", { type: "submit", autofocus: true }, "Cancel")),
+  ]);
 }
 
 function forcing(party, signal, because, give) {

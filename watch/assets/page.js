@@ -35,14 +35,26 @@ function showView() {
   }
 }
 
-function head(run, state, live) {
-  const when = live ? (state.finished ? "finished" : "live") : "replay";
+function head(state, live) {
+  const when = !live ? "replay" : state.finished ? "finished" : time.stale() ? "old" : "live";
   setText(document.getElementById("status"), `${when} · cycle ${state.cycle} of ${state.newest}`);
   document.body.dataset.when = when;
   const open = state.alarms.filter((alarm) => !alarm.acknowledged).length;
   const button = document.getElementById("alarm-count");
   button.hidden = open === 0;
   setText(button, open === 1 ? "⚠ 1 alarm" : `⚠ ${open} alarms`);
+}
+
+// Values that are not the present are greyed out, and it is said why.
+function showStale() {
+  const why = time.stale();
+  if (time.state() && Boolean(why) !== document.body.hasAttribute("data-stale")) {
+    head(time.state(), time.isLive());
+  }
+  const place = document.getElementById("stale");
+  place.hidden = !why;
+  setText(place, why ? `⚠ ${why}` : "");
+  document.body.toggleAttribute("data-stale", Boolean(why));
 }
 
 // What is run is known when its directory says it.
@@ -74,12 +86,15 @@ async function begin() {
   }
   document.getElementById("alarm-count").addEventListener("click", () => (location.hash = "events"));
   time.onState((state, live) => {
-    head(run, state, live);
+    head(state, live);
     VIEWS[currentView()].show(state, live);
+    showStale();
   });
+  setInterval(showStale, 250);
+  addEventListener("visibilitychange", showStale);
   addEventListener("hashchange", showView);
   showView();
-  time.start();
+  time.start(run);
 }
 
 addEventListener("unhandledrejection", (event) => toast(String(event.reason?.message ?? event.reason)));

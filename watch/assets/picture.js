@@ -17,6 +17,7 @@ export const STATES = {
   killed: { sign: "✕", words: "killed" },
   ended: { sign: "✕", words: "has ended" },
   "not-started": { sign: "…", words: "not started" },
+  "state-lost": { sign: "✗", words: "state lost" },
   "awaits-release": { sign: "⚠", words: "awaits release" },
   serving: { sign: "●", words: "serving" },
   listening: { sign: "◌", words: "listening" },

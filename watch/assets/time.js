@@ -5,6 +5,10 @@
 
 import { act, ask } from "/ask.js";
 
+// Older values are not the present: the server sends something twice a second.
+const STALE_MS = 2000;
+const STALE_CYCLES = 20;
+
 const listeners = new Set();
 let live = true;
 let newest = null;
@@ -13,6 +17,36 @@ let wanted = null;
 let asking = false;
 let playing = 0;
 let range = null;
+
+// Of the last event from the server: when it came by two clocks, of which one may stand still and the other be set; what was read of the
+// journal, where it is being read; and how old the newest record was.
+let heard = { date: Date.now(), clock: performance.now() };
+let reading = null;
+let age = 0;
+let patience = STALE_MS;
+
+function hear() {
+  heard = { date: Date.now(), clock: performance.now() };
+}
+
+// Why what is shown is not the present; nothing where it is, and for a cycle that was asked for.
+export function stale() {
+  if (!live || shown?.finished) {
+    return null;
+  }
+  const silent = Math.max(Date.now() - heard.date, performance.now() - heard.clock);
+  const seconds = (ms) => `${Math.floor(ms / 1000)} s`;
+  if (silent > STALE_MS) {
+    return `no message from the server for ${seconds(silent)}: the values below are old`;
+  }
+  if (reading !== null) {
+    return `reading the journal: ${reading} %; the present state is not known yet`;
+  }
+  if (shown && age > patience) {
+    return `the run has written no record for ${seconds(age + silent)}: the values below are old`;
+  }
+  return null;
+}
 
 export const onState = (listener) => listeners.add(listener);
 export const state = () => shown;
@@ -122,7 +156,8 @@ function step(by) {
   goTo((wanted ?? shown?.cycle ?? 0) + by);
 }
 
-export function start() {
+export function start(run) {
+  patience = Math.max(STALE_MS, (STALE_CYCLES * run.period_us) / 1000);
   const on = (id, event, work) => document.getElementById(id).addEventListener(event, work);
   on("live", "click", goLive);
   on("back", "click", () => step(-1));
@@ -145,7 +180,22 @@ export function start() {
 
 function follow() {
   const stream = new EventSource("/api/live");
-  stream.addEventListener("state", (event) => take(JSON.parse(event.data)));
+  stream.addEventListener("state", (event) => {
+    hear();
+    reading = null;
+    const next = JSON.parse(event.data);
+    age = next?.age_ms ?? 0;
+    take(next);
+  });
+  stream.addEventListener("pulse", (event) => {
+    hear();
+    reading = null;
+    age = Number(event.data);
+  });
+  stream.addEventListener("reading", (event) => {
+    hear();
+    reading = Number(event.data);
+  });
   // A browser calls again by itself, but not where it was answered by an error.
   stream.addEventListener("error", () => {
     const status = document.getElementById("status");

@@ -5,10 +5,11 @@ use std::sync::{Arc, Mutex, PoisonError, RwLock, RwLockReadGuard};
 
 use tokio::sync::{Semaphore, watch};
 use understudy_scenarios::Commander;
-use understudy_view::{Alarm, Run};
+use understudy_view::{Alarm, Reading, Run};
 
 use crate::api::not_remembered;
 use crate::error::Problem;
+use crate::follower::Newest;
 use crate::login::{Logins, Person, Role};
 use crate::model::{Known, Model};
 
@@ -29,8 +30,7 @@ pub struct Commanding {
 #[derive(Debug)]
 pub(crate) struct App {
     model: Arc<RwLock<Model>>,
-    /// The newest state as JSON, written once for all viewers.
-    pub(crate) newest: watch::Receiver<Arc<str>>,
+    pub(crate) newest: watch::Receiver<Newest>,
     pub(crate) commanding: Commanding,
     pub(crate) logins: Option<Logins>,
     /// Under which the page is known besides its addresses.
@@ -46,7 +46,7 @@ pub(crate) struct App {
 impl App {
     pub(crate) fn new(
         model: Arc<RwLock<Model>>,
-        newest: watch::Receiver<Arc<str>>,
+        newest: watch::Receiver<Newest>,
         commanding: Commanding,
         logins: Option<Logins>,
         names: Vec<String>,
@@ -101,9 +101,12 @@ impl App {
     }
 
     /// The alarm of a number.
-    pub(crate) fn alarm(&self, number: u64) -> Option<Alarm> {
+    pub(crate) fn alarm(&self, number: u64) -> Result<Option<Alarm>, Reading> {
         let model = self.model();
-        let mut alarms = model.known()?.run.alarms();
-        alarms.find(|alarm| alarm.number == number).cloned()
+        let mut alarms = model
+            .present()?
+            .into_iter()
+            .flat_map(|known| known.run.alarms());
+        Ok(alarms.find(|alarm| alarm.number == number).cloned())
     }
 }

@@ -8,6 +8,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_scenarios::{Action, Happening, Record, RunEvent};
+use understudy_view::{LostState, Protection};
 use understudy_wire::{Force, Party, ProgramId, SignalPlace, StationId, StationSet};
 
 /// Changes that are kept apart.
@@ -33,6 +34,14 @@ pub(crate) struct Standing {
     detached: BTreeSet<Party>,
     forced: BTreeMap<(ProgramId, SignalPlace), Force>,
     excluded: BTreeMap<ProgramId, StationSet>,
+    protection: BTreeMap<ProgramId, Protected>,
+}
+
+/// Whether a program is protected, and what is left of a state that is lost, as far as this is known.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct Protected {
+    pub(crate) protection: Option<Protection>,
+    pub(crate) lost: Option<LostState>,
 }
 
 impl Standing {
@@ -71,6 +80,10 @@ impl Standing {
             .get(&program)
             .copied()
             .unwrap_or(StationSet::EMPTY)
+    }
+
+    pub(crate) fn protection(&self, program: ProgramId) -> Protected {
+        self.protection.get(&program).cloned().unwrap_or_default()
     }
 
     fn apply(&mut self, change: &Change) {
@@ -117,6 +130,9 @@ impl Standing {
             Change::Released(program) => {
                 self.excluded.remove(program);
             }
+            Change::Protection(program, protected) => {
+                self.protection.insert(*program, protected.as_ref().clone());
+            }
         }
     }
 }
@@ -134,6 +150,7 @@ enum Change {
     Unforced(ProgramId, SignalPlace),
     Excluded(ProgramId, StationSet),
     Released(ProgramId),
+    Protection(ProgramId, Box<Protected>),
 }
 
 /// All that was done.
@@ -146,9 +163,17 @@ pub(crate) struct Changes {
 impl Changes {
     /// Takes the next record; what it does is felt in `cycle`.
     pub(crate) fn note(&mut self, record: &Record, cycle: i64) {
-        let Some(change) = change_of(record) else {
-            return;
-        };
+        if let Some(change) = change_of(record) {
+            self.push(change, cycle);
+        }
+    }
+
+    /// The protection of a program is another one from `cycle` on.
+    pub(crate) fn protection(&mut self, program: ProgramId, protected: Protected, cycle: i64) {
+        self.push(Change::Protection(program, Box::new(protected)), cycle);
+    }
+
+    fn push(&mut self, change: Change, cycle: i64) {
         if self.later.len() == MOST
             && let Some((_, oldest)) = self.later.pop_front()
         {

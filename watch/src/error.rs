@@ -8,7 +8,7 @@ use axum::Json;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use serde_json::json;
-use understudy_view::ViewError;
+use understudy_view::{Reading, ViewError};
 
 /// Why the page cannot be served. The codes are stable.
 #[derive(Debug, thiserror::Error)]
@@ -128,6 +128,14 @@ impl Problem {
     pub(crate) fn refused(words: &str) -> Self {
         let (code, message) = words.split_once(": ").unwrap_or(("U0682", words));
         Self::new(StatusCode::CONFLICT, code, message)
+    }
+}
+
+impl From<Reading> for Problem {
+    /// What is known so far is the past.
+    fn from(reading: Reading) -> Self {
+        let words = reading.to_string();
+        Self::new(StatusCode::SERVICE_UNAVAILABLE, Reading::CODE, words)
     }
 }
 

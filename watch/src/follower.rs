@@ -1,17 +1,34 @@
-//! The thread that reads the journal while it is written, and says what is newest.
+//! The thread that reads the journal while it is written, and publishes what is newest.
 
 use std::path::Path;
 use std::sync::{Arc, PoisonError, RwLock};
 use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
-use understudy_view::Run;
+use understudy_view::{Progress, Run};
 
-use crate::model::Model;
-use crate::shown::newest_state;
+use crate::model::{Known, Model};
+use crate::shown::{NOTHING, newest_state};
 
 /// Between two looks at a journal that says nothing new.
 const LOOK: Duration = Duration::from_millis(40);
+
+/// The newest state, written once for all viewers, and how far its reader was.
+#[derive(Debug, Clone)]
+pub(crate) struct Newest {
+    /// As JSON.
+    pub(crate) state: Arc<str>,
+    pub(crate) progress: Progress,
+}
+
+impl Default for Newest {
+    fn default() -> Self {
+        Self {
+            state: Arc::from(NOTHING),
+            progress: Progress::default(),
+        }
+    }
+}
 
 /// Between two words to the viewers.
 const SAY: Duration = Duration::from_millis(200);
@@ -22,7 +39,7 @@ const WAIT: Duration = Duration::from_millis(200);
 pub(crate) fn follow(
     path: &Path,
     model: &RwLock<Model>,
-    newest: &watch::Sender<Arc<str>>,
+    newest: &watch::Sender<Newest>,
     ends: &watch::Receiver<bool>,
 ) {
     let (run, mut source) = loop {
@@ -57,12 +74,28 @@ pub(crate) fn follow(
             unsaid = true;
             lock(model, Model::end);
         }
-        if unsaid && said.elapsed() >= SAY {
+        let progress = lock(model, |model| {
+            let has_ended = model.known().is_some_and(Known::has_ended);
+            model.progress = source.progress().of_ended(has_ended);
+            model.progress
+        });
+        let now = Instant::now();
+        let was_current = newest.borrow().progress.current(now).is_ok();
+        let is_due = said.elapsed() >= SAY || !was_current;
+        if unsaid && is_due && progress.current(now).is_ok() {
             let state = newest_state(&model.read().unwrap_or_else(PoisonError::into_inner));
-            // While a long journal is read for the first time this tells how far it is.
-            newest.send_replace(Arc::from(state));
-            said = Instant::now();
+            newest.send_replace(Newest {
+                state: Arc::from(state),
+                progress,
+            });
+            said = now;
             unsaid = false;
+        } else {
+            // Viewers look at this by themselves.
+            newest.send_if_modified(|newest| {
+                newest.progress = progress;
+                false
+            });
         }
         if taken == 0 {
             std::thread::sleep(LOOK);

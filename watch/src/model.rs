@@ -1,12 +1,14 @@
 //! What the page knows of the run: the model of its journal, and what was done to its parties.
 
 use std::path::Path;
+use std::time::Instant;
 
-use understudy_scenarios::Record;
-use understudy_view::{Bounds, Margin, Model as RunModel, Run, Source, Trouble};
+use understudy_remote_io::Event as RemoteIoEvent;
+use understudy_scenarios::{Happening, Record};
+use understudy_view::{Bounds, Margin, Model as RunModel, Progress, Reading, Run, Source, Trouble};
 use understudy_wire::{Party, ProgramId, StationId, StationSet};
 
-use crate::changes::Changes;
+use crate::changes::{Changes, Protected};
 use crate::foreseen::Foresight;
 
 /// Cycles by which a remote I/O that is alive may be behind the newest deadline.
@@ -17,6 +19,8 @@ const LAG_CYCLES: i64 = 3;
 pub(crate) struct Model {
     name: String,
     known: Option<Known>,
+    /// Of the follower, when it had folded what is known.
+    pub(crate) progress: Progress,
     /// Why nothing is known, while that is so.
     pub(crate) waits_for: String,
 }
@@ -26,6 +30,8 @@ pub(crate) struct Model {
 pub(crate) struct Known {
     pub(crate) run: RunModel,
     pub(crate) changes: Changes,
+    /// By program, as it was noted last among the changes.
+    protected: Vec<Protected>,
     foresight: Foresight,
     /// Nothing more will come, and all of it is read.
     ended: bool,
@@ -38,6 +44,7 @@ impl Model {
         Self {
             name: name.map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
             known: None,
+            progress: Progress::default(),
             waits_for: "the run has not begun".to_owned(),
         }
     }
@@ -47,18 +54,22 @@ impl Model {
         &self.name
     }
 
+    /// What runs, however it is now.
     pub(crate) fn known(&self) -> Option<&Known> {
         self.known.as_ref()
     }
 
+    /// How the run is now; nothing before it has begun.
+    pub(crate) fn present(&self) -> Result<Option<&Known>, Reading> {
+        if self.known.is_some() {
+            self.progress.current(Instant::now())?;
+        }
+        Ok(self.known.as_ref())
+    }
+
     /// The programs of the run are known from now on; its records are to be read.
     pub(crate) fn begin(&mut self, run: &Run) -> Source {
-        self.known = Some(Known {
-            run: run.model(Bounds::default()),
-            changes: Changes::default(),
-            foresight: Foresight::default(),
-            ended: false,
-        });
+        self.known = Some(Known::nothing_of(run, false));
         run.follow()
     }
 
@@ -81,14 +92,20 @@ impl Model {
 }
 
 impl Known {
-    /// All that a journal holds up to a cycle.
-    pub(crate) fn of_journal(run: &Run, until: i64) -> Self {
-        let mut known = Self {
+    /// Before the first record.
+    fn nothing_of(run: &Run, ended: bool) -> Self {
+        Self {
             run: run.model(Bounds::default()),
             changes: Changes::default(),
+            protected: vec![Protected::default(); run.cluster().controllers().len()],
             foresight: Foresight::default(),
-            ended: run.is_finished(),
-        };
+            ended,
+        }
+    }
+
+    /// All that a journal holds up to a cycle.
+    pub(crate) fn of_journal(run: &Run, until: i64) -> Self {
+        let mut known = Self::nothing_of(run, run.is_finished());
         let mut source = run.follow();
         while source.poll(&mut |found| known.note(found)) > 0 {
             let past = known.run.cycle().is_some_and(|newest| newest > until);
@@ -114,6 +131,33 @@ impl Known {
         }
         let felt = self.run.cycle().map_or(i64::MIN, |cycle| cycle + 1);
         self.changes.note(&record, felt);
+        let is_ordinary = matches!(
+            record.event,
+            Happening::Station(_)
+                | Happening::Plant(_)
+                | Happening::RemoteIo(
+                    RemoteIoEvent::Sampled { .. } | RemoteIoEvent::Applied { .. }
+                )
+        );
+        if !is_ordinary {
+            self.note_protection();
+        }
+    }
+
+    /// What a remote I/O reports of its deadline is so in the cycle of that deadline.
+    fn note_protection(&mut self) {
+        let cycle = self.run.cycle().unwrap_or(i64::MIN);
+        for (program, known) in (0..).map(ProgramId).zip(&mut self.protected) {
+            let protection = self.run.protection(program);
+            let lost = self.run.lost_state(program);
+            if (known.protection.as_ref(), known.lost.as_ref()) != (protection, lost) {
+                *known = Protected {
+                    protection: protection.cloned(),
+                    lost: lost.cloned(),
+                };
+                self.changes.protection(program, known.clone(), cycle);
+            }
+        }
     }
 
     pub(crate) fn has_ended(&self) -> bool {

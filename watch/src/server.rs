@@ -16,11 +16,10 @@ use tokio::sync::{oneshot, watch};
 use crate::api::router;
 use crate::app::{App, Commanding};
 use crate::error::WatchError;
-use crate::follower;
+use crate::follower::{self, Newest};
 use crate::listener::Doors;
 use crate::login::Logins;
 use crate::model::Model;
-use crate::shown::NOTHING;
 use crate::tls::{Certificate, acceptor};
 
 /// Few: what they do has time.
@@ -131,7 +130,7 @@ pub fn serve(settings: Settings) -> Result<Served, WatchError> {
     let (tls, fingerprint) = tls.map_or((None, None), |(tls, print)| (Some(tls), Some(print)));
 
     let model = Arc::new(RwLock::new(Model::new(&run)));
-    let (newest, taken) = watch::channel(Arc::from(NOTHING));
+    let (newest, taken) = watch::channel(Newest::default());
     let (ending, ends) = watch::channel(false);
     let follower = {
         let (run, model) = (run.clone(), Arc::clone(&model));

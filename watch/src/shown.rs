@@ -2,10 +2,12 @@
 
 mod parties;
 
+use std::time::Instant;
+
 use serde::Serialize;
 use understudy_remote_io::Missing;
 use understudy_scenarios::source_word;
-use understudy_view::{Alarm, Margin, Outcome};
+use understudy_view::{Alarm, LostState, Margin, Outcome, Protection};
 use understudy_wire::{Party, ProgramId, ProgramSet, SignalPlace, Source, StationId};
 
 use self::parties::{ShownParty, words_of};
@@ -18,6 +20,8 @@ const LISTED_FAILURES: usize = 40;
 /// One cycle.
 #[derive(Debug, Serialize)]
 pub(crate) struct State {
+    /// Of the newest record, in milliseconds, when this was written.
+    age_ms: u64,
     pub(crate) cycle: i64,
     pub(crate) oldest: i64,
     pub(crate) newest: i64,
@@ -44,7 +48,24 @@ struct ShownProgram {
     /// What its own controller said.
     said: Option<String>,
     forced: Vec<ShownForce>,
+    /// Nothing while the remote I/O has not reported it.
+    protection: Option<ShownProtection>,
+    lost: Option<ShownLost>,
     counts: Counts,
+}
+
+#[derive(Debug, Serialize)]
+struct ShownProtection {
+    #[serde(flatten)]
+    protection: Protection,
+    words: String,
+}
+
+#[derive(Debug, Serialize)]
+struct ShownLost {
+    #[serde(flatten)]
+    lost: LostState,
+    words: String,
 }
 
 #[derive(Debug, Serialize)]
@@ -104,9 +125,13 @@ pub(crate) const NOTHING: &str = "null";
 
 /// The newest state as JSON; [`NOTHING`] where nothing is known yet.
 pub(crate) fn newest_state(model: &Model) -> String {
-    let state = model
+    let mut state = model
         .known()
         .and_then(|known| state(known, known.newest()?));
+    if let Some(state) = &mut state {
+        let age = model.progress.age(Instant::now()).unwrap_or_default();
+        state.age_ms = u64::try_from(age.as_millis()).unwrap_or(u64::MAX);
+    }
     serde_json::to_string(&state).unwrap_or_else(|_| NOTHING.to_owned())
 }
 
@@ -134,6 +159,7 @@ pub(crate) fn state(known: &Known, cycle: i64) -> Option<State> {
         .programs()
         .filter_map(|program| parties::plant(known, &standing, program));
     Some(State {
+        age_ms: 0,
         cycle,
         oldest,
         newest,
@@ -182,6 +208,7 @@ fn shown_program(
     let driven = step.and_then(|step| step.driven.as_ref());
     let sampled = step.and_then(|step| step.sampled.as_ref());
     let own = words_of(known, StationId(program.0), cycle);
+    let protected = standing.protection(program);
     ShownProgram {
         index: program.index(),
         name: program_name(known, program),
@@ -210,6 +237,14 @@ fn shown_program(
                 }
             })
             .collect(),
+        protection: protected.protection.map(|protection| ShownProtection {
+            words: protection.text(),
+            protection,
+        }),
+        lost: protected.lost.map(|lost| ShownLost {
+            words: lost.text(),
+            lost,
+        }),
         counts: counts(known, program, cycle),
     }
 }
@@ -285,6 +320,21 @@ fn survival(known: &Known, margin: &Margin) -> Survival {
         _ => (
             "all",
             "any two further failures of stations would be masked".to_owned(),
+        ),
+    };
+    // A program that has lost its outputs already is no good sign, whatever else would be masked.
+    let lost = known
+        .programs()
+        .filter(|program| !margin.served.contains(*program));
+    let lost = program_names(known, lost.collect());
+    let (level, words) = match (lost.is_empty(), level) {
+        (true, _) | (_, "none") => (level, words),
+        _ => (
+            "some",
+            format!(
+                "{} has no true outputs now; of the others: {words}",
+                lost.join(" and ")
+            ),
         ),
     };
     let unmasked_pairs = margin.pairs.iter().filter(|pair| !pair.is_masked());

@@ -50,7 +50,6 @@ fn check(faults: &str, cycle: i64, feed: Feed, source: &str, statuses: [StatusCo
     let seen = Seen {
         observation: &observation,
         feed,
-        recent: &[],
     };
     let of = |path: &str| reading(&cluster, &seen, path);
     assert_eq!(of("Programs/robot/Source").value, Some(text(source)));
@@ -115,7 +114,6 @@ fn before_a_run_nothing_is_known() {
     let seen = Seen {
         observation: &observation,
         feed: trust::feed(&observation, observation.heard),
-        recent: &[],
     };
     assert_eq!(seen.feed, Feed::Waiting);
     for variable in variables(&cluster) {
@@ -135,7 +133,6 @@ fn every_signal_has_one_place_and_a_value_of_its_kind() {
     let seen = Seen {
         observation: &observation,
         feed: Feed::Live,
-        recent: &["one".to_owned()],
     };
     let variables = variables(&cluster);
     let paths: BTreeSet<String> = variables.iter().map(Variable::path).collect();

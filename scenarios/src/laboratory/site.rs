@@ -59,6 +59,8 @@ pub(super) struct Site {
     proxy: Option<Proxy>,
     /// From whom to whom, and the place of the route in the proxy.
     routes: BTreeMap<(Party, Party), usize>,
+    /// The address of each route that a member is given for another member's.
+    stand_ins: Vec<SocketAddr>,
     impairment: Impairment,
 }
 
@@ -108,6 +110,7 @@ impl Site {
             host_of,
             proxy: None,
             routes: BTreeMap::new(),
+            stand_ins: Vec::new(),
             impairment,
         };
         let only_loss = impairment
@@ -191,8 +194,7 @@ impl Site {
         seed: u64,
     ) -> Result<(), LaboratoryError> {
         let host = hosts.map_or(Ipv4Addr::LOCALHOST, |_| Hosts::SWITCH);
-        let listen = SocketAddr::new(IpAddr::V4(host), 0);
-        let mut routes = Vec::new();
+        let mut routes: Vec<Route> = Vec::new();
         for first in peers {
             let own = Endpoints::new(
                 cluster.agreement().cluster,
@@ -210,16 +212,30 @@ impl Site {
                 self.routes
                     .insert((first.party, second.party), routes.len());
                 routes.push(Route {
-                    listen,
-                    to: second.address,
+                    listen: SocketAddr::new(IpAddr::V4(host), 0),
+                    to: link
+                        .frames_address(second.address)
+                        .map_err(LaboratoryError::Endpoints)?,
                     transport: match link {
-                        LinkKind::ZenohTcp => Transport::Tcp,
-                        LinkKind::Zenoh | LinkKind::Udp => Transport::Udp,
+                        LinkKind::Zenoh => Transport::Tcp,
+                        LinkKind::Udp => Transport::Udp,
                     },
                     forth: self.impairment,
                     back: self.impairment,
                 });
             }
+        }
+        let free = understudy_bus::free_addresses(routes.len()).map_err(|source| {
+            LaboratoryError::System {
+                what: "free ports for the proxy",
+                source,
+            }
+        })?;
+        for (route, free) in routes.iter_mut().zip(free) {
+            let stands_for = SocketAddr::new(IpAddr::V4(host), free.port());
+            let frames = link.frames_address(stands_for);
+            route.listen = frames.map_err(LaboratoryError::Endpoints)?;
+            self.stand_ins.push(stands_for);
         }
         let start = || Proxy::start(&routes, seed);
         let proxy = match hosts {
@@ -232,9 +248,6 @@ impl Site {
 
     /// What each party is told of the others.
     fn write_views(&mut self, peers: &[Peer], directory: &RunDirectory) -> io::Result<()> {
-        let Some(proxy) = &self.proxy else {
-            return Ok(());
-        };
         let folder = directory.file("endpoints");
         std::fs::create_dir_all(&folder)?;
         for own in peers {
@@ -242,7 +255,7 @@ impl Site {
                 .iter()
                 .map(|peer| {
                     let route = self.routes.get(&(own.party, peer.party));
-                    let stands_for = route.and_then(|&route| proxy.addresses().get(route));
+                    let stands_for = route.and_then(|&route| self.stand_ins.get(route));
                     Peer {
                         address: stands_for.copied().unwrap_or(peer.address),
                         ..peer.clone()

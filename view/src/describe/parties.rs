@@ -166,7 +166,7 @@ pub(super) fn remote_io(event: &RemoteIoEvent, parties: &Parties) -> Words {
                 "the program starts cold, as configured"
             };
             let text = format!(
-                "the state of its program is lost: the newest available state, of {holder}, is from cycle {}, and {behind}; {next}",
+                "the state of its program is lost: the newest available state, of {holder}, is from cycle {} of the cluster, and {behind}; {next}",
                 newest.cycle.0
             );
             ("state-lost", Alarm, text)
@@ -193,16 +193,12 @@ pub(super) fn remote_io(event: &RemoteIoEvent, parties: &Parties) -> Words {
             Notice,
             "its program is protected: the failure of one station would be masked".to_owned(),
         ),
-        RemoteIoEvent::Unprotected { since, lacking, .. } => {
+        RemoteIoEvent::Unprotected { lacking, .. } => {
             let reasons: Vec<String> = lacking
                 .iter()
                 .map(|one| lacking_text(one, parties))
                 .collect();
-            let text = format!(
-                "its program is not protected since cycle {}: {}",
-                since.cycle.0,
-                reasons.join(", ")
-            );
+            let text = format!("its program is not protected: {}", reasons.join(", "));
             ("unprotected", Alarm, text)
         }
         RemoteIoEvent::Voided {

@@ -77,6 +77,18 @@ pub(super) fn host(event: &HostEvent, names: &Parties) -> Words {
             Warning,
             format!("{frames} frames could not be sent: {reason}"),
         ),
+        HostEvent::LinkReopened { silence_ms } => (
+            "link-reopened",
+            Warning,
+            format!("received no member for {silence_ms} ms and opened its link anew"),
+        ),
+        HostEvent::LinkFailed { silence_ms, reason } => (
+            "link-failed",
+            Alarm,
+            format!(
+                "received no member for {silence_ms} ms and cannot open its link anew: {reason}"
+            ),
+        ),
         HostEvent::FieldLost { reason } => (
             "field-lost",
             Alarm,

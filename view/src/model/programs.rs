@@ -10,6 +10,7 @@ use understudy_wire::{
 use super::Model;
 use crate::describe::{describe, missing_text};
 use crate::event::{Event, Level};
+use crate::protection::{LostState, Protection};
 
 /// One program at its remote I/O.
 #[derive(Debug, Clone, Default)]
@@ -29,6 +30,8 @@ pub(crate) struct ProgramTrack {
     pub(crate) awaits_release: bool,
     pub(crate) forced: Vec<Force>,
     pub(crate) plant: Option<Field>,
+    pub(crate) protection: Option<Protection>,
+    pub(crate) lost: Option<LostState>,
     /// Whether it was ever driven by true outputs.
     served: bool,
 }
@@ -38,11 +41,23 @@ impl ProgramTrack {
         self.heard[0].or(self.heard[1])
     }
 
+    pub(crate) fn shift(&mut self, by: i64) {
+        let protection = self.protection.as_mut().map(|of| &mut of.since);
+        let lost = self.lost.as_mut().map(|of| &mut of.since);
+        for since in [Some(&mut self.since), protection, lost]
+            .into_iter()
+            .flatten()
+        {
+            *since = since.saturating_add(by);
+        }
+    }
+
     /// Whether nothing true is driven for a reason that no station can help.
     pub(crate) fn is_blocked(&self) -> bool {
         let reasons = [
             Missing::BadQuality,
             Missing::NoHistory,
+            Missing::StateLost,
             Missing::NotReleased,
             Missing::ValueFault,
             Missing::TooLate,
@@ -89,9 +104,13 @@ impl Model {
             }
             _ => {}
         }
+        self.protection_changed(record, program, cycle, event);
         self.changed(record, program, cycle, event);
         let cause = match event {
             RemoteIoEvent::Flagged { station, .. } => self.cause_of_silence(*station),
+            RemoteIoEvent::Unprotected { lacking, .. } => lacking
+                .iter()
+                .find_map(|lacking| self.cause_of_silence(lacking.station)),
             _ => None,
         };
         self.happened(record, cycle, cause);

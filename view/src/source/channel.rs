@@ -3,10 +3,12 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::time::Instant;
 
 use understudy_scenarios::Record;
 
 use super::Trouble;
+use super::progress::Progress;
 
 /// Records taken in one go, at most.
 const AT_ONCE: usize = 4096;
@@ -36,6 +38,8 @@ impl Feed {
 pub(super) struct Channel {
     receiver: Receiver<Record>,
     lost: Arc<AtomicU64>,
+    read: u64,
+    progress: Progress,
 }
 
 pub(super) fn bounded(most: usize) -> (Feed, Channel) {
@@ -45,15 +49,37 @@ pub(super) fn bounded(most: usize) -> (Feed, Channel) {
         sender,
         lost: Arc::clone(&lost),
     };
-    (feed, Channel { receiver, lost })
+    let channel = Channel {
+        receiver,
+        lost,
+        read: 0,
+        progress: Progress::default(),
+    };
+    (feed, channel)
 }
 
 impl Channel {
+    pub(super) fn progress(&self) -> Progress {
+        self.progress
+    }
+
+    #[allow(
+        clippy::disallowed_methods,
+        reason = "whether the channel was emptied lately is a matter of the clock"
+    )]
     pub(super) fn poll(&mut self, take: &mut dyn FnMut(Result<Record, Trouble>)) -> usize {
+        let began = Instant::now();
         let mut taken = 0;
         for record in self.receiver.try_iter().take(AT_ONCE) {
             take(Ok(record));
             taken += 1;
+        }
+        self.read += taken as u64;
+        // How many wait is not known.
+        self.progress
+            .polled(began, self.read, u64::from(taken == AT_ONCE));
+        if taken > 0 {
+            self.progress.grew = Some(began);
         }
         match self.lost.swap(0, Ordering::Relaxed) {
             0 => taken,

@@ -11,12 +11,14 @@ use std::fs::{self, File};
 use std::io::{self, Read};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime};
 
 use understudy_bus::closed_segments;
 use understudy_diagnostic::shortened;
 use understudy_scenarios::Record;
 
 use super::Trouble;
+use super::progress::Progress;
 
 /// Bytes read in one go, and so the work of one call.
 const PIECE: usize = 1 << 20;
@@ -37,6 +39,9 @@ pub(super) struct Follower {
     skipping: bool,
     piece: Vec<u8>,
     failure: Option<Trouble>,
+    /// Bytes read so far, of all segments.
+    read: u64,
+    progress: Progress,
 }
 
 #[derive(Debug)]
@@ -45,6 +50,20 @@ struct Open {
     inode: u64,
     /// Where it is closed already.
     number: Option<u64>,
+    /// Bytes read of it.
+    read: u64,
+}
+
+impl Open {
+    /// The number that it got when it was closed; nothing while it is written, and when it is gone.
+    fn number_among(&self, closed: &[(u64, PathBuf)]) -> Option<u64> {
+        self.number.or_else(|| {
+            let ours =
+                |path: &Path| fs::metadata(path).is_ok_and(|found| found.ino() == self.inode);
+            let found = closed.iter().find(|(_, path)| ours(path));
+            found.map(|(number, _)| *number)
+        })
+    }
 }
 
 impl Follower {
@@ -56,17 +75,36 @@ impl Follower {
             skipping: false,
             piece: vec![0; PIECE],
             failure: None,
+            read: 0,
+            progress: Progress::default(),
         }
+    }
+
+    pub(super) fn progress(&self) -> Progress {
+        self.progress
     }
 
     pub(super) fn failure(&self) -> Option<Trouble> {
         self.failure.clone()
     }
 
+    #[allow(
+        clippy::disallowed_methods,
+        reason = "whether a file was read to its end lately is a matter of the clock"
+    )]
     pub(super) fn poll(&mut self, take: &mut dyn FnMut(Result<Record, Trouble>)) -> usize {
-        match self.try_poll(take) {
-            Ok(taken) => {
+        let began = Instant::now();
+        // What is written from now on is for the next poll.
+        let end = self.ahead().map(|ahead| self.read + ahead);
+        let polled = self.try_poll(take);
+        match end.and_then(|end| Ok((end, polled?))) {
+            Ok((end, taken)) => {
                 self.failure = None;
+                let ahead = end.saturating_sub(self.read);
+                self.progress.polled(began, self.read, ahead);
+                if ahead == 0 && (taken > 0 || self.progress.grew.is_none()) {
+                    self.progress.grew = self.age().and_then(|age| began.checked_sub(age));
+                }
                 taken
             }
             Err(error) => {
@@ -77,6 +115,44 @@ impl Follower {
                 0
             }
         }
+    }
+
+    /// Bytes of the journal that have not been read.
+    fn ahead(&self) -> io::Result<u64> {
+        let mut ahead = 0;
+        if let Some(open) = &self.open {
+            ahead = open.file.metadata()?.len().saturating_sub(open.read);
+            if !self.is_closed()? {
+                return Ok(ahead);
+            }
+        }
+        let closed = match closed_segments(&self.path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound && self.open.is_none() => {
+                return Ok(0);
+            }
+            closed => closed?,
+        };
+        let own = self.open.as_ref();
+        let own = own.and_then(|open| open.number_among(&closed));
+        let later = closed.iter().filter(|(number, _)| Some(*number) > own);
+        let paths = later.map(|(_, path)| path).chain([&self.path]);
+        let sizes = paths.filter_map(|path| fs::metadata(path).ok());
+        Ok(ahead + sizes.map(|found| found.len()).sum::<u64>())
+    }
+
+    /// For how long the open file has not been written to.
+    #[allow(
+        clippy::disallowed_methods,
+        reason = "the system says when a file was written by the calendar"
+    )]
+    fn age(&self) -> Option<Duration> {
+        let written = self.open.as_ref()?.file.metadata().ok()?.modified().ok()?;
+        // A clock that was set back makes no age.
+        Some(
+            SystemTime::now()
+                .duration_since(written)
+                .unwrap_or_default(),
+        )
     }
 
     fn try_poll(&mut self, take: &mut dyn FnMut(Result<Record, Trouble>)) -> io::Result<usize> {
@@ -130,6 +206,7 @@ impl Follower {
                     file,
                     inode,
                     number,
+                    read: 0,
                 });
                 Ok(true)
             }
@@ -164,12 +241,7 @@ impl Follower {
             return Ok(false);
         };
         let closed = closed_segments(&self.path)?;
-        let number = open.number.or_else(|| {
-            let ours =
-                |path: &Path| fs::metadata(path).is_ok_and(|found| found.ino() == open.inode);
-            let found = closed.iter().find(|(_, path)| ours(path));
-            found.map(|(number, _)| *number)
-        });
+        let number = open.number_among(&closed);
         let next = match number {
             Some(number) => closed.iter().find(|(other, _)| *other > number),
             // Ours is gone already: all that is left follows it.
@@ -222,6 +294,8 @@ impl Follower {
             return Ok((0, 0));
         };
         let length = open.file.read(&mut self.piece)?;
+        open.read += length as u64;
+        self.read += length as u64;
         let mut taken = 0;
         for part in self.piece[..length].split_inclusive(|byte| *byte == b'\n') {
             let ends = part.last() == Some(&b'\n');

@@ -124,9 +124,50 @@ fn last_sources(model: &Model, program: ProgramId, cycle: Option<i64>) -> String
     (last.saturating_sub(LAST - 1)..=last).map(letter).collect()
 }
 
+/// Programs whose state is lost or that are not protected, a line each; one line where there is none.
+pub(super) fn protection(snapshot: &Snapshot) -> Vec<Line<'static>> {
+    let alarm = Style::new().fg(BAD).add_modifier(Modifier::BOLD);
+    let programs = snapshot.programs.iter();
+    let texts = programs.filter_map(|program| {
+        let text = match (&program.lost, &program.protection) {
+            (Some(lost), _) => lost.text(),
+            (None, Some(protection)) if !protection.protected => protection.text(),
+            _ => return None,
+        };
+        Some(format!("{}: {text}", program.program))
+    });
+    let mut lines: Vec<Line<'static>> = texts
+        .map(|text| Line::from(vec![label("protected"), text.into()]).style(alarm))
+        .collect();
+    if lines.is_empty() {
+        let mut programs = snapshot.programs.iter();
+        let text = if programs.all(|program| program.protection.is_some()) {
+            "all programs"
+        } else {
+            "not known of all programs yet"
+        };
+        lines.push(Line::from(vec![label("protected"), text.into()]));
+    }
+    lines
+}
+
 /// The margin of survival in a sentence.
 pub(super) fn survives(snapshot: &Snapshot) -> Paragraph<'static> {
-    let line = Line::from(vec![label("survives"), sentence(&snapshot.margin).into()]);
+    let margin = &snapshot.margin;
+    let programs = snapshot.programs.iter().map(|program| &program.program);
+    let lost: Vec<&str> = programs
+        .filter(|program| !margin.served.contains(program))
+        .map(String::as_str)
+        .collect();
+    let sentence = match (margin.served.is_empty(), lost.is_empty()) {
+        (true, _) | (_, true) => sentence(margin),
+        _ => format!(
+            "{} has no true outputs; of the others: {}",
+            lost.join(" and "),
+            sentence(margin)
+        ),
+    };
+    let line = Line::from(vec![label("survives"), sentence.into()]);
     Paragraph::new(line).wrap(Wrap { trim: false })
 }
 

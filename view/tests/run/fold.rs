@@ -56,7 +56,13 @@ fn each_station_is_seen_to_be_killed_and_repaired() {
             .iter()
             .all(|station| station.state == StationState::Speaking)
     );
-    assert_eq!(alarms, []);
+    // Each kill cost the protection of programs, and each return brought it back.
+    assert_eq!(alarms.len(), 4, "{alarms:?}");
+    assert!(
+        alarms
+            .iter()
+            .all(|alarm| alarm.alarm == "unprotected" && alarm.over.is_some())
+    );
     assert_eq!(margin.survives, 1);
     let events: Vec<String> = model
         .events()

@@ -5,6 +5,7 @@ mod directory;
 mod fold;
 mod hostile;
 mod margin;
+mod protection;
 mod replay;
 mod screen;
 mod support;

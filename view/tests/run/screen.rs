@@ -1,8 +1,11 @@
 //! What a terminal shows, as letters.
 
+use std::time::{Duration, Instant};
+
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
-use understudy_view::{Key, Screen};
+use understudy_scenarios::{Record, RunEvent};
+use understudy_view::{Key, Screen, Source};
 
 use crate::support::{KILL_EACH, cell, line, model, scenario};
 
@@ -30,6 +33,48 @@ fn a_run_fits_a_terminal_of_eighty_columns() {
     assert!(
         help.contains("paused") && help.contains("all alarms have been seen"),
         "{help}"
+    );
+}
+
+/// While the journal is being read no value is shown, only how much of it was; a run that was not written lately says so.
+#[test]
+fn a_journal_that_is_being_read_shows_no_values() {
+    let cell = cell();
+    let model = model(&cell, &scenario(&cell, KILL_EACH).shortened(Some(140)), 1);
+    let mut screen = Screen::default();
+    let drawn = |screen: &mut Screen, progress, now| {
+        let mut terminal = Terminal::new(TestBackend::new(80, 24)).expect("a terminal");
+        terminal
+            .draw(|frame| screen.draw_live(frame, &model, progress, now))
+            .expect("drawn");
+        terminal.backend().to_string()
+    };
+    let (feed, mut source) = Source::channel(10);
+    let now = Instant::now();
+    let reading = drawn(&mut screen, source.progress(), now);
+    assert!(reading.contains("reading the journal: 0 %"), "{reading}");
+    assert!(!reading.contains("robot"), "{reading}");
+    assert!(feed.give(Record::of_run(0, RunEvent::Interrupted)));
+    source.poll(&mut |_| ());
+    let now = Instant::now();
+    let present = drawn(&mut screen, source.progress(), now);
+    assert!(
+        present.contains("robot") && !present.contains("NO RECORD"),
+        "{present}"
+    );
+    let later = now + Duration::from_secs(60);
+    let suspended = drawn(&mut screen, source.progress(), later);
+    assert!(!suspended.contains("robot"), "{suspended}");
+    source.poll(&mut |_| ());
+    let silent = drawn(
+        &mut screen,
+        source.progress(),
+        now + Duration::from_millis(2_500),
+    );
+    // The reader was at the end a moment ago, or on a busy machine a little longer.
+    assert!(
+        silent.contains("NO RECORD FOR 2 s") || silent.contains("reading"),
+        "{silent}"
     );
 }
 

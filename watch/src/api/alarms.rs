@@ -32,7 +32,7 @@ pub(super) async fn acknowledge(
         return Err(Problem::forbidden(why));
     }
     let alarm = app
-        .alarm(number)
+        .alarm(number)?
         .ok_or_else(|| Problem::unknown(format!("the run has no alarm {number}")))?;
     let seen = alarm.acknowledgement(owner, unix_seconds());
     // It is shown as seen when it has been read in the journal.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Instant;
 
 use axum::Json;
 use axum::extract::rejection::QueryRejection;
@@ -18,7 +19,7 @@ use super::compare::others;
 use crate::app::App;
 use crate::error::Problem;
 use crate::login::Person;
-use crate::model::Known;
+use crate::model::{Known, Model};
 use crate::shown::{self, NOTHING};
 
 /// Events in one answer, at most.
@@ -77,7 +78,8 @@ pub(super) async fn run(
     Extension(person): Extension<Person>,
 ) -> Answered<Json<RunFacts>> {
     let model = app.model();
-    let known = known(&model)?;
+    // What runs is known before it is known how it is now.
+    let known = model.known().ok_or_else(|| not_begun(&model))?;
     let run = &known.run;
     let cluster = run.cluster();
     let schedule = &cluster.agreement().schedule;
@@ -145,10 +147,12 @@ pub(super) async fn state(
     when: Result<Query<When>, QueryRejection>,
 ) -> Answered<Response> {
     let Query(when) = when?;
-    let newest = app.newest.borrow().to_string();
-    if when.cycle.is_none() && newest != NOTHING {
+    let newest = app.newest.borrow().clone();
+    let is_current = newest.progress.current(Instant::now()).is_ok();
+    if when.cycle.is_none() && is_current && &*newest.state != NOTHING {
         // Written once for everybody who asks, as for the viewers who are told.
-        return Ok(([(CONTENT_TYPE, "application/json")], newest).into_response());
+        let json = [(CONTENT_TYPE, "application/json")];
+        return Ok((json, newest.state.to_string()).into_response());
     }
     let state = at_cycle(&app, when.cycle, |known, cycle| {
         shown::state(known, cycle).ok_or_else(|| not_remembered(cycle))
@@ -187,10 +191,13 @@ pub(crate) fn not_remembered(cycle: i64) -> Problem {
     Problem::unrecorded(format!("the journal does not reach back to cycle {cycle}"))
 }
 
-pub(super) fn known(model: &crate::model::Model) -> Answered<&Known> {
-    model
-        .known()
-        .ok_or_else(|| Problem::unrecorded(model.waits_for.clone()))
+/// How the run is now.
+pub(super) fn known(model: &Model) -> Answered<&Known> {
+    model.present()?.ok_or_else(|| not_begun(model))
+}
+
+fn not_begun(model: &Model) -> Problem {
+    Problem::unrecorded(model.waits_for.clone())
 }
 
 #[derive(Debug, Deserialize)]

@@ -194,6 +194,7 @@ pub(super) fn remote_io(
     let alive = match (driven, missing) {
         (None, _) | (_, Some(Missing::NoHistory)) => "listening",
         (_, Some(Missing::NotReleased)) => "awaits-release",
+        (_, Some(Missing::StateLost)) => "state-lost",
         _ => "serving",
     };
     let forced = standing.forced(program).count();

@@ -1,5 +1,7 @@
 use std::io::Write;
 
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
 use understudy_bus::Segments;
 use understudy_scenarios::{Happening, RunEvent};
 
@@ -123,4 +125,51 @@ fn what_is_no_record_is_left_out() {
     let mut follower = Follower::new(&path);
     assert_eq!(taken(&mut follower), [Some(0), None, None, None, Some(1)]);
     fs::remove_dir_all(folder).expect("it goes");
+}
+
+/// However a journal is cut and however often it is read, who is at the end has every record that was written before the poll, and who
+/// reads on until nothing is left is at the end.
+#[test]
+fn only_the_end_is_taken_for_the_end() {
+    for seed in 0..40 {
+        let mut random = Pcg64Mcg::seed_from_u64(seed);
+        let folder = folder(&format!("follow-end-{seed}"));
+        let path = folder.join("journal.jsonl");
+        let mut follower = Follower::new(&path);
+        follower.piece = vec![0; random.random_range(1..2000)];
+        let mut segments = Segments::create(&path, 0).expect("created");
+        let (mut written, mut seen) = (0, 0);
+        for _ in 0..60 {
+            let lines = random.random_range(0..200_u64);
+            let bytes: Vec<u8> = (written..written + lines).flat_map(line).collect();
+            written += lines;
+            let cut = random.random_range(0..=bytes.len());
+            segments.write_all(&bytes[..cut]).expect("written");
+            let flushed = random.random::<bool>();
+            if flushed {
+                segments.flush().expect("written");
+            }
+            let complete = bytes[..cut].iter().filter(|byte| **byte == b'\n').count() as u64;
+            let complete = written - lines + complete;
+            for _ in 0..random.random_range(0..4) {
+                follower.poll(&mut |found| seen += u64::from(found.is_ok()));
+                let is_at_end = follower.progress().is_at_end();
+                assert!(
+                    !(flushed && is_at_end) || seen == complete,
+                    "seed {seed}: {seen}"
+                );
+            }
+            let mut rest = &bytes[cut..];
+            while !rest.is_empty() {
+                let now = segments.write(rest).expect("written");
+                rest = &rest[now..];
+            }
+            // Nothing is to be rotated out before it is read.
+            segments.flush().expect("written");
+            seen += taken(&mut follower).iter().flatten().count() as u64;
+            assert!(follower.progress().is_at_end(), "seed {seed}");
+            assert_eq!(seen, written, "seed {seed}");
+        }
+        fs::remove_dir_all(folder).expect("it goes");
+    }
 }

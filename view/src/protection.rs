@@ -1,0 +1,72 @@
+//! Whether the failure of one station would be masked, as the remote I/O of a program reports it, and what is left where a state is lost.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// Whether a program is protected.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Protection {
+    /// Whether the failure of one station would be masked.
+    pub protected: bool,
+    /// Since which cycle, from the origin.
+    pub since: i64,
+    /// The stations that cannot stand in; none where the program is protected.
+    pub lacking: Vec<LackingStation>,
+}
+
+/// A station that cannot stand in for a program.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct LackingStation {
+    /// Its name.
+    pub station: String,
+    /// `not-received`, `joining`, `behind`, `excluded` or `failed`.
+    pub reason: &'static str,
+    /// The link that is broken, as `from → to`, where the cause is a link.
+    pub link: Option<String>,
+    /// In words.
+    pub text: String,
+}
+
+/// What is available of a program whose state is lost.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct LostState {
+    /// Since which cycle, from the origin.
+    pub since: i64,
+    /// The cycle of the newest available state, as the cluster counts: the operator's choice names it.
+    pub newest: u64,
+    /// The station that holds it.
+    pub holder: String,
+    /// By how many cycles it was older than the newest applied output when the state was lost; nothing where that is not known.
+    pub age_cycles: Option<u64>,
+    /// Whether the operator is asked.
+    pub asks: bool,
+}
+
+impl Protection {
+    /// `protected`, or why not.
+    pub fn text(&self) -> String {
+        if self.protected {
+            return "protected".to_owned();
+        }
+        let texts: Vec<&str> = self.lacking.iter().map(|one| one.text.as_str()).collect();
+        format!(
+            "NOT protected since cycle {}: {}",
+            self.since,
+            texts.join(", ")
+        )
+    }
+}
+
+impl LostState {
+    /// What is available, and how old it is.
+    pub fn text(&self) -> String {
+        let age = self.age_cycles.map_or_else(
+            || "of unknown age".to_owned(),
+            |age| format!("{age} cycles old"),
+        );
+        format!(
+            "STATE LOST since cycle {}: the newest available state is of cycle {} of the cluster, {age}, in {}",
+            self.since, self.newest, self.holder
+        )
+    }
+}
