@@ -199,8 +199,8 @@ fn a_frame_of_an_earlier_life_never_counts() {
 /// A copy of a member with the same keys and another configuration, such as an old disk image.
 #[test]
 fn a_later_life_of_another_configuration_shuts_nobody_out() {
-    let own = frame(ROBOT, 1).header.configuration;
-    let mut opener = listener().of_configuration(ClusterHash(1), own);
+    let own = frame(ROBOT, 1).header;
+    let mut opener = listener().of_configuration(own.cluster, own.configuration);
     let (mut rightful, mut copy) = (seal(ROBOT, 1), seal(ROBOT, 9));
     for cycle in 0..200 {
         let said = frame(ROBOT, cycle);

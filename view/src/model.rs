@@ -279,14 +279,6 @@ impl Model {
                 self.alarms
                     .over(&(record.name.clone(), "field-lost"), cycle);
             }
-            (HostEvent::LinkFailed { reason, .. }, _) => {
-                let subject = (record.name.clone(), "link-failed");
-                self.alarms.raise(subject, cycle, reason.clone());
-            }
-            (HostEvent::LinkReopened { .. }, _) => {
-                self.alarms
-                    .over(&(record.name.clone(), "link-failed"), cycle);
-            }
             (HostEvent::DuplicateFound { member }, _) => {
                 let text = describe(record, &self.parties).text;
                 let subject = (self.parties.name(*member).to_owned(), "duplicate");
@@ -295,6 +287,14 @@ impl Model {
             (HostEvent::DuplicateGone { member }, _) => {
                 let subject = (self.parties.name(*member).to_owned(), "duplicate");
                 self.alarms.over(&subject, cycle);
+            }
+            (HostEvent::LinkFailed { reason, .. }, _) => {
+                let subject = (record.name.clone(), "link-failed");
+                self.alarms.raise(subject, cycle, reason.clone());
+            }
+            (HostEvent::LinkReopened { .. }, _) => {
+                self.alarms
+                    .over(&(record.name.clone(), "link-failed"), cycle);
             }
             (HostEvent::JournalLost { .. }, Party::RemoteIo(program)) => {
                 self.misses_records(program)
