@@ -231,20 +231,20 @@ fn input(reader: &mut Reader, point: Node<'_, '_>, name: Name, modifier: Modifie
     let mut wires = Vec::new();
     unread_expression(reader, point);
     for node in elements(point) {
-        match node.tag_name().name() {
-            "connection" => match attribute(node, "refLocalId").and_then(|id| id.parse().ok()) {
-                Some(from) => wires.push(Wire {
-                    from,
-                    pin: attribute(node, "formalParameter").filter(|pin| !pin.is_empty()),
-                    span: start_tag(node),
-                }),
-                None => reader.error(
-                    "U1002",
-                    "a connection has no refLocalId that is a number".to_owned(),
-                    node,
-                ),
-            },
-            _ => {}
+        if node.tag_name().name() != "connection" {
+            continue;
+        }
+        match attribute(node, "refLocalId").and_then(|id| id.parse().ok()) {
+            Some(from) => wires.push(Wire {
+                from,
+                pin: attribute(node, "formalParameter").filter(|pin| !pin.is_empty()),
+                span: start_tag(node),
+            }),
+            None => reader.error(
+                "U1002",
+                "a connection has no refLocalId that is a number".to_owned(),
+                node,
+            ),
         }
     }
     Pin {
