@@ -130,7 +130,9 @@ impl ZenohLink {
                 while matches!(stopped.recv_timeout(PULSE), Err(RecvTimeoutError::Timeout)) {
                     keeper.pulse(clock.now());
                 }
-                keeper.session.take().map(Session::close);
+                if let Some(session) = keeper.session.take() {
+                    session.close();
+                }
                 drop(closing);
             })
             .map_err(|source| BusError::System {
@@ -322,7 +324,9 @@ impl Keeper {
     }
 
     fn reopen(&mut self, silence: Duration) {
-        self.session.take().map(Session::close);
+        if let Some(session) = self.session.take() {
+            session.close();
+        }
         let failure = match Session::open(&self.endpoints, &self.ears) {
             Ok(session) => {
                 *self

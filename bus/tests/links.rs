@@ -5,6 +5,7 @@
     clippy::disallowed_methods,
     reason = "real links take real time, and a test that waits has a deadline"
 )]
+#![allow(clippy::print_stderr, reason = "a measurement is shown")]
 
 mod parties;
 
@@ -257,7 +258,7 @@ fn restarts_beside_busy_processes_are_received_over_zenoh() {
     let busy = number("UNDERSTUDY_BUSY", 24);
     let times = restarts(LinkKind::Zenoh, count, busy as usize);
     let share = |percent: usize| times[(times.len() - 1) * percent / 100];
-    println!(
+    eprintln!(
         "{count} restarts beside {busy} busy processes: p50 {:?}, p99 {:?}, longest {:?}",
         share(50),
         share(99),

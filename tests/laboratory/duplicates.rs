@@ -103,8 +103,11 @@ fn wait_for(run: &Path, what: &str, wanted: impl Fn(&Value) -> bool) {
     }
 }
 
+/// A record that is waited for, and what it is called.
+type Wanted<'a> = (&'a str, &'a dyn Fn(&Value) -> bool);
+
 /// A run with a copy of its robot, until `wanted` came; its records, and its summary.
-fn with_copy(name: &str, period: &str, wanted: &[(&str, &dyn Fn(&Value) -> bool)]) -> Vec<Value> {
+fn with_copy(name: &str, period: &str, wanted: &[Wanted<'_>]) -> Vec<Value> {
     let _one = one_at_a_time();
     let out = empty_folder(name);
     let folder = empty_folder(&format!("{name}_copy"));

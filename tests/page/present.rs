@@ -151,7 +151,7 @@ fn check(name: &str, arguments: &[&str], listen: &str, ask: fn(&Reader) -> Optio
     std::thread::sleep(AWAY);
     let mut file = OpenOptions::new().append(true).open(&journal);
     let file = file.as_mut().expect("the journal");
-    file.write_all(text[cut..].as_bytes()).expect("written");
+    file.write_all(&text.as_bytes()[cut..]).expect("written");
     let later = present_cycle(&run);
     assert!(later > present + 1000, "{later}");
     reader.signal(Signal::SIGCONT);

@@ -88,6 +88,7 @@ impl Progress {
 }
 
 #[cfg(test)]
+#[allow(clippy::disallowed_methods, reason = "any time to begin with")]
 mod tests {
     use super::*;
 

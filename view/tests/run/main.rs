@@ -1,5 +1,10 @@
 //! Runs of the simulator, looked at from their journals alone.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "the age of what is shown is counted on the real clock"
+)]
+
 mod diffs;
 mod directory;
 mod fold;
