@@ -12,16 +12,12 @@ mod parties;
 use std::collections::BTreeSet;
 use std::io::{Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream, UdpSocket};
-use std::os::unix::process::CommandExt;
-use std::process::{Child, Command};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use nix::sys::signal::{Signal, killpg};
-use nix::unistd::Pid;
 use parties::{Chat, Chatter, agreement, endpoints, guard, peers, plant, remote_io, station};
 use understudy_bus::{
     Clock, Control, EventSink, FieldDriver, Host, HostEvent, LinkKind, NoField, NoObserver, Noted,
@@ -185,9 +181,9 @@ fn all_hear_all_over_zenoh() {
 }
 
 /// How long each of so many restarts took, from the start of the new life until it received all of its peers and all of them received it,
-/// in ascending order. Each member of the cell in turn, beside so many busy processes.
+/// in ascending order. Each member of the cell in turn, beside so many busy threads.
 fn restarts(link: LinkKind, count: u64, busy: usize) -> Vec<Duration> {
-    let _busy: Vec<Busy> = (0..busy).map(|_| Busy::start()).collect();
+    let _busy = Busy::start(busy);
     let peers = peers(&cell());
     let (sender, reports) = channel();
     let start = |own, life| Running::start(own, life, link, &peers, &sender);
@@ -227,29 +223,41 @@ fn restarts(link: LinkKind, count: u64, busy: usize) -> Vec<Duration> {
     times
 }
 
-/// A process that does nothing but compute; it ends with its test.
-struct Busy(Child);
+/// Threads that do nothing but compute. No processes: one that is being started holds a copy of every port for a moment.
+struct Busy {
+    over: Arc<AtomicBool>,
+    threads: Vec<JoinHandle<()>>,
+}
 
 impl Busy {
-    fn start() -> Self {
-        let mut shell = Command::new("timeout");
-        let shell = shell.args(["300", "sh", "-c", "while :; do :; done"]);
-        Self(shell.process_group(0).spawn().expect("a shell"))
+    fn start(count: usize) -> Self {
+        let over = Arc::new(AtomicBool::new(false));
+        let compute = || {
+            let over = Arc::clone(&over);
+            std::thread::spawn(move || {
+                while !over.load(Ordering::Relaxed) {
+                    std::hint::spin_loop();
+                }
+            })
+        };
+        let threads = (0..count).map(|_| compute()).collect();
+        Self { over, threads }
     }
 }
 
 impl Drop for Busy {
     fn drop(&mut self) {
-        let group = Pid::from_raw(i32::try_from(self.0.id()).expect("a process id"));
-        // It can only fail where the process has ended by itself.
-        let _ = killpg(group, Signal::SIGKILL);
-        let _ = self.0.wait();
+        self.over.store(true, Ordering::Relaxed);
+        for thread in self.threads.drain(..) {
+            // It cannot panic.
+            let _ = thread.join();
+        }
     }
 }
 
 /// `UNDERSTUDY_RESTARTS=1000 UNDERSTUDY_BUSY=8` measures what docs/performance.md says.
 #[test]
-fn restarts_beside_busy_processes_are_received_over_zenoh() {
+fn restarts_beside_busy_threads_are_received_over_zenoh() {
     let number = |name, otherwise| {
         let text = std::env::var(name).ok();
         text.map_or(otherwise, |text| text.parse().expect("a number"))
@@ -259,7 +267,7 @@ fn restarts_beside_busy_processes_are_received_over_zenoh() {
     let times = restarts(LinkKind::Zenoh, count, busy as usize);
     let share = |percent: usize| times[(times.len() - 1) * percent / 100];
     eprintln!(
-        "{count} restarts beside {busy} busy processes: p50 {:?}, p99 {:?}, longest {:?}",
+        "{count} restarts beside {busy} busy threads: p50 {:?}, p99 {:?}, longest {:?}",
         share(50),
         share(99),
         share(100)

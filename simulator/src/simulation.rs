@@ -14,7 +14,7 @@ use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
 use understudy_wire::{
     Epoch, Field, Frame, Input, Machine, Moment, Output, Party, ProgramId, ProgramSet, Source,
-    StateChoice, StationId, Time,
+    StateChoice, StationId, StationSet, Time,
 };
 
 use crate::fault::{Action, Fault};
@@ -72,6 +72,8 @@ pub struct Simulation {
     tallies: Vec<Tally>,
     /// For each remote I/O, whether its last deadline was direct and everybody spoke.
     ready: ProgramSet,
+    /// For each remote I/O, the stations of which frames arrived since its last sample, and between that one and the one before.
+    arrived: Vec<[StationSet; 2]>,
     violations: Vec<Violation>,
     faults: Vec<Fault>,
     pace: Pace,
@@ -110,6 +112,7 @@ impl Simulation {
             referees,
             tallies: vec![Tally::default(); parts.remote_ios.len()],
             ready: ProgramSet::EMPTY,
+            arrived: vec![[StationSet::EMPTY; 2]; parts.remote_ios.len()],
             violations: Vec::new(),
             faults: Vec::new(),
             pace: Pace::new(parts.stations[0].agreement.schedule.period()),
@@ -360,6 +363,10 @@ impl Simulation {
             self.give(Party::Station(station), Input::Frame(frame), observe);
         }
         for program in delivery.remote_ios.iter() {
+            let is_running = self.remote_ios[program.index()].running().is_some();
+            if let (Party::Station(station), true) = (delivery.frame.header.sender, is_running) {
+                self.arrived[program.index()][0].insert(station);
+            }
             self.give(
                 Party::RemoteIo(program),
                 Input::Frame(&delivery.frame),
@@ -444,6 +451,10 @@ impl Simulation {
         observe: &mut Observe<'_>,
     ) {
         let holder = self.holder_before(program, event);
+        if let understudy_remote_io::Event::Sampled { .. } = event {
+            let [newest, before] = &mut self.arrived[program.index()];
+            *before = std::mem::take(newest);
+        }
         let referee = &mut self.referees[program.index()];
         let (chosen, started) = (referee.operator_may_choose(), referee.cold_starts());
         let mut found = referee.observe(event).err();
@@ -472,8 +483,9 @@ impl Simulation {
         self.tallies[program.index()].count(event);
     }
 
-    /// A station that runs, that the remote I/O receives and that receives it, and whose state a sample could have extended: asked
-    /// where a sample extends a state that the referee does not know.
+    /// A station that runs, that the remote I/O has received in the last two cycles, that can receive it, and whose state a sample could have
+    /// extended: asked where a sample extends a state that the referee does not know. Who has come back only now was silent for so long
+    /// that nobody could tell it from a dead one.
     fn holder_before(
         &self,
         program: ProgramId,
@@ -488,11 +500,16 @@ impl Simulation {
         }
         let remote_io = Party::RemoteIo(program);
         let own = self.remote_ios[program.index()].running()?.configuration();
+        let [newest, before] = self.arrived[program.index()];
         let mut stations = (0..).zip(&self.stations);
         let holder = stations.find(|(rank, slot)| {
             let station = Party::Station(StationId(*rank));
-            let connected =
-                self.links.reaches(station, remote_io) && self.links.reaches(remote_io, station);
+            let is_received = [newest, before]
+                .iter()
+                .all(|arrived| arrived.contains(StationId(*rank)));
+            let connected = is_received
+                && self.links.reaches(station, remote_io)
+                && self.links.reaches(remote_io, station);
             let admitted = slot.running().filter(|it| it.configuration() == own);
             let state = admitted.and_then(|it| it.state_of(program));
             connected && state.is_some_and(|(lineage, _)| referee.would_be_lost(lineage))
@@ -522,13 +539,14 @@ impl Hash for Simulation {
             referees,
             tallies: _,
             ready,
+            arrived,
             violations,
             faults,
             pace,
             founded,
         } = self;
         (links, stations, remote_ios, plants, referees).hash(hasher);
-        (ready, violations.len(), pace, founded).hash(hasher);
+        (ready, arrived, violations.len(), pace, founded).hash(hasher);
         for fault in faults {
             (
                 fault.at_cycle,

@@ -93,6 +93,32 @@ fn a_remote_io_that_receives_nobody_for_long_does_not_forget_its_history() {
     assert!(robot.fail_safe > 1_200 && robot.direct > 90, "{robot:?}");
 }
 
+/// The robot's controller stands still with the only copy of the state, and goes on just before, in or after the cycle in which the program starts
+/// cold: for as long as it was silent nobody could tell it from a dead one, and from then on it counts.
+#[test]
+fn a_station_that_comes_back_as_its_program_starts_cold_is_too_late_or_continues() {
+    let mut colds = 0;
+    for continues in 40..56 {
+        let mut simulation =
+            Simulation::new(press_cell::parts(Mode::Full, 1), Network::default(), 1);
+        simulation.schedule(fault(20, 0.0, station(0), Action::Stop));
+        simulation.schedule(fault(20, 0.0, Party::Station(UNDERSTUDY), Action::Crash));
+        simulation.schedule(fault(20, 0.0, Party::Station(UNDERSTUDY), Action::Restart));
+        simulation.schedule(fault(continues, 0.0, station(0), Action::Continue));
+        let mut cold = 0;
+        simulation
+            .run(120, 100, &mut |_, cycle, party, record| {
+                let is_cold = matches!(record, Record::RemoteIo(Event::StartedCold { .. }));
+                cold += u32::from(is_cold && party == ROBOT_IO && cycle > Some(20));
+            })
+            .expect("the cluster gets ready");
+        assert_eq!(simulation.violations(), [], "{continues}");
+        colds += cold;
+    }
+    // Some of them are too late, and some are not.
+    assert!((1..16).contains(&colds), "{colds}");
+}
+
 /// The understudy receives neither the samples of the robot nor any station for `length` cycles, then what
 /// `ends` says happens to the robot's controller.
 fn stale(length: u64, stale_state: StaleState, ends: Action) -> Simulation {
