@@ -74,6 +74,8 @@ pub struct Simulation {
     ready: ProgramSet,
     /// For each remote I/O, the stations of which frames arrived since its last sample, and between that one and the one before.
     arrived: Vec<[StationSet; 2]>,
+    /// For each remote I/O, the stations that had the state of its program when it sampled last.
+    holders: Vec<StationSet>,
     violations: Vec<Violation>,
     faults: Vec<Fault>,
     pace: Pace,
@@ -113,6 +115,7 @@ impl Simulation {
             tallies: vec![Tally::default(); parts.remote_ios.len()],
             ready: ProgramSet::EMPTY,
             arrived: vec![[StationSet::EMPTY; 2]; parts.remote_ios.len()],
+            holders: vec![StationSet::EMPTY; parts.remote_ios.len()],
             violations: Vec::new(),
             faults: Vec::new(),
             pace: Pace::new(parts.stations[0].agreement.schedule.period()),
@@ -452,6 +455,7 @@ impl Simulation {
     ) {
         let holder = self.holder_before(program, event);
         if let understudy_remote_io::Event::Sampled { .. } = event {
+            self.holders[program.index()] = self.holders_now(program);
             let [newest, before] = &mut self.arrived[program.index()];
             *before = std::mem::take(newest);
         }
@@ -483,9 +487,9 @@ impl Simulation {
         self.tallies[program.index()].count(event);
     }
 
-    /// A station that runs, that the remote I/O has received in the last two cycles, that can receive it, and whose state a sample could have
-    /// extended: asked where a sample extends a state that the referee does not know. Who has come back only now was silent for so long
-    /// that nobody could tell it from a dead one.
+    /// A station that the remote I/O has received in the last two cycles, and that had for all of the last one a state that the sample could
+    /// have extended: asked where a sample extends a state that the referee does not know. Who has come back, or has taken over the state of one that
+    /// has, only in the last cycle has not been able to say so.
     fn holder_before(
         &self,
         program: ProgramId,
@@ -494,27 +498,39 @@ impl Simulation {
         let understudy_remote_io::Event::Sampled { moment, before, .. } = event else {
             return None;
         };
-        let referee = &self.referees[program.index()];
-        if referee.state_of(*before).is_some() {
+        if self.referees[program.index()].state_of(*before).is_some() {
             return None;
         }
+        let [newest, earlier] = self.arrived[program.index()];
+        let holders = self.holders_now(program);
+        let mut lasting = self.holders[program.index()].iter();
+        let holder = lasting.find(|&station| {
+            let sets = [newest, earlier, holders];
+            sets.iter().all(|set| set.contains(station))
+        });
+        holder.map(|station| (*moment, station))
+    }
+
+    /// The stations that run, that the remote I/O of a program can receive and that can receive it, with a state that its next sample could extend.
+    fn holders_now(&self, program: ProgramId) -> StationSet {
         let remote_io = Party::RemoteIo(program);
-        let own = self.remote_ios[program.index()].running()?.configuration();
-        let [newest, before] = self.arrived[program.index()];
-        let mut stations = (0..).zip(&self.stations);
-        let holder = stations.find(|(rank, slot)| {
-            let station = Party::Station(StationId(*rank));
-            let is_received = [newest, before]
-                .iter()
-                .all(|arrived| arrived.contains(StationId(*rank)));
-            let connected = is_received
-                && self.links.reaches(station, remote_io)
-                && self.links.reaches(remote_io, station);
+        let Some(running) = self.remote_ios[program.index()].running() else {
+            return StationSet::EMPTY;
+        };
+        let (own, referee) = (running.configuration(), &self.referees[program.index()]);
+        let holds = |rank: u8, slot: &Slot<Station>| {
+            let station = Party::Station(StationId(rank));
+            let connected =
+                self.links.reaches(station, remote_io) && self.links.reaches(remote_io, station);
             let admitted = slot.running().filter(|it| it.configuration() == own);
             let state = admitted.and_then(|it| it.state_of(program));
             connected && state.is_some_and(|(lineage, _)| referee.would_be_lost(lineage))
-        });
-        holder.map(|(rank, _)| (*moment, StationId(rank)))
+        };
+        let stations = (0..).zip(&self.stations);
+        stations
+            .filter(|(rank, slot)| holds(*rank, slot))
+            .map(|(rank, _)| StationId(rank))
+            .collect()
     }
 
     fn send(&mut self, frame: Arc<Frame>) {
@@ -540,13 +556,14 @@ impl Hash for Simulation {
             tallies: _,
             ready,
             arrived,
+            holders,
             violations,
             faults,
             pace,
             founded,
         } = self;
         (links, stations, remote_ios, plants, referees).hash(hasher);
-        (ready, arrived, violations.len(), pace, founded).hash(hasher);
+        (ready, arrived, holders, violations.len(), pace, founded).hash(hasher);
         for fault in faults {
             (
                 fault.at_cycle,

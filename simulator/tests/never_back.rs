@@ -98,13 +98,26 @@ fn a_remote_io_that_receives_nobody_for_long_does_not_forget_its_history() {
 #[test]
 fn a_station_that_comes_back_as_its_program_starts_cold_is_too_late_or_continues() {
     let mut colds = 0;
-    for continues in 40..56 {
+    for (continues, phase) in
+        (40..58).flat_map(|cycle| [0.0, 0.13, 0.6].map(|phase| (cycle, phase)))
+    {
         let mut simulation =
             Simulation::new(press_cell::parts(Mode::Full, 1), Network::default(), 1);
-        simulation.schedule(fault(20, 0.0, station(0), Action::Stop));
-        simulation.schedule(fault(20, 0.0, Party::Station(UNDERSTUDY), Action::Crash));
-        simulation.schedule(fault(20, 0.0, Party::Station(UNDERSTUDY), Action::Restart));
-        simulation.schedule(fault(continues, 0.0, station(0), Action::Continue));
+        simulation.schedule(fault(20, phase, station(0), Action::Stop));
+        let crashes = if phase > 0.0 { 29 } else { 20 };
+        simulation.schedule(fault(
+            crashes,
+            phase,
+            Party::Station(UNDERSTUDY),
+            Action::Crash,
+        ));
+        simulation.schedule(fault(
+            crashes,
+            phase,
+            Party::Station(UNDERSTUDY),
+            Action::Restart,
+        ));
+        simulation.schedule(fault(continues, phase, station(0), Action::Continue));
         let mut cold = 0;
         simulation
             .run(120, 100, &mut |_, cycle, party, record| {
@@ -112,11 +125,11 @@ fn a_station_that_comes_back_as_its_program_starts_cold_is_too_late_or_continues
                 cold += u32::from(is_cold && party == ROBOT_IO && cycle > Some(20));
             })
             .expect("the cluster gets ready");
-        assert_eq!(simulation.violations(), [], "{continues}");
+        assert_eq!(simulation.violations(), [], "{continues} {phase}");
         colds += cold;
     }
     // Some of them are too late, and some are not.
-    assert!((1..16).contains(&colds), "{colds}");
+    assert!((1..54).contains(&colds), "{colds}");
 }
 
 /// The understudy receives neither the samples of the robot nor any station for `length` cycles, then what
