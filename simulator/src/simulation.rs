@@ -13,7 +13,7 @@ use serde::Serialize;
 use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
 use understudy_wire::{
-    Epoch, Field, Frame, Input, Machine, Moment, Output, Party, ProgramId, ProgramSet, Source,
+    Epoch, Field, Frame, Input, Lineage, Machine, Output, Party, ProgramId, ProgramSet, Source,
     StateChoice, StationId, StationSet, Time,
 };
 
@@ -453,11 +453,14 @@ impl Simulation {
         event: &understudy_remote_io::Event,
         observe: &mut Observe<'_>,
     ) {
-        let holder = self.holder_before(program, event);
-        if let understudy_remote_io::Event::Sampled { .. } = event {
-            self.holders[program.index()] = self.holders_now(program);
-            let [newest, before] = &mut self.arrived[program.index()];
-            *before = std::mem::take(newest);
+        let mut holder = None;
+        if let understudy_remote_io::Event::Sampled { moment, before, .. } = event {
+            let holders = self.holders(program);
+            let found = self.holder_before(program, *before, holders);
+            holder = found.map(|station| (*moment, station));
+            self.holders[program.index()] = holders;
+            let [newest, earlier] = &mut self.arrived[program.index()];
+            *earlier = std::mem::take(newest);
         }
         let referee = &mut self.referees[program.index()];
         let (chosen, started) = (referee.operator_may_choose(), referee.cold_starts());
@@ -487,32 +490,28 @@ impl Simulation {
         self.tallies[program.index()].count(event);
     }
 
-    /// A station that the remote I/O has received in the last two cycles, and that had for all of the last one a state that the sample could
-    /// have extended: asked where a sample extends a state that the referee does not know. Who has come back, or has taken over the state of one that
-    /// has, only in the last cycle has not been able to say so.
+    /// Of the stations that have the state of a program now, one that had it when the last sample was taken and that the remote I/O has received in
+    /// the last two cycles: asked where a sample extends a state, `before`, that the referee does not know. Who has come back, or has taken over
+    /// the state of one that has, only in the last cycle has not been able to say so.
     fn holder_before(
         &self,
         program: ProgramId,
-        event: &understudy_remote_io::Event,
-    ) -> Option<(Moment, StationId)> {
-        let understudy_remote_io::Event::Sampled { moment, before, .. } = event else {
-            return None;
-        };
-        if self.referees[program.index()].state_of(*before).is_some() {
+        before: Lineage,
+        holders: StationSet,
+    ) -> Option<StationId> {
+        if self.referees[program.index()].state_of(before).is_some() {
             return None;
         }
         let [newest, earlier] = self.arrived[program.index()];
-        let holders = self.holders_now(program);
         let mut lasting = self.holders[program.index()].iter();
-        let holder = lasting.find(|&station| {
+        lasting.find(|&station| {
             let sets = [newest, earlier, holders];
             sets.iter().all(|set| set.contains(station))
-        });
-        holder.map(|station| (*moment, station))
+        })
     }
 
     /// The stations that run, that the remote I/O of a program can receive and that can receive it, with a state that its next sample could extend.
-    fn holders_now(&self, program: ProgramId) -> StationSet {
+    fn holders(&self, program: ProgramId) -> StationSet {
         let remote_io = Party::RemoteIo(program);
         let Some(running) = self.remote_ios[program.index()].running() else {
             return StationSet::EMPTY;
