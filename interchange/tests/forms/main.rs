@@ -5,28 +5,13 @@ use std::ops::Range;
 use understudy_interchange::{Format, digraph, read};
 use understudy_ladder::print;
 
+use crate::reading::reading;
+
 #[allow(dead_code, reason = "parts of it are for others")]
 #[path = "../../../ladder/tests/ladder/random.rs"]
 mod random;
-
-/// What a reading is, but for the places in the file.
-fn reading(format: Format, text: &str) -> String {
-    let reading = read(format, "file", text, None);
-    let program = reading.program.as_ref().map(print).unwrap_or_default();
-    let found = reading.diagnostics.iter();
-    let mut said: Vec<String> = found
-        .map(|found| format!("{:?} {} {}", found.severity, found.code, found.message))
-        .chain(
-            reading
-                .fidelity
-                .notes
-                .iter()
-                .map(|note| note.message.clone()),
-        )
-        .collect();
-    said.sort();
-    format!("{program}\n{:?}\n{}", reading.period, said.join("\n"))
-}
+#[path = "../shared/reading.rs"]
+mod reading;
 
 /// The words and signs of a text: letters and digits, or one other character.
 fn words(text: &str) -> Vec<Range<usize>> {

@@ -4,10 +4,11 @@ use std::ops::Range;
 
 use roxmltree::{Document, Node};
 use understudy_diagnostic::Severity;
+use understudy_interchange::Format;
 use understudy_interchange::plcopen::{read, write};
-use understudy_ladder::print;
 
 use crate::random::random_program;
+use crate::reading::reading;
 use crate::support::PERIOD;
 
 /// Elements that only say how a program is drawn; a wire is the `connection` at its end, and the right rail takes no power.
@@ -38,33 +39,14 @@ const LAYOUT_ATTRIBUTES: [&str; 14] = [
     "organization",
 ];
 
-/// What a reading is, but for the places in the file.
-fn reading(text: &str) -> String {
-    let reading = read(text, None);
-    let program = reading.program.as_ref().map(print).unwrap_or_default();
-    let found = reading.diagnostics.iter();
-    let mut said: Vec<String> = found
-        .map(|found| format!("{:?} {} {}", found.severity, found.code, found.message))
-        .chain(
-            reading
-                .fidelity
-                .notes
-                .iter()
-                .map(|note| note.message.clone()),
-        )
-        .collect();
-    said.sort();
-    format!("{program}\n{:?}\n{}", reading.period, said.join("\n"))
-}
-
 /// The elements and attributes of a file without which it is read in the same way.
 fn unread(text: &str) -> Vec<String> {
-    let whole = reading(text);
+    let whole = reading(Format::PlcOpen, text);
     let document = Document::parse(text).expect("XML");
     let mut unread = Vec::new();
     let mut check = |place: Range<usize>, node: Node<'_, '_>, what: String| {
         let without = format!("{}{}", &text[..place.start], &text[place.end..]);
-        if Document::parse(&without).is_ok() && reading(&without) == whole {
+        if Document::parse(&without).is_ok() && reading(Format::PlcOpen, &without) == whole {
             let around: Vec<&str> = node
                 .ancestors()
                 .skip(1)
@@ -203,13 +185,13 @@ fn every_element_of_each_language_counts() {
         assert!(
             read(&text, None).program.is_some(),
             "{name}\n{}",
-            reading(&text)
+            reading(Format::PlcOpen, &text)
         );
         assert_eq!(
             unread(&text),
             Vec::<String>::new(),
             "{name}\n{}",
-            reading(&text)
+            reading(Format::PlcOpen, &text)
         );
     }
 }
@@ -266,7 +248,7 @@ fn what_has_no_meaning_here_is_refused_and_not_dropped() {
         assert!(
             codes(&file(body)).contains(&code),
             "{body}\n{}",
-            reading(&file(body))
+            reading(Format::PlcOpen, &file(body))
         );
     }
 }
@@ -275,7 +257,11 @@ fn what_has_no_meaning_here_is_refused_and_not_dropped() {
 fn names_that_differ_by_case_alone_are_named_both() {
     let text = file("<ST><xhtml:p>y := a;</xhtml:p></ST>").replace("name=\"b\"", "name=\"A\"");
     assert!(codes(&text).contains(&"U1003"));
-    assert!(reading(&text).contains("`a` and `A`"), "{}", reading(&text));
+    assert!(
+        reading(Format::PlcOpen, &text).contains("`a` and `A`"),
+        "{}",
+        reading(Format::PlcOpen, &text)
+    );
 }
 
 #[test]

@@ -9,6 +9,8 @@ mod public_ladders;
 #[path = "../../../ladder/tests/ladder/random.rs"]
 #[allow(dead_code, reason = "the generator of the ladder's own tests")]
 mod random;
+#[path = "../shared/reading.rs"]
+mod reading;
 mod round_trip;
 mod schema;
 mod support;
