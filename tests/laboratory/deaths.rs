@@ -12,13 +12,13 @@ use super::shared::{DEADLINE, answer, empty_folder, one_at_a_time};
 use super::{PRESS_CELL, no_orphan, running, running_with, signal};
 
 /// The journal of a run that is being written.
-struct Records {
+pub(super) struct Records {
     journal: BufReader<File>,
     line: String,
 }
 
 impl Records {
-    fn of(run: &Path) -> Self {
+    pub(super) fn of(run: &Path) -> Self {
         let journal = File::open(run.join("journal.jsonl")).expect("a journal");
         Self {
             journal: BufReader::new(journal),
@@ -27,7 +27,7 @@ impl Records {
     }
 
     /// The next record that is wanted, of those that have not been read.
-    fn wait_for(&mut self, what: &str, wanted: impl Fn(&Value) -> bool) -> Value {
+    pub(super) fn wait_for(&mut self, what: &str, wanted: impl Fn(&Value) -> bool) -> Value {
         let deadline = Instant::now() + DEADLINE;
         loop {
             assert!(Instant::now() < deadline, "{what} did not come");
@@ -55,7 +55,7 @@ impl Records {
     }
 }
 
-fn is(record: &Value, name: &str, event: &str) -> bool {
+pub(super) fn is(record: &Value, name: &str, event: &str) -> bool {
     record["name"] == name && record["event"]["event"] == event
 }
 

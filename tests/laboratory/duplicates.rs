@@ -4,13 +4,13 @@ use std::fs::{self, Permissions};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
-use std::time::Instant;
 
 use nix::sys::signal::Signal;
 use serde_json::Value;
 use understudy_bus::free_addresses;
 
-use super::shared::{DEADLINE, empty_folder, one_at_a_time, understudy};
+use super::deaths::{Records, is};
+use super::shared::{empty_folder, one_at_a_time, understudy};
 use super::{PERIOD, PRESS_CELL, no_orphan, running, signal};
 
 /// A second robot beside that of a run: with a copy of its keys, at an address of its own.
@@ -64,26 +64,14 @@ impl Drop for Double {
 fn endpoints(run: &Path, folder: &Path) -> PathBuf {
     let text = fs::read_to_string(run.join("endpoints.json")).expect("endpoints");
     let all: Value = serde_json::from_str(&text).expect("JSON");
-    let own = find(&all, "robot").expect("the robot's address");
+    let mut members = all.as_array().expect("a list").iter();
+    let own = members.find(|member| member["name"] == "robot");
+    let own = own.and_then(|robot| robot["address"].as_str());
+    let own = own.expect("the robot's address");
     let address = free_addresses(1).expect("a free port")[0];
     let path = folder.join("endpoints.json");
-    fs::write(&path, text.replace(&own, &address.to_string())).expect("written");
+    fs::write(&path, text.replace(own, &address.to_string())).expect("written");
     path
-}
-
-/// The address beside a name, wherever in a document.
-fn find(value: &Value, name: &str) -> Option<String> {
-    if value["name"] == name {
-        return value["address"].as_str().map(str::to_owned);
-    }
-    if let Some(address) = value.get(name).and_then(Value::as_str) {
-        return Some(address.to_owned());
-    }
-    match value {
-        Value::Array(list) => list.iter().find_map(|value| find(value, name)),
-        Value::Object(map) => map.values().find_map(|value| find(value, name)),
-        _ => None,
-    }
 }
 
 fn records(run: &Path) -> Vec<Value> {
@@ -93,14 +81,6 @@ fn records(run: &Path) -> Vec<Value> {
     lines
         .map(|line| serde_json::from_str(line).expect("a record"))
         .collect()
-}
-
-fn wait_for(run: &Path, what: &str, wanted: impl Fn(&Value) -> bool) {
-    let deadline = Instant::now() + DEADLINE;
-    while !records(run).iter().any(&wanted) {
-        assert!(Instant::now() < deadline, "{what} did not come");
-        std::thread::yield_now();
-    }
 }
 
 /// A record that is waited for, and what it is called.
@@ -115,7 +95,7 @@ fn with_copy(name: &str, period: &str, wanted: &[Wanted<'_>]) -> Vec<Value> {
     let run = fs::canonicalize(out.join("latest")).expect("a run");
     let copy = Double::start(&run, &folder, period);
     for (what, wanted) in wanted {
-        wait_for(&run, what, wanted);
+        Records::of(&run).wait_for(what, wanted);
     }
     drop(copy);
     signal(child.id(), Signal::SIGINT);
@@ -125,10 +105,6 @@ fn with_copy(name: &str, period: &str, wanted: &[Wanted<'_>]) -> Vec<Value> {
     let summary: Value = serde_json::from_str(&summary).expect("JSON");
     assert_eq!(summary["violation_count"], 0, "{summary:#}");
     records(&run)
-}
-
-fn is(record: &Value, name: &str, event: &str) -> bool {
-    record["name"] == name && record["event"]["event"] == event
 }
 
 fn refused_as<'a>(kind: &'a str) -> impl Fn(&Value) -> bool + 'a {

@@ -6,7 +6,7 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::io::{self, Read, Write as _};
+use std::io;
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -14,6 +14,7 @@ use std::thread;
 
 use serde_json::Value;
 
+use super::shared::modbus;
 use super::{PERIOD, answer, empty_folder, no_orphan, one_at_a_time};
 
 /// Counts requests, and folds the bit that comes with each into a signature of four bits.
@@ -202,11 +203,7 @@ fn serve(listener: &TcpListener, device: &Mutex<Device>) {
 fn exchange(mut connection: TcpStream, device: &Mutex<Device>) -> io::Result<()> {
     connection.set_nodelay(true)?;
     loop {
-        let mut header = [0; 7];
-        connection.read_exact(&mut header)?;
-        let length = usize::from(u16::from_be_bytes([header[4], header[5]]));
-        let mut request = vec![0; length.saturating_sub(1)];
-        connection.read_exact(&mut request)?;
+        let (head, request) = modbus::request(&mut connection)?;
         let mut device = device.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(answer) = device.request(&request) else {
             let request = format!("a request it does not know: {request:?}");
@@ -217,9 +214,7 @@ fn exchange(mut connection: TcpStream, device: &Mutex<Device>) -> io::Result<()>
             return Ok(());
         }
         drop(device);
-        let length = u16::try_from(answer.len() + 1).expect("short");
-        header[4..6].copy_from_slice(&length.to_be_bytes());
-        connection.write_all(&[&header[..], &answer].concat())?;
+        head.answer(&mut connection, &answer)?;
     }
 }
 

@@ -5,7 +5,7 @@
 
 use std::collections::VecDeque;
 use std::fs;
-use std::io::{self, Read, Write};
+use std::io;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, TcpListener, TcpStream};
 use std::os::fd::AsRawFd;
 use std::path::Path;
@@ -18,6 +18,7 @@ use std::time::{Duration, Instant};
 use nix::sys::socket::{AddressFamily, SockFlag, SockType, SockaddrIn, bind, connect, socket};
 use understudy_bus::free_addresses;
 
+use super::shared::modbus;
 use super::{DEADLINE, Running, answer, empty_folder, one_at_a_time, text};
 
 const CONNECTIONS: usize = 5_000;
@@ -70,11 +71,7 @@ impl Device {
         connection.set_nodelay(true)?;
         connection.set_read_timeout(Some(Duration::from_secs(5)))?;
         while self.is_there.load(Ordering::Relaxed) {
-            let mut header = [0; 7];
-            connection.read_exact(&mut header)?;
-            let length = usize::from(u16::from_be_bytes([header[4], header[5]]));
-            let mut request = vec![0; length - 1];
-            connection.read_exact(&mut request)?;
+            let (head, request) = modbus::request(&mut connection)?;
             let answer = match request[..] {
                 // Read one discrete input.
                 [2, 0, 0, 0, 1] => vec![2, 1, u8::from(self.asking.load(Ordering::Relaxed))],
@@ -88,9 +85,7 @@ impl Device {
                 }
                 _ => return Err(io::ErrorKind::InvalidData.into()),
             };
-            let length = u16::try_from(answer.len() + 1).expect("short");
-            header[4..6].copy_from_slice(&length.to_be_bytes());
-            connection.write_all(&[&header[..], &answer].concat())?;
+            head.answer(&mut connection, &answer)?;
         }
         Ok(())
     }

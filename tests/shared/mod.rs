@@ -1,6 +1,7 @@
 //! What the tests of real processes have in common: the binary, folders of their own, and one at a time.
 
 pub(crate) mod deployed;
+pub(crate) mod modbus;
 pub(crate) mod page;
 
 use std::fs;
