@@ -118,8 +118,8 @@ struct Applied {
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 enum Phase {
-    /// The history is not known: cycles listened for so far.
-    Listening { cycles: u32 },
+    /// The history is not known: cycles listened for, and whether a living station held a state in the last of them.
+    Listening { cycles: u32, held: bool },
     /// The history, whether it has this cycle's sample, and the cycles for which no living station was on it.
     Running {
         history: History,
@@ -141,7 +141,10 @@ impl RemoteIo {
             clock,
             attendance: Attendance::new(stations, agreement.flag_after),
             witnesses: Witnesses::new(settings.program, agreement),
-            phase: Phase::Listening { cycles: 0 },
+            phase: Phase::Listening {
+                cycles: 0,
+                held: false,
+            },
             sensors: Image::zero(settings.inputs),
             field: Image::zero(settings.inputs),
             diagnosing: Diagnosing::new(settings.diagnosis.as_deref()),

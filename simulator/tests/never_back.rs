@@ -309,3 +309,46 @@ fn a_remote_io_that_cannot_know_what_it_applied_asks() {
         assert_eq!(last, Some(expected), "{controller_dies}");
     }
 }
+
+/// A remote I/O that has just started loses the only holder of the state, and a station of a new life takes the state over: as long as it may,
+/// nothing starts cold.
+#[test]
+fn a_state_that_is_handed_over_while_a_remote_io_listens_is_waited_for() {
+    let robot_io_from = |rank| Action::Cut { to: station(rank) };
+    let to_robot_io = Action::Cut { to: ROBOT_IO };
+    for (at, phase) in (107..125).flat_map(|at| [0.1, 0.4, 0.6, 0.9].map(|phase| (at, phase))) {
+        // The controller is cut off from it, and gives the state to the understudy; or it comes back, and takes the state from
+        // the understudy, which the remote I/O does not receive.
+        let cut_off = [
+            (90, 0.4, station(2), Action::Crash),
+            (100, 0.0, ROBOT_IO, Action::Crash),
+            (103, 0.0, ROBOT_IO, Action::Restart),
+            (at, phase, ROBOT_IO, robot_io_from(0)),
+            (at, phase, station(0), to_robot_io.clone()),
+            (at + 2, 0.4, station(2), Action::Restart),
+        ];
+        let restarted = [
+            (20, 0.0, station(2), to_robot_io.clone()),
+            (100, 0.9, ROBOT_IO, Action::Crash),
+            (100, 0.9, ROBOT_IO, Action::Restart),
+            (at, phase, station(0), Action::Crash),
+            (at + 1, phase, station(0), Action::Restart),
+        ];
+        for faults in [&cut_off[..], &restarted] {
+            let parts = press_cell::parts(Mode::Full, 1);
+            let mut simulation = Simulation::new(parts, Network::default(), 1);
+            for (cycle, phase, party, action) in faults {
+                simulation.schedule(fault(*cycle, *phase, *party, action.clone()));
+            }
+            let mut seen = Seen::default();
+            simulation
+                .run(200, 100, &mut |_, cycle, party, record| {
+                    seen.note(cycle, party, &record)
+                })
+                .expect("the cluster gets ready");
+            let starts = faults.len();
+            assert_eq!(simulation.violations(), [], "{at} {phase} {starts}");
+            assert_eq!(seen.cold, 0, "{at} {phase} {starts}");
+        }
+    }
+}

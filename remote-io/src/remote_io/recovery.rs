@@ -52,7 +52,13 @@ impl RemoteIo {
                 }
                 waited
             }
-            Phase::Listening { cycles } => {
+            Phase::Listening { cycles, held } => {
+                let holds = self.witnesses.newest().is_some();
+                // Whoever held a state may come back, or have given it to another station.
+                if *held && !holds {
+                    *cycles = 0;
+                }
+                *held = holds;
                 *cycles = cycles.saturating_add(u32::from(self.witnesses.anybody()));
                 *cycles
             }
