@@ -85,7 +85,7 @@ enum What {
     Failover(Box<failover::Arguments>),
     /// Memory of a long simulated run with loss and failures
     Memory(memory::Arguments),
-    /// A scan of a program as machine code, beside the scan of a station
+    /// A scan of a program
     Scan(scan::Arguments),
     /// One process of the exchange
     #[command(hide = true)]

@@ -1,14 +1,17 @@
 //! `understudy catalogue`: controllers that can be bought, and who says what of them.
 
 use std::fmt::Write as _;
+use std::fs::File;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
 use understudy_allocation::{
-    Catalogue, Controller, Family, Figure, Kind, Quantity, Statement, file,
+    Added, AdditionError, Catalogue, Controller, Family, Figure, Kind, Mode, Quantity, Statement,
+    file,
 };
-use understudy_catalogue::{Mode, Store, StoreError, Written, seed};
+use understudy_diagnostic::Report;
 
 use crate::allocate::message;
 use crate::answer::{Answer, Status};
@@ -20,13 +23,13 @@ use crate::files;
 Example:
   understudy catalogue list --family S7-1200
   understudy catalogue show \"CPU 1214C\"
-  understudy catalogue add --catalogue ours.db --vendor Works --model A1 --family A --kind plc --source \"data sheet of 2026\" digital_inputs=8
-  understudy catalogue import prices.csv --catalogue ours.db --update
+  understudy catalogue add --catalogue ours.csv --vendor Works --model A1 --family A --kind plc --source \"data sheet of 2026\" digital_inputs=8
+  understudy catalogue import prices.csv --catalogue ours.csv --update
   understudy catalogue export --output controllers.csv
 
-Without --catalogue it is the one that comes with the program, which is only read. With it, it is a SQLite file; `add` and `import` make it
-where there is none, with everything that comes with the program in it. A figure that is not there is unknown, and never 0. The files and the
-tables are described in docs/catalogue.md.")]
+Without --catalogue it is the one that comes with the program, which is only read. With it, it is a file in one of the forms of
+docs/catalogue.md; `add` and `import` make it where there is none, with everything that comes with the program in it. A figure that is not
+there is unknown, and never 0.")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     what: What,
@@ -150,7 +153,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     answer.unwrap_or_else(|answer| answer)
 }
 
-fn refused(errors: &[StoreError]) -> Answer {
+fn refused(errors: &[AdditionError]) -> Answer {
     errors
         .iter()
         .fold(Answer::done("", Value::Null), |answer, error| {
@@ -158,51 +161,41 @@ fn refused(errors: &[StoreError]) -> Answer {
         })
 }
 
-fn one(error: StoreError) -> Answer {
-    refused(&[error])
-}
-
-fn seeded() -> Result<Catalogue, Answer> {
-    seed().map_err(Answer::bad_files)
-}
-
 /// The catalogue at `path`, or the one that comes with the program; and what it is called.
 pub(crate) fn read(path: Option<&Path>) -> Result<(Catalogue, String), Answer> {
-    let store = match path {
-        Some(path) if !path.exists() => {
-            let message = format!("{} cannot be read: there is no such file", path.display());
-            return Err(Answer::failed(Status::BadInput, "U0601", message));
-        }
-        Some(path) => Store::open(path, false).map_err(one)?,
+    let (catalogue, name) = match path {
+        Some(path) => (read_file(path)?.0, path.display().to_string()),
         None => {
-            let mut store = Store::in_memory().map_err(one)?;
-            let seeded = seeded()?;
-            store
-                .put(&seeded, Mode::New)
-                .map_err(|errors| refused(&errors))?;
-            store
+            let catalogue = Catalogue::built_in().map_err(Answer::bad_files)?;
+            let name = "the catalogue that comes with the program".to_owned();
+            (catalogue, name)
         }
     };
-    let catalogue = store.read().map_err(one)?;
-    let name = path.map_or_else(
-        || "the catalogue that comes with the program".to_owned(),
-        |path| path.display().to_string(),
-    );
     let about = format!("{name} ({} controllers)", catalogue.len());
     Ok((catalogue, about))
 }
 
-/// The catalogue at `path`, to be written; made where it is not there.
-fn to_write(path: &Path, empty: bool) -> Result<Store, Answer> {
-    if path.exists() {
-        return Store::open(path, true).map_err(one);
+/// What a catalogue file says, and the remarks on it.
+fn read_file(path: &Path) -> Result<(Catalogue, Report), Answer> {
+    if begins_as_sqlite(path) {
+        let message = format!(
+            "{} is a SQLite catalogue of an earlier version; write it as a file with that version: \
+             understudy catalogue export --catalogue {0} --output FILE.csv",
+            path.display()
+        );
+        return Err(Answer::failed(Status::BadInput, "U1121", message));
     }
-    let catalogue = if empty {
-        Catalogue::default()
-    } else {
-        seeded()?
-    };
-    Store::create(path, &catalogue).map_err(|errors| refused(&errors))
+    let loaded = file::read(&path.display().to_string(), &files::text(path)?);
+    match loaded.catalogue {
+        Some(catalogue) => Ok((catalogue, loaded.report)),
+        None => Err(Answer::bad_files(vec![loaded.report])),
+    }
+}
+
+fn begins_as_sqlite(path: &Path) -> bool {
+    let mut first = [0; 16];
+    let read = File::open(path).and_then(|mut file| file.read_exact(&mut first));
+    read.is_ok() && first == *b"SQLite format 3\0"
 }
 
 fn list(file: &FileArgument, vendor: Option<&str>, family: Option<&str>) -> Result<Answer, Answer> {
@@ -352,34 +345,40 @@ fn add(file: &WrittenFile, entry: &Entry) -> Result<Answer, Answer> {
 }
 
 fn import(file: &WrittenFile, from: &Path, update: bool, empty: bool) -> Result<Answer, Answer> {
-    let loaded = file::read(&from.display().to_string(), &files::text(from)?);
-    let Some(part) = loaded.catalogue else {
-        return Err(Answer::bad_files(vec![loaded.report]));
-    };
+    let (part, report) = read_file(from)?;
     let answer = put(file, &part, update, empty)?;
-    Ok(answer.with_reports(vec![loaded.report]))
+    Ok(answer.with_reports(vec![report]))
 }
 
 fn put(file: &WrittenFile, part: &Catalogue, update: bool, empty: bool) -> Result<Answer, Answer> {
-    let mut store = to_write(&file.catalogue, empty)?;
+    let path = &file.catalogue;
+    let mut catalogue = if path.exists() {
+        read_file(path)?.0
+    } else if empty {
+        Catalogue::default()
+    } else {
+        Catalogue::built_in().map_err(Answer::bad_files)?
+    };
     let mode = if update { Mode::Update } else { Mode::New };
-    let written = store.put(part, mode).map_err(|errors| refused(&errors))?;
-    let Written {
-        added,
+    let added = catalogue.add(part, mode);
+    let added = added.map_err(|errors| refused(&errors))?;
+    files::replace(path, &file::write(&catalogue))?;
+    let Added {
+        models,
         updated,
         family_figures,
         changed,
-    } = &written;
+    } = &added;
     let mut text = format!(
-        "{}: {added} added, {updated} updated, {family_figures} figures of families\n",
-        file.catalogue.display()
+        "{}: {models} added, {updated} updated, {family_figures} figures of families\n",
+        path.display()
     );
     for figure in changed {
         let _ = writeln!(text, "  changed: {figure}");
     }
     let result = json!({
-        "catalogue": file.catalogue.display().to_string(),
-        "added": added,
+        "catalogue": path.display().to_string(),
+        "added": models,
         "updated": updated,
         "family_figures": family_figures,
         "changed": changed,
@@ -393,7 +392,7 @@ fn export(file: &FileArgument, output: Option<&Path>) -> Result<Answer, Answer> 
     match output {
         None => Ok(Answer::done(text.clone(), json!({ "text": text }))),
         Some(path) => {
-            files::write(path, &text)?;
+            files::replace(path, &text)?;
             let name = path.display().to_string();
             let said = format!("{} controllers written to {name}", catalogue.len());
             Ok(Answer::done(said, json!({ "file": name })))

@@ -84,6 +84,19 @@ pub(crate) fn write(path: &Path, text: &str) -> Result<(), Answer> {
     })
 }
 
+/// Writes a file anew: whole, or not at all.
+pub(crate) fn replace(path: &Path, text: &str) -> Result<(), Answer> {
+    let mut staged = path.as_os_str().to_owned();
+    staged.push(".new");
+    let staged = PathBuf::from(staged);
+    write(&staged, text)?;
+    fs::rename(&staged, path).map_err(|error| {
+        let _ = fs::remove_file(&staged);
+        let message = format!("{} cannot be written: {error}", path.display());
+        Answer::failed(Status::Failed, "U0602", message)
+    })
+}
+
 /// Reads a cluster file and the ladders that it names, which stand beside it.
 pub(crate) fn read_cluster(path: &Path, text: &str, overrides: Overrides) -> Loaded {
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();

@@ -1,15 +1,15 @@
-//! `understudy bench scan`: how long a scan takes, by the scan of the stations and by machine code.
+//! `understudy bench scan`: how long a scan of a program takes.
 
-use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_pcg::Pcg64;
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_interchange::parse_program;
 use understudy_logic::{Circuit, Scan, Scratch};
-use understudy_native::{Frame, Machine, sample};
 
 use crate::answer::{Answer, Status};
 use crate::files;
@@ -18,22 +18,16 @@ use crate::kind::Kind;
 /// From one scan to the next where a program has timers; the speed does not depend on it.
 const PERIOD: Duration = Duration::from_millis(10);
 
-/// Scans of a round, so few that it is over before somebody else gets the processor; the fastest of all rounds counts.
+/// Scans of a round, so few that it is over before another process gets the processor; the fastest of all rounds counts.
 const SCANS: usize = 100;
 const ROUNDS: usize = 300;
 
-/// Rungs of a program, as the parser bounds them.
-const RUNGS: std::ops::RangeInclusive<i64> = 1..=100_000;
-
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// A program; without one, rungs of 4.9 contacts drawn at random
+    /// A program
     #[arg(value_name = "FILE")]
-    program: Option<PathBuf>,
-    /// How many random rungs
-    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(RUNGS))]
-    rungs: u32,
-    /// What they and the inputs are drawn from
+    program: PathBuf,
+    /// What the inputs are drawn from
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
@@ -42,19 +36,7 @@ pub(crate) struct Arguments {
 #[derive(Debug, Serialize, JsonSchema)]
 pub(crate) struct Found {
     rungs: usize,
-    /// Seconds from the circuit to machine code.
-    compiled_in: f64,
-    code_bytes: usize,
-    ways: Vec<Way>,
-    /// Whether all did the same.
-    equal: bool,
-}
-
-/// One way to scan.
-#[derive(Debug, Serialize, JsonSchema)]
-struct Way {
-    name: &'static str,
-    /// At once.
+    /// Runs of the program that one scan steps at once.
     runs: usize,
     nanoseconds_per_scan: f64,
     nanoseconds_per_rung: f64,
@@ -65,60 +47,37 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         Ok(program) => program,
         Err(answer) => return answer,
     };
-    let begin = Instant::now();
-    let machine = match Machine::new(&circuit) {
-        Ok(machine) => machine,
-        Err(error) => return Answer::failed(Status::Failed, error.code(), error.to_string()),
-    };
-    let compiled_in = begin.elapsed().as_secs_f64();
     let scan = Scan::new(&circuit);
     let images = images(circuit.inputs().len(), arguments.seed);
-    let mut frame = machine.frame();
-    let mut state: Vec<u64> = frame.registers().to_vec();
+    let registers = circuit.registers().iter();
+    let mut state: Vec<u64> = registers
+        .map(|register| u64::from(register.initial).wrapping_neg())
+        .collect();
     let mut scratch = Scratch::default();
     let mut outputs = vec![0; circuit.outputs().len()];
-    let mut equal = true;
-    let (mut by_code, mut by_scan) = (f64::INFINITY, f64::INFINITY);
-    for _ in 0..ROUNDS {
-        by_code = by_code.min(timed(|number| {
-            code(&machine, &mut frame, image(&images, number))
-        }));
-        by_scan = by_scan.min(timed(|number| {
-            scan.step_lanes(
-                &mut scratch,
-                &mut state,
-                image(&images, number),
-                &mut outputs,
-            );
-        }));
-        equal &= frame.outputs() == outputs && *frame.registers() == state[..];
-    }
-    let way = |name, nanoseconds: f64| Way {
-        name,
+    let rounds = (0..ROUNDS).map(|_| {
+        timed(|number| {
+            let inputs = &images[number % images.len()];
+            scan.step_lanes(&mut scratch, &mut state, inputs, &mut outputs);
+        })
+    });
+    let nanoseconds = rounds.fold(f64::INFINITY, f64::min);
+    let found = Found {
+        rungs,
         runs: 64,
         nanoseconds_per_scan: nanoseconds,
         nanoseconds_per_rung: nanoseconds / rungs.max(1) as f64,
     };
-    let found = Found {
-        rungs,
-        compiled_in,
-        code_bytes: machine.code_bytes(),
-        ways: vec![
-            way("machine code", by_code),
-            way("scan of a station", by_scan),
-        ],
-        equal,
-    };
-    let status = if equal { Status::Done } else { Status::Failed };
-    Answer::done(text(&found), found).with_status(status)
+    let text = format!(
+        "{rungs} rungs, 64 runs at once, random inputs: {:.0} ns a scan, {:.2} ns a rung",
+        found.nanoseconds_per_scan, found.nanoseconds_per_rung
+    );
+    Answer::done(text, found)
 }
 
 /// How many rungs, and what they do.
 fn program(arguments: &Arguments) -> Result<(usize, Circuit), Answer> {
-    let Some(path) = &arguments.program else {
-        let rungs = sample::rungs(arguments.rungs as usize, arguments.seed);
-        return Ok((rungs.len(), sample::program(&rungs)));
-    };
+    let path = &arguments.program;
     let source = files::text_of(Kind::Ladder, path)?;
     let name = path.display().to_string();
     let parsed = parse_program(&name, &source);
@@ -138,26 +97,10 @@ fn program(arguments: &Arguments) -> Result<(usize, Circuit), Answer> {
 
 /// Images of random inputs, taken in turn.
 fn images(inputs: usize, seed: u64) -> Vec<Vec<u64>> {
-    // Xorshift has no way on from 0.
-    let mut state = seed.max(1);
-    let mut draw = || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        state
-    };
+    let mut draw = Pcg64::seed_from_u64(seed);
     (0..16)
-        .map(|_| (0..inputs).map(|_| draw()).collect())
+        .map(|_| (0..inputs).map(|_| draw.random()).collect())
         .collect()
-}
-
-fn image(images: &[Vec<u64>], number: usize) -> &[u64] {
-    &images[number % images.len()]
-}
-
-fn code(machine: &Machine, frame: &mut Frame, inputs: &[u64]) {
-    frame.inputs().copy_from_slice(inputs);
-    machine.step(frame);
 }
 
 /// Nanoseconds of one scan.
@@ -167,26 +110,4 @@ fn timed(mut scan: impl FnMut(usize)) -> f64 {
         scan(number);
     }
     begin.elapsed().as_nanos() as f64 / SCANS as f64
-}
-
-fn text(found: &Found) -> String {
-    let mut text = format!(
-        "{} rungs, compiled in {:.3} s to {} KiB of machine code; 64 runs at once, random inputs\n",
-        found.rungs,
-        found.compiled_in,
-        found.code_bytes.div_ceil(1024)
-    );
-    for way in &found.ways {
-        let _ = writeln!(
-            text,
-            "  {:<18} {:>9.2} ns a rung {:>11.0} ns a scan",
-            way.name, way.nanoseconds_per_rung, way.nanoseconds_per_scan
-        );
-    }
-    text.push_str(if found.equal {
-        "both did the same in every run"
-    } else {
-        "THEY DIFFER: do not use the machine code, and report this program"
-    });
-    text
 }

@@ -3,7 +3,7 @@
 #
 #   deployment/release.sh [DIRECTORY] [TARGET...]
 #
-# Without targets both are built. The C parts (ring, SQLite) need a C compiler for musl: Zig (`pip install ziglang`) has it for both,
+# Without targets both are built. The C parts (ring) need a C compiler for musl: Zig (`pip install ziglang`) has it for both,
 # musl-gcc (Debian: musl-tools) for this machine's own. Rust brings the linker and the C library: Zig's own has an allocator on which a
 # thread waits by spinning, and one in real time then waits for ever for one that is not.
 set -eu

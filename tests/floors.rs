@@ -23,7 +23,6 @@ const FLOORS: &[&[&str]] = &[
     &[
         "understudy-allocation",
         "understudy-interchange",
-        "understudy-native",
         "understudy-node",
         "understudy-plant",
         "understudy-remote-io",
@@ -36,7 +35,6 @@ const FLOORS: &[&[&str]] = &[
     ],
     &[
         "understudy-bus",
-        "understudy-catalogue",
         "understudy-field",
         "understudy-keys",
         "understudy-network",

@@ -21,7 +21,7 @@ impl Kind {
     /// Both.
     pub const ALL: [Self; 2] = [Self::Plc, Self::Embedded];
 
-    /// Its name in files and in the database.
+    /// Its name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Plc => "plc",

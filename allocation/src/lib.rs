@@ -7,6 +7,7 @@
 //!
 //! Unknown is unknown: a figure that is not in the catalogue never counts as 0 and never as enough.
 
+mod additions;
 mod allocate;
 mod controller;
 mod csv;
@@ -23,6 +24,7 @@ mod report;
 mod requirement;
 mod resources;
 
+pub use additions::{Added, AdditionError, Mode};
 pub use allocate::{
     Allocation, AllocationError, BoxOnPlan, Candidate, Item, Options, Placed, Preference, Stock,
     Verification, allocate,

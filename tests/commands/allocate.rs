@@ -129,7 +129,7 @@ fn what_is_asked_wrongly_is_said_whole() {
 fn a_catalogue_of_ones_own_is_made_filled_and_exported() {
     let folder = empty_folder("catalogue");
     let file = |name: &str| folder.join(name).display().to_string();
-    let (database, prices, exported) = (file("ours.db"), file("prices.csv"), file("out.csv"));
+    let (database, prices, exported) = (file("ours.csv"), file("prices.csv"), file("out.csv"));
     let figures = [
         "--vendor",
         "Works",
@@ -192,7 +192,7 @@ fn a_catalogue_of_ones_own_is_made_filled_and_exported() {
         &exported,
     ]);
     assert_eq!(written.status, 0, "{}", written.shown());
-    let copy = file("copy.db");
+    let copy = file("copy.csv");
     let copied = understudy(&[
         "catalogue",
         "import",
@@ -211,7 +211,7 @@ fn a_catalogue_of_ones_own_is_made_filled_and_exported() {
 fn bad_catalogues_are_refused_and_nothing_is_written() {
     let folder = empty_folder("catalogue_bad");
     let file = |name: &str| folder.join(name).display().to_string();
-    let (bad, database) = (file("bad.csv"), file("ours.db"));
+    let (bad, database) = (file("bad.csv"), file("ours.csv"));
     let text = "vendor,model,family,kind,digital_inputs,source_url\nWorks,A,W,plc,many,x\nWorks,A,W,plc,8,\n";
     fs::write(&bad, text).expect("written");
     let answer = understudy(&["catalogue", "import", &bad, "--catalogue", &database]);
@@ -219,9 +219,12 @@ fn bad_catalogues_are_refused_and_nothing_is_written() {
     for code in ["U1107", "U1108", "U1109"] {
         assert!(answer.errors.contains(code), "{}", answer.errors);
     }
-    assert!(!folder.join("ours.db").exists());
+    assert!(!folder.join("ours.csv").exists());
     let answer = understudy(&["allocate", PAINTING, "--catalogue", &bad]);
     assert_eq!(answer.status, 2);
+    assert!(answer.errors.contains("U1107"), "{}", answer.errors);
+    fs::write(&database, b"SQLite format 3\0\xff\xfe").expect("written");
+    let answer = understudy(&["catalogue", "list", "--catalogue", &database]);
     assert!(answer.errors.contains("U1121"), "{}", answer.errors);
     let answer = understudy(&["catalogue", "show", "CPU 1214"]);
     assert!(answer.errors.contains("CPU 1214C"), "{}", answer.errors);

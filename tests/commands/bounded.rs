@@ -192,7 +192,7 @@ fn every_other_reader_is_bounded() {
     for file in ["line.csv", "lines.csv"] {
         refused(
             &folder,
-            &["catalogue", "import", file, "--catalogue", "ours.db"],
+            &["catalogue", "import", file, "--catalogue", "ours.csv"],
         );
     }
     write("line.chain", junk("a -> ", 1 << 20));

@@ -1,5 +1,6 @@
 //! What programs need, what controllers have, and which are taken.
 
+mod additions;
 mod files;
 mod fitting;
 mod instruction_list;

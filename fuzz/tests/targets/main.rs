@@ -178,8 +178,8 @@ fn nesting_has_a_bound() {
 #[test]
 fn catalogue() {
     let seeds = [
-        "catalogue/data/controllers.csv",
-        "catalogue/data/families.csv",
+        "allocation/data/controllers.csv",
+        "allocation/data/families.csv",
     ];
     attack("catalogue", &seeds, |bytes| {
         let Some(catalogue) = file::read("fuzz", &text(bytes)).catalogue else {
