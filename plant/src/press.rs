@@ -1,14 +1,14 @@
 //! The press of section V: a ram that presses the part that lies under it.
 //!
 //! A part is finished, counted and taken away when the ram has gone down on it and has come back up. Mishap: a part that
-//! arrives while another lies there, or while the ram is not up; such a part is lost.
+//! arrives while another lies there, or while the ram is more than a step from up; such a part is lost.
 
 use serde::{Deserialize, Serialize};
 use smallvec::{SmallVec, smallvec};
 
 use crate::feeder::Feeder;
 use crate::model::{Counts, Model};
-use crate::robot::{moved, shown};
+use crate::robot::{moved, shown, tolerance};
 
 /// How far and how fast.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, Hash)]
@@ -65,7 +65,8 @@ impl Press {
     }
 
     fn take_parts(&mut self, arrived: u64) {
-        let free = self.part.is_none() && self.ram == 0;
+        let is_up = self.ram <= tolerance(self.parameters.ram_cycles);
+        let free = self.part.is_none() && is_up;
         let parts = self.feeder.parts(arrived, free);
         let fits = u64::from(free).min(parts);
         if fits == 1 {

@@ -6,8 +6,9 @@
 //!   pick place                          where it hands over
 //! ```
 //!
-//! Driving an axis against its end is harmless, as is driving it both ways at once. Mishaps: moving sideways while not up, and
-//! opening the gripper with a part anywhere but at the two places below.
+//! Driving an axis against its end stop is harmless, as is driving it both ways at once. Mishaps: moving sideways while not up, and
+//! opening the gripper with a part anywhere but at the two places below. A step short of an end is near enough for both: an output
+//! that is held for a cycle moves an axis a little further, and breaks nothing.
 
 use serde::{Deserialize, Serialize};
 use smallvec::{SmallVec, smallvec};
@@ -89,6 +90,12 @@ impl Robot {
         self.vertical == self.parameters.vertical_cycles
     }
 
+    /// Low enough to open the gripper.
+    fn is_low(&self) -> bool {
+        let end = self.parameters.vertical_cycles;
+        self.vertical + tolerance(end) >= end
+    }
+
     fn is_right(&self) -> bool {
         self.horizontal == self.parameters.horizontal_cycles
     }
@@ -104,7 +111,8 @@ impl Robot {
     fn move_axes(&mut self, right: bool, left: bool, down: bool, up: bool) {
         let before = self.horizontal;
         self.horizontal = moved(before, right, left, self.parameters.horizontal_cycles);
-        let sideways = self.horizontal != before && self.vertical > 0;
+        let sideways =
+            self.horizontal != before && self.vertical > tolerance(self.parameters.vertical_cycles);
         if sideways && !self.sideways_while_low {
             self.counts.mishaps += 1;
         }
@@ -113,17 +121,17 @@ impl Robot {
     }
 
     fn move_gripper(&mut self, closed: bool) {
-        let at_pick_place = self.horizontal == 0 && self.is_down();
-        if closed && !self.closed && at_pick_place && self.part_at_pick_place {
+        let at_pick_place = self.horizontal == 0;
+        if closed && !self.closed && at_pick_place && self.is_down() && self.part_at_pick_place {
             self.part_at_pick_place = false;
             self.holds_part = true;
         }
         if !closed && self.holds_part {
             self.holds_part = false;
-            if self.is_right() && self.is_down() {
+            if self.is_right() && self.is_low() {
                 self.counts.handed_over += 1;
                 self.counts.finished += 1;
-            } else if at_pick_place && !self.part_at_pick_place {
+            } else if at_pick_place && self.is_low() && !self.part_at_pick_place {
                 self.part_at_pick_place = true;
             } else {
                 self.counts.mishaps += 1;
@@ -173,6 +181,11 @@ pub(crate) fn moved(position: u32, further: bool, back: bool, end: u32) -> u32 {
         (false, true) => position.saturating_sub(1),
         _ => position,
     }
+}
+
+/// By how many steps of an axis its end may be missed; a short one is exact.
+pub(crate) fn tolerance(end: u32) -> u32 {
+    u32::from(end > 2)
 }
 
 /// 0 to 1000 of the way to `end`.

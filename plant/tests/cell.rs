@@ -103,6 +103,7 @@ struct Loop {
     scan: Scan,
     scratch: Scratch,
     state: Image,
+    outputs: Image,
     plant: Plant,
     field: Field,
 }
@@ -117,6 +118,7 @@ impl Loop {
         Self {
             field: plant.field(),
             scratch: Scratch::default(),
+            outputs: Image::zero(scan.output_count()),
             state,
             scan,
             plant,
@@ -124,6 +126,19 @@ impl Loop {
     }
 
     fn cycle(&mut self, arrived: u64) {
+        self.outputs = self.scanned();
+        self.field = self.plant.step(&self.outputs, arrived);
+    }
+
+    /// A cycle in which the plant moves on with the outputs of the last one, whether the program is scanned or not.
+    fn held(&mut self, arrived: u64, scanned: bool) {
+        if scanned {
+            self.scanned();
+        }
+        self.field = self.plant.step(&self.outputs, arrived);
+    }
+
+    fn scanned(&mut self) -> Image {
         let mut outputs = Image::zero(self.scan.output_count());
         self.scan.step(
             &mut self.scratch,
@@ -131,7 +146,7 @@ impl Loop {
             self.field.sensors.words(),
             outputs.words_mut(),
         );
-        self.field = self.plant.step(&outputs, arrived);
+        outputs
     }
 }
 
@@ -154,6 +169,45 @@ fn the_working_reading_finishes_six_parts_in_300_cycles() {
     let (arm, ram) = run(Reading::Working, 300);
     assert_eq!((arm.handed_over, arm.finished, arm.mishaps), (6, 6, 0));
     assert_eq!((ram.finished, ram.mishaps), (6, 0));
+}
+
+/// Whichever cycle it is, and whether the samples of the held cycles are scanned or lost: outputs that are held for one or two
+/// cycles move an axis a little further, and nothing breaks.
+#[test]
+fn outputs_that_are_held_for_two_cycles_break_nothing() {
+    let arm = ModelKind::Robot(RobotParameters::default());
+    let ram = ModelKind::Press(PressParameters::default());
+    let mut broken = Vec::new();
+    for begin in 0..150 {
+        for (length, scanned, holds) in [1, 2]
+            .into_iter()
+            .flat_map(|length| [false, true].map(|scanned| (length, scanned)))
+            .flat_map(|(length, scanned)| [1, 2, 3].map(|holds| (length, scanned, holds)))
+        {
+            let mut robot = Loop::new(&robot(Reading::Working), &arm, false);
+            let mut press = Loop::new(&press(), &ram, true);
+            for cycle in 0..300 {
+                let is_held = (begin..begin + length).contains(&cycle);
+                let before = robot.field.handed_over;
+                let step = |one: &mut Loop, arrived, bit| {
+                    if is_held && holds & bit != 0 {
+                        one.held(arrived, scanned);
+                    } else {
+                        one.cycle(arrived);
+                    }
+                };
+                step(&mut robot, 0, 1);
+                let arrived = robot.field.handed_over - before;
+                step(&mut press, arrived, 2);
+            }
+            let mishaps = (robot.field.mishaps, press.field.mishaps);
+            let finished = press.field.finished;
+            if mishaps != (0, 0) || finished < 5 {
+                broken.push((begin, length, scanned, holds, mishaps, finished));
+            }
+        }
+    }
+    assert_eq!(broken, []);
 }
 
 #[test]
@@ -192,6 +246,11 @@ fn the_arm_knows_what_must_not_happen() {
     // Dropped on the way, and dropped from above the press.
     check_arm(&[down, take, lift, release], 0, 1);
     check_arm(&[down, take, lift, carry, release], 0, 1);
+    // A step above the press is near enough, two are not.
+    let nearly: (&[&str], usize) = (&["move_down", "grip"], 4);
+    let above: (&[&str], usize) = (&["move_down", "grip"], 3);
+    check_arm(&[down, take, lift, carry, nearly, release], 1, 0);
+    check_arm(&[down, take, lift, carry, above, release], 0, 1);
     // Put back where it was.
     check_arm(&[down, take, release, take, lift], 0, 0);
     // Sideways while low is one mishap, however long it lasts.
