@@ -39,6 +39,7 @@ const FLOORS: &[&[&str]] = &[
         "understudy-keys",
         "understudy-network",
         "understudy-simulator",
+        "understudy-testing",
     ],
     &[
         "understudy-baselines",

@@ -1,14 +1,10 @@
 //! Hosts of namespaces, where this machine lets the tests make them.
 
-#![allow(
-    clippy::print_stderr,
-    reason = "a test that cannot be done here says why"
-)]
-
 use std::net::{SocketAddr, UdpSocket};
 use std::time::Duration;
 
 use understudy_network::{Hosts, NetworkError, Share};
+use understudy_testing::skip;
 
 /// For what comes at once or never.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -18,7 +14,7 @@ fn hosts(count: usize) -> Option<Hosts> {
     match Hosts::build(&names) {
         Ok(hosts) => Some(hosts),
         Err(error @ (NetworkError::NotPermitted { .. } | NetworkError::NoTool { .. })) => {
-            eprintln!("skipped: {error}");
+            skip(error);
             None
         }
         Err(error) => panic!("{error}"),

@@ -3,8 +3,7 @@
 
 #![allow(
     clippy::disallowed_methods,
-    clippy::print_stderr,
-    reason = "what is waited for has a deadline on the real clock, and who skips says so"
+    reason = "what is waited for has a deadline on the real clock"
 )]
 
 use std::fs::{self, Permissions};
@@ -20,6 +19,7 @@ use nix::unistd::Pid;
 use serde_json::Value;
 use understudy_cluster::{Cluster, press_cell, read};
 use understudy_scenarios::{Journal, Parties, keep_cluster, read as read_scenario, simulate};
+use understudy_testing::skip;
 use understudy_view::{Bounds, Run};
 
 /// What the reader is written for.
@@ -277,9 +277,9 @@ fn python() -> Option<String> {
     if version == ASYNCUA {
         return Some(python);
     }
-    eprintln!(
-        "skipped: {python} has asyncua {version:?} and not {ASYNCUA}: pip install asyncua=={ASYNCUA}"
-    );
+    skip(format_args!(
+        "{python} has asyncua {version:?} and not {ASYNCUA}: pip install asyncua=={ASYNCUA}"
+    ));
     None
 }
 

@@ -2,8 +2,7 @@
 
 #![allow(
     clippy::disallowed_methods,
-    clippy::print_stderr,
-    reason = "what is waited for has a deadline on the real clock, and who skips says so"
+    reason = "what is waited for has a deadline on the real clock"
 )]
 
 use std::fs;
@@ -16,6 +15,7 @@ use std::time::Duration;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
+use understudy_testing::skip;
 
 use crate::{empty_folder, understudy, understudy_in};
 
@@ -373,9 +373,9 @@ fn grafanas_own_model_reads_the_dashboard_whole() {
         .as_ref()
         .map_or(true, |read| read.status.code() == Some(77));
     if missing {
-        eprintln!(
-            "skipped: {python} has no Grafana model: pip install grafana-foundation-sdk, and name it by UNDERSTUDY_PYTHON"
-        );
+        skip(format_args!(
+            "{python} has no Grafana model: pip install grafana-foundation-sdk, and name it by UNDERSTUDY_PYTHON"
+        ));
         return;
     }
     let read = read.expect("it ran");

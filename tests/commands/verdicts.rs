@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use understudy_testing::skip;
 
 use crate::{empty_folder, understudy_in};
 
@@ -16,10 +17,9 @@ const EXPLAINED: [(&str, &str); 3] = [
 ];
 
 fn folders() -> Vec<PathBuf> {
-    let Some(data) = std::env::var_os("UNDERSTUDY_DATA") else {
-        return Vec::new();
-    };
+    let data = std::env::var_os("UNDERSTUDY_DATA").unwrap_or_default();
     let Ok(entries) = fs::read_dir(Path::new(&data).join("ladder/esbmc_ld")) else {
+        skip("UNDERSTUDY_DATA names no folder with ladder/esbmc_ld");
         return Vec::new();
     };
     let mut folders: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();

@@ -8,6 +8,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::Instant;
 
 use serde_json::Value;
+use understudy_testing::skip;
 
 use super::{DEADLINE, answer, empty_folder, no_orphan, one_at_a_time, running_cluster, signal};
 
@@ -37,13 +38,15 @@ impl Device {
         let python = std::env::var("UNDERSTUDY_PYTHON").unwrap_or_else(|_| "python3".into());
         let version = Command::new(&python)
             .args(["-c", "import pymodbus; print(pymodbus.__version__)"])
-            .output()
-            .ok()?;
-        let version = String::from_utf8_lossy(&version.stdout).trim().to_owned();
+            .output();
+        let version = version.map_or_else(
+            |error| error.to_string(),
+            |output| String::from_utf8_lossy(&output.stdout).trim().to_owned(),
+        );
         if version != PYMODBUS {
-            eprintln!(
-                "skipped: {python} has pymodbus {version:?} and not {PYMODBUS}: pip install pymodbus=={PYMODBUS}"
-            );
+            skip(format_args!(
+                "{python} has pymodbus {version:?} and not {PYMODBUS}: pip install pymodbus=={PYMODBUS}"
+            ));
             return None;
         }
         let port = port.unwrap_or_else(|| {

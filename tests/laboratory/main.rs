@@ -1,9 +1,6 @@
 //! Real processes: what the laboratory promises of them. Over plain UDP, so that an unoptimised build keeps its times too.
 
-#![allow(
-    clippy::print_stderr,
-    reason = "a test that cannot be done here says why"
-)]
+#![allow(clippy::print_stderr, reason = "what was measured is worth a line")]
 #![allow(
     clippy::disallowed_methods,
     reason = "what is waited for has a deadline on the real clock"

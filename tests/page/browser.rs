@@ -1,6 +1,7 @@
 //! A real browser drives every view of a real laboratory, where `UNDERSTUDY_BROWSER` names a Chromium and Node is installed.
 
 use std::process::Command;
+use understudy_testing::skip;
 
 use crate::{Page, empty_folder, one_at_a_time, party, understudy};
 
@@ -16,7 +17,7 @@ fn is_there(program: &str) -> bool {
 fn a_browser_sees_a_kill_and_asks_why() {
     let browser = std::env::var("UNDERSTUDY_BROWSER").unwrap_or_default();
     if browser.is_empty() || !is_there("node") || !is_there(&browser) {
-        eprintln!("skipped: UNDERSTUDY_BROWSER names no Chromium, or Node is not installed");
+        skip("UNDERSTUDY_BROWSER names no Chromium, or Node is not installed");
         return;
     }
     let _turn = one_at_a_time();
@@ -42,7 +43,7 @@ fn a_browser_sees_a_kill_and_asks_why() {
     let said = String::from_utf8_lossy(&output.stdout);
     let errors = String::from_utf8_lossy(&output.stderr);
     if output.status.code() == Some(NOT_STARTED) {
-        eprintln!("skipped: {browser} does not start here: {errors:.200}");
+        skip(format_args!("{browser} does not start here: {errors:.200}"));
         return;
     }
     assert!(output.status.success(), "{said:.4000}{errors:.4000}");

@@ -1,10 +1,6 @@
 //! The page of a run from outside: every path by HTTP, commands against a real laboratory, and a browser where there is one.
 
 #![allow(
-    clippy::print_stderr,
-    reason = "a test that cannot be done here says why"
-)]
-#![allow(
     clippy::disallowed_methods,
     reason = "what is waited for has a deadline on the real clock"
 )]

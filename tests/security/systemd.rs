@@ -1,6 +1,6 @@
 //! The units of `deployment/`, started by a systemd of their own in namespaces, over a copy of this machine that is thrown away.
 
-#![allow(clippy::print_stderr, reason = "a test that is skipped says why")]
+#![allow(clippy::print_stderr, reason = "what is left behind is named")]
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
+use understudy_testing::skip;
 
 use super::{DEADLINE, addressed_cell, answer, empty_folder, one_at_a_time, text};
 
@@ -31,7 +32,7 @@ impl Machine {
     /// Nothing, with the reason on standard error, where this machine does not let a test do that.
     fn boot(folder: &Path) -> Option<Self> {
         let skipped = |reason: &str| {
-            eprintln!("skipped: {reason}");
+            skip(reason);
             None
         };
         if !Path::new("/lib/systemd/systemd").exists() {
