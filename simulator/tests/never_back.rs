@@ -324,11 +324,11 @@ fn a_state_that_is_handed_over_while_a_remote_io_listens_is_waited_for() {
             (100, 0.0, ROBOT_IO, Action::Crash),
             (103, 0.0, ROBOT_IO, Action::Restart),
             (at, phase, ROBOT_IO, robot_io_from(0)),
-            (at, phase, station(0), to_robot_io.clone()),
+            (at, phase, station(0), to_robot_io),
             (at + 2, 0.4, station(2), Action::Restart),
         ];
         let restarted = [
-            (20, 0.0, station(2), to_robot_io.clone()),
+            (20, 0.0, station(2), to_robot_io),
             (100, 0.9, ROBOT_IO, Action::Crash),
             (100, 0.9, ROBOT_IO, Action::Restart),
             (at, phase, station(0), Action::Crash),
@@ -338,7 +338,7 @@ fn a_state_that_is_handed_over_while_a_remote_io_listens_is_waited_for() {
             let parts = press_cell::parts(Mode::Full, 1);
             let mut simulation = Simulation::new(parts, Network::default(), 1);
             for (cycle, phase, party, action) in faults {
-                simulation.schedule(fault(*cycle, *phase, *party, action.clone()));
+                simulation.schedule(fault(*cycle, *phase, *party, *action));
             }
             let mut seen = Seen::default();
             simulation
