@@ -62,6 +62,8 @@ pub struct RemoteIo {
     /// Statuses that the diagnosis found to be 1 in the last scan.
     diagnosed: Image,
     floor: Floor,
+    /// When a cycle was counted last in which the history was looked for.
+    looked: Time,
     question: Option<Question>,
     protection: Protection,
     /// Whether the operator has released everybody meanwhile.
@@ -89,13 +91,11 @@ pub struct RemoteIo {
 }
 
 /// The newest sample whose outputs were applied: an applied output has moved the plant, so the history never continues from a
-/// state before it.
+/// state before it. A cold start of which no output was applied moves nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 enum Floor {
     /// Not known after a restart: stations know more of the past than this remote I/O does.
     Unknown,
-    /// No output of this history was applied.
-    Nothing,
     /// Its cycle, and the lineage that it led to.
     At { moment: Moment, lineage: Lineage },
 }
@@ -150,6 +150,7 @@ impl RemoteIo {
             diagnosing: Diagnosing::new(settings.diagnosis.as_deref()),
             diagnosed: Image::zero(settings.inputs),
             floor: Floor::Unknown,
+            looked: now,
             question: None,
             protection: Protection::default(),
             pardons: false,
@@ -249,7 +250,7 @@ impl RemoteIo {
         self.decided = false;
         self.idle = 0;
         self.turns.fill(None);
-        self.find_history(moment);
+        self.find_history(now, moment);
         self.sample(now);
     }
 
@@ -325,6 +326,7 @@ impl Hash for RemoteIo {
             diagnosing,
             diagnosed,
             floor,
+            looked,
             question,
             protection,
             pardons,
@@ -348,7 +350,7 @@ impl Hash for RemoteIo {
         )
             .hash(hasher);
         (sensors, diagnosing, diagnosed, pardons).hash(hasher);
-        (floor, question, protection).hash(hasher);
+        (floor, looked, question, protection).hash(hasher);
         (released, turns, decided, idle, missed, applied).hash(hasher);
         (waking, last_true, trust, differed, copies).hash(hasher);
     }

@@ -352,8 +352,8 @@ impl Referee {
             self.last_true = None;
             let initial = Image::from_words(self.scan.register_count(), self.scan.initial());
             let initial = initial.expect("a circuit packs its initial state");
+            // The floor stays until an output is applied: a cold start of which nothing came may be undone.
             self.remember(born, before, initial);
-            self.floor = self.states.len() - 1;
             return Ok(());
         }
         if self.recover(before) || self.blind {

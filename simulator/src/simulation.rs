@@ -72,10 +72,10 @@ pub struct Simulation {
     tallies: Vec<Tally>,
     /// For each remote I/O, whether its last deadline was direct and everybody spoke.
     ready: ProgramSet,
-    /// For each remote I/O, the stations of which frames arrived since its last sample, and between that one and the one before.
-    arrived: Vec<[StationSet; 2]>,
-    /// For each remote I/O, the stations that had the state of its program when it sampled last.
-    holders: Vec<StationSet>,
+    /// For each remote I/O, the stations of which frames arrived since its last deadline, in the cycle before that, and in the one before.
+    arrived: Vec<[StationSet; 3]>,
+    /// For each remote I/O, the stations that had the state of its program at its last deadline, and at the one before.
+    holders: Vec<[StationSet; 2]>,
     violations: Vec<Violation>,
     faults: Vec<Fault>,
     pace: Pace,
@@ -114,8 +114,8 @@ impl Simulation {
             referees,
             tallies: vec![Tally::default(); parts.remote_ios.len()],
             ready: ProgramSet::EMPTY,
-            arrived: vec![[StationSet::EMPTY; 2]; parts.remote_ios.len()],
-            holders: vec![StationSet::EMPTY; parts.remote_ios.len()],
+            arrived: vec![[StationSet::EMPTY; 3]; parts.remote_ios.len()],
+            holders: vec![[StationSet::EMPTY; 2]; parts.remote_ios.len()],
             violations: Vec::new(),
             faults: Vec::new(),
             pace: Pace::new(parts.stations[0].agreement.schedule.period()),
@@ -455,12 +455,15 @@ impl Simulation {
     ) {
         let mut holder = None;
         if let understudy_remote_io::Event::Sampled { moment, before, .. } = event {
-            let holders = self.holders(program);
-            let found = self.holder_before(program, *before, holders);
+            let found = self.holder_before(program, *before);
             holder = found.map(|station| (*moment, station));
-            self.holders[program.index()] = holders;
-            let [newest, earlier] = &mut self.arrived[program.index()];
-            *earlier = std::mem::take(newest);
+        }
+        if let understudy_remote_io::Event::Applied { .. } = event {
+            let holders = self.holders(program);
+            let [last, earlier] = &mut self.holders[program.index()];
+            *earlier = std::mem::replace(last, holders);
+            let [newest, last, earlier] = &mut self.arrived[program.index()];
+            *earlier = std::mem::replace(last, std::mem::take(newest));
         }
         let referee = &mut self.referees[program.index()];
         let (chosen, started) = (referee.operator_may_choose(), referee.cold_starts());
@@ -490,22 +493,18 @@ impl Simulation {
         self.tallies[program.index()].count(event);
     }
 
-    /// Of the stations that have the state of a program now, one that had it when the last sample was taken and that the remote I/O has received in
-    /// the last two cycles: asked where a sample extends a state, `before`, that the referee does not know. Who has come back, or has taken over
-    /// the state of one that has, only in the last cycle has not been able to say so.
-    fn holder_before(
-        &self,
-        program: ProgramId,
-        before: Lineage,
-        holders: StationSet,
-    ) -> Option<StationId> {
+    /// Of the stations that have the state of a program now, one that had it at the last two deadlines and that the remote I/O received before both:
+    /// asked where a sample extends a state, `before`, that the referee does not know. Who has come back, or has taken over the state of one that has,
+    /// only in the last cycle has not been able to say so.
+    fn holder_before(&self, program: ProgramId, before: Lineage) -> Option<StationId> {
         if self.referees[program.index()].state_of(before).is_some() {
             return None;
         }
-        let [newest, earlier] = self.arrived[program.index()];
-        let mut lasting = self.holders[program.index()].iter();
-        lasting.find(|&station| {
-            let sets = [newest, earlier, holders];
+        let [_, last, earlier] = self.arrived[program.index()];
+        let [held, held_before] = self.holders[program.index()];
+        let now = self.holders(program);
+        now.iter().find(|&station| {
+            let sets = [last, earlier, held, held_before];
             sets.iter().all(|set| set.contains(station))
         })
     }

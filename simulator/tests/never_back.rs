@@ -352,3 +352,38 @@ fn a_state_that_is_handed_over_while_a_remote_io_listens_is_waited_for() {
         }
     }
 }
+
+/// A remote I/O is suspended while the only station with the state is cut off, and reads at once what it received meanwhile: what it decides by
+/// that loses no state, and it does not continue from before an applied output.
+#[test]
+fn a_remote_io_that_was_suspended_decides_by_the_present() {
+    let members = [station(1), station(2), ROBOT_IO];
+    for (stopped, length) in (21..47).flat_map(|at| [4, 12, 25, 40].map(|length| (at, length))) {
+        let parts = press_cell::parts(Mode::Full, 1);
+        let mut simulation = Simulation::new(parts, Network::default(), 1);
+        for to in members {
+            simulation.schedule(fault(20, 0.0, station(0), Action::Cut { to }));
+            simulation.schedule(fault(46, 0.0, station(0), Action::Heal { to }));
+        }
+        for from in members {
+            let to = station(0);
+            simulation.schedule(fault(20, 0.0, from, Action::Cut { to }));
+            if from != ROBOT_IO {
+                simulation.schedule(fault(46, 0.0, from, Action::Heal { to }));
+            }
+        }
+        simulation.schedule(fault(20, 0.0, station(2), Action::Crash));
+        simulation.schedule(fault(20, 0.0, station(2), Action::Restart));
+        simulation.schedule(fault(stopped, 0.0, ROBOT_IO, Action::Stop));
+        simulation.schedule(fault(stopped + length, 0.0, ROBOT_IO, Action::Continue));
+        let mut seen = Seen::default();
+        simulation
+            .run(200, 100, &mut |_, cycle, party, record| {
+                seen.note(cycle, party, &record)
+            })
+            .expect("the cluster gets ready");
+        assert_eq!(simulation.violations(), [], "{stopped} {length}");
+        // It stays awake for so long that it starts cold before the state is there, or not at all.
+        assert!(seen.cold == 0 || stopped > 40, "{stopped} {length}");
+    }
+}

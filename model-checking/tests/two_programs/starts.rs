@@ -48,18 +48,18 @@ fn check_broken(broken: &[(Party, Party)], states: usize) {
 
 #[test]
 fn the_understudy_did_not_receive_a_remote_io() {
-    check_broken(&[(remote_io(0), station(2))], 289_817);
+    check_broken(&[(remote_io(0), station(2))], 339_382);
 }
 
 #[test]
 fn the_understudy_received_neither_a_remote_io_nor_a_station() {
     let deaf = [remote_io(0), station(0), station(1)];
-    check_broken(&deaf.map(|from| (from, station(2))), 345_524);
+    check_broken(&deaf.map(|from| (from, station(2))), 422_723);
 }
 
 #[test]
 fn a_controller_did_not_receive_its_remote_io() {
-    check_broken(&[(remote_io(0), station(0))], 290_254);
+    check_broken(&[(remote_io(0), station(0))], 339_947);
 }
 
 /// Anything once, in so many cycles.
@@ -70,37 +70,37 @@ fn one_in(cycles: u64) -> Budget {
 #[test]
 fn everybody_starts_together() {
     let everybody = [&STATIONS[..], &REMOTE_IOS[..]].concat();
-    check_from(restarted(&everybody), 1, one_in(5), 30_535);
+    check_from(restarted(&everybody), 1, one_in(5), 34_080);
 }
 
 #[test]
 fn all_stations_start_and_the_remote_ios_run() {
-    check_from(restarted(&STATIONS), 1, one_in(3), 10_197);
+    check_from(restarted(&STATIONS), 1, one_in(3), 11_150);
 }
 
 #[test]
 fn all_remote_ios_start_and_the_stations_run() {
-    check_from(restarted(&REMOTE_IOS), 1, one_in(3), 11_615);
+    check_from(restarted(&REMOTE_IOS), 1, one_in(3), 13_583);
 }
 
 #[test]
 fn a_remote_io_has_restarted() {
-    check_from(restarted(&[remote_io(0)]), 1, one_in(3), 12_489);
+    check_from(restarted(&[remote_io(0)]), 1, one_in(3), 14_142);
 }
 
 #[test]
 fn the_pacemaker_has_restarted() {
-    check_from(restarted(&[station(0)]), 1, one_in(3), 12_833);
+    check_from(restarted(&[station(0)]), 1, one_in(3), 14_393);
 }
 
 #[test]
 fn the_understudy_has_restarted_with_a_controller() {
-    check_from(restarted(&[station(1), station(2)]), 1, one_in(3), 11_969);
+    check_from(restarted(&[station(1), station(2)]), 1, one_in(3), 12_724);
 }
 
 #[test]
 fn a_controller_is_a_cycle_behind() {
-    check_from(behind(station(0)), 1, one_in(3), 13_067);
+    check_from(behind(station(0)), 1, one_in(3), 14_065);
 }
 
 #[test]
@@ -112,10 +112,10 @@ fn the_understudy_is_a_cycle_behind_and_a_controller_crashes_under_loss() {
         cycles: 1,
         ..NONE
     };
-    check_from(behind(station(2)), 1, budget, 16_073);
+    check_from(behind(station(2)), 1, budget, 12_497);
 }
 
 #[test]
 fn a_remote_io_is_a_cycle_behind() {
-    check_from(behind(remote_io(1)), 1, one_in(3), 14_130);
+    check_from(behind(remote_io(1)), 1, one_in(3), 16_007);
 }

@@ -8,7 +8,7 @@
 //!   to cover it after a restart ────────────────────────── the state is lost: see `StaleState`
 //! ```
 
-use understudy_wire::{Holding, Moment, StateChoice, StationId, StationSet};
+use understudy_wire::{Holding, Moment, StateChoice, StationId, StationSet, Time};
 
 use super::{Floor, Phase, Question, RemoteIo};
 use crate::event::Event;
@@ -26,8 +26,14 @@ enum Verdict {
 
 impl RemoteIo {
     /// Listens until it is known which station holds which state; notices when no living station is on this history any more.
-    pub(super) fn find_history(&mut self, moment: Moment) {
+    pub(super) fn find_history(&mut self, now: Time, moment: Moment) {
         let listen_cycles = self.settings.agreement.listen_cycles;
+        // What was received while this remote I/O was stopped is read at once, and counts as one cycle: the present may differ.
+        let period = self.settings.agreement.schedule.period();
+        let counted = now.since(self.looked) * 2 >= period;
+        if counted {
+            self.looked = now;
+        }
         let waited = match &mut self.phase {
             Phase::Running {
                 history,
@@ -42,7 +48,7 @@ impl RemoteIo {
                 *unfollowed = if follower.is_some() || !self.witnesses.anybody() {
                     0
                 } else {
-                    unfollowed.saturating_add(1)
+                    unfollowed.saturating_add(u32::from(counted))
                 };
                 let waited = unfollowed.saturating_sub(listen_cycles);
                 if let Some(from) = follower
@@ -59,7 +65,7 @@ impl RemoteIo {
                     *cycles = 0;
                 }
                 *held = holds;
-                *cycles = cycles.saturating_add(u32::from(self.witnesses.anybody()));
+                *cycles = cycles.saturating_add(u32::from(counted && self.witnesses.anybody()));
                 *cycles
             }
         };
@@ -95,15 +101,18 @@ impl RemoteIo {
                     None => Verdict::Stale(from, *newest),
                 }
             }
-            Floor::Unknown | Floor::Nothing => match self.witnesses.disputed() {
-                Some(stations) => Verdict::Disputed(stations),
-                None if self.floor == Floor::Unknown
-                    && !self.witnesses.covers_all_applied(newest) =>
-                {
-                    Verdict::Stale(from, *newest)
+            Floor::Unknown => {
+                let proved = match &self.phase {
+                    Phase::Listening { .. } => self.witnesses.covers_all_applied(newest),
+                    // What was applied before the cold start is not known, and nothing was applied since.
+                    Phase::Running { history, .. } => newest.born == history.born(),
+                };
+                match self.witnesses.disputed() {
+                    Some(stations) => Verdict::Disputed(stations),
+                    None if !proved => Verdict::Stale(from, *newest),
+                    None => Verdict::Adopt(from, *newest),
                 }
-                None => Verdict::Adopt(from, *newest),
-            },
+            }
         }
     }
 
@@ -114,7 +123,7 @@ impl RemoteIo {
         self.question = Some(Question::StateLost);
         let applied = match self.floor {
             Floor::At { moment, .. } => Some(moment),
-            Floor::Unknown | Floor::Nothing => None,
+            Floor::Unknown => None,
         };
         let asks = self.settings.stale_state == StaleState::Operator;
         self.report(Event::StateLost {
@@ -179,14 +188,12 @@ impl RemoteIo {
             self.remember(moment, state.map(|(station, _)| station));
         }
         self.question = None;
-        self.floor = match state {
-            None => Floor::Nothing,
-            Some(_) if self.floor == Floor::Nothing => Floor::Nothing,
-            Some((_, holding)) => Floor::At {
+        if let Some((_, holding)) = state {
+            self.floor = Floor::At {
                 moment: holding.stepped,
                 lineage: holding.lineage,
-            },
-        };
+            };
+        }
         self.phase = Phase::Running {
             history,
             sampled: false,

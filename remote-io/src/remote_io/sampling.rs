@@ -66,7 +66,7 @@ impl RemoteIo {
         });
         let (floor, applied) = match self.floor {
             Floor::At { moment, lineage } => (Some(lineage), Some(moment)),
-            Floor::Unknown | Floor::Nothing => (None, None),
+            Floor::Unknown => (None, None),
         };
         let void = history.push(&inputs, living, floor);
         *sampled = true;
