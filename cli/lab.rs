@@ -218,14 +218,14 @@ pub(crate) fn in_laboratory(
     }
 }
 
-/// An output of the first controller that the scenario kills, and the cycle in which it was first reconstructed.
+/// An output of the first controller that the scenario kills, and a cycle in which it was reconstructed.
 fn first_reconstructed(cluster: &Cluster, summary: &Summary) -> Option<(String, String)> {
     let controllers = cluster.controllers();
     summary.steps.iter().find_map(|step| {
         let controller = controllers.iter().find(|it| it.name == step.name)?;
         let output = controller.circuit.outputs().first()?;
         let output = format!("{}.{}", controller.name, output.name);
-        (step.action == "crash").then(|| (output, step.measured.to_string()))
+        (step.action == "crash").then(|| (output, (step.measured + 1).to_string()))
     })
 }
 
