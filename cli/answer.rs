@@ -1,6 +1,7 @@
 //! What a command answers, for people and for machines alike.
 
 use std::borrow::Cow;
+use std::ffi::OsStr;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -63,6 +64,8 @@ pub(crate) struct Answer {
     /// Nobody asked about the files: people are told how many warnings there are, and where to see them.
     pub(crate) counts_warnings: bool,
     pub(crate) failures: Vec<Failure>,
+    /// Commands that are useful after this one when it ended well; for people only.
+    pub(crate) next: Vec<String>,
 }
 
 impl Answer {
@@ -75,6 +78,7 @@ impl Answer {
             reports: Vec::new(),
             counts_warnings: false,
             failures: Vec::new(),
+            next: Vec::new(),
         }
     }
 
@@ -104,6 +108,14 @@ impl Answer {
 
     pub(crate) fn with_numbers(mut self, numbers: Map<String, Value>) -> Self {
         *self.numbers = numbers;
+        self
+    }
+
+    /// A command that is useful after this one, by its arguments.
+    pub(crate) fn and_next(mut self, arguments: &[&dyn AsRef<OsStr>]) -> Self {
+        let words = arguments.iter();
+        let words: Vec<_> = words.map(|word| word.as_ref().to_string_lossy()).collect();
+        self.next.push(shell_line(words.iter().map(Cow::as_ref)));
         self
     }
 
@@ -142,6 +154,21 @@ impl Answer {
             });
         }
     }
+}
+
+/// A call of this program, as a shell takes it.
+pub(crate) fn shell_line<'a>(arguments: impl IntoIterator<Item = &'a str>) -> String {
+    let plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./=:,".contains(letter);
+    let mut line = "understudy".to_owned();
+    for argument in arguments {
+        line.push(' ');
+        if !argument.is_empty() && argument.chars().all(plain) {
+            line.push_str(argument);
+        } else {
+            line.push_str(&format!("'{}'", argument.replace('\'', r"'\''")));
+        }
+    }
+    line
 }
 
 /// The findings of each file that an answer shows.

@@ -116,12 +116,8 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
     answer.unwrap_or_else(|failed| failed)
 }
 
-fn campaign(
-    arguments: &Arguments,
-    cluster: &Path,
-    console: &mut Console,
-) -> Result<Answer, Answer> {
-    let (cluster, reports) = files::cluster(cluster, arguments.overrides.overrides())?;
+fn campaign(arguments: &Arguments, path: &Path, console: &mut Console) -> Result<Answer, Answer> {
+    let (cluster, reports) = files::cluster(path, arguments.overrides.overrides())?;
     let mut kinds: Vec<Kind> = arguments.faults.iter().flatten().copied().collect();
     if kinds.is_empty() {
         kinds = Kind::masked_by(cluster.understudies().len());
@@ -161,7 +157,9 @@ fn campaign(
         .map_err(|error| Answer::failed(Status::Failed, "U0530", error.to_string()))?;
     let took = start.elapsed();
     bar.finish_and_clear();
-    let mut answer = kept(&findings, arguments.out.as_deref())?.with_used(reports);
+    let mut answer = kept(&findings, arguments.out.as_deref())?
+        .with_used(reports)
+        .and_next(&[&"model-check", &path, &"--faults", &"1", &"--cycles", &"2"]);
     if interrupted.load(Ordering::Relaxed) {
         answer.text.push_str(&format!(
             "interrupted: these are partial findings, of {} of {} runs\n",

@@ -1,5 +1,6 @@
 //! `understudy check`: everything that is wrong with files of the project, in one run.
 
+mod next;
 mod remarks;
 
 use std::fmt::Write as _;
@@ -70,7 +71,9 @@ struct CheckedFile {
 }
 
 #[derive(Default)]
-struct Found {
+struct Found<'a> {
+    /// What was named, in its order.
+    given: Vec<(Kind, &'a Path)>,
     cut_short: Vec<String>,
     reports: Vec<(Kind, Report)>,
     failures: Vec<Failure>,
@@ -86,7 +89,9 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         let Some(text) = found.text(path) else {
             continue;
         };
-        match Kind::of(path, &text) {
+        let kind = Kind::of(path, &text);
+        found.given.push((kind, path));
+        match kind {
             Kind::Ads => {
                 let diagnostics = read_ads(&text).diagnostics;
                 found.add_file(Kind::Ads, path, text, diagnostics);
@@ -136,7 +141,8 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         let scenario = read(&path.display().to_string(), &text, parties.as_ref());
         found.add(Kind::Scenario, scenario.report);
     }
-    found.answer()
+    let given = std::mem::take(&mut found.given);
+    next::after_check(found.answer(), &given)
 }
 
 /// Of the `cluster.toml` in the folder of a scenario, where there is a right one.
@@ -147,7 +153,7 @@ fn parties_beside(scenario: &Path) -> Option<Parties> {
     Some(Parties::of(&cluster))
 }
 
-impl Found {
+impl Found<'_> {
     /// Looks at the rungs of the programs of a cluster, and at its understudy.
     fn look(&mut self, looking: &Looking, cluster: &Cluster, reports: &mut [Report]) {
         let period = cluster.agreement().schedule.period();

@@ -11,7 +11,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use understudy_diagnostic::{Diagnostic, Lines, Report, Severity};
 use understudy_scenarios::Progress;
 
-use crate::answer::{Answer, Envelope, shown};
+use crate::answer::{Answer, Envelope, Status, shown};
 use crate::excerpt::Shown;
 
 /// Where a command talks to.
@@ -160,6 +160,12 @@ fn print_text(answer: &Answer) -> io::Result<()> {
         // Errors of the crates below begin with their code for those who only see the text.
         let message = without_code(&failure.message);
         writeln!(errors, "error[{}]: {message}", failure.code)?;
+    }
+    if answer.status == Status::Done {
+        for (count, line) in answer.next.iter().enumerate() {
+            let head = if count == 0 { "next:" } else { "     " };
+            writeln!(errors, "{head} {line}")?;
+        }
     }
     if let Some(failure) = answer.failures.first()
         && errors.is_terminal()

@@ -143,6 +143,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
                 let name = path.display().to_string();
                 let result = json!({ "file": name, "text": null, "fidelity": fidelity });
                 Answer::done(format!("written to {name}\n{kept}"), result)
+                    .and_next(&[&"check", path])
             }
             Err(answer) => answer,
         },
@@ -150,7 +151,8 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     answer.with_reports(vec![report])
 }
 
-fn code(error: &WriteError) -> &'static str {
+/// The code of a program that was not written.
+pub(crate) fn code(error: &WriteError) -> &'static str {
     match error {
         WriteError::ReadOnly | WriteError::Program(_) => "U1014",
         WriteError::Different(_) => "U1019",

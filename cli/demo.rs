@@ -44,7 +44,8 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
         return Answer::bad_files(vec![found.report]);
     };
     let page = arguments.beside.page();
-    cell.run(&scenario, &run, page.as_ref(), console)
+    let answer = cell.run(&scenario, &run, page.as_ref(), console);
+    answer.and_next(&[&"init", &"cell"])
 }
 
 /// The cluster of section V, written into the directory of its run.

@@ -37,7 +37,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     match (read(&arguments.left), read(&arguments.right)) {
         (Ok(left), Ok(right)) => {
             let found = diff(&left, &right);
-            Answer::done(found.to_text(), &found)
+            Answer::done(found.to_text(), &found).and_next(&[&"journal", &arguments.right])
         }
         (left, right) => {
             let errors: Vec<ViewError> = [left.err(), right.err()].into_iter().flatten().collect();

@@ -86,7 +86,25 @@ fn examined(arguments: &Arguments) -> Result<Answer, Answer> {
         configuration: hash.to_string(),
         findings: &findings,
     };
-    Ok(Answer::done(text(&findings), result).with_status(status))
+    let answer = Answer::done(text(&findings), result).with_status(status);
+    let path = &arguments.cluster;
+    Ok(match (&arguments.name, &arguments.keys) {
+        (Some(name), Some(keys)) => {
+            let command = command_of(&cluster, name)?;
+            answer.and_next(&[&command, path, &"--name", name, &"--keys", keys])
+        }
+        (Some(_), None) => answer,
+        (None, _) => answer.and_next(&[&"lab", path]),
+    })
+}
+
+/// The command that runs a member.
+fn command_of(cluster: &Cluster, name: &str) -> Result<&'static str, Answer> {
+    Ok(match crate::party::find(cluster, name)? {
+        Party::Station(_) => "node",
+        Party::RemoteIo(_) => "remote-io",
+        Party::Plant(_) => "plant",
+    })
 }
 
 fn of_party(

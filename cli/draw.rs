@@ -69,6 +69,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
             Ok(()) => {
                 let name = path.display().to_string();
                 Answer::done(format!("written to {name}"), json!({ "file": name }))
+                    .and_next(&[&"verify", &arguments.ladder])
             }
             Err(answer) => answer,
         },

@@ -14,11 +14,20 @@ use crate::kind::{self, Kind};
 
 /// The text of a file; a failure names it and says why not.
 pub(crate) fn text(path: &Path) -> Result<String, Answer> {
-    let failed = |code, message| Answer::failed(Status::BadInput, code, message);
-    let bytes = fs::read(path).map_err(|error| failed("U0601", unreadable(path, &error)))?;
+    decoded(path, bytes(path)?)
+}
+
+/// The bytes of a file.
+pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>, Answer> {
+    fs::read(path)
+        .map_err(|error| Answer::failed(Status::BadInput, "U0601", unreadable(path, &error)))
+}
+
+/// The text that the bytes of a file stand for.
+pub(crate) fn decoded(path: &Path, bytes: Vec<u8>) -> Result<String, Answer> {
     decode(bytes).map_err(|error| {
         let message = format!("{} is not a text file: {error}", path.display());
-        failed("U0618", message)
+        Answer::failed(Status::BadInput, "U0618", message)
     })
 }
 
@@ -78,10 +87,7 @@ fn nearest_file(path: &Path) -> Option<PathBuf> {
 
 /// Writes a file; a failure names it and says why not.
 pub(crate) fn write(path: &Path, text: &str) -> Result<(), Answer> {
-    fs::write(path, text).map_err(|error| {
-        let message = format!("{} cannot be written: {error}", path.display());
-        Answer::failed(Status::Failed, "U0602", message)
-    })
+    fs::write(path, text).map_err(|error| unwritable(path, &error))
 }
 
 /// Writes a file anew: whole, or not at all.
@@ -134,26 +140,57 @@ pub(crate) fn scenario(path: &Path, cluster: &Cluster) -> Result<Scenario, Answe
         .ok_or_else(|| Answer::bad_files(vec![found.report]))
 }
 
+/// A file to be written.
+pub(crate) struct NewFile {
+    /// Its name, without folders.
+    pub(crate) name: String,
+    pub(crate) bytes: Vec<u8>,
+}
+
 /// Writes files of a template into a folder that has none of them.
 pub(crate) fn write_template(
     folder: &Path,
     files: &[TemplateFile],
 ) -> Result<Vec<PathBuf>, Answer> {
-    let failed = |path: &Path, error: std::io::Error| {
-        let message = format!("{} cannot be written: {error}", path.display());
-        Answer::failed(Status::Failed, "U0602", message)
-    };
-    let paths: Vec<PathBuf> = files.iter().map(|file| folder.join(file.name)).collect();
-    if let Some(path) = paths.iter().find(|path| path.exists()) {
+    let files = files.iter().map(|file| NewFile {
+        name: file.name.to_owned(),
+        bytes: file.text.into(),
+    });
+    write_new(folder, &files.collect::<Vec<_>>())
+}
+
+/// Writes files into a folder that has none of them: all, or none.
+pub(crate) fn write_new(folder: &Path, files: &[NewFile]) -> Result<Vec<PathBuf>, Answer> {
+    let paths: Vec<PathBuf> = files.iter().map(|file| folder.join(&file.name)).collect();
+    let existing: Vec<String> = paths
+        .iter()
+        .filter(|path| path.symlink_metadata().is_ok())
+        .map(|path| path.display().to_string())
+        .collect();
+    if !existing.is_empty() {
         let message = format!(
-            "{} exists already, and nothing is overwritten",
-            path.display()
+            "nothing is overwritten, and these files exist already: {}; name another folder, or move them away",
+            existing.join(", ")
         );
         return Err(Answer::failed(Status::BadInput, "U0603", message));
     }
-    fs::create_dir_all(folder).map_err(|error| failed(folder, error))?;
-    for (file, path) in files.iter().zip(&paths) {
-        write(path, file.text)?;
+    let is_new = !folder.exists();
+    fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))?;
+    for (count, (file, path)) in files.iter().zip(&paths).enumerate() {
+        if let Err(error) = fs::write(path, &file.bytes) {
+            for written in &paths[..=count] {
+                let _ = fs::remove_file(written);
+            }
+            if is_new {
+                let _ = fs::remove_dir(folder);
+            }
+            return Err(unwritable(path, &error));
+        }
     }
     Ok(paths)
+}
+
+fn unwritable(path: &Path, error: &io::Error) -> Answer {
+    let message = format!("{} cannot be written: {error}", path.display());
+    Answer::failed(Status::Failed, "U0602", message)
 }

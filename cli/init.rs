@@ -1,42 +1,94 @@
-//! `understudy init`: a small cluster that runs.
+//! `understudy init`: a cluster that runs, from a template or from programs that exist.
 
-use std::path::PathBuf;
+mod from;
 
-use clap::Args;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
 use serde_json::json;
-use understudy_cluster::template;
+use understudy_cluster::{TemplateFile, minimal, modbus_cell, template};
 
 use crate::answer::Answer;
 use crate::files;
 
-/// Write a small cluster that runs, to begin with
+/// Write a cluster that runs: a template, or one made from programs that exist
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy init cell
-  understudy lab cell/cluster.toml --scenario cell/kill.toml")]
+  understudy init cell --template modbus
+  understudy init cell --from plc.xml tank.st conveyor.ladder
+  understudy init cell --from north=north/plc.xml south=south/plc.xml
+
+--from takes programs in every form that `understudy convert` reads. Each program gets a controller, a remote I/O and a stand-in for its
+plant; a file with several programs gives one controller for each. NAME= names the controller where the name of the program does not do.")]
 pub(crate) struct Arguments {
     /// A folder; files that exist are not overwritten
     #[arg(value_name = "DIR")]
     folder: PathBuf,
+    /// What to begin with
+    #[arg(long, value_enum, default_value_t)]
+    template: Template,
+    /// Programs of your own, in place of a template
+    #[arg(long, value_name = "[NAME=]FILE", num_args = 1.., conflicts_with = "template")]
+    from: Vec<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+enum Template {
+    /// One program and one understudy
+    Minimal,
+    /// A tank that fills boxes and a conveyor, with simulated plants
+    #[default]
+    Cell,
+    /// A tank behind a Modbus TCP device, with a script that simulates the device, and a simulated press
+    Modbus,
+}
+
+impl Template {
+    fn files(self) -> &'static [TemplateFile] {
+        match self {
+            Self::Minimal => minimal(),
+            Self::Cell => template(),
+            Self::Modbus => modbus_cell(),
+        }
+    }
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Answer {
-    match files::write_template(&arguments.folder, template()) {
+    let folder = &arguments.folder;
+    if !arguments.from.is_empty() {
+        return from::run(folder, &arguments.from);
+    }
+    match files::write_template(folder, arguments.template.files()) {
         Err(answer) => answer,
         Ok(paths) => {
-            let names: Vec<String> = paths
-                .iter()
-                .map(|path| path.display().to_string())
-                .collect();
-            let folder = arguments.folder.display();
-            let text = format!(
-                "{}\n\nnext:\n  understudy check {folder}/cluster.toml {folder}/kill.toml\n  \
-                 understudy lab {folder}/cluster.toml --scenario {folder}/kill.toml\n  \
-                 understudy watch {folder}/cluster.toml --allow-commands\n",
-                names.join("\n")
-            );
-            Answer::done(text, json!({ "files": names }))
+            let answer = written(folder, &paths, "");
+            if arguments.template == Template::Modbus {
+                let device = folder.join("device.py");
+                return with_device(answer, &device);
+            }
+            answer
         }
     }
+}
+
+/// The answer that names the files, and what to do with them.
+fn written(folder: &Path, paths: &[PathBuf], more: &str) -> Answer {
+    let names = paths.iter().map(|path| path.display().to_string());
+    let names: Vec<String> = names.collect();
+    let text = format!("{}\n{more}", names.join("\n"));
+    let (cluster, scenario) = (folder.join("cluster.toml"), folder.join("kill.toml"));
+    Answer::done(text, json!({ "files": names }))
+        .and_next(&[&"check", &cluster, &scenario])
+        .and_next(&[&"lab", &cluster, &"--scenario", &scenario])
+}
+
+/// How the simulated device is started, which is no command of this program.
+fn with_device(mut answer: Answer, device: &Path) -> Answer {
+    answer.text.push_str(&format!(
+        "\nStart the simulated device in a terminal of its own before the laboratory:\n  pip install pymodbus==3.16.1\n  python3 {}\n",
+        device.display()
+    ));
+    answer
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 use std::net::IpAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use clap::{Args, Subcommand};
@@ -139,12 +139,38 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         }),
     };
     match done {
-        Ok((issued, without_address)) => changed(&issued, without_address, now),
+        Ok((issued, without_address)) => {
+            let has_addresses = without_address.is_empty();
+            let answer = changed(&issued, without_address, now);
+            match &arguments.what {
+                What::Init {
+                    cluster, folder, ..
+                } if has_addresses => with_doctor(answer, cluster, &folder.folder, &issued),
+                What::Init { cluster, .. } => answer.and_next(&[&"lab", cluster]),
+                _ => answer,
+            }
+        }
         Err(answer) => answer,
     }
 }
 
-fn read(path: &std::path::Path) -> Result<Cluster, Answer> {
+/// What is run on the machine of the first member.
+fn with_doctor(answer: Answer, cluster: &Path, folder: &Path, issued: &Issued) -> Answer {
+    let Some(member) = issued.holders.iter().find(|it| it.role == Role::Party) else {
+        return answer;
+    };
+    let keys = folder.join("parties").join(&member.name);
+    answer.and_next(&[
+        &"doctor",
+        &cluster,
+        &"--name",
+        &member.name,
+        &"--keys",
+        &keys,
+    ])
+}
+
+fn read(path: &Path) -> Result<Cluster, Answer> {
     files::cluster(path, Overrides::default()).map(|(cluster, _)| cluster)
 }
 

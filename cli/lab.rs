@@ -201,7 +201,14 @@ pub(crate) fn in_laboratory(
         Ok(judged) => judged,
         Err(answer) => return answer,
     };
-    let mut answer = answer(&summary, Some(directory.path()));
+    let answered = answer(&summary, Some(directory.path()));
+    let path = directory.path();
+    let mut answer = match first_reconstructed(cluster, &summary) {
+        Some((output, cycle)) => {
+            answered.and_next(&[&"why", &output, &"--at", &cycle, &"--run", &path])
+        }
+        None => answered.and_next(&[&"watch", &path]),
+    };
     if let Err(error) = run.written {
         answer = answer.and_failure(Status::Failed, "U0602", error.to_string());
     }
@@ -209,6 +216,17 @@ pub(crate) fn in_laboratory(
         Some(failure) => answer.and_failure(Status::Failed, failure.code(), failure.to_string()),
         None => answer,
     }
+}
+
+/// An output of the first controller that the scenario kills, and a cycle in which it was reconstructed.
+fn first_reconstructed(cluster: &Cluster, summary: &Summary) -> Option<(String, String)> {
+    let controllers = cluster.controllers();
+    summary.steps.iter().find_map(|step| {
+        let controller = controllers.iter().find(|it| it.name == step.name)?;
+        let output = controller.circuit.outputs().first()?;
+        let output = format!("{}.{}", controller.name, output.name);
+        (step.action == "crash").then(|| (output, (step.measured + 1).to_string()))
+    })
 }
 
 /// What a run left besides its summary.

@@ -136,7 +136,15 @@ fn measured(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answ
     };
     let mut answer = Answer::done(found.to_text(), &found)
         .with_used(reports)
-        .with_status(status);
+        .with_status(status)
+        .and_next(&[
+            &"reliability",
+            &arguments.cluster,
+            &"--mtbf",
+            &arguments.mtbf,
+            &"--mttr",
+            &arguments.mttr,
+        ]);
     if let Some((directory, failure)) = run {
         let _ = writeln!(answer.text, "journals: {}", directory.display());
         if let Some(failure) = failure {

@@ -133,7 +133,9 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         depth: verdict.depth,
         properties,
     };
-    let mut answer = Answer::done(text(&found), found).with_used(reports);
+    let mut answer = Answer::done(text(&found), found)
+        .with_used(reports)
+        .and_next(&[&"lab", &arguments.cluster]);
     if !holds {
         answer.status = Status::Failed;
     }

@@ -131,7 +131,7 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
     done.map_err(|refusal| refused(&refusal))?;
     let text = format!("{word} {}: done", arguments.name);
     let result = json!({ "run": run.path(), "name": arguments.name, "done": word });
-    Ok(Answer::done(text, result))
+    Ok(Answer::done(text, result).and_next(&[&"top", &run.path()]))
 }
 
 /// The run that is meant: a directory of it, or the newest of a cluster that is being written.

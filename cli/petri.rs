@@ -353,5 +353,5 @@ fn proved(
         text.push_str(&format!("; never fired: {}", proof.never_fired.join(" ")));
     }
     said(&mut text, &mut result, path);
-    Answer::done(text, result)
+    Answer::done(text, result).and_next(&[&"verify", &path])
 }

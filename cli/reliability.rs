@@ -177,7 +177,11 @@ fn of_cluster(arguments: &Arguments) -> Result<Answer, Answer> {
     if let Some(folder) = &arguments.report {
         text.push_str(&write_report(folder, &options, cluster.as_ref(), None)?);
     }
-    Ok(calculated(text, &found, reports))
+    let answer = calculated(text, &found, reports);
+    Ok(match &arguments.cluster {
+        Some(cluster) => answer.and_next(&[&"allocate", cluster]),
+        None => answer,
+    })
 }
 
 /// The answer; its numbers stand at the top of the document too.

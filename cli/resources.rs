@@ -1,5 +1,6 @@
 //! `understudy resources`: what programs consist of, counted.
 
+use std::ffi::OsStr;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -33,7 +34,12 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> Answer {
     match Programs::read(&arguments.programs, arguments.period) {
-        Ok(programs) => counted(&programs, arguments.instructions),
+        Ok(programs) => {
+            let answer = counted(&programs, arguments.instructions);
+            let mut next: Vec<&dyn AsRef<OsStr>> = vec![&"allocate"];
+            next.extend(arguments.programs.iter().map(|it| it as &dyn AsRef<OsStr>));
+            answer.and_next(&next)
+        }
         Err(answer) => answer,
     }
 }

@@ -8,7 +8,7 @@ use understudy_cluster::Cluster;
 use understudy_scenarios::{Circumstances, Summary, Table, World};
 use understudy_wire::Mode;
 
-use crate::answer::{Answer, Status};
+use crate::answer::{Answer, Status, shell_line};
 use crate::overrides::link_kind;
 
 pub(crate) fn circumstances(
@@ -58,19 +58,8 @@ pub(crate) fn machine() -> Vec<String> {
 
 /// How this command was called, to be called again.
 pub(crate) fn command_line() -> String {
-    let arguments = std::env::args().skip(1);
-    let quoted = arguments.map(|argument| {
-        let plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./=:,".contains(letter);
-        if !argument.is_empty() && argument.chars().all(plain) {
-            argument
-        } else {
-            format!("'{}'", argument.replace('\'', r"'\''"))
-        }
-    });
-    std::iter::once("understudy".to_owned())
-        .chain(quoted)
-        .collect::<Vec<_>>()
-        .join(" ")
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    shell_line(arguments.iter().map(String::as_str))
 }
 
 #[derive(Serialize)]

@@ -102,6 +102,12 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     let mut answer =
         answer(&summary, directory.as_ref().map(RunDirectory::path)).with_used(reports);
     answer.text = format!("seed {seed}\n{}", answer.text);
+    let cluster = &arguments.cluster;
+    answer = match &arguments.scenario {
+        Some(scenario) => answer.and_next(&[&"lab", cluster, &"--scenario", scenario]),
+        None => answer.and_next(&[&"lab", cluster]),
+    };
+    answer = answer.and_next(&[&"campaign", cluster, &"--runs", &"1000", &"--seed", &"1"]);
     match written {
         Ok(()) => answer,
         Err(error) => answer.and_failure(Status::Failed, "U0602", error.to_string()),

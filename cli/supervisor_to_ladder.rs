@@ -313,5 +313,5 @@ fn answer(
         proof.states,
         proof.scans
     );
-    Answer::done(summary, result)
+    Answer::done(summary, result).and_next(&[&"verify", path])
 }

@@ -87,7 +87,17 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
             Ok(answer) | Err(answer) => answer,
         }
     };
-    answer.with_reports(reports)
+    let answer = answer.with_reports(reports);
+    match &arguments.output {
+        Some(path) if path.extension().is_some_and(|ending| ending == "toml") => {
+            answer.and_next(&[&"supervisor-to-ladder", path, &"--plant", path])
+        }
+        Some(_) => answer,
+        None => {
+            let model = &arguments.model;
+            answer.and_next(&[&"synth", model, &"--reduce", &"-o", &"supervisor.toml"])
+        }
+    }
 }
 
 fn failed(code: &str, message: String) -> Answer {

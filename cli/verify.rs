@@ -144,6 +144,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
             proved(
                 arguments, &program, &subject, &remarks, &asked, &patience, bounds,
             )
+            .and_next(&[&"init", &"cell", &"--from", &arguments.file])
         }
     };
     answer.with_used(vec![report])
@@ -331,7 +332,9 @@ fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Answer {
         };
         programs.push(ProgramAnswer::of(&subject, bounds, &remarks));
     }
-    answer::of_programs(programs, Some(parity(&cluster)), None).with_used(reports)
+    answer::of_programs(programs, Some(parity(&cluster)), None)
+        .with_used(reports)
+        .and_next(&[&"simulate", &arguments.file])
 }
 
 /// What the proof of the understudy says.

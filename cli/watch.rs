@@ -278,8 +278,9 @@ fn serve_until_asked_to_end(
 }
 
 fn watched(run: &Path) -> Answer {
-    let run = run.display().to_string();
-    Answer::done(format!("watched: {run}\n"), Watched { run })
+    let name = run.display().to_string();
+    let text = format!("watched: {name}\n");
+    Answer::done(text, Watched { run: name }).and_next(&[&"journal", &run])
 }
 
 /// Runs the laboratory of a cluster until it is asked to end.

@@ -38,7 +38,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         model.why(&arguments.output, arguments.at)
     });
     match found {
-        Ok(why) => Answer::done(why.to_text(), &why),
+        Ok(why) => Answer::done(why.to_text(), &why).and_next(&[&"watch", &arguments.run]),
         Err(error) => refused(&error),
     }
 }

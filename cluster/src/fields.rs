@@ -45,6 +45,13 @@ pub fn why_unreachable(address: SocketAddr) -> Option<&'static str> {
     }
 }
 
+/// Whether a party can have this name.
+pub fn is_name(text: &str) -> bool {
+    let legal = |character: char| character.is_ascii_alphanumeric() || "-_".contains(character);
+    let starts = text.starts_with(|first: char| first.is_ascii_alphabetic());
+    starts && text.chars().all(legal) && text.len() <= MAXIMUM_NAME_LENGTH
+}
+
 /// One table of the file.
 pub(crate) struct Fields<'a, 't> {
     section: &'static Section,
@@ -113,11 +120,7 @@ impl<'a, 't> Fields<'a, 't> {
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Option<Placed<String>> {
         let text = self.text(name, diagnostics)?;
-        let legal = |character: char| character.is_ascii_alphanumeric() || "-_".contains(character);
-        let starts = text
-            .value
-            .starts_with(|first: char| first.is_ascii_alphabetic());
-        if !starts || !text.value.chars().all(legal) || text.value.len() > MAXIMUM_NAME_LENGTH {
+        if !is_name(&text.value) {
             let message = format!("{:?} is no name", text.value);
             diagnostics.push(
                 Diagnostic::error("U0206", message, text.span.clone()).with_help(format!(

@@ -7,6 +7,10 @@ use std::time::Duration;
 use understudy_form::spoken;
 use understudy_wire::MAXIMUM_HISTORY;
 
+/// The bounds of a cluster's period.
+pub(crate) const SHORTEST_PERIOD: Duration = Duration::from_micros(200);
+pub(crate) const LONGEST_PERIOD: Duration = Duration::from_secs(10);
+
 /// A table of the file.
 #[derive(Debug)]
 pub(crate) struct Section {
@@ -110,8 +114,8 @@ pub(crate) static CLUSTER: Section = Section {
         key(
             "period",
             Kind::Time {
-                least: Duration::from_micros(200),
-                most: Duration::from_secs(10),
+                least: SHORTEST_PERIOD,
+                most: LONGEST_PERIOD,
                 default: Duration::from_millis(10),
             },
             "T, from one cycle to the next; timers of the ladders count in it",

@@ -11,6 +11,7 @@ mod canonical;
 mod cluster;
 mod configuration;
 mod device;
+mod draft;
 mod fields;
 mod file;
 mod format;
@@ -20,7 +21,8 @@ mod template;
 
 pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Security, Understudy};
 pub use device::{FieldDevice, NoPoint, Point};
-pub use fields::{MAXIMUM_NAME_LENGTH, why_unreachable};
+pub use draft::{Draft, DraftProgram, MAXIMUM_PROGRAM_NAME};
+pub use fields::{MAXIMUM_NAME_LENGTH, is_name, why_unreachable};
 pub use read::{Loaded, MAXIMUM_TEXT_BYTES, Overrides, read, read_with};
 pub use schema::schema;
-pub use template::{TemplateFile, press_cell, template};
+pub use template::{TemplateFile, minimal, modbus_cell, press_cell, template};

@@ -26,12 +26,14 @@
 //! | U0252 | warning: an output that moves nothing |
 //! | U0253 | warning: not one understudy where the mode wants one |
 //! | U0254 | warning: parts that never come |
+//! | U0255 | warning: a mark of what is to be filled in |
 
 mod devices;
 mod diagnosis;
 mod follows;
 mod ladders;
 mod limits;
+mod marks;
 mod names;
 mod plants;
 
@@ -50,6 +52,7 @@ use understudy_wire::{
 };
 
 use self::ladders::Ladders;
+pub(crate) use self::marks::MARK;
 use self::names::Names;
 use crate::canonical::program_hash;
 use crate::cluster::{Cluster, Controller, Link, RemoteIo, Security, Understudy};
@@ -106,6 +109,7 @@ pub fn read_with(
         diagnostics.push(Diagnostic::error("U0213", message, 0..0));
         None
     } else {
+        marks::remind(text, &mut diagnostics);
         file::read(text, &mut diagnostics)
     };
     let cluster = file.and_then(|file| build(file, overrides, &mut ladders, &mut diagnostics));

@@ -20,6 +20,22 @@ pub fn press_cell() -> &'static [TemplateFile] {
     files!("../../examples/press-cell/": "cluster.toml", "robot.ladder", "press.ladder")
 }
 
+/// One program and one understudy.
+pub fn minimal() -> &'static [TemplateFile] {
+    files!("../template/minimal/": "cluster.toml", "pump.ladder", "sump.ladder", "kill.toml")
+}
+
+/// A tank behind a Modbus TCP device, with a simulation of the device, and the press of section V.
+pub fn modbus_cell() -> &'static [TemplateFile] {
+    files!("../../examples/modbus-cell/":
+        "cluster.toml",
+        "tank.ladder",
+        "press.ladder",
+        "device.py",
+        "kill.toml",
+    )
+}
+
 /// A tank that fills boxes and a conveyor, with plants that are ladders, a scenario and a page to begin with.
 pub fn template() -> &'static [TemplateFile] {
     files!("../template/":

@@ -78,6 +78,17 @@ impl Format {
         found.map(|(_, format)| format)
     }
 
+    /// The usual ending of its files.
+    pub fn ending(self) -> &'static str {
+        let known = if self == Self::Digraph {
+            Self::PlcOpen
+        } else {
+            self
+        };
+        let found = ENDINGS.iter().find(|(_, format)| *format == known);
+        found.map_or("", |(ending, _)| ending)
+    }
+
     fn of_xml(start: &str) -> Self {
         let mut tags = start.split('<').map(str::trim_start);
         match tags.find(|tag| tag.starts_with(|letter: char| letter.is_alphabetic())) {
@@ -104,6 +115,30 @@ impl Format {
             (first == Some("program")).then_some(Self::Ladder)
         }
     }
+}
+
+/// Reads every program of the file `name`: the programs that its tasks run, or all where it has no tasks. What is wrong with several of
+/// them is in the first reading only.
+pub fn read_all(format: Format, name: &str, text: &str) -> Vec<Reading> {
+    let units = match format {
+        Format::PlcOpen => plcopen::programs(text),
+        Format::StructuredText => {
+            let programs = structured_text::read(text).programs;
+            programs.iter().map(|unit| unit.name.to_string()).collect()
+        }
+        Format::Ladder | Format::Digraph | Format::LdMicro => Vec::new(),
+    };
+    if units.len() < 2 {
+        return vec![read(format, name, text, None)];
+    }
+    let mut known = Vec::new();
+    let each = units.iter().map(|unit| {
+        let mut reading = read(format, name, text, Some(unit));
+        reading.diagnostics.retain(|found| !known.contains(found));
+        known.extend_from_slice(&reading.diagnostics);
+        reading
+    });
+    each.collect()
 }
 
 /// Reads the program of the file `name`; `unit` chooses one where there are several.

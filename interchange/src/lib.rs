@@ -7,7 +7,7 @@ pub mod plcopen;
 pub mod structured_text;
 mod written;
 
-pub use format::{Format, Reading, parse_program, read, unknown_form};
+pub use format::{Format, Reading, parse_program, read, read_all, unknown_form};
 pub use written::{Compared, USUAL_PERIOD, WriteError, Written, write};
 
 /// The examples of the codes of this crate are run with its own.

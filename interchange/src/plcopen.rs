@@ -100,6 +100,24 @@ pub fn read(text: &str, unit: Option<&str>) -> Reading {
     reading
 }
 
+/// Names of the programs that the tasks of a file run, or, where it has no tasks, of all its programs; each once.
+pub fn programs(text: &str) -> Vec<String> {
+    let Ok(document) = xml::parse(text) else {
+        return Vec::new();
+    };
+    let (project, _) = document::read(document.root_element());
+    let run = project.instances.iter();
+    let mut names: Vec<String> = run.map(|run| run.type_name.to_string()).collect();
+    if names.is_empty() {
+        let pous = project.pous.iter();
+        let programs = pous.filter(|pou| pou.kind == PouKind::Program);
+        names = programs.map(|pou| pou.name.to_string()).collect();
+    }
+    let mut seen = HashSet::new();
+    names.retain(|name| seen.insert(name.to_lowercase()));
+    names
+}
+
 /// Places that were reckoned through texts with entities in them may be off: they are brought to letters of the file.
 fn within(text: &str, span: &mut Range<usize>) {
     let letter = |place: usize| {
