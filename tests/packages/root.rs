@@ -108,8 +108,8 @@ impl Root {
         let errors = String::from_utf8_lossy(&output.stderr);
         eprintln!("{text}");
         if output.status.code() == Some(3) {
-            return skipped("this machine woke the members of the demo too late for a verdict")
-                .unwrap_or_default();
+            eprintln!("skipped: this machine woke the members too late for a verdict");
+            return;
         }
         assert!(output.status.success(), "{command:?}: {text}{errors}");
         assert!(text.contains("passed"), "{text}");
