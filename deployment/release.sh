@@ -104,11 +104,12 @@ debian_package() {
     install -D -m 644 "$texts/_understudy" "$tree/usr/share/zsh/vendor-completions/_understudy"
     install -D -m 644 LICENSE-MIT "$tree/usr/share/doc/understudy/copyright"
     install -m 644 LICENSE-APACHE "$work"/understudy*-"$version-$1.cdx.json" "$tree/usr/share/doc/understudy"
-    size=$(du --summarize --apparent-size --block-size=1024 "$tree" | cut -f 1)
+    size=$(find "$tree" -type f -printf '%s\n' | awk '{ bytes += $1 } END { print int(bytes / 1024) }')
     sed "s/@version@/$version/; s/@architecture@/$2/; s/@size@/$size/" deployment/deb/control > "$tree/DEBIAN/control"
     install -m 755 deployment/deb/postinst deployment/deb/prerm deployment/deb/postrm "$tree/DEBIAN"
     chmod 755 "$tree"
-    dpkg-deb --root-owner-group --build "$tree" "$work/understudy_${version}_$2.deb" > /dev/null
+    # More threads compress to other bytes.
+    DPKG_DEB_THREADS_MAX=1 dpkg-deb --root-owner-group --build "$tree" "$work/understudy_${version}_$2.deb" > /dev/null
     rm -rf "$tree"
 }
 
