@@ -1,25 +1,39 @@
 #!/bin/sh
-# Static binaries of `understudy` and `understudy-opcua` for Linux on x86-64 and aarch64, each with its bill of materials and its checksum.
+# Everything that can be installed without a build, from one commit, for Linux on x86-64 and aarch64. Publishes nothing; needs no root.
 #
 #   deployment/release.sh [DIRECTORY] [TARGET...]
 #
-# Without targets both are built. The C parts (ring) need a C compiler for musl: Zig (`pip install ziglang`) has it for both,
-# musl-gcc (Debian: musl-tools) for this machine's own. Rust brings the linker and the C library: Zig's own has an allocator on which a
-# thread waits by spinning, and one in real time then waits for ever for one that is not.
+# For each target: static binaries of `understudy` and `understudy-opcua` with their bills of materials, a Python wheel, a Debian package and
+# a container image. For all: the cell of compose.yaml, and SHA256SUMS. Without targets both are built. docs/how-to/install.md describes them.
+#
+# The C parts (ring) need a C compiler for musl: Zig (`pip install ziglang`) has it for both, musl-gcc (Debian: musl-tools) for this
+# machine's own. Rust brings the linker and the C library: Zig's own has an allocator on which a thread waits by spinning, and one in real
+# time then waits for ever for one that is not.
 set -eu
 cd "$(dirname "$0")/.."
+umask 022
 
 out=${1:-release}
 [ $# -gt 0 ] && shift
 [ $# -gt 0 ] || set -- x86_64-unknown-linux-musl aarch64-unknown-linux-musl
 
 version=$(sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
-target_directory=${CARGO_TARGET_DIR:-target}
-mkdir -p "$out"
+mkdir -p "${CARGO_TARGET_DIR:-target}"
+target_directory=$(cd "${CARGO_TARGET_DIR:-target}" && pwd)
+# Packages are made here and appear in the directory of the release when all of them are complete.
+work=$target_directory/release-packages
+# The same commit gives the same bytes, wherever it is built.
+remapped="--remap-path-prefix=$PWD=. --remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}=cargo"
+
+refuse() {
+    echo "release.sh: $*" >&2
+    exit 1
+}
 
 # Compilers under the names that a build asks for, and what musl has in its C library and others beside it.
 prepare() {
-    tools=$(mkdir -p "$target_directory/release-tools/$1" && cd "$target_directory/release-tools/$1" && pwd)
+    tools=$target_directory/release-tools/$1
+    mkdir -p "$tools"
     if python3 -m ziglang version > /dev/null 2>&1; then
         # Zig knows the target by a name of its own.
         cat > "$tools/cc" << END
@@ -35,37 +49,116 @@ END
         printf '#!/bin/sh\nexec musl-gcc "$@"\n' > "$tools/cc"
         printf '#!/bin/sh\nexec ar "$@"\n' > "$tools/ar"
     else
-        echo "no C compiler for $1: pip install ziglang, or apt install musl-tools for this machine" >&2
-        return 1
+        refuse "no C compiler for $1: pip install ziglang, or apt install musl-tools for this machine"
     fi
     chmod +x "$tools/cc" "$tools/ar"
     printf '!<arch>\n' > "$tools/libdl.a"
+    [ -d "$(rustc --print target-libdir --target "$1")" ] || rustup target add "$1"
 }
 
 build() {
-    prepare "$1"
+    tools=$target_directory/release-tools/$1
     name=$(echo "$1" | tr - _)
     upper=$(echo "$name" | tr '[:lower:]' '[:upper:]')
     env "CC_$name=$tools/cc" "AR_$name=$tools/ar" \
-        "CARGO_TARGET_${upper}_LINKER=rust-lld" "CARGO_TARGET_${upper}_RUSTFLAGS=-L native=$tools" \
+        "CARGO_TARGET_${upper}_LINKER=rust-lld" "CARGO_TARGET_${upper}_RUSTFLAGS=-L native=$tools $remapped" \
         cargo build --locked --release --target "$1" \
         -p understudy -p understudy-opcua-gateway --bin understudy --bin understudy-opcua
-}
-
-for target in "$@"; do
-    rustup target add "$target"
-    build "$target"
     for package in understudy understudy-opcua-gateway; do
         binary=${package%-gateway}
-        name="$binary-$version-$target"
-        cp "$target_directory/$target/release/$binary" "$out/$name"
-        python3 deployment/bill_of_materials.py "$target" "$package" > "$out/$name.cdx.json"
-        (cd "$out" && sha256sum "$name" "$name.cdx.json" > "$name.sha256")
+        name="$work/$binary-$version-$1"
+        cp "$target_directory/$1/release/$binary" "$name"
+        python3 deployment/bill_of_materials.py "$1" "$package" > "$name.cdx.json"
         # A static binary needs no interpreter.
-        if readelf --program-headers "$out/$name" | grep -q INTERP; then
-            echo "$name is not static" >&2
-            exit 1
+        if readelf --program-headers "$name" | grep -q INTERP; then
+            refuse "$name is not static"
         fi
-        echo "$out/$name"
     done
+}
+
+# The manual page and the completions, from the first binary that this machine can run.
+describe() {
+    for binary in "$work/understudy-$version"-*-musl; do
+        if "$binary" man > "$texts/understudy.1" 2> /dev/null; then
+            "$binary" completions bash > "$texts/understudy"
+            "$binary" completions zsh > "$texts/_understudy"
+            gzip --best --no-name "$texts/understudy.1"
+            return
+        fi
+    done
+    refuse "none of the targets runs on this machine, and the Debian package needs the manual page: name the target of this machine too"
+}
+
+debian_package() {
+    tree=$(mktemp -d)
+    install -D -m 755 "$work/understudy-$version-$1" "$tree/usr/bin/understudy"
+    install -m 755 "$work/understudy-opcua-$version-$1" "$tree/usr/bin/understudy-opcua"
+    install -d "$tree/usr/lib/systemd/system" "$tree/etc/understudy" "$tree/DEBIAN"
+    for unit in deployment/*.service; do
+        sed 's|/usr/local/bin/|/usr/bin/|' "$unit" > "$tree/usr/lib/systemd/system/${unit##*/}"
+    done
+    install -D -m 644 deployment/understudy-journal.logrotate "$tree/etc/logrotate.d/understudy"
+    echo /etc/logrotate.d/understudy > "$tree/DEBIAN/conffiles"
+    install -D -m 644 "$texts/understudy.1.gz" "$tree/usr/share/man/man1/understudy.1.gz"
+    install -D -m 644 "$texts/understudy" "$tree/usr/share/bash-completion/completions/understudy"
+    install -D -m 644 "$texts/_understudy" "$tree/usr/share/zsh/vendor-completions/_understudy"
+    install -D -m 644 LICENSE-MIT "$tree/usr/share/doc/understudy/copyright"
+    install -m 644 LICENSE-APACHE "$work"/understudy*-"$version-$1.cdx.json" "$tree/usr/share/doc/understudy"
+    size=$(find "$tree" -type f -printf '%s\n' | awk '{ bytes += $1 } END { print int(bytes / 1024) }')
+    sed "s/@version@/$version/; s/@architecture@/$2/; s/@size@/$size/" deployment/deb/control > "$tree/DEBIAN/control"
+    install -m 755 deployment/deb/postinst deployment/deb/prerm deployment/deb/postrm "$tree/DEBIAN"
+    chmod 755 "$tree"
+    # More threads compress to other bytes.
+    DPKG_DEB_THREADS_MAX=1 dpkg-deb --root-owner-group --build "$tree" "$work/understudy_${version}_$2.deb" > /dev/null
+    rm -rf "$tree"
+}
+
+# The press cell with an address for each member, and its services.
+cell() {
+    folder=$(mktemp -d)
+    cp examples/press-cell/*.ladder "$folder"
+    awk '{ print } /^\[\[/ { print "address = \"127.0.0.1:" 7450 + members++ "\"" }' examples/press-cell/cluster.toml > "$folder/cluster.toml"
+    sed "s/@version@/$version/" deployment/compose.yaml > "$folder/compose.yaml"
+    tar --create --directory "$folder" --sort=name --mtime="@$SOURCE_DATE_EPOCH" --owner=0 --group=0 --numeric-owner --mode=a+rX,u+w \
+        --transform "s|^\.|understudy-cell-$version|" . | gzip --best --no-name > "$work/understudy-cell-$version.tar.gz"
+    rm -rf "$folder"
+}
+
+missing=
+for tool in git cargo rustc python3 readelf dpkg-deb gzip awk sha256sum; do
+    command -v "$tool" > /dev/null || missing="$missing $tool"
 done
+[ -z "$missing" ] || refuse "not installed:$missing (Debian: git, cargo, rustc, python3, binutils, dpkg, gzip, mawk, coreutils)"
+python3 -c 'import tomllib' 2> /dev/null || refuse "python3 is older than 3.11, and the bills of materials need its tomllib"
+[ ! -e "$out" ] || refuse "$out exists: name another directory, or remove it"
+[ -z "$(git status --porcelain)" ] || refuse "the tree differs from its commit (git status): commit first"
+commit=$(git rev-parse HEAD)
+SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
+export SOURCE_DATE_EPOCH
+
+rm -rf "$work"
+mkdir -p "$work"
+for target in "$@"; do
+    prepare "$target"
+done
+for target in "$@"; do
+    build "$target"
+done
+texts=$(mktemp -d)
+trap 'rm -rf "$texts"' EXIT
+describe
+for target in "$@"; do
+    machine=${target%%-*}
+    case $machine in x86_64) debian=amd64 ;; aarch64) debian=arm64 ;; *) refuse "no packages are known for $target" ;; esac
+    command="understudy=$work/understudy-$version-$target"
+    opcua="understudy-opcua=$work/understudy-opcua-$version-$target"
+    python3 deployment/wheel.py "$version" "$machine" "$work" "$command" "$opcua" "$work"/understudy*-"$version-$target.cdx.json"
+    python3 deployment/image.py "$version" "$debian" "$commit" "$work/understudy-$version-$machine.oci.tar" "$command" "$opcua"
+    debian_package "$target" "$debian"
+done
+cell
+(cd "$work" && sha256sum -- * > SHA256SUMS)
+mkdir -p "$(dirname "$out")"
+mv "$work" "$out"
+echo "$out, from commit $commit:"
+ls "$out"
