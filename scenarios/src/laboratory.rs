@@ -85,6 +85,14 @@ pub enum Deaths {
     EndTheRun,
 }
 
+/// A cluster that stays up when its scenario is over, until the run is asked to end. What happens then is in the journal, and not in the account.
+pub struct Afterwards<'a> {
+    /// Judges the account of the scenario, and answers with the verdict in words.
+    pub judge: Box<dyn FnMut(Account) -> String + 'a>,
+    /// Whether commands are refused until then, so that they do not disturb the scenario.
+    pub refuse_until_then: bool,
+}
+
 /// How far a run is.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Progress {
@@ -152,10 +160,10 @@ pub fn run_laboratory(
     directory: &RunDirectory,
     watch: &mut dyn FnMut(Progress),
 ) -> Result<LaboratoryRun, LaboratoryError> {
-    run_commanded(cluster, scenario, settings, directory, None, watch)
+    run_commanded(cluster, scenario, settings, directory, None, None, watch)
 }
 
-/// The same, while somebody may give commands; then it waits for cycles as long as that takes.
+/// The same, while somebody may give commands; then it waits for cycles as long as that takes. With `afterwards` the cluster stays up.
 ///
 /// # Errors
 /// As [`run_laboratory`].
@@ -165,12 +173,13 @@ pub fn run_commanded(
     settings: LaboratorySettings,
     directory: &RunDirectory,
     commands: Option<Commands>,
+    afterwards: Option<Afterwards<'_>>,
     watch: &mut dyn FnMut(Progress),
 ) -> Result<LaboratoryRun, LaboratoryError> {
     let mut steps = Steps::new(scenario, cluster.agreement().schedule.period());
     let conductor = &mut steps;
     run(
-        cluster, scenario, settings, directory, commands, conductor, watch,
+        cluster, scenario, settings, directory, commands, afterwards, conductor, watch,
     )
 }
 
@@ -184,16 +193,21 @@ pub(crate) fn run_conducted(
     watch: &mut dyn FnMut(Progress),
 ) -> Result<LaboratoryRun, LaboratoryError> {
     run(
-        cluster, scenario, settings, directory, None, conductor, watch,
+        cluster, scenario, settings, directory, None, None, conductor, watch,
     )
 }
 
+#[allow(
+    clippy::too_many_arguments,
+    reason = "the three ways to call it differ in these"
+)]
 fn run(
     cluster: &Cluster,
     scenario: &Scenario,
     settings: LaboratorySettings,
     directory: &RunDirectory,
     commands: Option<Commands>,
+    afterwards: Option<Afterwards<'_>>,
     conductor: &mut dyn Conductor,
     watch: &mut dyn FnMut(Progress),
 ) -> Result<LaboratoryRun, LaboratoryError> {
@@ -233,6 +247,8 @@ fn run(
         cuts: BTreeMap::new(),
         recovery: Recovery::default(),
         conductor,
+        afterwards,
+        judged: None,
         commanded: commands.is_some(),
         directory: directory.path().to_owned(),
         sender,
@@ -284,6 +300,9 @@ struct Laboratory<'w> {
     cuts: BTreeMap<Party, Cuts>,
     recovery: Recovery,
     conductor: &'w mut dyn Conductor,
+    afterwards: Option<Afterwards<'w>>,
+    /// The account of the scenario, where the cluster stays up after it.
+    judged: Option<Account>,
     /// Whether somebody gives commands, or said that he might.
     commanded: bool,
     directory: PathBuf,
@@ -302,7 +321,7 @@ impl Laboratory<'_> {
         self.note(RunEvent::Finished);
         self.machine.extend(self.site.describe());
         LaboratoryRun {
-            account: self.account,
+            account: self.judged.unwrap_or(self.account),
             journal: self.journal.take().map(Journal::finish).unwrap_or_default(),
             machine: self.machine.into_iter().collect(),
             failure,
@@ -356,23 +375,37 @@ impl Laboratory<'_> {
                 self.restart(party).await;
             }
             self.show_progress(&mut waits);
-            if self.conductor.is_over(now) {
-                return Ok(());
-            }
-            // One cycle more, so that all remote I/Os have surely told of the last one.
-            if self
-                .account
-                .cycle()
-                .is_some_and(|cycle| cycle > self.account.cycles)
-            {
+            if self.judged.is_none() && self.is_over(now) && !self.stays() {
                 return Ok(());
             }
             self.check_patience(&mut waits, now)?;
         }
     }
 
+    fn is_over(&self, now: Instant) -> bool {
+        // One cycle more, so that all remote I/Os have surely told of the last one.
+        let told = self.account.cycle();
+        self.conductor.is_over(now) || told.is_some_and(|cycle| cycle > self.account.cycles)
+    }
+
+    /// The scenario is over: whether the cluster stays up.
+    fn stays(&mut self) -> bool {
+        let Some(afterwards) = &mut self.afterwards else {
+            return false;
+        };
+        (self.watch)(Progress::Ending);
+        let verdict = (afterwards.judge)(self.account.clone());
+        self.judged = Some(self.account.clone());
+        // From here on the cluster may stand still for as long as an operator wants.
+        self.commanded = true;
+        self.note(RunEvent::ScenarioOver { verdict });
+        true
+    }
+
     fn interrupted(&mut self) -> Result<(), LaboratoryError> {
-        self.note(RunEvent::Interrupted);
+        if self.judged.is_none() {
+            self.note(RunEvent::Interrupted);
+        }
         Ok(())
     }
 
