@@ -216,7 +216,7 @@ impl Command {
             Self::Init(arguments) => init::run(&arguments),
             Self::Keys(arguments) => keys::run(&arguments),
             Self::Operate(arguments) => operate::run(&arguments),
-            Self::Doctor(arguments) => doctor::run(&arguments),
+            Self::Doctor(arguments) => doctor::run(&arguments, console),
             Self::Gateway(arguments) => gateway::run(&arguments, console),
             Self::Node(arguments) => party::run_station(&arguments),
             Self::RemoteIo(arguments) => party::run_remote_io(&arguments.common),
