@@ -4,6 +4,7 @@
 //! for, and ends everything that it started, whatever happens. It decides nothing about the cycle, and no frame passes through it
 //! unless it shapes the links. The unexpected end of a member is a fault like any other: it is recorded, and the run goes on.
 
+mod afterwards;
 mod conductor;
 mod error;
 mod keys;
@@ -35,6 +36,7 @@ use crate::record::{Record, RunEvent};
 use crate::run_directory::RunDirectory;
 use crate::scenario::Scenario;
 
+pub use afterwards::Afterwards;
 pub(crate) use conductor::Conductor;
 pub use error::LaboratoryError;
 pub use site::{HostKind, NetworkSettings};
@@ -83,14 +85,6 @@ pub enum Deaths {
     Restarted,
     /// The run ends: a measurement in which a failure that was not drawn counted as one would be wrong.
     EndTheRun,
-}
-
-/// A cluster that stays up when its scenario is over, until the run is asked to end. What happens then is in the journal, and not in the account.
-pub struct Afterwards<'a> {
-    /// Judges the account of the scenario, and answers with the verdict in words.
-    pub judge: Box<dyn FnMut(Account) -> String + 'a>,
-    /// Whether commands are refused until then, so that they do not disturb the scenario.
-    pub refuse_until_then: bool,
 }
 
 /// How far a run is.
@@ -380,26 +374,6 @@ impl Laboratory<'_> {
             }
             self.check_patience(&mut waits, now)?;
         }
-    }
-
-    fn is_over(&self, now: Instant) -> bool {
-        // One cycle more, so that all remote I/Os have surely told of the last one.
-        let told = self.account.cycle();
-        self.conductor.is_over(now) || told.is_some_and(|cycle| cycle > self.account.cycles)
-    }
-
-    /// The scenario is over: whether the cluster stays up.
-    fn stays(&mut self) -> bool {
-        let Some(afterwards) = &mut self.afterwards else {
-            return false;
-        };
-        (self.watch)(Progress::Ending);
-        let verdict = (afterwards.judge)(self.account.clone());
-        self.judged = Some(self.account.clone());
-        // From here on the cluster may stand still for as long as an operator wants.
-        self.commanded = true;
-        self.note(RunEvent::ScenarioOver { verdict });
-        true
     }
 
     fn interrupted(&mut self) -> Result<(), LaboratoryError> {
