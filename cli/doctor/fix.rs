@@ -177,8 +177,8 @@ impl Fixed {
     /// What was done, what is better, and what remains; `before` are the findings before that.
     pub(super) fn text(&self, before: &[Finding]) -> String {
         let mut text = String::new();
-        if self.repairs.is_empty() {
-            text += "no command repairs anything here\n";
+        if self.repairs.is_empty() && self.not_repairable.is_empty() {
+            text += "nothing to repair\n";
         }
         for done in &self.repairs {
             let outcome = match &done.outcome {

@@ -89,7 +89,11 @@ fn quoted_where_needed(text: &str) -> String {
 
 /// As one word of a shell.
 fn quoted(text: &str) -> String {
-    format!("'{}'", text.replace('\'', r"'\''"))
+    if text.contains('\'') && !text.contains(['"', '$', '`', '\\', '!']) {
+        format!("\"{text}\"")
+    } else {
+        format!("'{}'", text.replace('\'', r"'\''"))
+    }
 }
 
 #[cfg(test)]
@@ -104,6 +108,7 @@ mod tests {
             "plain",
             "with spaces",
             "it's",
+            "it's $HOME",
             "$HOME `id` \"x\"",
             "a;b|c>d",
         ] {
@@ -125,7 +130,7 @@ mod tests {
         // A redirection outside the quotes would be done without the rights.
         check(
             Repair::limit("anna", "memlock", "unlimited"),
-            r"sudo sh -c 'echo '\''anna - memlock unlimited'\'' > /etc/security/limits.d/90-understudy-memlock.conf'",
+            "sudo sh -c \"echo 'anna - memlock unlimited' > /etc/security/limits.d/90-understudy-memlock.conf\"",
         );
         check(
             Repair::receive_buffer(1024),
@@ -133,7 +138,7 @@ mod tests {
         );
         check(
             Repair::real_time(Path::new("/home/anna/my programs/understudy")),
-            r"sudo sh -c 'setcap cap_sys_nice+ep '\''/home/anna/my programs/understudy'\'''",
+            "sudo sh -c \"setcap cap_sys_nice+ep '/home/anna/my programs/understudy'\"",
         );
     }
 }
