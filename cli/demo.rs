@@ -21,9 +21,11 @@ Example:
   understudy demo
   understudy demo --period 10ms
   understudy demo --link zenoh
+  understudy demo --watch
 
 Without --period it measures for a second how late this host wakes it, and takes the shortest of 10, 20, 50 and 100 ms that the host keeps.
 Station 1 is killed at cycle 200 and started again at 327, station 2 at 400 and 527, station 3 at 600 and 727 (Table II).
+With --watch the cluster stays up when the scenario is over: kill a station yourself on the page. Ctrl-C ends it.
 Exit status 0 when every plant stayed functional and nothing wrong was applied; 3 where the host woke the members too late to tell.")]
 pub(crate) struct Arguments {
     #[command(flatten)]
@@ -43,7 +45,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
     let Some(scenario) = found.scenario else {
         return Answer::bad_files(vec![found.report]);
     };
-    let page = arguments.beside.page();
+    let page = arguments.beside.page().map(Page::staying);
     let answer = cell.run(&scenario, &run, page.as_ref(), console);
     answer.and_next(&[&"init", &"cell"])
 }

@@ -1,5 +1,7 @@
 //! `understudy doctor`: whether a machine is ready for a party, and what to do where it is not.
 
+mod fix;
+
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::time::{Duration, SystemTime};
@@ -13,8 +15,10 @@ use understudy_keys::{Date, KeysError, PartyKeys};
 use understudy_wire::Party;
 
 use crate::answer::{Answer, Status};
+use crate::console::Console;
 use crate::files;
 use crate::overrides::{OverrideArguments, link_kind};
+use fix::Fixed;
 
 /// Look whether this machine is ready for a party of a cluster
 #[derive(Debug, Args)]
@@ -22,7 +26,9 @@ use crate::overrides::{OverrideArguments, link_kind};
 Example:
   understudy doctor cell/cluster.toml
   understudy doctor cell/cluster.toml --name robot --keys /etc/understudy/keys/robot
+  sudo understudy doctor cell/cluster.toml --fix
 
+With --fix it shows the commands that repair the machine, asks before each one on a terminal, runs it where it is root, and looks again.
 Without --name it looks at the machine alone; with it also at ports, keys, and at the parties that this one is to hear. Exit status 1
 where something keeps the party from its work; what only could be better is a warning.")]
 pub(crate) struct Arguments {
@@ -41,6 +47,12 @@ pub(crate) struct Arguments {
     /// For how many cycles the other parties are listened for
     #[arg(long, value_name = "CYCLES", default_value_t = 100)]
     listen: u32,
+    /// Repair the machine: show each command, ask, run it as root, and look again
+    #[arg(long)]
+    fix: bool,
+    /// Run the commands of --fix without asking
+    #[arg(long, requires = "fix")]
+    yes: bool,
     #[command(flatten)]
     overrides: OverrideArguments,
 }
@@ -55,15 +67,18 @@ const LEAST_PATIENCE: Duration = Duration::from_secs(2);
 struct Examined<'a> {
     configuration: String,
     findings: &'a [Finding],
+    /// What was done about them, where that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fixed: Option<&'a Fixed>,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
-    match examined(arguments) {
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
+    match examined(arguments, console) {
         Ok(answer) | Err(answer) => answer,
     }
 }
 
-fn examined(arguments: &Arguments) -> Result<Answer, Answer> {
+fn examined(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let (cluster, _) = files::cluster(&arguments.cluster, arguments.overrides.overrides())?;
     let agreement = cluster.agreement();
     let mut findings = examine_machine(agreement.schedule.period());
@@ -76,6 +91,14 @@ fn examined(arguments: &Arguments) -> Result<Answer, Answer> {
         let party = crate::party::find(&cluster, name)?;
         findings.extend(of_party(arguments, &cluster, party)?);
     }
+    let look_again = || examine_machine(agreement.schedule.period());
+    let fixed = arguments
+        .fix
+        .then(|| fix::fix(&findings, &look_again, arguments.yes, console));
+    let (found, findings) = match &fixed {
+        Some(fixed) => (findings.clone(), fixed.applied_to(findings)),
+        None => (Vec::new(), findings),
+    };
     let worst = findings.iter().map(|finding| finding.health).max();
     let status = if worst == Some(Health::Bad) {
         Status::Failed
@@ -85,8 +108,13 @@ fn examined(arguments: &Arguments) -> Result<Answer, Answer> {
     let result = Examined {
         configuration: hash.to_string(),
         findings: &findings,
+        fixed: fixed.as_ref(),
     };
-    let answer = Answer::done(text(&findings), result).with_status(status);
+    let mut words = text(&findings);
+    if let Some(fixed) = &fixed {
+        words += &fixed.text(&found);
+    }
+    let answer = Answer::done(words, result).with_status(status);
     let path = &arguments.cluster;
     Ok(match (&arguments.name, &arguments.keys) {
         (Some(name), Some(keys)) => {
@@ -210,6 +238,10 @@ fn text(findings: &[Finding]) -> String {
         let _ = writeln!(text, "{word:8} {:14} {}", finding.check, finding.found);
         if let Some(remedy) = &finding.remedy {
             let _ = writeln!(text, "{:24}remedy: {remedy}", "");
+        }
+        if let Some(repair) = &finding.repair {
+            let command = fix::shown(repair);
+            let _ = writeln!(text, "{:24}command: {command}", "");
         }
     }
     let count = |health| {

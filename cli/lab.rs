@@ -1,5 +1,6 @@
 //! `understudy lab`: a cluster and a scenario on real processes.
 
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -7,8 +8,9 @@ use clap::{Args, ValueEnum};
 use understudy_cluster::Cluster;
 use understudy_network::Share;
 use understudy_scenarios::{
-    Deaths, HostKind, JOURNAL_LIMIT_BYTES, LaboratoryError, LaboratorySettings, NetworkSettings,
-    RunDirectory, RunDirectoryError, Scenario, Summary, World, run_commanded,
+    Afterwards, Deaths, HostKind, JOURNAL_LIMIT_BYTES, JournalState, LaboratoryError,
+    LaboratorySettings, NetworkSettings, RunDirectory, RunDirectoryError, Scenario, Summary, World,
+    run_commanded,
 };
 
 use crate::answer::{Answer, Status};
@@ -16,7 +18,7 @@ use crate::console::Console;
 use crate::files;
 use crate::overrides::{OverrideArguments, link_kind, parse_size};
 use crate::proxy::ImpairmentArguments;
-use crate::run::{answer, circumstances, command_line, machine};
+use crate::run::{answer, circumstances, command_line, machine, verdict};
 use crate::wakefulness;
 use crate::watch::{BesideArguments, Page};
 
@@ -229,6 +231,14 @@ fn first_reconstructed(cluster: &Cluster, summary: &Summary) -> Option<(String, 
     })
 }
 
+/// What is said when the scenario is over and the cluster stays up.
+fn invitation(verdict: &str, url: &str) -> String {
+    format!(
+        "the scenario is over: {verdict}\n\
+         Kill a station yourself: open {url}, click a station, then Kill. The cluster stays up until Ctrl-C."
+    )
+}
+
 /// What a run left besides its summary.
 pub(crate) struct Judged {
     pub(crate) written: Result<(), RunDirectoryError>,
@@ -256,23 +266,43 @@ pub(crate) fn judged(
         ..laboratory_settings(cluster, cluster_file, &arguments.overrides, network)?
     };
     let served = page.map(|page| page.beside(directory.path(), console));
-    let (_served, commands) = match served.transpose() {
+    let (served, commands) = match served.transpose() {
         Ok(served) => served.unzip(),
         Err(answer) => {
             directory.take_back();
             return Err(answer);
         }
     };
-    let mut watch = |progress| console.show(&progress);
-    let run = run_commanded(cluster, scenario, settings, directory, commands, &mut watch).map_err(
-        |error| {
-            directory.take_back();
-            Answer::failed(Status::Failed, error.code(), error.to_string())
-        },
-    )?;
-    let machine = machine().into_iter().chain(run.machine).collect();
-    let circumstances = circumstances(cluster, World::Laboratory, None, machine, command_line());
-    let (mut summary, account) = Summary::new(run.account, scenario, circumstances, run.journal);
+    let summarised = |account, of_run: Vec<String>, journal| {
+        let machine = machine().into_iter().chain(of_run).collect();
+        let circumstances =
+            circumstances(cluster, World::Laboratory, None, machine, command_line());
+        Summary::new(account, scenario, circumstances, journal)
+    };
+    let console = RefCell::new(console);
+    let judge = |account| {
+        let (summary, _) = summarised(account, Vec::new(), JournalState::default());
+        let verdict = verdict(&summary);
+        if let Some(served) = &served {
+            console
+                .borrow_mut()
+                .note(&invitation(&verdict, &served.url()));
+        }
+        verdict
+    };
+    let afterwards = page.filter(|page| page.stays()).map(|page| Afterwards {
+        judge: Box::new(judge),
+        refuse_until_then: !page.may_command(),
+    });
+    let mut watch = |progress| console.borrow_mut().show(&progress);
+    let run = run_commanded(
+        cluster, scenario, settings, directory, commands, afterwards, &mut watch,
+    );
+    let run = run.map_err(|error| {
+        directory.take_back();
+        Answer::failed(Status::Failed, error.code(), error.to_string())
+    })?;
+    let (mut summary, account) = summarised(run.account, run.machine, run.journal);
     if run.failure.is_some() {
         summary.passed = false;
         summary.inconclusive = None;

@@ -6,6 +6,7 @@
 )]
 
 mod allocate;
+mod animate;
 mod answer;
 mod attach;
 mod automata;
@@ -118,6 +119,7 @@ enum Command {
     Why(why::Arguments),
     Journal(journal::Arguments),
     Diff(diff::Arguments),
+    Animate(animate::Arguments),
     ModelCheck(model_check::Arguments),
     Init(init::Arguments),
     Keys(keys::Arguments),
@@ -163,6 +165,7 @@ impl Command {
             Self::Why(_) => "why",
             Self::Journal(_) => "journal",
             Self::Diff(_) => "diff",
+            Self::Animate(_) => "animate",
             Self::ModelCheck(_) => "model-check",
             Self::Init(_) => "init",
             Self::Keys(_) => "keys",
@@ -209,10 +212,11 @@ impl Command {
             Self::Why(arguments) => why::run(&arguments),
             Self::Journal(arguments) => journal::run(&arguments, console.is_json()),
             Self::Diff(arguments) => diff::run(&arguments),
+            Self::Animate(arguments) => animate::run(&arguments),
             Self::Init(arguments) => init::run(&arguments),
             Self::Keys(arguments) => keys::run(&arguments),
             Self::Operate(arguments) => operate::run(&arguments),
-            Self::Doctor(arguments) => doctor::run(&arguments),
+            Self::Doctor(arguments) => doctor::run(&arguments, console),
             Self::Gateway(arguments) => gateway::run(&arguments, console),
             Self::Node(arguments) => party::run_station(&arguments),
             Self::RemoteIo(arguments) => party::run_remote_io(&arguments.common),

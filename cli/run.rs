@@ -122,22 +122,7 @@ fn text(summary: &Summary, directory: Option<&Path>) -> String {
             "the journal stopped ({reason}): {lost} records are lost"
         );
     }
-    let verdict = match (&summary.inconclusive, summary.passed, summary.interrupted) {
-        (_, true, _) => "passed: every expectation was met".to_owned(),
-        (Some(why), false, _) => format!("INCONCLUSIVE: {why}; neither passed nor failed"),
-        (None, false, true) => format!(
-            "interrupted after {} of {} cycles",
-            summary.cycles_run, summary.cycles_asked
-        ),
-        (None, false, false) if summary.cycles_run < summary.cycles_asked => {
-            format!(
-                "FAILED: only {} of {} cycles were run",
-                summary.cycles_run, summary.cycles_asked
-            )
-        }
-        (None, false, false) => "FAILED".to_owned(),
-    };
-    let _ = writeln!(text, "{verdict}");
+    let _ = writeln!(text, "{}", verdict(summary));
     if !summary.passed && summary.circumstances.seed.is_some() {
         let _ = writeln!(text, "repeat it with: {}", summary.circumstances.repeat);
     }
@@ -155,6 +140,25 @@ fn text(summary: &Summary, directory: Option<&Path>) -> String {
         let _ = writeln!(text, "report: {}", directory.join("report.html").display());
     }
     text
+}
+
+/// What the run came to, in one line.
+pub(crate) fn verdict(summary: &Summary) -> String {
+    match (&summary.inconclusive, summary.passed, summary.interrupted) {
+        (_, true, _) => "passed: every expectation was met".to_owned(),
+        (Some(why), false, _) => format!("INCONCLUSIVE: {why}; neither passed nor failed"),
+        (None, false, true) => format!(
+            "interrupted after {} of {} cycles",
+            summary.cycles_run, summary.cycles_asked
+        ),
+        (None, false, false) if summary.cycles_run < summary.cycles_asked => {
+            format!(
+                "FAILED: only {} of {} cycles were run",
+                summary.cycles_run, summary.cycles_asked
+            )
+        }
+        (None, false, false) => "FAILED".to_owned(),
+    }
 }
 
 /// Table II, and a line for each plant and each remote I/O.

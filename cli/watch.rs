@@ -94,6 +94,7 @@ impl BesideArguments {
         Some(Page {
             address: self.watch?,
             arguments: self.page.clone(),
+            stays: false,
         })
     }
 }
@@ -103,9 +104,22 @@ impl BesideArguments {
 pub(crate) struct Page {
     address: SocketAddr,
     arguments: PageArguments,
+    stays: bool,
 }
 
 impl Page {
+    /// The same, of a cluster that stays up when its scenario is over, and then takes commands.
+    pub(crate) fn staying(self) -> Self {
+        Self {
+            stays: true,
+            ..self
+        }
+    }
+
+    pub(crate) fn stays(&self) -> bool {
+        self.stays
+    }
+
     pub(crate) fn may_command(&self) -> bool {
         self.arguments.allow_commands
     }
@@ -126,7 +140,8 @@ impl Page {
         commander: Commander,
         impossible: Vec<(&'static str, String)>,
     ) -> Commanding {
-        let forbidden = (!self.may_command()).then_some("the page was not told --allow-commands");
+        let takes = self.may_command() || self.stays;
+        let forbidden = (!takes).then_some("the page was not told --allow-commands");
         Commanding {
             commander,
             forbidden: forbidden.map(str::to_owned),
@@ -184,6 +199,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
     let page = Page {
         address: arguments.address,
         arguments: arguments.page.clone(),
+        stays: false,
     };
     if arguments.target.is_dir() {
         watch_run(&arguments.target, &page, console)

@@ -1,13 +1,15 @@
-//! What a machine lacks that a party is to run on, each with its remedy.
+//! What a machine lacks that a party is to run on, each with its remedy, and with the command that repairs it where one does.
 //!
 //! Nothing is changed, and no frame is sent: peers are found by listening for as long as they surely speak.
+
+mod machine;
+mod repair;
 
 use std::collections::BTreeMap;
 use std::net::{SocketAddr, TcpListener, UdpSocket};
 use std::time::Duration;
 
 use nix::poll::{PollFd, PollFlags, ppoll};
-use nix::sys::resource::{Resource, getrlimit};
 use nix::sys::time::TimeSpec;
 use serde::Serialize;
 use understudy_wire::{ConfigurationHash, Party};
@@ -17,15 +19,9 @@ use crate::endpoints::Endpoints;
 use crate::error::BusError;
 use crate::guard::Guard;
 use crate::link::LinkKind;
-use crate::rights::{CYCLE_PRIORITY, lock_memory, run_in_real_time};
-use crate::wakefulness::Wakefulness;
 
-/// For so long wake-ups are measured.
-const SPAN: Duration = Duration::from_secs(1);
-
-/// Clocks that take long to read, or are too coarse.
-const SLOW_CLOCKS: [&str; 4] = ["hpet", "acpi_pm", "jiffies", "refined-jiffies"];
-const CLOCK_SOURCE: &str = "/sys/devices/system/clocksource/clocksource0/current_clocksource";
+pub use machine::examine_machine;
+pub use repair::{Repair, may_repair};
 
 /// How something stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -42,7 +38,7 @@ pub enum Health {
 /// One thing that was looked at.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Finding {
-    /// What: `clock`, `scheduler`, `memory`, `ports`, `keys`, `configuration` or `peer`.
+    /// What: `clock`, `scheduler`, `memory`, `descriptors`, `processors`, `sockets`, `ports`, `keys`, `configuration` or `peer`.
     pub check: &'static str,
     /// How it stands.
     pub health: Health,
@@ -50,6 +46,8 @@ pub struct Finding {
     pub found: String,
     /// What to do about it, where something is to be done.
     pub remedy: Option<String>,
+    /// The command that does it, where one can.
+    pub repair: Option<Repair>,
 }
 
 impl Finding {
@@ -60,6 +58,7 @@ impl Finding {
             health: Health::Good,
             found: found.into(),
             remedy: None,
+            repair: None,
         }
     }
 
@@ -75,84 +74,13 @@ impl Finding {
             health,
             found: found.into(),
             remedy: Some(remedy.into()),
+            repair: None,
         }
     }
-}
 
-/// Clock, scheduler rights and memory, for cycles of `period`.
-pub fn examine_machine(period: Duration) -> Vec<Finding> {
-    vec![clock_source(), scheduler(), memory(), sleeps(period)]
-}
-
-fn clock_source() -> Finding {
-    let Ok(text) = std::fs::read_to_string(CLOCK_SOURCE) else {
-        return Finding::good("clock", "the kernel does not say which clock it uses");
-    };
-    let name = text.trim();
-    if SLOW_CLOCKS.contains(&name) {
-        Finding::trouble(
-            "clock",
-            Health::Warning,
-            format!("the clock source is {name}, which takes long to read"),
-            format!(
-                "boot with `clocksource=tsc`, or write `tsc` to {CLOCK_SOURCE} where it is listed as available"
-            ),
-        )
-    } else {
-        Finding::good("clock", format!("the clock source is {name}"))
-    }
-}
-
-fn scheduler() -> Finding {
-    // In a thread of its own: the rest of the examination is no real-time work.
-    let tried = std::thread::spawn(|| run_in_real_time(CYCLE_PRIORITY)).join();
-    match tried.unwrap_or_else(|_| Err("the attempt ended by itself".to_owned())) {
-        Ok(()) => Finding::good(
-            "scheduler",
-            format!("SCHED_FIFO {CYCLE_PRIORITY} is granted"),
-        ),
-        Err(error) => Finding::trouble(
-            "scheduler",
-            Health::Warning,
-            format!("no SCHED_FIFO ({error}): other programs delay the cycle"),
-            "grant CAP_SYS_NICE: `AmbientCapabilities=CAP_SYS_NICE` in the unit, or `setcap cap_sys_nice+ep` on the program; root is not needed",
-        ),
-    }
-}
-
-fn memory() -> Finding {
-    match lock_memory() {
-        Ok(()) => Finding::good("memory", "memory can be locked"),
-        Err(reason) => {
-            let limit = getrlimit(Resource::RLIMIT_MEMLOCK).map_or(0, |(soft, _)| soft);
-            Finding::trouble(
-                "memory",
-                Health::Warning,
-                format!(
-                    "memory is not locked ({reason}; the limit is {limit} bytes): paging may delay the cycle"
-                ),
-                "`LimitMEMLOCK=infinity` in the unit, or `ulimit -l unlimited`",
-            )
-        }
-    }
-}
-
-/// How late sleepers are woken, which is what a cycle feels of everything above.
-fn sleeps(period: Duration) -> Finding {
-    let measured = Wakefulness::measure(SPAN, true);
-    let found = format!("{measured}; a cycle has {} ms", period.as_secs_f64() * 1e3);
-    if measured.keeps(period) {
-        Finding::good("clock", found)
-    } else {
-        Finding::trouble(
-            "clock",
-            Health::Warning,
-            found,
-            format!(
-                "a `period` of {} ms, real-time rights, a kernel with PREEMPT_RT, processors kept free of other work (`isolcpus`), or a machine that is not virtual",
-                measured.period().as_millis()
-            ),
-        )
+    /// The same, with a command that repairs it.
+    fn repaired_by(self, repair: Option<Repair>) -> Self {
+        Self { repair, ..self }
     }
 }
 

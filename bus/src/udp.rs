@@ -15,7 +15,7 @@ use crate::error::BusError;
 use crate::link::{Link, LinkCounters};
 
 /// Asked of the system for datagrams that wait while this party is not scheduled; the system may give less.
-const RECEIVE_BUFFER_BYTES: usize = 1024 * 1024;
+pub(crate) const RECEIVE_BUFFER_BYTES: usize = 1024 * 1024;
 
 pub(crate) struct UdpLink {
     socket: UdpSocket,

@@ -120,7 +120,7 @@ struct OpenCycle {
 }
 
 /// The account of one run.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Account {
     pub(crate) terms: Terms,
     pub(crate) cycles: u64,
@@ -430,6 +430,7 @@ impl Account {
             | RunEvent::Acknowledged(_)
             | RunEvent::Attached { .. }
             | RunEvent::Detached { .. }
+            | RunEvent::ScenarioOver { .. }
             | RunEvent::Finished => {}
         }
     }

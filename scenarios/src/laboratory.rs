@@ -4,6 +4,7 @@
 //! for, and ends everything that it started, whatever happens. It decides nothing about the cycle, and no frame passes through it
 //! unless it shapes the links. The unexpected end of a member is a fault like any other: it is recorded, and the run goes on.
 
+mod afterwards;
 mod conductor;
 mod error;
 mod keys;
@@ -35,6 +36,7 @@ use crate::record::{Record, RunEvent};
 use crate::run_directory::RunDirectory;
 use crate::scenario::Scenario;
 
+pub use afterwards::Afterwards;
 pub(crate) use conductor::Conductor;
 pub use error::LaboratoryError;
 pub use site::{HostKind, NetworkSettings};
@@ -152,10 +154,10 @@ pub fn run_laboratory(
     directory: &RunDirectory,
     watch: &mut dyn FnMut(Progress),
 ) -> Result<LaboratoryRun, LaboratoryError> {
-    run_commanded(cluster, scenario, settings, directory, None, watch)
+    run_commanded(cluster, scenario, settings, directory, None, None, watch)
 }
 
-/// The same, while somebody may give commands; then it waits for cycles as long as that takes.
+/// The same, while somebody may give commands; then it waits for cycles as long as that takes. With `afterwards` the cluster stays up.
 ///
 /// # Errors
 /// As [`run_laboratory`].
@@ -165,12 +167,13 @@ pub fn run_commanded(
     settings: LaboratorySettings,
     directory: &RunDirectory,
     commands: Option<Commands>,
+    afterwards: Option<Afterwards<'_>>,
     watch: &mut dyn FnMut(Progress),
 ) -> Result<LaboratoryRun, LaboratoryError> {
     let mut steps = Steps::new(scenario, cluster.agreement().schedule.period());
     let conductor = &mut steps;
     run(
-        cluster, scenario, settings, directory, commands, conductor, watch,
+        cluster, scenario, settings, directory, commands, afterwards, conductor, watch,
     )
 }
 
@@ -184,16 +187,21 @@ pub(crate) fn run_conducted(
     watch: &mut dyn FnMut(Progress),
 ) -> Result<LaboratoryRun, LaboratoryError> {
     run(
-        cluster, scenario, settings, directory, None, conductor, watch,
+        cluster, scenario, settings, directory, None, None, conductor, watch,
     )
 }
 
+#[allow(
+    clippy::too_many_arguments,
+    reason = "the three ways to call it differ in these"
+)]
 fn run(
     cluster: &Cluster,
     scenario: &Scenario,
     settings: LaboratorySettings,
     directory: &RunDirectory,
     commands: Option<Commands>,
+    afterwards: Option<Afterwards<'_>>,
     conductor: &mut dyn Conductor,
     watch: &mut dyn FnMut(Progress),
 ) -> Result<LaboratoryRun, LaboratoryError> {
@@ -233,6 +241,8 @@ fn run(
         cuts: BTreeMap::new(),
         recovery: Recovery::default(),
         conductor,
+        afterwards,
+        judged: None,
         commanded: commands.is_some(),
         directory: directory.path().to_owned(),
         sender,
@@ -284,6 +294,9 @@ struct Laboratory<'w> {
     cuts: BTreeMap<Party, Cuts>,
     recovery: Recovery,
     conductor: &'w mut dyn Conductor,
+    afterwards: Option<Afterwards<'w>>,
+    /// The account of the scenario, where the cluster stays up after it.
+    judged: Option<Account>,
     /// Whether somebody gives commands, or said that he might.
     commanded: bool,
     directory: PathBuf,
@@ -302,7 +315,7 @@ impl Laboratory<'_> {
         self.note(RunEvent::Finished);
         self.machine.extend(self.site.describe());
         LaboratoryRun {
-            account: self.account,
+            account: self.judged.unwrap_or(self.account),
             journal: self.journal.take().map(Journal::finish).unwrap_or_default(),
             machine: self.machine.into_iter().collect(),
             failure,
@@ -356,15 +369,7 @@ impl Laboratory<'_> {
                 self.restart(party).await;
             }
             self.show_progress(&mut waits);
-            if self.conductor.is_over(now) {
-                return Ok(());
-            }
-            // One cycle more, so that all remote I/Os have surely told of the last one.
-            if self
-                .account
-                .cycle()
-                .is_some_and(|cycle| cycle > self.account.cycles)
-            {
+            if self.judged.is_none() && self.is_over(now) && !self.stays() {
                 return Ok(());
             }
             self.check_patience(&mut waits, now)?;
@@ -372,7 +377,9 @@ impl Laboratory<'_> {
     }
 
     fn interrupted(&mut self) -> Result<(), LaboratoryError> {
-        self.note(RunEvent::Interrupted);
+        if self.judged.is_none() {
+            self.note(RunEvent::Interrupted);
+        }
         Ok(())
     }
 

@@ -46,8 +46,8 @@ pub use joining::{JOIN_CYCLES, Joined, join_trial};
 pub use journal::{JOURNAL_LIMIT_BYTES, Journal, JournalError, JournalState, records, records_of};
 pub use kept::{KeptError, keep_cluster, kept_cluster};
 pub use laboratory::{
-    Deaths, HostKind, LaboratoryError, LaboratoryRun, LaboratorySettings, NetworkSettings,
-    Progress, monotonic_ns, run_commanded, run_laboratory,
+    Afterwards, Deaths, HostKind, LaboratoryError, LaboratoryRun, LaboratorySettings,
+    NetworkSettings, Progress, monotonic_ns, run_commanded, run_laboratory,
 };
 pub use named_files::{ALLOWED_FOLDERS, named_file};
 pub use observed::{JournalView, ObservationError, observe_journal};

@@ -88,6 +88,9 @@ pub enum Refusal {
     /// The run is not there any more, or too many commands wait.
     #[error("U0557: the run takes no command now")]
     Busy,
+    /// The scenario is to be judged first.
+    #[error("U0560: the scenario runs until cycle {0}; commands are taken after that")]
+    ScenarioRuns(u64),
     /// The system refused it.
     #[error("U0558: {name}: {reason}")]
     System {

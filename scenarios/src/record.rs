@@ -102,6 +102,11 @@ pub enum RunEvent {
         /// Which cycle of the run it is; 0 but for a run of which it is known later.
         cycle: u64,
     },
+    /// The scenario is over, and the cluster stays up.
+    ScenarioOver {
+        /// What it came to, such as `passed: every expectation was met`.
+        verdict: String,
+    },
     /// The run was asked to end early.
     Interrupted,
     /// The last record.

@@ -4,7 +4,7 @@ use insta::assert_snapshot;
 
 use crate::understudy;
 
-const COMMANDS: [&str; 33] = [
+const COMMANDS: [&str; 34] = [
     "allocate",
     "catalogue",
     "resources",
@@ -25,6 +25,7 @@ const COMMANDS: [&str; 33] = [
     "why",
     "journal",
     "diff",
+    "animate",
     "init",
     "keys",
     "operate",

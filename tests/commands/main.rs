@@ -1,6 +1,7 @@
 //! The command line as a person sees it: help, answers, errors, exit statuses.
 
 mod allocate;
+mod animate;
 mod bench;
 mod book;
 mod bounded;

@@ -131,6 +131,31 @@ async function drive() {
   await until("everybody", `['robot', 'press', 'understudy'].every((name) => document.querySelector('g.party[data-name="' + name + '"]')?.dataset.state === 'speaking')`);
   await scheme("light");
   await until("a margin", `${text("#survival-words")}.includes("any one further failure")`);
+
+  // The tour: three steps beside the view, by keyboard or mouse, and not again.
+  const tour = (part) => `document.querySelector("#tour ${part}")`;
+  await until("the tour", `${tour(".tour-step")}?.textContent === "1 of 3"`);
+  await picture("tour");
+  await accessible("tour");
+  const before = await evaluate("document.activeElement === document.body");
+  if (!before) {
+    problems.push("the tour took the focus without being asked for");
+  }
+  await click("[data-tour=next]");
+  await click("[data-tour=next]");
+  await until("its last step", `${tour(".tour-step")}.textContent === "3 of 3" && document.querySelectorAll(".party.tour-target").length === 3`);
+  await click("[data-tour=next]");
+  await until("its end", `document.getElementById("tour") === null && document.querySelector(".tour-target") === null`);
+  await call("Page.reload");
+  await until("everybody again", `${stateOf("robot")} === "speaking"`);
+  if (await evaluate(`document.getElementById("tour") !== null`)) {
+    problems.push("a tour that was ended came back");
+  }
+  await click("#tour-start");
+  await until("the tour that was asked for", `document.activeElement?.dataset.tour === "next"`);
+  await evaluate(`document.activeElement.dispatchEvent(new KeyboardEvent("keydown", { key: "Escape", bubbles: true }))`);
+  await until("its end by a key", `document.getElementById("tour") === null && document.activeElement?.id === "tour-start"`);
+  await until("a margin again", `${text("#survival-words")}.includes("any one further failure")`);
   await picture("cluster");
   await accessible("cluster");
 
@@ -142,7 +167,7 @@ async function drive() {
   await click("[data-command=kill]");
   await until("its end", `${stateOf("robot")} === "killed"`);
   await until("a smaller margin", `${text("#survival-words")}.includes("1 of 2 failures")`);
-  await until("restored outputs", `document.querySelector(".flow[data-source=reconstructed]") !== null`);
+  await until("restored outputs", `document.querySelector(".picture-frame .flow[data-source=reconstructed]") !== null`);
   await picture("killed");
   await scheme("dark");
   await until("the dark", "document.documentElement.dataset.theme === 'dark'");
@@ -181,7 +206,7 @@ async function drive() {
   await picture("choice");
   await accessible("choice");
   await click("#confirm-choice");
-  await until("an older state that goes on", `${lampOf("robot")} !== "lost" && document.querySelector(".flow[data-source=reconstructed]") !== null`);
+  await until("an older state that goes on", `${lampOf("robot")} !== "lost" && document.querySelector(".picture-frame .flow[data-source=reconstructed]") !== null`);
   await command("robot", "restart");
   await until("its return", `${stateOf("robot")} === "speaking" && ${lampOf("robot")} === "protected"`);
 

@@ -29,7 +29,7 @@ fn started(name: &str) -> (Page, std::path::PathBuf) {
     (page, runs)
 }
 
-fn give(page: &Page, name: &str, command: &Value) -> (u16, String) {
+pub(crate) fn give(page: &Page, name: &str, command: &Value) -> (u16, String) {
     let body = json!({ "party": name, "command": command, "owner": "anna", "reason": "a test" });
     let answer = page.post("/api/command", &body.to_string());
     let code = if answer.status == 200 {

@@ -8,6 +8,7 @@
 mod attach;
 mod browser;
 mod commands;
+mod demo;
 mod paths;
 mod present;
 #[allow(dead_code, reason = "each test uses its part")]

@@ -219,6 +219,30 @@ fn doctor_names_what_is_wrong_with_its_remedy() {
             "{machine:#}"
         );
     }
+    // Without a terminal the commands are shown, and none is run.
+    let (status, fixed, _) = answer(&["doctor", cluster, "--fix"]);
+    assert_eq!(status, 0, "{fixed:#}");
+    let findings = fixed["result"]["findings"].as_array().expect("a list");
+    let with_command = findings
+        .iter()
+        .filter(|finding| finding["repair"].is_object());
+    let repairs = fixed["result"]["fixed"]["repairs"]
+        .as_array()
+        .expect("a list");
+    assert_eq!(repairs.len(), with_command.count(), "{fixed:#}");
+    assert!(
+        repairs
+            .iter()
+            .all(|done| done["outcome"]["outcome"] == "shown"),
+        "{fixed:#}"
+    );
+    let (status, refused, _) = answer(&["doctor", cluster, "--yes"]);
+    assert_eq!(
+        (status, codes(&refused)),
+        (2, vec!["U0600"]),
+        "--yes is of --fix"
+    );
+
     let of = |name: &str| format!("{keys}/parties/{name}");
     let robot = [
         "doctor", cluster, "--name", "robot", "--link", "udp", "--listen", "20",

@@ -24,7 +24,7 @@ pub struct Description {
 }
 
 /// Every word that [`Description::event`] can be.
-pub(crate) const EVENTS: [&str; 64] = [
+pub(crate) const EVENTS: [&str; 65] = [
     "acknowledged",
     "adopted",
     "adopted-lineage",
@@ -73,6 +73,7 @@ pub(crate) const EVENTS: [&str; 64] = [
     "refused-frames",
     "released",
     "sampled",
+    "scenario-over",
     "source",
     "spoke",
     "stalled",

@@ -72,6 +72,9 @@ pub enum ViewError {
         /// The nearest name, or all.
         hint: String,
     },
+    /// Nothing says which part of the run is to be shown.
+    #[error("U0579: no part of the run to show: {0}")]
+    NoScene(String),
 }
 
 impl ViewError {
@@ -94,6 +97,7 @@ impl ViewError {
             Self::NoCycle { .. } => "U0575",
             Self::NoState { .. } => "U0576",
             Self::NoName { .. } => "U0577",
+            Self::NoScene(_) => "U0579",
         }
     }
 }

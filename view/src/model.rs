@@ -75,6 +75,8 @@ pub struct Model {
     left_out: u64,
     pub(crate) finished: bool,
     pub(crate) interrupted: bool,
+    /// From which cycle on, and what it came to.
+    scenario_over: Option<(i64, String)>,
 }
 
 impl Model {
@@ -102,6 +104,7 @@ impl Model {
             left_out: 0,
             finished: false,
             interrupted: false,
+            scenario_over: None,
             cluster,
         }
     }
@@ -173,6 +176,9 @@ impl Model {
         self.alarms.shift(by);
         self.timings.shift(by);
         self.closed = self.closed.map(|closed| closed.saturating_add(by));
+        if let Some((cycle, _)) = &mut self.scenario_over {
+            *cycle = cycle.saturating_add(by);
+        }
     }
 
     // ── what the parties say ────────────────────────────────────────────────────────────────────────────────────────
@@ -363,6 +369,9 @@ impl Model {
             RunEvent::Origin { moment, cycle } => {
                 let cycle = i64::try_from(*cycle).unwrap_or(i64::MAX / 2);
                 self.cycles.origin_is(*moment, cycle);
+            }
+            RunEvent::ScenarioOver { verdict } => {
+                self.scenario_over = Some((cycle, verdict.clone()))
             }
             RunEvent::Interrupted => self.interrupted = true,
             RunEvent::Finished => self.finished = true,

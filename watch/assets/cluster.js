@@ -1,10 +1,14 @@
 // The cluster: who works, from where each plant gets its outputs, and what could fail now.
 
 import { el, keyed, setText, setAttribute } from "/element.js";
-import { makePicture } from "/picture.js";
+import { signalLegend, sourceLegend, stateLegend } from "/legend.js";
+import { STATES, makePicture } from "/picture.js";
 import { continueWords, openChoice, openParty } from "/commands.js";
 import { SOURCES } from "/sources.js";
 import { openWhy } from "/why.js";
+
+// The states that a visitor meets; the others say themselves what they are.
+const LEGEND_STATES = ["speaking", "silent", "flagged", "joining", "shadow", "stopped", "killed"];
 
 let run = null;
 let place = null;
@@ -20,12 +24,13 @@ export function prepare(facts) {
   place = document.getElementById("view-cluster");
   place.append(
     el("div", { class: "picture-frame", tabindex: "0", role: "region", "aria-label": "Picture of the cluster" }, picture.element),
+    el("div", { class: "legends", id: "cluster-legend" }, sourceLegend(), stateLegend(LEGEND_STATES.map((name) => STATES[name]))),
     el("div", { class: "cards" },
       card("protection", "Protection", el("ul", { id: "protection-list", class: "plain" })),
       card("survival", "What could fail now", el("p", { id: "survival-words", class: "verdict" }), el("ul", { id: "survival-list", class: "plain" })),
       card("timing", "Cycle", el("dl", { id: "timing-list" })),
-      card("counts", "Outputs so far", el("div", { class: "wide", tabindex: "0", role: "region", "aria-label": "Table of outputs so far" }, table("counts-table", ["program", "direct", "restored", "held", "fail-safe"]))),
-      card("signals", "Inputs and outputs", el("div", { id: "signals-list" })),
+      card("counts", "Cycles so far, by source of the outputs", el("div", { class: "wide", tabindex: "0", role: "region", "aria-label": "Table of cycles by source" }, table("counts-table", ["program", ...["direct", "reconstructed", "held", "fail-safe"].map((source) => `${SOURCES[source].sign} ${SOURCES[source].words}`)]))),
+      card("signals", "Inputs and outputs", signalLegend(), el("div", { id: "signals-list" })),
     ),
   );
 }
@@ -99,8 +104,8 @@ function timing(state) {
     ["deadline", micro(run.deadline_us)],
     ["last turn before it", micro(timing.margin_us)],
     ["least so far", micro(timing.least_margin_us)],
-    ["starts the cycles", state.pacemaker ?? "nobody"],
-    ["host stood still", `${timing.stalls} times`],
+    ["cycle master", state.pacemaker ?? "none"],
+    ["host stalls", timing.stalls === 1 ? "1 stall" : `${timing.stalls} stalls`],
   ];
   keyed(
     document.getElementById("timing-list"),

@@ -38,8 +38,8 @@ function actions(party) {
   const all = [
     ["kill", "Kill", "as kill -9", down ? DOWN : null],
     ["restart", "Start again", "", down ? null : UP],
-    ["stop", "Make stand still", "as SIGSTOP", down ? DOWN : still ? "it stands still already" : null],
-    ["continue", "Let go on", "as SIGCONT", down ? DOWN : still ? null : "it does not stand still"],
+    ["stop", "Suspend", "as SIGSTOP", down ? DOWN : still ? "it is suspended already" : null],
+    ["continue", "Resume", "as SIGCONT", down ? DOWN : still ? null : "it is not suspended"],
   ];
   if (party.kind !== "plant") {
     const cut = party.cut;

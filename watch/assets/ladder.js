@@ -4,6 +4,7 @@
 import { act, ask } from "/ask.js";
 import { el, setText } from "/element.js";
 import { cycleParameter, isLive, state } from "/time.js";
+import { ladderLegend } from "/legend.js";
 import { openWhy } from "/why.js";
 
 let run = null;
@@ -35,6 +36,7 @@ export function prepare(facts) {
         el("option", { value: "understudy" }, "Understudy"), el("option", { value: "codesys" }, "CODESYS"), el("option", { value: "tia" }, "TIA"))),
     ),
     el("p", { id: "ladder-stamp", class: "stamp", role: "status" }),
+    ladderLegend(),
     el("div", { class: "ladder-columns" },
       el("div", { id: "ladder-picture", class: "wide", tabindex: "0", role: "region", "aria-label": "Ladder" }),
       el("section", { id: "ladder-cross", class: "card", "aria-label": "Cross-reference" })),

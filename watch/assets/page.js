@@ -9,6 +9,7 @@ import * as trends from "/trends.js";
 import * as events from "/events.js";
 import * as compare from "/compare.js";
 import * as commands from "/commands.js";
+import * as tour from "/tour.js";
 import * as why from "/why.js";
 
 const VIEWS = { cluster, ladder, trends, events, compare };
@@ -35,14 +36,24 @@ function showView() {
   }
 }
 
+let period = 0;
+
 function head(state, live) {
   const when = !live ? "replay" : state.finished ? "finished" : time.stale() ? "old" : "live";
-  setText(document.getElementById("status"), `${when} · cycle ${state.cycle} of ${state.newest}`);
+  setText(document.getElementById("status"), `${when} · cycle ${state.cycle} of ${state.newest} · ${period} ms each`);
   document.body.dataset.when = when;
   const open = state.alarms.filter((alarm) => !alarm.acknowledged).length;
   const button = document.getElementById("alarm-count");
   button.hidden = open === 0;
   setText(button, open === 1 ? "⚠ 1 alarm" : `⚠ ${open} alarms`);
+}
+
+// The scenario of a demo is over, and its cluster stays up: what a visitor can do now.
+function scenarioOver(state, run) {
+  const place = document.getElementById("scenario-over");
+  place.hidden = !state.scenario_over || state.finished;
+  const invitation = run.commands.why ? "" : " Kill a station yourself: click a station, then Kill.";
+  setText(place, `The scenario is over (${state.scenario_over}).${invitation}`);
 }
 
 // Values that are not the present are greyed out, and it is said why.
@@ -71,6 +82,7 @@ async function facts() {
 
 async function begin() {
   const run = await facts();
+  period = run.period_us / 1000;
   setText(document.getElementById("title"), run.title || run.cluster);
   document.title = `${run.cluster} · Understudy`;
   const logOut = document.getElementById("log-out");
@@ -87,6 +99,7 @@ async function begin() {
   document.getElementById("alarm-count").addEventListener("click", () => (location.hash = "events"));
   time.onState((state, live) => {
     head(state, live);
+    scenarioOver(state, run);
     VIEWS[currentView()].show(state, live);
     showStale();
   });
@@ -94,6 +107,7 @@ async function begin() {
   addEventListener("visibilitychange", showStale);
   addEventListener("hashchange", showView);
   showView();
+  tour.prepare(run);
   time.start(run);
 }
 

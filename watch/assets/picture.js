@@ -10,10 +10,10 @@ export const STATES = {
   silent: { sign: "○", words: "silent" },
   flagged: { sign: "⚑", words: "flagged" },
   joining: { sign: "↻", words: "joining" },
-  shadow: { sign: "◐", words: "in shadow" },
+  shadow: { sign: "◐", words: "shadow mode" },
   refused: { sign: "✗", words: "refused" },
   excluded: { sign: "⊘", words: "excluded" },
-  stopped: { sign: "‖", words: "stands still" },
+  stopped: { sign: "‖", words: "suspended" },
   killed: { sign: "✕", words: "killed" },
   ended: { sign: "✕", words: "has ended" },
   "not-started": { sign: "…", words: "not started" },
@@ -70,7 +70,7 @@ function makeBox(name, kind, x, y, width, letters, pick) {
   const state = svg("text", { class: "state", x: x + 12, y: y + 38 });
   const note = svg("text", { class: "note", x: x + 12, y: y + 54 });
   const element = svg("g", {
-    class: "party", tabindex: "0", role: "button", "data-name": name, click: pick,
+    class: "party", tabindex: "0", role: "button", "data-name": name, "data-kind": kind, click: pick,
     keydown: (event) => {
       if (event.key === "Enter" || event.key === " ") {
         event.preventDefault();
@@ -121,6 +121,6 @@ function showAll(run, boxes, flows, state) {
 function showBox(box, party) {
   const look = STATES[party.state] ?? { sign: "?", words: party.state };
   setAttribute(box.element, "data-state", party.state);
-  setText(box.state, `${look.sign} ${look.words}${party.paces ? ", paces" : ""}`);
-  setText(box.note, party.note ? party.note : box.kind);
+  setText(box.state, `${look.sign} ${look.words}`);
+  setText(box.note, party.note || (party.paces ? `${box.kind}, cycle master` : box.kind));
 }

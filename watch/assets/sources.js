@@ -2,7 +2,7 @@
 
 export const SOURCES = {
   direct: { sign: "→", words: "direct" },
-  reconstructed: { sign: "⊕", words: "restored" },
+  reconstructed: { sign: "⊕", words: "reconstructed" },
   held: { sign: "‖", words: "held" },
   "fail-safe": { sign: "■", words: "fail-safe" },
   unknown: { sign: "?", words: "not known" },

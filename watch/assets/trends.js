@@ -4,6 +4,7 @@ import { act, ask } from "/ask.js";
 import { el, setText, shorten } from "/element.js";
 import { goTo, state } from "/time.js";
 import { bandPlugin } from "/bands.js";
+import { bandLegend } from "/legend.js";
 
 let run = null;
 let plot = null;
@@ -24,11 +25,11 @@ export function prepare(facts) {
   chosen = run.programs.flatMap((program) => program.outputs.slice(0, 2).map((_, index) => `${program.index}.output.${index}`)).slice(0, 6);
   id("view-trends").append(
     el("div", { class: "tools" },
-      el("label", {}, "Cycles ", el("select", { id: "trend-span", change: (event) => { span = Number(event.target.value); refresh(); } },
+      el("label", {}, "Length in cycles ", el("select", { id: "trend-span", change: (event) => { span = Number(event.target.value); refresh(); } },
         [100, 500, 2000, 10000].map((count) => el("option", { value: count, selected: count === span }, String(count))))),
       el("span", { id: "trend-words", class: "soft", role: "status" })),
     el("div", { id: "trend-plot", class: "plot", role: "img", "aria-label": "Trends of the chosen signals" }),
-    el("p", { class: "legend-words" }, "Bands: one row for each remote I/O. Plain: direct. Slanted lines: restored. Dots: held. Filled: fail-safe. Upright lines: what was done to the cluster."),
+    bandLegend(),
     el("details", { class: "chooser" }, el("summary", {}, "Signals"), groups));
   for (const input of document.querySelectorAll("#view-trends input[type=checkbox]")) {
     input.checked = chosen.includes(input.value);
@@ -110,7 +111,7 @@ function draw(answer) {
     height: Math.max(220, 26 * lanes + 18 * bandRows + 110),
     scales: { x: { time: false }, y: { range: [-0.3 - bandRows * 0.7, Math.max(lanes, 1)] } },
     axes: [
-      { ...axis, values: (_, values) => values.map((value) => (Number.isInteger(value) ? String(value) : "")) },
+      { ...axis, label: "cycle", labelSize: 20, values: (_, values) => values.map((value) => (Number.isInteger(value) ? String(value) : "")) },
       { ...axis, size: 130, splits: () => answer.signals.map((_, index) => lanes - 1 - index + 0.35), values: () => answer.signals.map((signal) => shorten(signal.name, 18)), grid: { show: false } },
     ],
     series: [{ label: "cycle", value: (_, value) => (value === null ? "" : String(value)) }, ...series],
@@ -124,7 +125,8 @@ function draw(answer) {
       goTo(plot.posToVal(plot.cursor.left, "x"));
     }
   });
-  setText(id("trend-words"), `cycles ${answer.from} to ${answer.to}; a click goes to the cycle`);
+  const seconds = ((answer.to - answer.from + 1) * run.period_us) / 1e6;
+  setText(id("trend-words"), `cycles ${answer.from} to ${answer.to}, ${seconds.toFixed(1)} s; a click goes to the cycle`);
 }
 
 // The value of a run-length coded signal at each mark.

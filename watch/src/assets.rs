@@ -31,6 +31,8 @@ const ASSETS: &[(&str, &str, &str)] = assets![
     "cluster.js": SCRIPT,
     "picture.js": SCRIPT,
     "sources.js": SCRIPT,
+    "legend.js": SCRIPT,
+    "tour.js": SCRIPT,
     "ladder.js": SCRIPT,
     "why.js": SCRIPT,
     "trends.js": SCRIPT,

@@ -26,6 +26,8 @@ pub(crate) struct State {
     pub(crate) oldest: i64,
     pub(crate) newest: i64,
     finished: bool,
+    /// What the scenario came to, where it is over and the cluster stays up.
+    scenario_over: Option<String>,
     pacemaker: Option<String>,
     parties: Vec<ShownParty>,
     programs: Vec<ShownProgram>,
@@ -164,6 +166,7 @@ pub(crate) fn state(known: &Known, cycle: i64) -> Option<State> {
         oldest,
         newest,
         finished: known.has_ended(),
+        scenario_over: run.scenario_over(cycle).map(str::to_owned),
         pacemaker: paces.map(|station| name(known, Party::Station(station))),
         parties: stations.chain(remote_ios).chain(plants).collect(),
         programs: known

@@ -371,7 +371,8 @@ fn meaning(signal: &Signal) -> String {
     parts.into_iter().flatten().collect::<Vec<_>>().join("  ")
 }
 
-fn escaped(text: &str) -> String {
+/// Text as SVG and XML hold it.
+pub fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
         match character {

@@ -35,7 +35,8 @@ impl Laboratory<'_> {
     ) -> Result<(), Refusal> {
         // Whoever commands may make everybody stand still for as long as he wants.
         self.commanded = true;
-        let done = match self.refusal(party, &command) {
+        let refusal = self.too_early().or_else(|| self.refusal(party, &command));
+        let done = match refusal {
             Some(refusal) => Err(refusal),
             None => self.command(party, &command).await,
         };
@@ -47,6 +48,13 @@ impl Laboratory<'_> {
             refused: done.as_ref().err().map(ToString::to_string),
         });
         done
+    }
+
+    /// Why no command is taken before the scenario is over, where that is so.
+    fn too_early(&self) -> Option<Refusal> {
+        let afterwards = self.afterwards.as_ref()?;
+        let refuses = afterwards.refuse_until_then && self.judged.is_none();
+        refuses.then_some(Refusal::ScenarioRuns(self.account.cycles))
     }
 
     /// Why a command cannot be done now.

@@ -187,6 +187,11 @@ pub(super) fn run(event: &RunEvent, parties: &Parties) -> Words {
             Info,
             "everybody is in step: cycles are counted from here".to_owned(),
         ),
+        RunEvent::ScenarioOver { verdict } => (
+            "scenario-over",
+            Notice,
+            format!("the scenario is over, and the cluster stays up; {verdict}"),
+        ),
         RunEvent::Interrupted => (
             "interrupted",
             Notice,

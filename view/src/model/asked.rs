@@ -54,6 +54,12 @@ impl Model {
         self.finished
     }
 
+    /// What the scenario came to, where it is over in this cycle and the cluster stays up.
+    pub fn scenario_over(&self, cycle: i64) -> Option<&str> {
+        let (over, verdict) = self.scenario_over.as_ref()?;
+        (*over <= cycle).then_some(verdict)
+    }
+
     /// What a station is now.
     pub fn station_state(&self, station: StationId) -> Option<StationState> {
         let track = self.stations.get(station.index())?;

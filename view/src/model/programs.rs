@@ -79,7 +79,12 @@ impl Model {
                 moment, missing, ..
             } => {
                 let idle = *missing == Some(Missing::NoCycle);
-                self.cycles.deadline(program, *moment, idle)
+                let cycle = self.cycles.deadline(program, *moment, idle);
+                // It may tell of an epoch whose origin was awaited: what was told before moves, and this cycle is counted from there already.
+                if let Some(shift) = self.cycles.take_shift() {
+                    self.shift(shift);
+                }
+                cycle
             }
             RemoteIoEvent::Sampled { moment, .. } => {
                 self.timings.sampled(*moment, record.at_ns);
