@@ -57,13 +57,19 @@ pub(crate) struct Answer {
     pub(crate) text: String,
     /// The same for machines.
     pub(crate) result: Value,
-    /// Those of its numbers that stand at the top of the document too.
-    pub(crate) numbers: Box<Map<String, Value>>,
     /// Files that were read, with what was found in them.
     pub(crate) reports: Vec<Report>,
     /// Nobody asked about the files: people are told how many warnings there are, and where to see them.
     pub(crate) counts_warnings: bool,
     pub(crate) failures: Vec<Failure>,
+    pub(crate) about: Box<About>,
+}
+
+/// What few commands add to their answer.
+#[derive(Debug, Default)]
+pub(crate) struct About {
+    /// Those of its numbers that stand at the top of the document too.
+    pub(crate) numbers: Map<String, Value>,
     /// Commands that are useful after this one when it ended well; for people only.
     pub(crate) next: Vec<String>,
 }
@@ -74,11 +80,10 @@ impl Answer {
             status: Status::Done,
             text: text.into(),
             result: serde_json::to_value(result).unwrap_or(Value::Null),
-            numbers: Box::default(),
             reports: Vec::new(),
             counts_warnings: false,
             failures: Vec::new(),
-            next: Vec::new(),
+            about: Box::default(),
         }
     }
 
@@ -107,7 +112,7 @@ impl Answer {
     }
 
     pub(crate) fn with_numbers(mut self, numbers: Map<String, Value>) -> Self {
-        *self.numbers = numbers;
+        self.about.numbers = numbers;
         self
     }
 
@@ -115,7 +120,9 @@ impl Answer {
     pub(crate) fn and_next(mut self, arguments: &[&dyn AsRef<OsStr>]) -> Self {
         let words = arguments.iter();
         let words: Vec<_> = words.map(|word| word.as_ref().to_string_lossy()).collect();
-        self.next.push(shell_line(words.iter().map(Cow::as_ref)));
+        self.about
+            .next
+            .push(shell_line(words.iter().map(Cow::as_ref)));
         self
     }
 
@@ -248,7 +255,7 @@ impl<'a> Envelope<'a> {
             diagnostics: shown(&answer.reports).flat_map(placed).collect(),
             failures: &answer.failures,
             result: &answer.result,
-            numbers: &answer.numbers,
+            numbers: &answer.about.numbers,
         }
     }
 }

@@ -162,7 +162,7 @@ fn print_text(answer: &Answer) -> io::Result<()> {
         writeln!(errors, "error[{}]: {message}", failure.code)?;
     }
     if answer.status == Status::Done {
-        for (count, line) in answer.next.iter().enumerate() {
+        for (count, line) in answer.about.next.iter().enumerate() {
             let head = if count == 0 { "next:" } else { "     " };
             writeln!(errors, "{head} {line}")?;
         }

@@ -3,8 +3,8 @@
 //! `UNDERSTUDY_RELEASE` names the folder of the release. The systems have no network, and are removed after the test.
 
 #![allow(
-    clippy::print_stderr,
-    reason = "a test that cannot be done here says why"
+    clippy::disallowed_methods,
+    reason = "what is waited for has a deadline on the real clock"
 )]
 
 mod image;
@@ -18,6 +18,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use understudy_testing::skip;
+
 use root::{Root, User};
 use shared::{empty_folder, one_at_a_time};
 
@@ -26,7 +28,7 @@ const VERSION: &str = env!("CARGO_PKG_VERSION");
 const SUITE: &str = "bookworm";
 
 fn skipped<T>(reason: &str) -> Option<T> {
-    eprintln!("skipped: {reason}");
+    skip(reason);
     None
 }
 

@@ -5,6 +5,8 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
+use understudy_testing::skip;
+
 use super::shared::empty_folder;
 use super::{SUITE, skipped};
 
@@ -106,9 +108,8 @@ impl Root {
         let output = self.inside(user, folder, command);
         let text = String::from_utf8_lossy(&output.stdout);
         let errors = String::from_utf8_lossy(&output.stderr);
-        eprintln!("{text}");
         if output.status.code() == Some(3) {
-            eprintln!("skipped: this machine woke the members too late for a verdict");
+            skip("this machine woke the members too late for a verdict");
             return;
         }
         assert!(output.status.success(), "{command:?}: {text}{errors}");
@@ -119,8 +120,6 @@ impl Root {
 impl Drop for Root {
     fn drop(&mut self) {
         // What was mounted in it went with the last process inside.
-        if let Err(error) = fs::remove_dir_all(&self.0) {
-            eprintln!("{} is left: {error}", self.0.display());
-        }
+        let _ = fs::remove_dir_all(&self.0);
     }
 }

@@ -22,13 +22,16 @@ const FAILED: &str = ".failed";
 pub(super) struct Stub<'a> {
     pub(super) program: &'a DraftProgram,
     /// The signals of the program with the names of their terminals.
-    inputs: Vec<(String, &'a Signal)>,
-    outputs: Vec<(String, &'a Signal)>,
+    inputs: Vec<Named<'a>>,
+    outputs: Vec<Named<'a>>,
     /// Names of the stub's own.
     tick: String,
     pace: String,
     step: String,
 }
+
+/// A terminal of the plant, and the signal that it stands for.
+type Named<'a> = (String, &'a Signal);
 
 impl<'a> Stub<'a> {
     pub(super) fn new(program: &'a DraftProgram) -> Self {
@@ -36,7 +39,7 @@ impl<'a> Stub<'a> {
         for name in SPECIAL {
             namer.name(name);
         }
-        let mut terminals = |signals: &'a [Signal]| -> Vec<(String, &'a Signal)> {
+        let mut terminals = |signals: &'a [Signal]| -> Vec<Named<'a>> {
             let named = signals
                 .iter()
                 .map(|signal| (namer.name(&signal.name), signal));
@@ -100,17 +103,17 @@ program {}
     }
 
     /// The inputs that say that a channel is failed, and all others.
-    fn channels(&self) -> (Vec<&(String, &Signal)>, Vec<&(String, &Signal)>) {
+    fn channels(&self) -> (Vec<&Named<'_>>, Vec<&Named<'_>>) {
         let names = self.inputs.iter().map(|(_, signal)| &*signal.name);
         let names: HashSet<&str> = names.collect();
-        let says_failed = |(_, signal): &&(String, &Signal)| {
+        let says_failed = |(_, signal): &&Named<'_>| {
             let base = signal.name.strip_suffix(FAILED);
             base.is_some_and(|base| names.contains(base))
         };
         self.inputs.iter().partition(says_failed)
     }
 
-    fn push_moves(&self, text: &mut String, inputs: &[&(String, &Signal)], period: Duration) {
+    fn push_moves(&self, text: &mut String, inputs: &[&Named<'_>], period: Duration) {
         if inputs.is_empty() {
             return;
         }
