@@ -3,9 +3,9 @@
 
     deployment/image.py VERSION ARCHITECTURE COMMIT FILE NAME=BINARY...
 
-ARCHITECTURE is a name of Go: amd64 or arm64. `podman load`, `docker load` and `skopeo copy oci-archive:FILE` read it; no container engine
-is needed to make it. SOURCE_DATE_EPOCH dates its files. The format is that of the OCI image specification, with `manifest.json` of
-`docker save` next to it for engines that read only that.
+ARCHITECTURE is a name of Go: amd64 or arm64. `podman load`, `docker load` and `skopeo copy oci-archive:FILE` read it;
+no container engine is needed to make it. SOURCE_DATE_EPOCH dates its files. The format is that of the OCI image
+specification, with `manifest.json` of `docker save` next to it for engines that read only that.
 """
 
 import gzip
@@ -108,7 +108,7 @@ def image(version: str, architecture: str, commit: str, binaries: list[str]) -> 
         }),
     )
     kind = "application/vnd.oci.image.manifest.v1+json"
-    manifest = {"schemaVersion": 2, "mediaType": kind, "config": configuration, "layers": [packed], "annotations": labels}
+    manifest = {"schemaVersion": 2, "mediaType": kind, "config": configuration, "layers": [packed]}
     found = blob("manifest.v1+json", document(manifest))
     name = f"localhost/understudy:{version}"
     found["platform"] = {"architecture": architecture, "os": "linux"}

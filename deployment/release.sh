@@ -1,14 +1,16 @@
 #!/bin/sh
-# Everything that can be installed without a build, from one commit, for Linux on x86-64 and aarch64. Publishes nothing; needs no root.
+# Everything that can be installed without a build, from one commit, for Linux on x86-64 and aarch64. Publishes nothing;
+# needs no root.
 #
 #   deployment/release.sh [DIRECTORY] [TARGET...]
 #
-# For each target: static binaries of `understudy` and `understudy-opcua` with their bills of materials, a Python wheel, a Debian package and
-# a container image. For all: the cell of compose.yaml, and SHA256SUMS. Without targets both are built. docs/how-to/install.md describes them.
+# For each target: static binaries of `understudy` and `understudy-opcua` with their bills of materials, a Python wheel,
+# a Debian package and a container image. For all: the cell of compose.yaml, and SHA256SUMS. Without targets both are
+# built. docs/how-to/install.md describes them.
 #
-# The C parts (ring) need a C compiler for musl: Zig (`pip install ziglang`) has it for both, musl-gcc (Debian: musl-tools) for this
-# machine's own. Rust brings the linker and the C library: Zig's own has an allocator on which a thread waits by spinning, and one in real
-# time then waits for ever for one that is not.
+# The C parts (ring) need a C compiler for musl: Zig (`pip install ziglang`) has it for both, musl-gcc (Debian:
+# musl-tools) for this machine's own. Rust brings the linker and the C library: Zig's own has an allocator on which a
+# thread waits by spinning, and one in real time then waits for ever for one that is not.
 set -eu
 cd "$(dirname "$0")/.."
 umask 022

@@ -3,8 +3,9 @@
 
     deployment/wheel.py VERSION ARCHITECTURE DIRECTORY NAME=BINARY... [BILL_OF_MATERIALS...]
 
-The binaries are static, so one wheel serves glibc and musl, and every Python 3. It has no dependencies. SOURCE_DATE_EPOCH dates its
-files. The formats are those of packaging.python.org: "Binary distribution format", PEP 639 (licences), PEP 770 (bills of materials).
+The binaries are static, so one wheel serves glibc and musl, and every Python 3. It has no dependencies.
+SOURCE_DATE_EPOCH dates its files. The formats are those of packaging.python.org: "Binary distribution format", PEP 639
+(licences), PEP 770 (bills of materials).
 """
 
 import base64
@@ -42,7 +43,8 @@ def main(version: str, architecture: str, directory: str, *files: str) -> None:
         "Classifier: Operating System :: POSIX :: Linux",
         "Requires-Python: >=3.8",
     ]
-    wheel = ["Wheel-Version: 1.0", "Generator: understudy", "Root-Is-Purelib: false", *(f"Tag: py3-none-{platform}" for platform in platforms)]
+    wheel = ["Wheel-Version: 1.0", "Generator: understudy", "Root-Is-Purelib: false"]
+    wheel += [f"Tag: py3-none-{platform}" for platform in platforms]
     for file, lines in (("METADATA", metadata), ("WHEEL", wheel)):
         content[f"{information}/{file}"] = ("".join(f"{line}\n" for line in lines).encode(), 0o644)
     record = f"{information}/RECORD"
