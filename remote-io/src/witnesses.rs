@@ -67,9 +67,8 @@ impl Witnesses {
             .find(|entry| entry.station == station)
         {
             entry.holding = holding.copied();
-            if recalled.is_some() {
-                entry.recalled = recalled.cloned();
-            }
+            // A station that has restarted recalls nothing of what it said before.
+            entry.recalled = recalled.cloned();
             entry.silent = 0;
             self.recalled_gone.remove(station);
         }

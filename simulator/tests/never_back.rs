@@ -387,3 +387,29 @@ fn a_remote_io_that_was_suspended_decides_by_the_present() {
         assert!(seen.cold == 0 || stopped > 40, "{stopped} {length}");
     }
 }
+
+/// The remote I/O restarts in the cycle whose outputs only its controller has proved, and the controller restarts after it: what the controller
+/// recalled in its earlier life proves nothing of its new one, and the operator is asked.
+#[test]
+fn what_a_station_recalled_before_its_restart_proves_nothing() {
+    for (dies, phase) in (64..75).flat_map(|dies| [0.0, 0.4, 0.8].map(|phase| (dies, phase))) {
+        let parts = press_cell::parts(Mode::Full, 1);
+        let mut simulation = Simulation::new(parts, Network::default(), 1);
+        let understudy = Party::Station(UNDERSTUDY);
+        for other in [station(0), station(1), ROBOT_IO] {
+            simulation.schedule(fault(63, 0.0, understudy, Action::Cut { to: other }));
+            simulation.schedule(fault(63, 0.0, other, Action::Cut { to: understudy }));
+        }
+        let to = ROBOT_IO;
+        simulation.schedule(fault(64, 0.0, understudy, Action::Heal { to }));
+        simulation.schedule(fault(64, 0.0, to, Action::Heal { to: understudy }));
+        simulation.schedule(fault(63, 0.8, ROBOT_IO, Action::Crash));
+        simulation.schedule(fault(63, 0.8, ROBOT_IO, Action::Restart));
+        simulation.schedule(fault(dies, phase, station(0), Action::Crash));
+        simulation.schedule(fault(dies, phase, station(0), Action::Restart));
+        simulation
+            .run(200, 100, &mut |_, _, _, _| {})
+            .expect("the cluster gets ready");
+        assert_eq!(simulation.violations(), [], "{dies} {phase}");
+    }
+}
