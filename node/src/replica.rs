@@ -315,12 +315,15 @@ impl Replica {
         true
     }
 
-    /// The state itself, for one who lacks it; none from a copy that is lost.
-    pub(crate) fn transfer(&self, program: &Program, to: StationId) -> Option<Transfer> {
+    /// The state itself, for one who lacks it and can prove outputs with it from then on; none from a copy that is lost.
+    pub(crate) fn transfer(&mut self, program: &Program, to: StationId) -> Option<Transfer> {
         let copy = self
             .copy
             .as_ref()
             .filter(|_| self.standing == Standing::Proven)?;
+        if let Some((_, recalled)) = &mut self.recalled {
+            recalled.accounted_for.remove(to);
+        }
         Some(Transfer {
             to,
             program: self.id,

@@ -413,3 +413,39 @@ fn what_a_station_recalled_before_its_restart_proves_nothing() {
         assert_eq!(simulation.violations(), [], "{dies} {phase}");
     }
 }
+
+/// The controller was gone for long, gets its state from the understudy, which receives nothing from then on, and proves outputs alone until it dies
+/// with the remote I/O's memory: the understudy does not vouch for it any more.
+#[test]
+fn a_station_that_was_given_the_state_is_gone_no_more() {
+    let mut adopted = 0;
+    for (deaf, phase) in (60..75).flat_map(|deaf| [0.0, 0.4, 0.7, 0.9].map(|phase| (deaf, phase))) {
+        let parts = press_cell::parts(Mode::Full, 1);
+        let mut simulation = Simulation::new(parts, Network::default(), 1);
+        let understudy = Party::Station(UNDERSTUDY);
+        simulation.schedule(fault(20, 0.3, station(0), Action::Crash));
+        simulation.schedule(fault(60, 0.3, station(0), Action::Restart));
+        for other in [station(0), station(1), ROBOT_IO] {
+            let to = understudy;
+            simulation.schedule(fault(deaf, phase, other, Action::Cut { to }));
+        }
+        for (at, party) in [(90, station(0)), (90, ROBOT_IO)] {
+            simulation.schedule(fault(at, 0.8, party, Action::Crash));
+        }
+        simulation.schedule(fault(95, 0.0, ROBOT_IO, Action::Restart));
+        let mut direct = 0;
+        simulation
+            .run(200, 100, &mut |_, cycle, party, record| {
+                if let (Record::RemoteIo(Event::Applied { source, .. }), ROBOT_IO) = (record, party)
+                {
+                    let is_alone = (deaf + 1..90).contains(&cycle.unwrap_or(0));
+                    direct += u64::from(*source == Source::Direct && is_alone);
+                }
+            })
+            .expect("the cluster gets ready");
+        adopted += u64::from(direct > 0);
+        assert_eq!(simulation.violations(), [], "{deaf} {phase}");
+    }
+    // In some of them the controller has the state in time.
+    assert!(adopted > 0);
+}

@@ -24,7 +24,7 @@ impl Station {
             }
             let transfer = self
                 .replicas
-                .iter()
+                .iter_mut()
                 .find(|replica| replica.id() == program)
                 .and_then(|replica| {
                     replica.transfer(&self.settings.programs[program.index()], station)
