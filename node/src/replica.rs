@@ -144,9 +144,14 @@ impl Replica {
             return;
         };
         if inputs.width() == program.scan.input_count() {
+            // Outputs of the first sample may have been proved in this station's earlier life.
+            let witnessed = match &self.recalled {
+                Some((Some(heard), known)) => known.witnessed || *heard < moment,
+                _ => false,
+            };
             let recalled = Recalled {
                 program: self.id,
-                witnessed: true,
+                witnessed,
                 applied: sample.applied,
                 excluded: sample.excluded,
                 accounted_for: sample.gone,

@@ -171,7 +171,8 @@ pub struct Join {
 pub struct Recalled {
     /// Whose sample.
     pub program: ProgramId,
-    /// Whether this station has received a sample of the program since it started; others have told it otherwise.
+    /// Whether this station has received samples of two cycles of the program since it started: what it proved in an earlier life is in
+    /// `applied` then.
     pub witnessed: bool,
     /// The newest applied sample that it knows of, as in a [`Sample`].
     pub applied: Option<Moment>,

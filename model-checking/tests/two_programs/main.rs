@@ -73,7 +73,7 @@ fn a_crash_and_a_stop_in_two_cycles() {
         cycles: 2,
         ..NONE
     };
-    check_all(1, budget, 548_144);
+    check_all(1, budget, 548_150);
 }
 
 #[test]

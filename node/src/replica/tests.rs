@@ -248,3 +248,25 @@ fn a_given_state_speaks_only_after_its_shadow() {
     }
     assert_eq!(proved, [false, true, false]);
 }
+
+/// The same sample again, as a copy, is no second one: its outputs may have been proved before a restart.
+#[test]
+fn a_station_is_a_witness_from_its_second_sample_on() {
+    let program = program();
+    let mut truth = Truth::new();
+    let mut replica = Replica::new(ProgramId(0), &program, HISTORY);
+    let mut hear = |frame: &Frame| {
+        let Body::Sample(sample) = &frame.body else {
+            panic!("a sample");
+        };
+        replica.hear(&program, frame.header.moment, sample);
+        let recalled = replica.recalled(moment(0)).expect("it was heard");
+        recalled.witnessed
+    };
+    let first = truth.sample(true);
+    assert!(!hear(&first));
+    assert!(!hear(&first));
+    let second = truth.sample(true);
+    assert!(hear(&second));
+    assert!(hear(&second));
+}
