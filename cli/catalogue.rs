@@ -392,7 +392,7 @@ fn export(file: &FileArgument, output: Option<&Path>) -> Result<Answer, Answer> 
     match output {
         None => Ok(Answer::done(text.clone(), json!({ "text": text }))),
         Some(path) => {
-            files::replace(path, &text)?;
+            files::write(path, &text)?;
             let name = path.display().to_string();
             let said = format!("{} controllers written to {name}", catalogue.len());
             Ok(Answer::done(said, json!({ "file": name })))

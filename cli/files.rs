@@ -95,11 +95,10 @@ pub(crate) fn replace(path: &Path, text: &str) -> Result<(), Answer> {
     let mut staged = path.as_os_str().to_owned();
     staged.push(".new");
     let staged = PathBuf::from(staged);
-    write(&staged, text)?;
-    fs::rename(&staged, path).map_err(|error| {
+    let written = fs::write(&staged, text).and_then(|()| fs::rename(&staged, path));
+    written.map_err(|error| {
         let _ = fs::remove_file(&staged);
-        let message = format!("{} cannot be written: {error}", path.display());
-        Answer::failed(Status::Failed, "U0602", message)
+        unwritable(path, &error)
     })
 }
 

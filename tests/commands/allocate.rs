@@ -220,6 +220,11 @@ fn bad_catalogues_are_refused_and_nothing_is_written() {
         assert!(answer.errors.contains(code), "{}", answer.errors);
     }
     assert!(!folder.join("ours.csv").exists());
+    let nowhere = file("absent/ours.csv");
+    let answer = understudy(&["catalogue", "export", "--output", &nowhere]);
+    assert!(answer.errors.contains("U0602"), "{}", answer.errors);
+    let printed = understudy(&["catalogue", "export", "--output", "/dev/stdout"]);
+    assert_eq!(printed.status, 0, "{}", printed.shown());
     let answer = understudy(&["allocate", PAINTING, "--catalogue", &bad]);
     assert_eq!(answer.status, 2);
     assert!(answer.errors.contains("U1107"), "{}", answer.errors);

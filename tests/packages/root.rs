@@ -1,6 +1,7 @@
 //! Root file systems that a test makes, and commands inside of them.
 
 use std::fs;
+use std::io;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -23,6 +24,18 @@ impl User {
 /// A root file system that is removed after the test.
 pub(crate) struct Root(PathBuf);
 
+/// Whether a command that a test needs ended well; says that the test skips where not.
+fn done(result: io::Result<Output>, otherwise: &str) -> Option<()> {
+    match result {
+        Ok(output) if output.status.success() => Some(()),
+        Ok(output) => {
+            let errors = String::from_utf8_lossy(&output.stderr);
+            skipped(&format!("{otherwise}: {}", errors.trim()))
+        }
+        Err(error) => skipped(&format!("{otherwise}: {error}")),
+    }
+}
+
 impl Root {
     /// An empty one, where this machine lets a test run commands in one.
     pub(crate) fn empty(name: &str) -> Option<Self> {
@@ -30,17 +43,8 @@ impl Root {
             .args(["--fork", "--pid", "--mount", "--net", "--ipc", "--uts"])
             .args(["mount", "--make-rprivate", "/"])
             .output();
-        match possible {
-            Ok(output) if output.status.success() => Some(Self(empty_folder(name))),
-            Ok(output) => {
-                let errors = String::from_utf8_lossy(&output.stderr);
-                skipped(&format!(
-                    "namespaces cannot be made; that needs root: {}",
-                    errors.trim()
-                ))
-            }
-            Err(error) => skipped(&format!("unshare: {error}")),
-        }
+        done(possible, "namespaces cannot be made; that needs root")?;
+        Some(Self(empty_folder(name)))
     }
 
     /// A bare Debian with these packages besides the required ones.
@@ -57,17 +61,8 @@ impl Root {
             .arg(&root.0)
             .stdin(Stdio::null())
             .output();
-        match made {
-            Ok(output) if output.status.success() => Some(root),
-            Ok(output) => {
-                let errors = String::from_utf8_lossy(&output.stderr);
-                skipped(&format!(
-                    "mmdebstrap makes no Debian here: {}",
-                    errors.trim()
-                ))
-            }
-            Err(error) => skipped(&format!("mmdebstrap: {error}")),
-        }
+        done(made, "mmdebstrap makes no Debian here")?;
+        Some(root)
     }
 
     pub(crate) fn path(&self, inside: &str) -> PathBuf {
