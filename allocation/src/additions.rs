@@ -143,9 +143,9 @@ pub enum AdditionError {
         model: String,
         /// `family` or `kind`.
         what: &'static str,
-        /// In the catalogue.
+        /// The family or kind that the catalogue has for the model.
         known: String,
-        /// In what is added.
+        /// The family or kind that is to be added for it.
         new: String,
     },
 }

@@ -60,7 +60,7 @@ impl RemoteIo {
             }
             Phase::Listening { cycles, held } => {
                 let holds = self.witnesses.newest().is_some();
-                // Whoever held a state may come back, or have given it to another station.
+                // The station that held a state may come back, or have given it to another one.
                 if *held && !holds {
                     *cycles = 0;
                 }

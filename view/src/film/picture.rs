@@ -53,7 +53,7 @@ impl Film {
         drawing.finish()
     }
 
-    /// From the left edge of the traces.
+    /// Where `cycle` is drawn: distance from the left edge of the picture, in its units.
     fn x(&self, cycle: i64) -> f64 {
         PLOT.0 + (PLOT.1 - PLOT.0) * self.share(cycle)
     }
