@@ -1,6 +1,6 @@
 //! Theorems 1 and 2 on random programs of any widths, with every pattern of erasures.
 
-#[path = "../../logic/tests/common/mod.rs"]
+#[path = "../../programs/logic/tests/common/mod.rs"]
 mod common;
 
 use common::{Recipe, circuit, configuration, recipe};

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use crate::{Answer, empty_folder, understudy};
 
-const FACTORY: &str = "supervisor/tests/data/small_factory";
+const FACTORY: &str = "engineering/supervisor/tests/data/small_factory";
 const MODEL: &str = "examples/small-factory/model.toml";
 
 fn des(arguments: &[&str]) -> Answer {

@@ -181,7 +181,7 @@ fn models_have_the_counts_of_other_tools() {
         assert!(states.as_u64() <= theirs.as_u64(), "{example}: {states}");
         // The named model is TCT's.
         let theirs = format!(
-            "supervisor/tests/data/{}/_SUPER.ADS",
+            "engineering/supervisor/tests/data/{}/_SUPER.ADS",
             example.replace('-', "_")
         );
         succeeds(&["des", "isomorph", text(&super_file), &theirs]);

@@ -178,8 +178,8 @@ fn nesting_has_a_bound() {
 #[test]
 fn catalogue() {
     let seeds = [
-        "allocation/data/controllers.csv",
-        "allocation/data/families.csv",
+        "engineering/allocation/data/controllers.csv",
+        "engineering/allocation/data/families.csv",
     ];
     attack("catalogue", &seeds, |bytes| {
         let Some(catalogue) = file::read("fuzz", &text(bytes)).catalogue else {

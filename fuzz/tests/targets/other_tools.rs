@@ -20,9 +20,9 @@ fn is_sound(program: &Program) {
 #[test]
 fn structured_text() {
     let seeds = [
-        "interchange/tests/structured_text/texts/blocks.st",
+        "programs/interchange/tests/structured_text/texts/blocks.st",
         "examples/other-tools/press.st",
-        "interchange/tests/structured_text/texts/full-of-errors.st",
+        "programs/interchange/tests/structured_text/texts/full-of-errors.st",
     ];
     attack("structured_text", &seeds, |bytes| {
         let reading = structured_text::read(&text(bytes));
@@ -34,8 +34,8 @@ fn structured_text() {
 fn digraph() {
     let seeds = [
         "examples/other-tools/vents.xml",
-        "interchange/tests/digraph/bridge.xml",
-        "interchange/tests/digraph/full-of-errors.xml",
+        "programs/interchange/tests/digraph/bridge.xml",
+        "programs/interchange/tests/digraph/full-of-errors.xml",
     ];
     attack("digraph", &seeds, |bytes| {
         let Some(program) = digraph::read(&text(bytes)).program else {
@@ -55,7 +55,7 @@ fn digraph() {
 fn ldmicro() {
     let seeds = [
         "examples/other-tools/light.ld",
-        "interchange/tests/ldmicro/full-of-errors.ld",
+        "programs/interchange/tests/ldmicro/full-of-errors.ld",
     ];
     attack("ldmicro", &seeds, |bytes| {
         let reading = ldmicro::read("program", &text(bytes));

@@ -1,0 +1,16 @@
+//! Programs in and out of other tools: PLCopen XML, Structured Text, the digraph XML of the paper, LDmicro.
+
+pub mod digraph;
+mod format;
+pub mod ldmicro;
+pub mod plcopen;
+pub mod structured_text;
+mod written;
+
+pub use format::{Format, Reading, parse_program, read, read_all, unknown_form};
+pub use written::{Compared, USUAL_PERIOD, WriteError, Written, write};
+
+/// The examples of the codes of this crate are run with its own.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/errors/U10.md")]
+pub struct ErrorPages;

@@ -1,0 +1,510 @@
+//! Every key of a cluster file, once: the reader, the schema and the documentation are made from these tables.
+//!
+//! Invariant: a value is in its bounds when it leaves the reader, and a key that is not in its section's table is an error.
+
+use std::time::Duration;
+
+use understudy_form::spoken;
+use understudy_wire::MAXIMUM_HISTORY;
+
+/// The bounds of a cluster's period.
+pub(crate) const SHORTEST_PERIOD: Duration = Duration::from_micros(200);
+pub(crate) const LONGEST_PERIOD: Duration = Duration::from_secs(10);
+
+/// A table of the file.
+#[derive(Debug)]
+pub(crate) struct Section {
+    /// As it stands between the brackets.
+    pub(crate) name: &'static str,
+    /// Any number of it, `[[name]]`, or at most one, `[name]`.
+    pub(crate) repeated: bool,
+    pub(crate) meaning: &'static str,
+    pub(crate) keys: &'static [Key],
+}
+
+#[derive(Debug)]
+pub(crate) struct Key {
+    pub(crate) name: &'static str,
+    pub(crate) required: bool,
+    pub(crate) kind: Kind,
+    pub(crate) meaning: &'static str,
+}
+
+/// What may stand behind a key.
+#[derive(Debug)]
+pub(crate) enum Kind {
+    /// The name of a party.
+    Name,
+    /// Any text.
+    Text,
+    /// `host:port` with a numeric host.
+    Address,
+    /// A whole number.
+    Count { least: u32, most: u32, default: u32 },
+    /// A number with its unit.
+    Time {
+        least: Duration,
+        most: Duration,
+        default: Duration,
+    },
+    /// One of these; the first is the default where the key is not required and `default` is true.
+    Word {
+        words: &'static [&'static str],
+        default: bool,
+    },
+    /// A table from names to `true` or `false`.
+    Bits,
+    /// A table from names to names.
+    Names,
+    /// A table whose keys depend on the model.
+    Parameters,
+    /// The table of a device.
+    Device,
+    /// A table from signals to places in a device.
+    Points,
+}
+
+const fn key(name: &'static str, kind: Kind, meaning: &'static str) -> Key {
+    Key {
+        name,
+        required: false,
+        kind,
+        meaning,
+    }
+}
+
+const fn required(name: &'static str, kind: Kind, meaning: &'static str) -> Key {
+    Key {
+        name,
+        required: true,
+        kind,
+        meaning,
+    }
+}
+
+const fn count(least: u32, most: u32, default: u32) -> Kind {
+    Kind::Count {
+        least,
+        most,
+        default,
+    }
+}
+
+/// Cycles in one number of the file, at most.
+const MANY_CYCLES: u32 = 100_000;
+
+pub(crate) const MODES: [&str; 2] = ["full", "paper"];
+pub(crate) const LINKS: [&str; 2] = ["udp", "zenoh"];
+pub(crate) const SECURITIES: [&str; 2] = ["keys", "off"];
+pub(crate) const RELEASES: [&str; 2] = ["automatic", "operator"];
+pub(crate) const VALUE_FAULTS: [&str; 3] = ["hold", "alarm", "fail-safe"];
+pub(crate) const STALE_STATES: [&str; 2] = ["operator", "cold"];
+pub(crate) const MODELS: [&str; 2] = ["robot", "press"];
+
+pub(crate) static CLUSTER: Section = Section {
+    name: "cluster",
+    repeated: false,
+    meaning: "what holds for all",
+    keys: &[
+        required(
+            "name",
+            Kind::Name,
+            "names the cluster; frames of other clusters on the same network are ignored",
+        ),
+        key(
+            "period",
+            Kind::Time {
+                least: SHORTEST_PERIOD,
+                most: LONGEST_PERIOD,
+                default: Duration::from_millis(10),
+            },
+            "T, from one cycle to the next; timers of the ladders count in it",
+        ),
+        key(
+            "mode",
+            Kind::Word {
+                words: &MODES,
+                default: true,
+            },
+            "how many failures are masked: `full`, any number of controllers as long as one understudy lives; `paper`, one failure, and everything falls safe at the second",
+        ),
+        key(
+            "copies",
+            count(1, 4, 2),
+            "how often each cyclic frame is sent, against loss",
+        ),
+        key(
+            "history",
+            count(1, MAXIMUM_HISTORY as u32, 8),
+            "samples that a remote I/O keeps and sends along, so that lost cycles are replayed",
+        ),
+        key(
+            "flag_after",
+            count(1, MANY_CYCLES, 3),
+            "cycles of silence after which a station counts as failed, and its slot is closed",
+        ),
+        key(
+            "shadow_cycles",
+            count(0, MANY_CYCLES, 3),
+            "cycles for which a repaired station computes in shadow before it speaks",
+        ),
+        key(
+            "listen_cycles",
+            count(1, MANY_CYCLES, 4),
+            "cycles for which a station that starts listens before it believes that nobody is there",
+        ),
+        key(
+            "link",
+            Kind::Word {
+                words: &LINKS,
+                default: true,
+            },
+            "what carries the frames",
+        ),
+        key(
+            "security",
+            Kind::Word {
+                words: &SECURITIES,
+                default: true,
+            },
+            "who may speak: `keys`, whoever has the keys of this cluster, see `understudy keys`; `off`, everybody on the network. The laboratory makes keys of its own for each run",
+        ),
+    ],
+};
+
+pub(crate) static CONTROLLER: Section = Section {
+    name: "controller",
+    repeated: true,
+    meaning: "a controller and its program; at least one, in the order of their turns",
+    keys: &[
+        required("name", Kind::Name, "names the station"),
+        required(
+            "ladder",
+            Kind::Text,
+            "the file with its program, relative to the cluster file",
+        ),
+        key(
+            "address",
+            Kind::Address,
+            "where it listens, such as `192.168.1.11:7450`; the laboratory picks a free loopback port where it is absent",
+        ),
+    ],
+};
+
+pub(crate) static UNDERSTUDY: Section = Section {
+    name: "understudy",
+    repeated: true,
+    meaning: "a generated parity controller, which knows every program; one named `understudy` where there is no such section, none with `understudy = []`",
+    keys: &[
+        required("name", Kind::Name, "names the station"),
+        key("address", Kind::Address, "as for a controller"),
+    ],
+};
+
+pub(crate) static REMOTE_IO: Section = Section {
+    name: "remote_io",
+    repeated: true,
+    meaning: "the plant's side of a controller; each controller has one, with or without this section",
+    keys: &[
+        required("controller", Kind::Text, "whose"),
+        key(
+            "name",
+            Kind::Name,
+            "names it; `<controller>-io` where absent",
+        ),
+        key(
+            "hold_cycles",
+            count(0, MANY_CYCLES, 3),
+            "cycles for which the last true outputs are kept when nothing true is there",
+        ),
+        key(
+            "fail_safe",
+            Kind::Bits,
+            "outputs by name and what they are after that, such as `{ grip = true }`; `false` where not named",
+        ),
+        key(
+            "release",
+            Kind::Word {
+                words: &RELEASES,
+                default: true,
+            },
+            "who releases the outputs after the program has started from its initial state",
+        ),
+        key(
+            "value_fault",
+            Kind::Word {
+                words: &VALUE_FAULTS,
+                default: true,
+            },
+            "what is driven while two stations say different outputs from one history and no third one says which is right: `hold`, the last true outputs and then the fail-safe ones, until they agree or the operator releases them; `alarm`, the outputs of the controller itself; `fail-safe`, the fail-safe outputs at once, until the operator releases them",
+        ),
+        key(
+            "stale_state",
+            Kind::Word {
+                words: &STALE_STATES,
+                default: true,
+            },
+            "what follows where living stations hold only states that are older than the newest applied output: `operator`, the outputs are held, then fail-safe, until the operator chooses the older state or a cold start; `cold`, the program starts from its initial state",
+        ),
+        key(
+            "diagnosis",
+            Kind::Text,
+            "the file of a ladder that finds failed input channels, relative to the cluster file, see [reconfiguration.md](reconfiguration.md)",
+        ),
+        key(
+            "field",
+            Kind::Device,
+            "real equipment behind it, see below; without it its plant is simulated",
+        ),
+        key("address", Kind::Address, "as for a controller"),
+    ],
+};
+
+pub(crate) static FIELD: Section = Section {
+    name: "remote_io.field",
+    repeated: false,
+    meaning: "a device that the remote I/O reads and drives by Modbus TCP, below its `[[remote_io]]`",
+    keys: &[
+        required("modbus", Kind::Address, "where the device listens"),
+        key(
+            "unit",
+            count(0, 255, 1),
+            "the unit behind that address, where it is a gateway",
+        ),
+        key(
+            "timeout",
+            Kind::Time {
+                least: Duration::from_millis(1),
+                most: Duration::from_secs(10),
+                default: Duration::from_millis(100),
+            },
+            "how long one exchange with the device may take; then the connection is made anew",
+        ),
+        key(
+            "stale_after",
+            Kind::Time {
+                least: Duration::from_millis(1),
+                most: Duration::from_secs(60),
+                default: Duration::from_millis(200),
+            },
+            "the age at which its last answer is worth nothing any more: the outputs are held, and then fail-safe",
+        ),
+        key(
+            "inputs",
+            Kind::Points,
+            "where the inputs of the program come from; one that is not named stays 0",
+        ),
+        key(
+            "outputs",
+            Kind::Points,
+            "where the outputs of the program go to; registers that are named belong to the remote I/O as a whole",
+        ),
+    ],
+};
+
+pub(crate) static PLANT: Section = Section {
+    name: "plant",
+    repeated: true,
+    meaning: "a simulated plant behind a remote I/O, for the laboratory; at most one for each controller",
+    keys: &[
+        required("controller", Kind::Text, "whose outputs move it"),
+        key(
+            "name",
+            Kind::Name,
+            "names it; `<controller>-plant` where absent",
+        ),
+        key(
+            "model",
+            Kind::Word {
+                words: &MODELS,
+                default: false,
+            },
+            "a built-in model; either this or `ladder`",
+        ),
+        key(
+            "ladder",
+            Kind::Text,
+            "a program that is the plant: its inputs bear the names of the controller's outputs, its outputs those of the controller's inputs",
+        ),
+        key(
+            "fed_by",
+            Kind::Text,
+            "the plant whose finished parts come to this one; a built-in model feeds itself where absent",
+        ),
+        key(
+            "signals",
+            Kind::Names,
+            "a signal of the controller for a terminal of the model, where their names differ, such as `{ part_present = \"u10\" }`",
+        ),
+        key(
+            "follows",
+            Kind::Names,
+            "a sensor of another plant for a terminal of this one that the controller does not drive, such as `{ pilot_flame = \"pilot-burner.flame\" }`",
+        ),
+        key(
+            "parameters",
+            Kind::Parameters,
+            "of a built-in model, see below",
+        ),
+        key(
+            "watchdog_cycles",
+            count(2, MANY_CYCLES, 3),
+            "periods without an actuation after which the fail-safe outputs are in force",
+        ),
+        key("address", Kind::Address, "as for a controller"),
+    ],
+};
+
+/// In the order of the documentation.
+pub(crate) static SECTIONS: [&Section; 5] =
+    [&CLUSTER, &CONTROLLER, &UNDERSTUDY, &REMOTE_IO, &PLANT];
+
+pub(crate) static ROBOT_PARAMETERS: Section = Section {
+    name: "plant.parameters",
+    repeated: false,
+    meaning: "of the model `robot`",
+    keys: &[
+        key(
+            "horizontal_cycles",
+            count(1, MANY_CYCLES, 10),
+            "cycles from left to right",
+        ),
+        key(
+            "vertical_cycles",
+            count(1, MANY_CYCLES, 5),
+            "cycles from up to down",
+        ),
+        key(
+            "feed_cycles",
+            count(0, MANY_CYCLES, 5),
+            "cycles between taking a part and the next one at the pick place",
+        ),
+    ],
+};
+
+pub(crate) static PRESS_PARAMETERS: Section = Section {
+    name: "plant.parameters",
+    repeated: false,
+    meaning: "of the model `press`",
+    keys: &[
+        key(
+            "ram_cycles",
+            count(1, MANY_CYCLES, 8),
+            "cycles from up to down",
+        ),
+        key(
+            "feed_cycles",
+            count(0, MANY_CYCLES, 5),
+            "cycles between a finished part and the next one",
+        ),
+    ],
+};
+
+pub(crate) static LADDER_PARAMETERS: Section = Section {
+    name: "plant.parameters",
+    repeated: false,
+    meaning: "of a plant that is a ladder: none",
+    keys: &[],
+};
+
+impl Section {
+    /// The key of a name.
+    ///
+    /// # Panics
+    /// Where it is not in the table; the names in the reader are constants.
+    pub(crate) fn key(&'static self, name: &str) -> &'static Key {
+        let mut keys = self.keys.iter();
+        keys.find(|key| key.name == name)
+            .expect("the reader asks for keys of the table only")
+    }
+
+    /// What holds where a count is absent; 0 for a key that is none.
+    pub(crate) fn default_count(&'static self, name: &str) -> u32 {
+        match self.key(name).kind {
+            Kind::Count { default, .. } => default,
+            _ => 0,
+        }
+    }
+
+    /// `[name]` or `[[name]]`.
+    pub(crate) fn header(&self) -> String {
+        if self.repeated {
+            format!("[[{}]]", self.name)
+        } else {
+            format!("[{}]", self.name)
+        }
+    }
+}
+
+impl Kind {
+    /// What is expected, as a person says it.
+    pub(crate) fn expected(&self) -> String {
+        match self {
+            Self::Name => "a name in quotes".into(),
+            Self::Text => "a text in quotes".into(),
+            Self::Address => "an address in quotes, such as \"192.168.1.11:7450\"".into(),
+            Self::Count { least, most, .. } => format!("a whole number from {least} to {most}"),
+            Self::Time { least, most, .. } => format!(
+                "a time with its unit in quotes, from \"{}\" to \"{}\"",
+                spoken(*least),
+                spoken(*most)
+            ),
+            Self::Word { words, .. } => {
+                let quoted: Vec<String> = words.iter().map(|word| format!("\"{word}\"")).collect();
+                quoted.join(" or ")
+            }
+            Self::Bits => "a table from names to true or false, such as { grip = true }".into(),
+            Self::Names => "a table from names to names in quotes".into(),
+            Self::Parameters => "a table, [plant.parameters]".into(),
+            Self::Device => "a table, [remote_io.field]".into(),
+            Self::Points => {
+                "a table from signals to places in quotes, such as { start = \"discrete:0\" }"
+                    .into()
+            }
+        }
+    }
+
+    /// As it would be written in the file.
+    pub(crate) fn default(&self) -> Option<String> {
+        match self {
+            Self::Count { default, .. } => Some(default.to_string()),
+            Self::Time { default, .. } => Some(format!("\"{}\"", spoken(*default))),
+            Self::Word {
+                words,
+                default: true,
+            } => Some(format!("\"{}\"", words[0])),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each row of the documentation, so that it cannot differ from what is read.
+    #[test]
+    fn the_documentation_has_every_key_with_its_bounds() {
+        let page = include_str!("../../../docs/cluster-file.md");
+        let parameters = [&ROBOT_PARAMETERS, &PRESS_PARAMETERS, &FIELD];
+        for section in SECTIONS.into_iter().chain(parameters) {
+            assert!(page.contains(&section.header()), "{}", section.header());
+            for key in section.keys {
+                let default = match (key.required, key.kind.default()) {
+                    (true, _) => "required".into(),
+                    (false, Some(default)) => format!("`{default}`"),
+                    (false, None) => "—".into(),
+                };
+                let expected = key.kind.expected();
+                let row = format!(
+                    "| `{}` | {expected} | {default} | {} |",
+                    key.name, key.meaning
+                );
+                assert!(
+                    page.contains(&row),
+                    "docs/cluster-file.md lacks the row\n{row}"
+                );
+            }
+        }
+    }
+}

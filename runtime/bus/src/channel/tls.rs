@@ -1,0 +1,161 @@
+//! Mutual TLS, and who may do what over it: the settings that both ends of the channel share.
+
+use std::path::PathBuf;
+
+use serde_json::json;
+use understudy_wire::ClusterHash;
+
+/// Where a holder's TLS files lie.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TlsKeys {
+    /// The certificate of the authority, whom alone a listener trusts.
+    pub authority: PathBuf,
+    /// Its own certificate.
+    pub certificate: PathBuf,
+    /// Its own private key.
+    pub private_key: PathBuf,
+}
+
+/// Whose calls are answered, by the common names of their certificates.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Admitted {
+    /// May command.
+    pub operators: Vec<String>,
+    /// May ask.
+    pub members: Vec<String>,
+}
+
+/// Where a party's keys begin.
+pub(crate) fn prefix(cluster: ClusterHash, name: &str) -> String {
+    format!("understudy/{cluster}/{name}")
+}
+
+/// Where a party says the hash of its configuration to whoever does not know it.
+pub(crate) fn hash_key(name: &str) -> String {
+    format!("understudy/cluster/{name}")
+}
+
+/// Nothing but mutual TLS to and from named addresses.
+pub(crate) fn tls_config(mode: &str, keys: &TlsKeys) -> zenoh::Result<zenoh::Config> {
+    let mut config = zenoh::Config::default();
+    let tls = json!({
+        "root_ca_certificate": keys.authority,
+        "listen_certificate": keys.certificate,
+        "listen_private_key": keys.private_key,
+        "connect_certificate": keys.certificate,
+        "connect_private_key": keys.private_key,
+        "enable_mtls": true,
+        "verify_name_on_connect": true,
+        "close_link_on_expiration": true,
+    });
+    for (setting, value) in [
+        ("mode", json!(mode)),
+        ("scouting/multicast/enabled", json!(false)),
+        ("scouting/gossip/enabled", json!(false)),
+        ("transport/link/protocols", json!(["tls"])),
+        ("transport/link/tls", tls),
+    ] {
+        insert(&mut config, setting, &value)?;
+    }
+    Ok(config)
+}
+
+pub(crate) fn insert(
+    config: &mut zenoh::Config,
+    setting: &str,
+    value: &serde_json::Value,
+) -> zenoh::Result<()> {
+    config
+        .insert_json5(setting, &value.to_string())
+        .map_err(|error| format!("{setting}: {error}").into())
+}
+
+/// The table above as Zenoh's rules; what no rule allows is denied.
+pub(super) fn access_control(prefix: &str, hash: &str, admitted: &Admitted) -> serde_json::Value {
+    let asked = ["configuration", "status"].map(|what| format!("{prefix}/{what}"));
+    let asked: Vec<String> = asked.into_iter().chain([hash.to_owned()]).collect();
+    let commands = vec![format!("{prefix}/command/*")];
+    let journal = vec![format!("{prefix}/journal")];
+    let rule = |id: &str, messages: &[&str], flow: &str, keys: &[String]| {
+        json!({
+            "id": id,
+            "permission": "allow",
+            "messages": messages,
+            "flows": [flow],
+            "key_exprs": keys,
+        })
+    };
+    let rules = [
+        rule("ask", &["query"], "ingress", &asked),
+        rule(
+            "ask-answer",
+            &["reply", "declare_queryable"],
+            "egress",
+            &asked,
+        ),
+        rule("command", &["query"], "ingress", &commands),
+        rule(
+            "command-answer",
+            &["reply", "declare_queryable"],
+            "egress",
+            &commands,
+        ),
+        rule("follow", &["declare_subscriber"], "ingress", &journal),
+        rule("follow-lines", &["put"], "egress", &journal),
+    ];
+    let all: Vec<&serde_json::Value> = rules.iter().map(|rule| &rule["id"]).collect();
+    let groups = [
+        ("operators", &admitted.operators, &all[..]),
+        ("members", &admitted.members, &all[..2]),
+    ];
+    // A group of nobody would be one of everybody: Zenoh takes a missing list for a wildcard, and refuses an empty one.
+    let groups = groups.iter().filter(|(_, names, _)| !names.is_empty());
+    let subjects: Vec<serde_json::Value> = groups
+        .clone()
+        .map(|(id, names, _)| json!({"id": id, "cert_common_names": names, "link_protocols": ["tls"]}))
+        .collect();
+    let policies: Vec<serde_json::Value> = groups
+        .map(|(id, _, rules)| json!({"subjects": [id], "rules": rules}))
+        .collect();
+    json!({
+        "enabled": true,
+        "default_permission": "deny",
+        "rules": rules,
+        "subjects": subjects,
+        "policies": policies,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_router_of_a_site_is_one_that_zenoh_knows() {
+        let text = include_str!("../../../../deployment/site-router.json5");
+        let config = zenoh::Config::from_json5(text).expect("Zenoh reads it");
+        let rules = config.get_json("access_control/default_permission");
+        assert_eq!(rules.expect("it is set"), "\"deny\"");
+    }
+
+    #[test]
+    fn nobody_is_not_everybody() {
+        let rules = access_control(
+            "understudy/1/robot",
+            &hash_key("robot"),
+            &Admitted::default(),
+        );
+        assert_eq!(rules["default_permission"], "deny");
+        assert_eq!(rules["subjects"], json!([]));
+        assert_eq!(rules["policies"], json!([]));
+        let admitted = Admitted {
+            operators: vec!["operator.1".into()],
+            members: vec!["press.1".into()],
+        };
+        let rules = access_control("understudy/1/robot", &hash_key("robot"), &admitted);
+        assert_eq!(rules["policies"][1]["rules"], json!(["ask", "ask-answer"]));
+        zenoh::Config::default()
+            .insert_json5("access_control", &rules.to_string())
+            .expect("Zenoh knows such rules");
+    }
+}

@@ -1,0 +1,206 @@
+//! The channel by mutual TLS, directly and through the router of a site as `deployment/site-router.json5` sets it up.
+
+#![allow(missing_docs, reason = "a test")]
+#![allow(
+    clippy::disallowed_methods,
+    reason = "certificates hold from one date to another, and what is waited for has a deadline"
+)]
+
+#[allow(dead_code, reason = "each test uses its part")]
+mod parties;
+
+use std::fs;
+use std::net::{SocketAddr, TcpListener};
+use std::path::{Path, PathBuf};
+use std::thread::spawn;
+use std::time::{Duration, Instant, SystemTime};
+
+use parties::{Chatter, endpoints, peers, station};
+use serde_json::json;
+use understudy_bus::{
+    Admitted, BusError, Call, ChannelSettings, Commands, DONE, Guard, LinkKind, NoField,
+    NoObserver, PartySettings, Request, TlsKeys, run_party,
+};
+use understudy_cluster::{Cluster, press_cell, read};
+use understudy_keys::{Authority, Date, Operators};
+use understudy_wire::{ConfigurationHash, Force, SignalPlace};
+use zenoh::Wait;
+
+const DEADLINE: Duration = Duration::from_secs(60);
+
+fn cluster() -> Cluster {
+    let files = press_cell();
+    let loaded = read(files[0].name, files[0].text, &mut |name| {
+        let file = files.iter().find(|file| file.name == name);
+        Ok(file.expect("the template is whole").text.to_owned())
+    });
+    loaded.cluster.expect("the template is right")
+}
+
+/// Keys of the robot, of the router, and of two who call through it.
+fn issued() -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("channel");
+    if folder.exists() {
+        fs::remove_dir_all(&folder).expect("an old folder goes");
+    }
+    let now = Date::of(SystemTime::now());
+    let cluster = cluster();
+    let mut authority = Authority::init(&folder, &cluster, now).expect("an empty folder");
+    let names = ["site-router", "control-room", "shift-leader", "passer-by"].map(str::to_owned);
+    let operators = Operators {
+        names: &names,
+        address: None,
+    };
+    authority
+        .issue(&cluster, &["robot".to_owned()], operators, 1, now)
+        .expect("names of the cluster");
+    folder.join("parties")
+}
+
+fn keys(folder: &Path, name: &str) -> TlsKeys {
+    let folder = folder.join(name);
+    TlsKeys {
+        authority: folder.join("authority.pem"),
+        certificate: folder.join("certificate.pem"),
+        private_key: folder.join("private-key.pem"),
+    }
+}
+
+/// A router as it stands in the file, but for its addresses and its keys.
+fn router(folder: &Path, party: SocketAddr, own: SocketAddr) -> zenoh::Session {
+    let text = include_str!("../../../deployment/site-router.json5");
+    let mut config = zenoh::Config::from_json5(text).expect("Zenoh reads it");
+    let keys = keys(folder, "site-router");
+    let tls = "transport/link/tls";
+    for (setting, value) in [
+        ("connect/endpoints", json!([format!("tls/{party}")])),
+        ("listen/endpoints", json!([format!("tls/{own}")])),
+        (&format!("{tls}/root_ca_certificate"), json!(keys.authority)),
+        (
+            &format!("{tls}/connect_certificate"),
+            json!(keys.certificate),
+        ),
+        (
+            &format!("{tls}/connect_private_key"),
+            json!(keys.private_key),
+        ),
+        (
+            &format!("{tls}/listen_certificate"),
+            json!(keys.certificate),
+        ),
+        (
+            &format!("{tls}/listen_private_key"),
+            json!(keys.private_key),
+        ),
+    ] {
+        config
+            .insert_json5(setting, &value.to_string())
+            .expect("it is a setting");
+    }
+    zenoh::open(config).wait().expect("a free port")
+}
+
+fn until<T>(what: &str, mut ask: impl FnMut() -> Result<T, BusError>) -> T {
+    let started = Instant::now();
+    loop {
+        match ask() {
+            Ok(answer) => return answer,
+            Err(error) => assert!(started.elapsed() < DEADLINE, "{what}: {error}"),
+        }
+    }
+}
+
+#[test]
+fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
+    let folder = issued();
+    let mut peers = peers(&[station(0)]);
+    peers[0].name = "robot".into();
+    let endpoint = endpoints(station(0), &peers);
+    let (party, hash) = (endpoint.own().address, endpoint.cluster());
+    let own = keys(&folder, "robot");
+    let running = spawn(move || {
+        let admitted = || Admitted {
+            operators: vec!["site-router.1".into(), "shift-leader.1".into()],
+            members: vec!["robot.1".into()],
+        };
+        let settings = PartySettings {
+            endpoints: endpoint,
+            link: LinkKind::Udp,
+            guard: Guard::Off,
+            channel: Some(ChannelSettings {
+                keys: own,
+                admitted: Box::new(admitted),
+                configuration: "what everybody has to agree on".into(),
+            }),
+            field: Box::new(NoField),
+            observer: Box::new(NoObserver),
+            commands: Commands::None,
+            ends_with_parent: false,
+            real_time: false,
+        };
+        run_party(Chatter::new(station(0), 1), settings, std::io::sink())
+    });
+    let call = |address, who: &str| Call::to(address, hash, "robot", &keys(&folder, who));
+    let asked = |address, who: &str, request| call(address, who)?.ask(&request);
+
+    let text = until("the party itself", || {
+        asked(party, "shift-leader", Request::Configuration)
+    });
+    assert_eq!(text, "what everybody has to agree on");
+    let hash_there = asked(party, "shift-leader", Request::Cluster);
+    let expected = ConfigurationHash::of(text.as_bytes()).to_string();
+    assert_eq!(hash_there.ok(), Some(expected));
+    let force = Request::Force(Force {
+        signal: SignalPlace::Output(0),
+        value: true,
+        seconds: 0,
+        owner: "anna".to_owned(),
+        reason: "to see it".to_owned(),
+    });
+    let refused = asked(party, "shift-leader", force);
+    assert!(
+        refused.as_ref().is_ok_and(|answer| answer != DONE),
+        "no time: {refused:?}"
+    );
+    let unforce = Request::Unforce(SignalPlace::Output(0));
+    let taken = asked(party, "shift-leader", unforce.clone());
+    assert_eq!(taken.ok().as_deref(), Some(DONE));
+    let denied = asked(party, "passer-by", unforce);
+    assert!(
+        matches!(denied, Err(BusError::Unanswered { .. })),
+        "{denied:?}"
+    );
+    let denied = asked(party, "passer-by", Request::Status);
+    assert!(
+        matches!(denied, Err(BusError::Unanswered { .. })),
+        "{denied:?}"
+    );
+
+    let listener = TcpListener::bind(("127.0.0.1", 0)).expect("a free port");
+    let site = listener.local_addr().expect("bound");
+    drop(listener);
+    let router = router(&folder, party, site);
+    let status = until("the router", || {
+        asked(site, "control-room", Request::Status)
+    });
+    assert!(status.contains("\"event\":\"ready\""), "{status}");
+    let denied = asked(site, "control-room", Request::Stop);
+    assert!(
+        matches!(denied, Err(BusError::Unanswered { .. })),
+        "{denied:?}"
+    );
+    let denied = asked(site, "passer-by", Request::Status);
+    assert!(
+        matches!(denied, Err(BusError::Unanswered { .. })),
+        "{denied:?}"
+    );
+    let started = Instant::now();
+    while !running.is_finished() {
+        // Where the answer is lost, the party ends all the same.
+        let _ = asked(site, "shift-leader", Request::Stop);
+        assert!(started.elapsed() < DEADLINE, "the leader is not obeyed");
+    }
+    let ended = running.join().expect("no panic");
+    ended.expect("it ends as it is told to");
+    router.close().wait().expect("it is open");
+}
