@@ -1,4 +1,4 @@
-//! Looking at a cluster that runs already: a laboratory of this machine, or parties elsewhere, called with an operator's keys.
+//! Looking at a cluster that runs already: a laboratory of this machine, or members elsewhere, called with an operator's keys.
 
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
@@ -12,17 +12,17 @@ use understudy_scenarios::{RunDirectory, keep_cluster};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
+use crate::member::peers;
 use crate::operate::tls_keys;
-use crate::party::peers;
 
 /// Which cluster that runs is meant.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "A cluster that runs elsewhere")]
 pub(crate) struct AttachArguments {
-    /// The folder of an operator's keys: its parties are called at their addresses, and what they say is looked at
+    /// The folder of an operator's keys: its members are called at their addresses, and what they say is looked at
     #[arg(long, value_name = "DIR")]
     keys: Option<PathBuf>,
-    /// A JSON list of parties, names and addresses, in place of the addresses of the cluster file
+    /// A JSON list of members, names and addresses, in place of the addresses of the cluster file
     #[arg(long, value_name = "FILE", requires = "keys")]
     endpoints: Option<PathBuf>,
 }
@@ -30,7 +30,7 @@ pub(crate) struct AttachArguments {
 /// A machine of this network says within this time that somebody listens there.
 const REACH: Duration = Duration::from_millis(300);
 
-/// Parties that are looked for before a laboratory starts, at most: where they are on other machines, each may take its time.
+/// Members that are looked for before a laboratory starts, at most: where they are on other machines, each may take its time.
 const ASKED: usize = 8;
 
 impl AttachArguments {
@@ -38,7 +38,7 @@ impl AttachArguments {
         self.keys.is_some()
     }
 
-    /// Calls the parties, and writes what they say to a run below `out`.
+    /// Calls the members, and writes what they say to a run below `out`.
     pub(crate) fn attach(
         &self,
         cluster_file: &Path,
@@ -79,12 +79,12 @@ impl AttachArguments {
     }
 }
 
-/// A party of the cluster file that takes calls at its own address now: the cluster runs already.
+/// A member of the cluster file that takes calls at its own address now: the cluster runs already.
 pub(crate) fn who_runs_already(cluster: &Cluster) -> Option<String> {
-    cluster.parties().take(ASKED).find_map(|party| {
-        let address = cluster.address(party)?;
+    cluster.members().take(ASKED).find_map(|member| {
+        let address = cluster.address(member)?;
         TcpStream::connect_timeout(&address, REACH).ok()?;
-        let name = cluster.party_name(party)?;
+        let name = cluster.member_name(member)?;
         Some(format!("{name} at {address}"))
     })
 }

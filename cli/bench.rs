@@ -12,12 +12,12 @@ use serde::Serialize;
 use serde_json::json;
 use understudy_bus::LinkKind;
 use understudy_bus::exchange::{
-    Carrier, Exchange, ExchangeParty, ExchangeSettings, measure, run_exchange_party,
+    Carrier, Exchange, ExchangeMember, ExchangeSettings, measure, run_exchange_member,
 };
 use understudy_cluster::{Cluster, press_cell};
 use understudy_scenarios::{Action, Expectation, Fault, Network, Scenario, parts};
 use understudy_simulator::Simulation;
-use understudy_wire::{Party, StationId};
+use understudy_wire::{Member, StationId};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
@@ -89,7 +89,7 @@ enum What {
     Scan(scan::Arguments),
     /// One process of the exchange
     #[command(hide = true)]
-    Party {
+    Member {
         /// Its part as JSON
         part: String,
     },
@@ -127,16 +127,16 @@ pub(crate) fn run(arguments: Arguments, console: &mut Console) -> Answer {
         What::Failover(arguments) => failover::run(&arguments, console),
         What::Memory(arguments) => memory::run(&arguments),
         What::Scan(arguments) => scan::run(&arguments),
-        What::Party { part } => party(&part),
+        What::Member { part } => member(&part),
     }
 }
 
-fn party(part: &str) -> Answer {
+fn member(part: &str) -> Answer {
     let part = match serde_json::from_str(part) {
         Ok(part) => part,
         Err(error) => return Answer::failed(Status::BadInput, "U0607", error.to_string()),
     };
-    match run_exchange_party(part, io::stdout()) {
+    match run_exchange_member(part, io::stdout()) {
         Ok(()) => Answer::done("", json!(null)),
         Err(error) => Answer::failed(Status::Failed, error.code(), error.to_string()),
     }
@@ -203,18 +203,18 @@ pub(crate) fn kills(
     let stations = cell.cluster.agreement().schedule.stations() as u64;
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let steps = (0..count).flat_map(|kill| {
-        let party = Party::Station(StationId((kill % stations) as u8));
+        let member = Member::Station(StationId((kill % stations) as u8));
         let at_cycle = KILL_EVERY * kill + KILL_EVERY / 2;
         let crash = Fault {
             at_cycle,
             phase: random.random(),
-            party,
+            member,
             action: Action::Crash,
         };
         let restart = Fault {
             at_cycle: at_cycle + RESTART_AFTER,
             phase: random.random(),
-            party,
+            member,
             action: Action::Restart,
         };
         [crash, restart]
@@ -251,9 +251,9 @@ fn exchange(cycles: u64, real_time: bool) -> Answer {
     };
     let mut list: Vec<Measured> = Vec::new();
     for (carrier, kind, bar) in carriers {
-        let process = |part: &ExchangeParty| {
+        let process = |part: &ExchangeMember| {
             let mut command = Command::new(&program);
-            command.args(["bench", "party"]);
+            command.args(["bench", "member"]);
             command.arg(serde_json::to_string(part).unwrap_or_default());
             command
         };

@@ -93,7 +93,7 @@ enum PropertyArgument {
     Held,
     /// A cycle with fail-safe outputs
     FailSafe,
-    /// Somebody who is not in step again 100 cycles after the last fault
+    /// Somebody who is not synchronised again 100 cycles after the last fault
     Unprotected,
 }
 

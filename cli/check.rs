@@ -13,7 +13,7 @@ use understudy_cluster::{Cluster, Overrides};
 use understudy_diagnostic::{Diagnostic, Report, Severity, has_errors};
 use understudy_interchange::{parse_program, unknown_form};
 use understudy_ladder::parse_time;
-use understudy_scenarios::{Parties, read};
+use understudy_scenarios::{Members, read};
 use understudy_supervisor::ladder::read_map;
 use understudy_supervisor::petri::read_net;
 use understudy_supervisor::read_ads;
@@ -129,16 +129,16 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
                     found.look(&looking, cluster, &mut loaded.reports);
                 }
                 found.add_with_ladders(Kind::Cluster, loaded.reports);
-                clusters.extend(loaded.cluster.as_ref().map(Parties::of));
+                clusters.extend(loaded.cluster.as_ref().map(Members::of));
             }
         }
     }
     for (path, text) in scenarios {
-        let parties = match clusters.as_slice() {
+        let members = match clusters.as_slice() {
             [only] => Some(only.clone()),
-            _ => parties_beside(path),
+            _ => members_beside(path),
         };
-        let scenario = read(&path.display().to_string(), &text, parties.as_ref());
+        let scenario = read(&path.display().to_string(), &text, members.as_ref());
         found.add(Kind::Scenario, scenario.report);
     }
     let given = std::mem::take(&mut found.given);
@@ -146,11 +146,11 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
 }
 
 /// Of the `cluster.toml` in the folder of a scenario, where there is a right one.
-fn parties_beside(scenario: &Path) -> Option<Parties> {
+fn members_beside(scenario: &Path) -> Option<Members> {
     let path = scenario.with_file_name("cluster.toml");
     let text = files::text(&path).ok()?;
     let cluster = read_cluster(&path, &text, Overrides::default()).cluster?;
-    Some(Parties::of(&cluster))
+    Some(Members::of(&cluster))
 }
 
 impl Found<'_> {

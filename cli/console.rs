@@ -19,7 +19,7 @@ pub(crate) struct Console {
     json: bool,
     progress: Option<ProgressBar>,
     /// Whether the cycles of the scenario have begun.
-    in_step: bool,
+    synchronised: bool,
     said: String,
 }
 
@@ -28,7 +28,7 @@ impl Console {
         Self {
             json,
             progress: None,
-            in_step: false,
+            synchronised: false,
             said: String::new(),
         }
     }
@@ -77,15 +77,15 @@ impl Console {
                     self.say(&format!("{done} of {of} failures"));
                 }
             }
-            Progress::Cycle { .. } if self.in_step => {}
+            Progress::Cycle { .. } if self.synchronised => {}
             Progress::Cycle { .. } => {
-                self.in_step = true;
-                self.say("in step: the cycles of the scenario begin");
+                self.synchronised = true;
+                self.say("synchronised: the cycles of the scenario begin");
             }
-            Progress::Starting { parties, .. } => {
-                self.say(&format!("starting {parties} processes"));
+            Progress::Starting { members, .. } => {
+                self.say(&format!("starting {members} processes"));
             }
-            Progress::ComingIntoStep { .. } => self.say("waiting until everybody is in step"),
+            Progress::ComingIntoStep { .. } => self.say("waiting until everybody is synchronised"),
             Progress::Step { cycle, what } => self.say(&format!("cycle {cycle:>5}: {what}")),
             Progress::Ending => {
                 if let Some(bar) = self.progress.take() {

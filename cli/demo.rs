@@ -5,7 +5,7 @@ use std::time::SystemTime;
 
 use clap::Args;
 use understudy_cluster::{Cluster, press_cell};
-use understudy_scenarios::{Parties, RunDirectory, Scenario, Summary, TABLE_TWO, read};
+use understudy_scenarios::{Members, RunDirectory, Scenario, Summary, TABLE_TWO, read};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
@@ -40,8 +40,8 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
         Ok(cell) => cell,
         Err(answer) => return answer,
     };
-    let parties = Parties::of(&cell.cluster);
-    let found = read("table-two.toml", TABLE_TWO, Some(&parties));
+    let members = Members::of(&cell.cluster);
+    let found = read("table-two.toml", TABLE_TWO, Some(&members));
     let Some(scenario) = found.scenario else {
         return Answer::bad_files(vec![found.report]);
     };

@@ -1,4 +1,4 @@
-//! `understudy doctor`: whether a machine is ready for a party, and what to do where it is not.
+//! `understudy doctor`: whether a machine is ready for a member, and what to do where it is not.
 
 mod fix;
 
@@ -11,8 +11,8 @@ use serde::Serialize;
 use understudy_bus::doctor::{Finding, Health, examine_machine, examine_peers, examine_ports};
 use understudy_bus::{BusError, Endpoints, Guard};
 use understudy_cluster::{Cluster, Security};
-use understudy_keys::{Date, KeysError, PartyKeys};
-use understudy_wire::Party;
+use understudy_keys::{Date, KeysError, MemberKeys};
+use understudy_wire::Member;
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
@@ -20,7 +20,7 @@ use crate::files;
 use crate::overrides::{OverrideArguments, link_kind};
 use fix::Fixed;
 
-/// Look whether this machine is ready for a party of a cluster
+/// Look whether this machine is ready for a member of a cluster
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -29,22 +29,22 @@ Example:
   sudo understudy doctor cell/cluster.toml --fix
 
 With --fix it shows the commands that repair the machine, asks before each one on a terminal, runs it where it is root, and looks again.
-Without --name it looks at the machine alone; with it also at ports, keys, and at the parties that this one is to hear. Exit status 1
-where something keeps the party from its work; what only could be better is a warning.")]
+Without --name it looks at the machine alone; with it also at ports, keys, and at the members that this one is to hear. Exit status 1
+where something keeps the member from its work; what only could be better is a warning.")]
 pub(crate) struct Arguments {
     /// The cluster file
     #[arg(value_name = "CLUSTER.toml")]
     cluster: PathBuf,
-    /// Which party of the cluster is to run here, by its name
+    /// Which member of the cluster is to run here, by its name
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
-    /// The folder of this party's keys
+    /// The folder of this member's keys
     #[arg(long, value_name = "DIR", requires = "name")]
     keys: Option<PathBuf>,
-    /// A JSON list of parties, names and addresses, in place of the addresses of the cluster file
+    /// A JSON list of members, names and addresses, in place of the addresses of the cluster file
     #[arg(long, value_name = "FILE", requires = "name")]
     endpoints: Option<PathBuf>,
-    /// For how many cycles the other parties are listened for
+    /// For how many cycles the other members are listened for
     #[arg(long, value_name = "CYCLES", default_value_t = 100)]
     listen: u32,
     /// Repair the machine: show each command, ask, run it as root, and look again
@@ -88,8 +88,8 @@ fn examined(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answ
         format!("{hash}; it has to be the same on every machine"),
     ));
     if let Some(name) = &arguments.name {
-        let party = crate::party::find(&cluster, name)?;
-        findings.extend(of_party(arguments, &cluster, party)?);
+        let member = crate::member::find(&cluster, name)?;
+        findings.extend(of_member(arguments, &cluster, member)?);
     }
     let look_again = || examine_machine(agreement.schedule.period());
     let fixed = arguments
@@ -128,25 +128,25 @@ fn examined(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answ
 
 /// The command that runs a member.
 fn command_of(cluster: &Cluster, name: &str) -> Result<&'static str, Answer> {
-    Ok(match crate::party::find(cluster, name)? {
-        Party::Station(_) => "node",
-        Party::RemoteIo(_) => "remote-io",
-        Party::Plant(_) => "plant",
+    Ok(match crate::member::find(cluster, name)? {
+        Member::Station(_) => "node",
+        Member::RemoteIo(_) => "remote-io",
+        Member::Plant(_) => "plant",
     })
 }
 
-fn of_party(
+fn of_member(
     arguments: &Arguments,
     cluster: &Cluster,
-    party: Party,
+    member: Member,
 ) -> Result<Vec<Finding>, Answer> {
-    let parties = crate::party::peers(cluster, arguments.endpoints.as_deref())?;
+    let members = crate::member::peers(cluster, arguments.endpoints.as_deref())?;
     let agreement = cluster.agreement();
-    let endpoints = Endpoints::new(agreement.cluster, party, parties, cluster.neighbours());
+    let endpoints = Endpoints::new(agreement.cluster, member, members, cluster.neighbours());
     let endpoints = endpoints
         .map_err(|error| Answer::failed(Status::BadInput, error.code(), error.to_string()))?;
     let mut findings = examine_ports(&endpoints, link_kind(cluster));
-    let (mut guard, of_keys) = keys(arguments, cluster, party);
+    let (mut guard, of_keys) = keys(arguments, cluster, member);
     findings.extend(of_keys);
     let Some(guard) = &mut guard else {
         return Ok(findings);
@@ -163,7 +163,7 @@ fn of_party(
         Ok(heard) => findings.extend(heard),
         Err(BusError::PortInUse { .. }) => findings.push(Finding::good(
             "peer",
-            "not looked for: where this party runs already, its journal names whom it hears",
+            "not looked for: where this member runs already, its journal names whom it hears",
         )),
         // What is wrong with the address was said with the ports.
         Err(BusError::Listen { .. }) => {}
@@ -178,7 +178,7 @@ fn of_party(
 }
 
 /// What is found about the keys, and what opens frames where they are good.
-fn keys(arguments: &Arguments, cluster: &Cluster, party: Party) -> (Option<Guard>, Vec<Finding>) {
+fn keys(arguments: &Arguments, cluster: &Cluster, member: Member) -> (Option<Guard>, Vec<Finding>) {
     let folder = match (cluster.security(), &arguments.keys) {
         (Security::Off, _) => {
             let finding = Finding::trouble(
@@ -193,7 +193,7 @@ fn keys(arguments: &Arguments, cluster: &Cluster, party: Party) -> (Option<Guard
             let finding = Finding::trouble(
                 "keys",
                 Health::Bad,
-                "no keys were named, and the party does not start without them",
+                "no keys were named, and the member does not start without them",
                 "`--keys DIR`; `understudy keys init` makes them",
             );
             return (None, vec![finding]);
@@ -205,11 +205,11 @@ fn keys(arguments: &Arguments, cluster: &Cluster, party: Party) -> (Option<Guard
         let text = error.to_string();
         let (found, remedy) = text.split_once("; ").unwrap_or((
             &text,
-            "copy the folder of this party anew from where keys are issued",
+            "copy the folder of this member anew from where keys are issued",
         ));
         Finding::trouble("keys", Health::Bad, found, remedy)
     };
-    let keys = match PartyKeys::load(folder, cluster, party, now) {
+    let keys = match MemberKeys::load(folder, cluster, member, now) {
         Ok(keys) => keys,
         Err(errors) => return (None, errors.iter().map(bad).collect()),
     };

@@ -46,7 +46,7 @@ pub(crate) fn troubles(
     }
     let mut text = format!(
         "{:24} {:13} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8}\n",
-        "trouble", "of", "count", "wrong", "held", "fail-safe", "unserved", "by stall"
+        "trouble", "of", "count", "wrong", "held", "fail-safe", "missed", "by stall"
     );
     for Row { row, .. } in &rows {
         let _ = writeln!(
@@ -58,7 +58,7 @@ pub(crate) fn troubles(
             row.wrong,
             row.held,
             row.fail_safe,
-            row.unserved,
+            row.missed,
             row.by_stall,
             if row.passed { "" } else { "  FAILED" }
         );

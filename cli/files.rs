@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use understudy_cluster::{Cluster, Loaded, Overrides, TemplateFile};
 use understudy_diagnostic::spelling::nearest;
 use understudy_diagnostic::{Report, decode};
-use understudy_scenarios::{Parties, Scenario, named_file, read as read_scenario};
+use understudy_scenarios::{Members, Scenario, named_file, read as read_scenario};
 
 use crate::answer::{Answer, Status};
 use crate::kind::{self, Kind};
@@ -132,7 +132,7 @@ pub(crate) fn scenario(path: &Path, cluster: &Cluster) -> Result<Scenario, Answe
     let found = read_scenario(
         &path.display().to_string(),
         &text,
-        Some(&Parties::of(cluster)),
+        Some(&Members::of(cluster)),
     );
     found
         .scenario

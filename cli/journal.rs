@@ -17,10 +17,10 @@ use crate::view::{RUN, refused, several};
 #[command(after_help = "\
 Example:
   understudy journal
-  understudy journal runs/latest --party robot --party robot-io --from 195 --to 230
+  understudy journal runs/latest --member robot --member robot-io --from 195 --to 230
   understudy journal --follow --event flagged --event source --event value-fault
 
-Without filters everything is shown but what every party says in every cycle. Cycles are counted from the origin of the run, as its
+Without filters everything is shown but what every member says in every cycle. Cycles are counted from the origin of the run, as its
 report counts them. With --follow and --json each line is a JSON object.")]
 pub(crate) struct Arguments {
     /// The directory of a run
@@ -29,9 +29,9 @@ pub(crate) struct Arguments {
     /// Go on with what is written, until the run is over
     #[arg(long)]
     follow: bool,
-    /// Only what this party says; may be given again
+    /// Only what this member says; may be given again
     #[arg(long, value_name = "NAME")]
-    party: Vec<String>,
+    member: Vec<String>,
     /// Only this kind of record, such as flagged; may be given again
     #[arg(long, value_name = "EVENT")]
     event: Vec<String>,
@@ -44,7 +44,7 @@ pub(crate) struct Arguments {
     /// The last cycle
     #[arg(long, value_name = "CYCLE", allow_hyphen_values = true)]
     to: Option<i64>,
-    /// Also what every party says in every cycle
+    /// Also what every member says in every cycle
     #[arg(long)]
     all: bool,
 }
@@ -59,7 +59,7 @@ pub(crate) fn run(arguments: &Arguments, json: bool) -> Answer {
 fn answered(arguments: &Arguments, json: bool) -> Result<Answer, Answer> {
     let run = Run::open(&arguments.run).map_err(|error| refused(&error))?;
     let filter = Filter {
-        parties: arguments.party.clone(),
+        members: arguments.member.clone(),
         events: arguments.event.clone(),
         programs: arguments.program.clone(),
         from: arguments.from,
@@ -84,7 +84,7 @@ fn answered(arguments: &Arguments, json: bool) -> Result<Answer, Answer> {
     }
     let mut text: String = lines.iter().map(|line| line.to_text() + "\n").collect();
     if lines.is_empty() {
-        text += "Nothing else happened there than what every party says in every cycle, which --all shows.\n";
+        text += "Nothing else happened there than what every member says in every cycle, which --all shows.\n";
     }
     for trouble in &troubles {
         text += &format!("       -  {trouble}\n");

@@ -24,7 +24,7 @@ Example:
   understudy keys revoke tank --folder cell/keys
   understudy keys issue cell/cluster.toml tank --folder cell/keys
 
-`init` issues keys to every party and to one operator. The folder parties/NAME goes to the machine of NAME, and to nobody else
+`init` issues keys to every member and to one operator. The folder members/NAME goes to the machine of NAME, and to nobody else
 (docs/deployment.md); the folder authority stays where keys are made.")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
@@ -33,7 +33,7 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum What {
-    /// Make an authority, and keys for every party and for an operator
+    /// Make an authority, and keys for every member and for an operator
     Init {
         /// The cluster file
         #[arg(value_name = "CLUSTER.toml")]
@@ -43,15 +43,15 @@ enum What {
         #[command(flatten)]
         days: DaysArgument,
     },
-    /// Make new keys in place of those that expire or were revoked, or for parties that are new
+    /// Make new keys in place of those that expire or were revoked, or for members that are new
     Issue {
         /// The cluster file
         #[arg(value_name = "CLUSTER.toml")]
         cluster: PathBuf,
-        /// Parties of the cluster
+        /// Members of the cluster
         #[arg(value_name = "NAME")]
         names: Vec<String>,
-        /// An operator, who is no party and may command them; may be given more than once
+        /// An operator, who is no member and may command them; may be given more than once
         #[arg(long, value_name = "NAME")]
         operator: Vec<String>,
         /// Where these operators are called, such as the router of a site
@@ -69,7 +69,7 @@ enum What {
     },
     /// Keys that no longer count; those who run obey as soon as their revoked.toml is replaced
     Revoke {
-        /// Parties or operators
+        /// Members or operators
         #[arg(value_name = "NAME", required = true)]
         names: Vec<String>,
         #[command(flatten)]
@@ -99,8 +99,8 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
             folder,
             days,
         } => read(cluster).and_then(|cluster| {
-            let parties = cluster.parties();
-            let names = parties.filter_map(|party| cluster.party_name(party));
+            let members = cluster.members();
+            let names = members.filter_map(|member| cluster.member_name(member));
             let names: Vec<String> = names.map(str::to_owned).collect();
             let mut authority =
                 Authority::init(&folder.folder, &cluster, now).map_err(|error| failed(&[error]))?;
@@ -156,10 +156,10 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
 
 /// What is run on the machine of the first member.
 fn with_doctor(answer: Answer, cluster: &Path, folder: &Path, issued: &Issued) -> Answer {
-    let Some(member) = issued.holders.iter().find(|it| it.role == Role::Party) else {
+    let Some(member) = issued.holders.iter().find(|it| it.role == Role::Member) else {
         return answer;
     };
-    let keys = folder.join("parties").join(&member.name);
+    let keys = folder.join("members").join(&member.name);
     answer.and_next(&[
         &"doctor",
         &cluster,
@@ -248,7 +248,7 @@ fn table(holders: &[Holder], now: Date) -> String {
     for holder in holders {
         let shown = shown(holder, now);
         let role = match shown.role {
-            Role::Party => "party",
+            Role::Member => "member",
             Role::Operator => "operator",
         };
         let state = match shown.revoked {
@@ -277,7 +277,7 @@ fn listed(holders: &[Holder], now: Date) -> Answer {
 /// Members that the cluster file gives no address, and whose certificates are therefore for 127.0.0.1.
 fn without_address(cluster: &Cluster, names: &[String]) -> Vec<String> {
     let lacks = |name: &&String| {
-        let member = cluster.party(name);
+        let member = cluster.member(name);
         member.is_some_and(|member| cluster.address(member).is_none())
     };
     names.iter().filter(lacks).cloned().collect()
@@ -296,7 +296,7 @@ fn changed(issued: &Issued, without_address: Vec<String>, now: Date) -> Answer {
     }
     text.push_str(&table(&issued.holders, now));
     text.push_str(
-        "\nthese folders changed; copy each to the machine of its party, and to nobody else:\n",
+        "\nthese folders changed; copy each to the machine of its member, and to nobody else:\n",
     );
     for folder in &folders {
         let _ = writeln!(text, "  {folder}");

@@ -159,7 +159,7 @@ pub(crate) fn scenario_or_undisturbed(
     }
 }
 
-/// How the parties of a cluster are started: by this program, from its file.
+/// How the members of a cluster are started: by this program, from its file.
 pub(crate) fn laboratory_settings(
     cluster: &Cluster,
     cluster_file: PathBuf,

@@ -35,13 +35,13 @@ mod keys;
 mod kind;
 mod lab;
 mod measure;
+mod member;
 mod memory;
 mod model_check;
 mod operate;
 mod outlook;
 mod overrides;
 mod parity;
-mod party;
 mod petri;
 mod proxy;
 mod reconfigure;
@@ -126,9 +126,9 @@ enum Command {
     Operate(operate::Arguments),
     Doctor(doctor::Arguments),
     Gateway(gateway::Arguments),
-    Node(party::Arguments),
-    RemoteIo(party::RemoteIoArguments),
-    Plant(party::PlantArguments),
+    Node(member::Arguments),
+    RemoteIo(member::RemoteIoArguments),
+    Plant(member::PlantArguments),
     Proxy(proxy::Arguments),
     Bench(bench::Arguments),
     Schema(schema::Arguments),
@@ -218,9 +218,9 @@ impl Command {
             Self::Operate(arguments) => operate::run(&arguments),
             Self::Doctor(arguments) => doctor::run(&arguments, console),
             Self::Gateway(arguments) => gateway::run(&arguments, console),
-            Self::Node(arguments) => party::run_station(&arguments),
-            Self::RemoteIo(arguments) => party::run_remote_io(&arguments.common),
-            Self::Plant(arguments) => party::run_plant(&arguments.common),
+            Self::Node(arguments) => member::run_station(&arguments),
+            Self::RemoteIo(arguments) => member::run_remote_io(&arguments.common),
+            Self::Plant(arguments) => member::run_plant(&arguments.common),
             Self::Proxy(arguments) => proxy::run(&arguments, console),
             Self::Bench(arguments) => bench::run(arguments, console),
             Self::Schema(arguments) => schema::run(&arguments),

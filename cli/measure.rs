@@ -216,7 +216,7 @@ fn on_processes(
         (None, Some(failure)) => Err(failed(failure.code(), failure.to_string())),
         (None, None) => Err(failed(
             "U0531",
-            "it ended before everybody was in step: nothing was measured".to_owned(),
+            "it ended before everybody was synchronised: nothing was measured".to_owned(),
         )),
     }
 }

@@ -7,7 +7,7 @@ use clap::Args;
 use serde::Serialize;
 use understudy_scenarios::{Action, Fault, Network, parts};
 use understudy_simulator::{Record, Simulation};
-use understudy_wire::{Party, StationId};
+use understudy_wire::{Member, StationId};
 
 use crate::answer::{Answer, Status};
 use crate::bench;
@@ -57,7 +57,7 @@ fn measured(arguments: &Arguments) -> Result<Answer, Answer> {
     let mut simulation = Simulation::new(parts(&cluster), network, 1);
     // The simulation keeps every violation that it finds; here they are counted as they come.
     let mut violations = 0;
-    let mut observe = |_: _, _: Option<u64>, _: Party, record: Record<'_>| {
+    let mut observe = |_: _, _: Option<u64>, _: Member, record: Record<'_>| {
         violations += u64::from(matches!(record, Record::Violation(_)));
     };
     simulation
@@ -67,7 +67,7 @@ fn measured(arguments: &Arguments) -> Result<Answer, Answer> {
     let mut next = arguments.cycles / POINTS;
     for failure in 0..arguments.cycles / FAILURE_EVERY {
         let at_cycle = failure * FAILURE_EVERY + 1;
-        let party = Party::Station(StationId((failure % stations) as u8));
+        let member = Member::Station(StationId((failure % stations) as u8));
         for (at_cycle, action) in [
             (at_cycle, Action::Crash),
             (at_cycle + REPAIR_AFTER, Action::Restart),
@@ -75,7 +75,7 @@ fn measured(arguments: &Arguments) -> Result<Answer, Answer> {
             simulation.schedule(Fault {
                 at_cycle,
                 phase: 0.3,
-                party,
+                member,
                 action,
             });
         }

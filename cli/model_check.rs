@@ -7,8 +7,8 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use understudy_cluster::Cluster;
 use understudy_model_checking::{ALL, Budget, Counterexample, Model, Promise, Start, check};
-use understudy_scenarios::{Expectation, Parties, Scenario, parts, write};
-use understudy_wire::Party;
+use understudy_scenarios::{Expectation, Members, Scenario, parts, write};
+use understudy_wire::Member;
 
 use crate::answer::{Answer, Status};
 use crate::files;
@@ -38,7 +38,7 @@ pub(crate) struct Arguments {
     /// Cycles in which they may begin
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u64).range(1..=1000))]
     cycles: u64,
-    /// Who has just started again where a run begins; `all` for all stations and remote I/Os. Without it a run begins in step
+    /// Who has just started again where a run begins; `all` for all stations and remote I/Os. Without it a run begins synchronised
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     restarted: Vec<String>,
     /// Who stood still for the cycle before
@@ -68,9 +68,9 @@ enum Kind {
     Delay,
     /// The last frame of a sender comes twice
     Duplicate,
-    /// A party crashes, and starts again at any later slot
+    /// A member crashes, and starts again at any later slot
     Crash,
-    /// A party stands still, and goes on at any later slot
+    /// A member stands still, and goes on at any later slot
     Stop,
 }
 
@@ -142,16 +142,16 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     answer
 }
 
-/// The parties that are named, or every name that is none of a station or of a remote I/O.
+/// The members that are named, or every name that is none of a station or of a remote I/O.
 fn start(arguments: &Arguments, cluster: &Cluster) -> Result<Start, Answer> {
-    let plays = |party: &Party| !matches!(party, Party::Plant(_));
+    let plays = |member: &Member| !matches!(member, Member::Plant(_));
     let mut unknown = Vec::new();
     let mut find = |names: &[String]| {
         let mut found = Vec::new();
         for name in names {
-            match cluster.party(name).filter(plays) {
-                Some(party) => found.push(party),
-                None if name == "all" => found.extend(cluster.parties().filter(plays)),
+            match cluster.member(name).filter(plays) {
+                Some(member) => found.push(member),
+                None if name == "all" => found.extend(cluster.members().filter(plays)),
                 None => unknown.push(name.clone()),
             }
         }
@@ -177,9 +177,9 @@ fn start(arguments: &Arguments, cluster: &Cluster) -> Result<Start, Answer> {
         });
     }
     let known: Vec<&str> = cluster
-        .parties()
+        .members()
         .filter(plays)
-        .filter_map(|party| cluster.party_name(party))
+        .filter_map(|member| cluster.member_name(member))
         .collect();
     let mut answer = Answer::bad_files(Vec::new());
     for name in unknown {
@@ -222,7 +222,7 @@ fn scenario(cluster: &Cluster, example: &Counterexample) -> String {
         },
         ..Scenario::default()
     };
-    write(&scenario, &Parties::of(cluster), &[])
+    write(&scenario, &Members::of(cluster), &[])
 }
 
 fn text(found: &Found) -> String {

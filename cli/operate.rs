@@ -22,10 +22,10 @@ use crate::files;
 Example:
   understudy operate runs/latest --name robot kill
   understudy operate runs/latest --name robot restart
-  understudy operate cell/cluster.toml --keys keys/parties/operator --name robot-io status
-  understudy operate cell/cluster.toml --keys keys/parties/operator --name robot-io release
-  understudy operate cell/cluster.toml --keys keys/parties/operator --name robot-io accept-state --cycle 4711
-  understudy operate cell/cluster.toml --keys keys/parties/operator --name robot journal --lines 100
+  understudy operate cell/cluster.toml --keys keys/members/operator --name robot-io status
+  understudy operate cell/cluster.toml --keys keys/members/operator --name robot-io release
+  understudy operate cell/cluster.toml --keys keys/members/operator --name robot-io accept-state --cycle 4711
+  understudy operate cell/cluster.toml --keys keys/members/operator --name robot journal --lines 100
 
 Without --keys the member is one of a laboratory that runs on this machine: in the directory of a run, or of the cluster below --out.")]
 pub(crate) struct Arguments {
@@ -89,7 +89,7 @@ enum What {
     Restart,
 }
 
-/// A party says something in every cycle.
+/// A member says something in every cycle.
 const SILENCE: Duration = Duration::from_secs(60);
 
 pub(crate) fn run(arguments: &Arguments) -> Answer {
@@ -122,7 +122,7 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
     };
     let run = written(arguments)?;
     let action = OperatorAction::Command {
-        party: crate::party::find(run.cluster(), &arguments.name)?,
+        member: crate::member::find(run.cluster(), &arguments.name)?,
         command,
         owner: crate::top::owner(),
         reason: arguments.reason.clone(),
@@ -164,7 +164,7 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
     let (cluster, _) = files::cluster(&arguments.target, Overrides::default())?;
     let keys = OperatorKeys::load(keys, &cluster, Date::of(SystemTime::now()));
     let keys = keys.map_err(|errors| crate::keys::failed(&errors))?;
-    let party = crate::party::find(&cluster, &arguments.name)?;
+    let member = crate::member::find(&cluster, &arguments.name)?;
     let request = match arguments.what {
         What::Status => Some(Request::Status),
         What::Configuration => Some(Request::Configuration),
@@ -179,7 +179,7 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
             }));
         }
     };
-    let address = cluster.address(party).ok_or_else(|| {
+    let address = cluster.address(member).ok_or_else(|| {
         let message = format!("no address for {}", arguments.name);
         Answer::failed(Status::BadInput, "U0608", message)
     })?;

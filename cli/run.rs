@@ -173,13 +173,13 @@ fn push_cycles(text: &mut String, summary: &Summary) {
         } else {
             "NOT FUNCTIONAL"
         };
-        let mishaps = match plant.mishaps {
+        let plant_faults = match plant.plant_faults {
             0 => String::new(),
-            mishaps => format!(", {mishaps} mishaps"),
+            plant_faults => format!(", {plant_faults} plant faults"),
         };
         let _ = writeln!(
             text,
-            "{:width$}  {verdict}, {} parts finished{mishaps}",
+            "{:width$}  {verdict}, {} parts finished{plant_faults}",
             plant.name, plant.finished
         );
     }
@@ -195,7 +195,7 @@ fn push_cycles(text: &mut String, summary: &Summary) {
                 counts.fail_safe_by_stall,
                 "fail-safe while the host stood still",
             ),
-            (counts.unserved, "unserved"),
+            (counts.missed, "missed"),
         ];
         let shown = numbers
             .iter()
@@ -217,7 +217,7 @@ fn push_cycles(text: &mut String, summary: &Summary) {
 /// Whether real processes lacked time: cycles went without true outputs, and nothing wrong was driven.
 fn may_have_been_late(summary: &Summary) -> bool {
     let counts = || summary.remote_ios.iter().map(|remote_io| &remote_io.counts);
-    let lacking = counts().map(|counts| counts.held + counts.fail_safe + counts.unserved);
+    let lacking = counts().map(|counts| counts.held + counts.fail_safe + counts.missed);
     summary.circumstances.world == World::Laboratory
         && !summary.passed
         && !summary.interrupted

@@ -25,7 +25,7 @@ Example:
   understudy top
   understudy top runs/latest --once
   understudy top examples/press-cell/cluster.toml
-  understudy top cell/cluster.toml --keys keys/parties/operator          what runs on other machines
+  understudy top cell/cluster.toml --keys keys/members/operator          what runs on other machines
 
 A cluster file stands for its newest run below --out. Keys: q quit, space stand still, tab events, alarms, failures to come, a
 acknowledge, arrows scroll, h help. With --once or --json it says how the run is now, and ends.")]
@@ -53,7 +53,7 @@ const HEIGHT: u16 = 30;
 /// A cluster elsewhere that says nothing of a cycle for so long is printed as it is.
 const HEARD_FOR: Duration = Duration::from_secs(20);
 
-/// What its parties say in so long, all of them have begun to say something.
+/// What its members say in so long, all of them have begun to say something.
 const ALL_SAY: Duration = Duration::from_secs(1);
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
@@ -88,7 +88,7 @@ fn answered(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answ
     Ok(Answer::done("", ()))
 }
 
-/// Until parties elsewhere have begun to tell of their cycles.
+/// Until members elsewhere have begun to tell of their cycles.
 fn wait_for_a_cycle(run: &Run) {
     let mut source = run.follow();
     let mut model = run.model(Bounds::default());

@@ -32,7 +32,7 @@ Example:
   understudy watch examples/press-cell/cluster.toml --allow-commands     run it until Ctrl-C, and command it
   understudy watch runs/latest                                           a run that is finished, or is being written
   understudy watch runs/latest --address 0.0.0.0:7480 --logins logins.txt
-  understudy watch cell/cluster.toml --keys keys/parties/operator        what runs on other machines
+  understudy watch cell/cluster.toml --keys keys/members/operator        what runs on other machines
 
 A cluster file whose laboratory runs already below --out is looked at, and no other one is started. The page looks only, unless it is told --allow-commands. Where other machines can reach its address, it is served over TLS, and only to
 those that the file of --logins names (docs/watch.md).")]
@@ -230,7 +230,7 @@ fn watch_cluster(arguments: &Arguments, page: &Page, console: &mut Console) -> A
     if arguments.attach {
         let out = run.out.display();
         let message = format!(
-            "no laboratory of `{}` runs below {out}; parties on other machines are called with the keys of an operator (--keys DIR)",
+            "no laboratory of `{}` runs below {out}; members on other machines are called with the keys of an operator (--keys DIR)",
             cluster.name()
         );
         return Answer::failed(Status::BadInput, "U0614", message);

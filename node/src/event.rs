@@ -5,7 +5,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 use understudy_wire::{
-    ConfigurationHash, Image, Lineage, Moment, Party, ProgramId, ProgramSet, StationId, Word,
+    ConfigurationHash, Image, Lineage, Member, Moment, ProgramId, ProgramSet, StationId, Word,
 };
 
 /// One thing that happened to a station.
@@ -13,7 +13,7 @@ use understudy_wire::{
 #[serde(tag = "event", rename_all = "kebab-case")]
 pub enum Event {
     /// It took its turn.
-    Spoke {
+    Published {
         /// In this cycle.
         moment: Moment,
         /// Its outputs.
@@ -32,7 +32,7 @@ pub enum Event {
         state: Image,
     },
     /// It starts the cycles from now on.
-    Paces {
+    BecameCycleMaster {
         /// From this cycle.
         moment: Moment,
     },
@@ -69,7 +69,7 @@ pub enum Event {
         from: Option<StationId>,
     },
     /// A copy proved itself in shadow: from now on it takes part in the turns.
-    InStep {
+    Synchronised {
         /// In this cycle.
         moment: Moment,
         /// Whose state.
@@ -98,10 +98,10 @@ pub enum Event {
         /// Whose state.
         program: ProgramId,
     },
-    /// A party of this cluster runs another configuration; its frames are dropped.
+    /// A member of this cluster runs another configuration; its frames are dropped.
     Refused {
         /// Who.
-        party: Party,
+        member: Member,
         /// Its configuration.
         theirs: ConfigurationHash,
         /// The configuration of this station.

@@ -21,7 +21,7 @@ use crate::settings::Program;
 pub(crate) enum Standing {
     /// There is no copy, or none that the program's remote I/O knows.
     Lost,
-    /// Adopted from another station; takes no part in the turns for so many more cycles in step.
+    /// Adopted from another station; takes no part in the turns for so many more cycles synchronised.
     Shadow(u32),
     /// Replayed from the initial state, or proved in shadow.
     Proven,
@@ -66,7 +66,7 @@ struct Copied {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Followed {
     /// It is current.
-    InStep,
+    Synchronised,
     /// It is current, and stands where it does because the history starts from the initial state.
     FromGenesis(Lineage),
     /// It does not find itself in the history.
@@ -223,7 +223,7 @@ impl Replica {
             return Followed::Lost;
         }
         if self.is_current(moment) {
-            return Followed::InStep;
+            return Followed::Synchronised;
         }
         let newest = &sample.history[sample.history.len() - 1];
         if sample.before.after(newest) != sample.after {
@@ -235,7 +235,7 @@ impl Replica {
             .is_some_and(|copy| copy.state.lineage == sample.before)
         {
             self.step(program, scratch, newest, moment);
-            return self.in_step(shadow_cycles);
+            return self.synchronised(shadow_cycles);
         }
         let lineages = lineages_of(sample);
         if lineages.last() != Some(&sample.after) {
@@ -243,7 +243,7 @@ impl Replica {
         }
         if let Some(place) = self.find(&lineages) {
             self.replay(program, scratch, sample, place, moment);
-            return self.in_step(shadow_cycles);
+            return self.synchronised(shadow_cycles);
         }
         let genesis = Lineage::genesis(program.hash, sample.born);
         if let Some(place) = lineages.iter().position(|&lineage| lineage == genesis) {
@@ -385,12 +385,12 @@ impl Replica {
         news
     }
 
-    fn in_step(&mut self, shadow_cycles: u32) -> Followed {
+    fn synchronised(&mut self, shadow_cycles: u32) -> Followed {
         if self.standing == Standing::Lost {
             self.standing = Standing::Shadow(shadow_cycles);
         }
         self.unfollowed = None;
-        Followed::InStep
+        Followed::Synchronised
     }
 
     /// The place in the history at which this copy stands now, or stood a few steps ago; it stands there afterwards.

@@ -7,8 +7,8 @@
 //!   samples come: copies follow ──► its turn: words ──► rest: asks for what it lacks, gives what others lack
 //! ```
 //!
-//! It speaks when it knows its outputs and its predecessor has spoken or its own slot starts, whichever is first; at the last
-//! call it speaks whatever it knows; and only with copies that are proven (invariant *In step or silent*). It decides nothing
+//! It speaks when it knows its outputs and its predecessor has published or its own slot starts, whichever is first; at the last
+//! call it speaks whatever it knows; and only with copies that are proven (invariant *Synchronised or silent*). It decides nothing
 //! for others: what is applied is decided by each remote I/O for itself (*No election*).
 
 mod pacing;
@@ -24,7 +24,7 @@ use smallvec::SmallVec;
 use understudy_logic::Scratch;
 use understudy_wire::{
     Admission, Arrival, Attendance, Body, ConfigurationHash, Copies, CycleClock, Digest, Frame,
-    Header, Holding, Image, Input, Lineage, Machine, Moment, Output, Party, ProgramId, ProgramSet,
+    Header, Holding, Image, Input, Lineage, Machine, Member, Moment, Output, ProgramId, ProgramSet,
     Recalled, Reception, Sample, StationId, StationSet, Time, Waking,
 };
 
@@ -47,7 +47,7 @@ pub struct Station {
     started: Time,
     waking: Waking,
     /// Whether this station starts the cycles.
-    paces: bool,
+    is_cycle_master: bool,
     wanted: ProgramSet,
     /// Stations that asked to join in the last cycle; they pace only when nobody who speaks does.
     joining: StationSet,
@@ -62,7 +62,7 @@ pub struct Station {
 /// What a station remembers of the current cycle only.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 struct CycleNotes {
-    spoken: bool,
+    published: bool,
     asked: bool,
     /// The turns of controllers that said their outputs.
     said: SmallVec<[Said; 2]>,
@@ -100,7 +100,7 @@ impl Station {
             .map(|id| Replica::new(id, &settings.programs[id.index()], agreement.history))
             .collect();
         let mut station = Self {
-            reception: Reception::new(Party::Station(settings.station), agreement),
+            reception: Reception::new(Member::Station(settings.station), agreement),
             clock: CycleClock::default(),
             attendance: Attendance::new(agreement.schedule.stations(), agreement.flag_after),
             replicas,
@@ -110,7 +110,7 @@ impl Station {
             cycle: CycleNotes::default(),
             started: now,
             waking: Waking::default(),
-            paces: false,
+            is_cycle_master: false,
             wanted: ProgramSet::EMPTY,
             joining: StationSet::EMPTY,
             differed: SmallVec::new(),
@@ -167,7 +167,7 @@ impl Station {
                 cluster: agreement.cluster,
                 configuration: agreement.configuration,
                 moment: self.clock.moment().unwrap_or_default(),
-                sender: Party::Station(self.own()),
+                sender: Member::Station(self.own()),
                 alone: self.clock.alone(),
             },
             body,
@@ -195,7 +195,7 @@ impl Station {
             Admission::Dropped => return,
             Admission::Refused { theirs } => {
                 return self.report(Event::Refused {
-                    party: frame.header.sender,
+                    member: frame.header.sender,
                     theirs,
                     ours: self.settings.agreement.configuration,
                 });
@@ -211,20 +211,20 @@ impl Station {
                 self.close_cycle();
                 self.clock.begin(now, frame.header.moment, anchor);
                 let pacer = matches!(frame.body, Body::Sync);
-                self.paces &= !pacer;
+                self.is_cycle_master &= !pacer;
             }
         }
         match (&frame.body, frame.header.sender) {
-            (Body::Sample(sample), Party::RemoteIo(program)) => {
+            (Body::Sample(sample), Member::RemoteIo(program)) => {
                 self.cycle.direct.insert(program);
                 self.follow(program, frame, sample);
             }
-            (Body::Turn(turn), Party::Station(station)) => {
+            (Body::Turn(turn), Member::Station(station)) => {
                 self.hear_turn(station, turn);
                 self.hear_relayed(&frame.header, turn);
             }
-            (Body::Join(join), Party::Station(station)) => self.hear_join(station, join),
-            (Body::Transfer(transfer), Party::Station(station)) => self.adopt(station, transfer),
+            (Body::Join(join), Member::Station(station)) => self.hear_join(station, join),
+            (Body::Transfer(transfer), Member::Station(station)) => self.adopt(station, transfer),
             _ => {}
         }
         self.speak_if_it_is_time(now);
@@ -324,7 +324,7 @@ impl Hash for Station {
             cycle,
             started,
             waking,
-            paces,
+            is_cycle_master,
             wanted,
             joining,
             differed,
@@ -332,7 +332,7 @@ impl Hash for Station {
             awaited,
         } = self;
         (reception, clock, attendance, replicas, copies).hash(hasher);
-        (cycle, started, waking, paces, wanted).hash(hasher);
+        (cycle, started, waking, is_cycle_master, wanted).hash(hasher);
         (joining, differed, lacked, awaited).hash(hasher);
     }
 }

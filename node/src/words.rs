@@ -3,7 +3,7 @@
 //! A controller has one word, y(i) over its own program. An understudy, which speaks last and so knows who was silent, says
 //!
 //! ```text
-//! one word over all programs that spoke for themselves        Σ h(j)(x(j), u(j)), (9) when nobody was silent
+//! one word over all programs that published for themselves        Σ h(j)(x(j), u(j)), (9) when nobody was silent
 //! one word for each program whose controller was silent       h(j)(x(j), u(j))
 //! ```
 //!
@@ -17,33 +17,33 @@ use understudy_wire::{Image, Mode, ProgramId, ProgramSet, Word};
 /// The word of a controller.
 pub fn of_controller(program: ProgramId, outputs: &Image) -> SmallVec<[Word; 2]> {
     smallvec::smallvec![Word {
-        members: ProgramSet::only(program),
+        mask: ProgramSet::only(program),
         sum: outputs.clone(),
     }]
 }
 
 /// The words of an understudy that knows the outputs of `known` (those that `outputs_of` answers for), in a cluster of
-/// the programs `all`, where the controllers of `spoke` have said the same in this cycle.
+/// the programs `all`, where the controllers of `published` have said the same in this cycle.
 pub fn of_understudy<'a>(
     mode: Mode,
     all: ProgramSet,
     known: ProgramSet,
-    spoke: ProgramSet,
+    published: ProgramSet,
     outputs_of: impl Fn(ProgramId) -> Option<&'a Image>,
 ) -> SmallVec<[Word; 2]> {
-    let sum = |members: ProgramSet| {
+    let sum = |mask: ProgramSet| {
         let mut sum = Image::default();
-        for outputs in members.iter().filter_map(&outputs_of) {
+        for outputs in mask.iter().filter_map(&outputs_of) {
             sum.add(outputs);
         }
-        Word { members, sum }
+        Word { mask, sum }
     };
     match mode {
         Mode::Paper if known == all => smallvec::smallvec![sum(all)],
         Mode::Paper => SmallVec::new(),
         Mode::Full => {
-            let together = known.and(spoke);
-            let silent = known.without(spoke);
+            let together = known.and(published);
+            let silent = known.without(published);
             let first = (!together.is_empty()).then_some(together);
             first
                 .into_iter()
@@ -68,23 +68,23 @@ mod tests {
             .collect();
         let all = ProgramSet::first(3);
         for known in (0..8).map(ProgramSet::from_bits) {
-            for spoke in (0..8).map(ProgramSet::from_bits) {
+            for published in (0..8).map(ProgramSet::from_bits) {
                 let of = |program: ProgramId| outputs.get(program.index());
-                let words = of_understudy(Mode::Full, all, known, spoke, of);
+                let words = of_understudy(Mode::Full, all, known, published, of);
                 let mut covered = ProgramSet::EMPTY;
                 for word in &words {
-                    assert!(covered.and(word.members).is_empty());
-                    covered = covered.or(word.members);
-                    let alone = word.members.len() == 1;
-                    assert!(alone || word.members.without(spoke).is_empty());
+                    assert!(covered.and(word.mask).is_empty());
+                    covered = covered.or(word.mask);
+                    let alone = word.mask.len() == 1;
+                    assert!(alone || word.mask.without(published).is_empty());
                     let expected = word
-                        .members
+                        .mask
                         .iter()
                         .fold(0, |sum, program| sum ^ outputs[program.index()].words()[0]);
                     assert_eq!(word.sum.words(), [expected]);
                 }
                 assert_eq!(covered, known);
-                let paper = of_understudy(Mode::Paper, all, known, spoke, of);
+                let paper = of_understudy(Mode::Paper, all, known, published, of);
                 assert_eq!(paper.len(), usize::from(known == all));
             }
         }

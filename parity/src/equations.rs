@@ -15,7 +15,7 @@ use understudy_logic::bdd::Diagrams;
 use understudy_logic::notation::{self, FormulaTooLarge};
 use understudy_logic::{Circuit, Cover, Expression, Graph, Operation, Polynomial, Variable};
 
-use crate::generate::{Member, ParityController};
+use crate::generate::{ParityController, Summand};
 
 /// Nodes of the diagrams of one function, at most, while a short formula is looked for.
 const NODES: usize = 20_000;
@@ -80,17 +80,17 @@ impl Equations {
     /// Its cost is that of printing all of them; what is too large to be read is left out, never attempted.
     pub fn of(controller: &ParityController) -> Self {
         let circuit = controller.circuit();
-        let members = controller.members();
-        let own = members.len() + 1;
+        let summands = controller.summands();
+        let own = summands.len() + 1;
         let legend = |variable| Legend {
-            symbol: symbol_of(members, variable),
+            symbol: symbol_of(summands, variable),
             name: circuit.variable_name(variable).to_owned(),
         };
         let equation = |defines: Legend, initial, root| Equation {
             defines,
             initial,
-            polynomial: polynomial(circuit, members, root),
-            boolean: boolean(circuit, members, root),
+            polynomial: polynomial(circuit, summands, root),
+            boolean: boolean(circuit, summands, root),
         };
         let states = (0..).zip(circuit.registers()).map(|(index, register)| {
             let defines = legend(Variable::Register(index));
@@ -104,7 +104,10 @@ impl Equations {
             equation(defines, None, output.value)
         });
         Self {
-            programs: members.iter().map(|member| member.name.clone()).collect(),
+            programs: summands
+                .iter()
+                .map(|summand| summand.name.clone())
+                .collect(),
             inputs: (0..)
                 .zip(circuit.inputs())
                 .map(|(index, _)| legend(Variable::Input(index)))
@@ -177,26 +180,26 @@ fn symbol(letter: char, first: usize, second: usize) -> String {
     }
 }
 
-fn symbol_of(members: &[Member], variable: Variable) -> String {
+fn symbol_of(summands: &[Summand], variable: Variable) -> String {
     match variable {
-        Variable::Register(index) => symbol('x', members.len() + 1, index as usize + 1),
+        Variable::Register(index) => symbol('x', summands.len() + 1, index as usize + 1),
         Variable::Input(index) => {
             let index = index as usize;
             // Members without inputs have empty ranges, so the last that starts at or before the input holds it.
-            let member = members.partition_point(|member| member.inputs.start <= index);
-            let start = members[member - 1].inputs.start;
-            symbol('u', member, index - start)
+            let summand = summands.partition_point(|summand| summand.inputs.start <= index);
+            let start = summands[summand - 1].inputs.start;
+            symbol('u', summand, index - start)
         }
     }
 }
 
 fn both(
     circuit: &Circuit,
-    members: &[Member],
+    summands: &[Summand],
     print: impl Fn(Style, &Naming<'_>) -> String,
 ) -> Formula {
     Formula {
-        symbols: print(Style::Symbols, &|variable| symbol_of(members, variable)),
+        symbols: print(Style::Symbols, &|variable| symbol_of(summands, variable)),
         names: print(Style::Names, &|variable| {
             circuit.variable_name(variable).to_owned()
         }),
@@ -205,17 +208,17 @@ fn both(
 
 type Naming<'a> = dyn Fn(Variable) -> String + 'a;
 
-fn polynomial(circuit: &Circuit, members: &[Member], root: Expression) -> Option<Formula> {
+fn polynomial(circuit: &Circuit, summands: &[Summand], root: Expression) -> Option<Formula> {
     let polynomial = Polynomial::of(circuit.graph(), root).ok()?;
-    Some(both(circuit, members, |style, name| {
+    Some(both(circuit, summands, |style, name| {
         polynomial.print(name, if style == Style::Symbols { "" } else { "·" })
     }))
 }
 
-fn boolean(circuit: &Circuit, members: &[Member], root: Expression) -> Option<Formula> {
+fn boolean(circuit: &Circuit, summands: &[Summand], root: Expression) -> Option<Formula> {
     let print = |graph: &Graph, root: Expression| -> Result<Formula, FormulaTooLarge> {
-        notation::boolean(graph, root, &|variable| symbol_of(members, variable))?;
-        Ok(both(circuit, members, |_, name| {
+        notation::boolean(graph, root, &|variable| symbol_of(summands, variable))?;
+        Ok(both(circuit, summands, |_, name| {
             notation::boolean(graph, root, name).unwrap_or_default()
         }))
     };

@@ -5,9 +5,9 @@
 //! y(N+1)(t)   = h(1) + h(2) + .. + h(N)             (8) (9)
 //! ```
 //!
-//! Invariant: the inputs and the registers of the members stand one after another, in the order of the members, each named
-//! `program.signal`; so x(N+1) is the concatenation of the members' states, bit by bit. p(N+1) = max p(i); an output that a
-//! member does not have counts as 0.
+//! Invariant: the inputs and the registers of the summands stand one after another, in the order of the summands, each named
+//! `program.signal`; so x(N+1) is the concatenation of the summands' states, bit by bit. p(N+1) = max p(i); an output that a
+//! summand does not have counts as 0.
 
 use std::borrow::Borrow;
 use std::collections::HashSet;
@@ -18,9 +18,9 @@ use understudy_logic::{Circuit, CircuitBuilder, CircuitError, Expression, Variab
 /// Name of the generated circuit.
 const NAME: &str = "understudy";
 
-/// Where a member's signals stand among those of the parity controller.
+/// Where a summand's signals stand among those of the parity controller.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Member {
+pub struct Summand {
     /// The program's name.
     pub name: String,
     /// u(i) in u(N+1), in bits.
@@ -35,7 +35,7 @@ pub struct Member {
 #[derive(Debug, Clone)]
 pub struct ParityController {
     circuit: Circuit,
-    members: Vec<Member>,
+    summands: Vec<Summand>,
 }
 
 impl ParityController {
@@ -49,9 +49,9 @@ impl ParityController {
         self.circuit
     }
 
-    /// Where each member stands, in order.
-    pub fn members(&self) -> &[Member] {
-        &self.members
+    /// Where each summand stands, in order.
+    pub fn summands(&self) -> &[Summand] {
+        &self.summands
     }
 }
 
@@ -89,39 +89,39 @@ impl ParityError {
     }
 }
 
-/// Generates the parity controller (7)-(9) of `members`, with the outputs `parity_1`, `parity_2`, ...
+/// Generates the parity controller (7)-(9) of `summands`, with the outputs `parity_1`, `parity_2`, ...
 ///
-/// Linear in the operations of the members. It has as many registers as all members together, and keeps their initial
+/// Linear in the operations of the summands. It has as many registers as all summands together, and keeps their initial
 /// values.
 ///
 /// # Errors
-/// No members, or names that do not tell the members' signals apart.
-pub fn generate<C: Borrow<Circuit>>(members: &[C]) -> Result<ParityController, ParityError> {
-    if members.is_empty() {
+/// No summands, or names that do not tell the summands' signals apart.
+pub fn generate<C: Borrow<Circuit>>(summands: &[C]) -> Result<ParityController, ParityError> {
+    if summands.is_empty() {
         return Err(ParityError::NoPrograms);
     }
-    distinct(members.iter().map(|member| member.borrow().name()))?;
+    distinct(summands.iter().map(|summand| summand.borrow().name()))?;
     let mut builder = CircuitBuilder::new(NAME);
-    let mut places = Vec::with_capacity(members.len());
+    let mut places = Vec::with_capacity(summands.len());
     let mut parities: Vec<Option<Expression>> = Vec::new();
     let (mut input_count, mut register_count) = (0, 0);
-    for member in members {
-        let member: &Circuit = member.borrow();
-        let qualified = |signal: &str| format!("{}.{signal}", member.name());
-        let inputs: Vec<Expression> = member
+    for summand in summands {
+        let summand: &Circuit = summand.borrow();
+        let qualified = |signal: &str| format!("{}.{signal}", summand.name());
+        let inputs: Vec<Expression> = summand
             .inputs()
             .iter()
             .map(|input| builder.input(qualified(input)))
             .collect();
-        let registers: Vec<_> = member
+        let registers: Vec<_> = summand
             .registers()
             .iter()
             .map(|register| builder.register(qualified(&register.name), register.initial))
             .collect();
         let copies =
             builder.graph().import(
-                member.graph(),
-                &member.roots(),
+                summand.graph(),
+                &summand.roots(),
                 |_, variable| match variable {
                     Variable::Input(index) => inputs[index as usize],
                     Variable::Register(index) => registers[index as usize].1,
@@ -138,8 +138,8 @@ pub fn generate<C: Borrow<Circuit>>(members: &[C]) -> Result<ParityController, P
                 Some(sum) => builder.graph().xor(sum, output),
             });
         }
-        places.push(Member {
-            name: member.name().to_owned(),
+        places.push(Summand {
+            name: summand.name().to_owned(),
             inputs: input_count..input_count + inputs.len(),
             registers: register_count..register_count + registers.len(),
             outputs: outputs.len(),
@@ -152,7 +152,7 @@ pub fn generate<C: Borrow<Circuit>>(members: &[C]) -> Result<ParityController, P
     }
     Ok(ParityController {
         circuit: builder.finish()?,
-        members: places,
+        summands: places,
     })
 }
 

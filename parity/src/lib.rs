@@ -9,4 +9,4 @@ pub mod words;
 
 pub use equations::{Equation, Equations, Formula, Legend, Style};
 
-pub use generate::{Member, ParityController, ParityError, generate};
+pub use generate::{ParityController, ParityError, Summand, generate};

@@ -198,7 +198,7 @@ fn theorems_hold_everywhere() {
         let x: Vec<u64> = (inputs..inputs + registers).map(lane).collect();
         let mut outputs: Vec<Vec<u64>> = Vec::new();
         let mut states = Vec::new();
-        for (scan, member) in scans.iter().zip(generated.members()) {
+        for (scan, member) in scans.iter().zip(generated.summands()) {
             let mut state = x[member.registers.clone()].to_vec();
             let mut output = vec![0; member.outputs];
             scan.step_lanes(

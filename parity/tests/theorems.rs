@@ -116,7 +116,7 @@ proptest! {
         }
         // x(N+1) is the members' states, one after another.
         let bit = |words: &[u64], place: usize| words[place / 64] >> (place % 64) & 1;
-        for ((_, state), member) in cluster.members.iter().zip(generated.members()) {
+        for ((_, state), member) in cluster.members.iter().zip(generated.summands()) {
             for (own, place) in member.registers.clone().enumerate() {
                 prop_assert_eq!(bit(&cluster.parity.1, place), bit(state, own));
             }

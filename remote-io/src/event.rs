@@ -5,7 +5,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 use understudy_wire::{
-    ConfigurationHash, Force, Image, Lineage, Moment, Party, ProgramId, SignalPlace, Source,
+    ConfigurationHash, Force, Image, Lineage, Member, Moment, ProgramId, SignalPlace, Source,
     StationId, StationSet,
 };
 
@@ -40,7 +40,7 @@ pub enum Event {
         word_of: Option<StationId>,
         /// Why nothing true was left, where the outputs are held or fail-safe.
         missing: Option<Missing>,
-        /// Stations that spoke in this cycle, as heard here.
+        /// Stations that published in this cycle, as heard here.
         heard: StationSet,
     },
     /// The program starts from its initial state.
@@ -195,10 +195,10 @@ pub enum Event {
         /// One of these is wrong.
         accused: StationSet,
     },
-    /// A party of this cluster runs another configuration; its frames are dropped.
+    /// A member of this cluster runs another configuration; its frames are dropped.
     Refused {
         /// Who.
-        party: Party,
+        member: Member,
         /// Its configuration.
         theirs: ConfigurationHash,
         /// The configuration of this remote I/O.
@@ -261,7 +261,7 @@ pub enum Missing {
     /// Stations disagree, and nobody says who is right.
     ValueFault,
     /// Neither the controller nor any word of an understudy was there with the true lineage.
-    NobodyInStep,
+    NotSynchronised,
     /// A word was there, and another member of it was not.
     TwoErasures,
     /// The paper's S2: two stations have failed.

@@ -30,7 +30,7 @@ use std::sync::Arc;
 
 use understudy_wire::{
     Admission, Arrival, Attendance, Body, Change, ConfigurationHash, Copies, CycleClock, Frame,
-    Header, Holding, Image, Input, Lineage, Machine, Moment, Output, Party, ProgramId, Recalled,
+    Header, Holding, Image, Input, Lineage, Machine, Member, Moment, Output, ProgramId, Recalled,
     Reception, Source, StateChoice, StationId, StationSet, Time, Waking,
 };
 
@@ -137,7 +137,7 @@ impl RemoteIo {
         let mut clock = CycleClock::default();
         clock.start(now);
         let mut remote_io = Self {
-            reception: Reception::new(Party::RemoteIo(settings.program), agreement),
+            reception: Reception::new(Member::RemoteIo(settings.program), agreement),
             clock,
             attendance: Attendance::new(stations, agreement.flag_after),
             witnesses: Witnesses::new(settings.program, agreement),
@@ -193,7 +193,7 @@ impl RemoteIo {
     }
 
     fn receive(&mut self, now: Time, frame: &Arc<Frame>) {
-        let Party::Station(station) = frame.header.sender else {
+        let Member::Station(station) = frame.header.sender else {
             return;
         };
         match self.reception.admit(&frame.header) {
@@ -201,7 +201,7 @@ impl RemoteIo {
             Admission::Dropped => return,
             Admission::Refused { theirs } => {
                 return self.report(Event::Refused {
-                    party: frame.header.sender,
+                    member: frame.header.sender,
                     theirs,
                     ours: self.settings.agreement.configuration,
                 });
@@ -277,7 +277,7 @@ impl RemoteIo {
                 cluster: agreement.cluster,
                 configuration: agreement.configuration,
                 moment: self.moment(),
-                sender: Party::RemoteIo(self.settings.program),
+                sender: Member::RemoteIo(self.settings.program),
                 alone: self.clock.alone(),
             },
             body,

@@ -91,7 +91,7 @@ impl<'a> Heard<'a> {
         excluded: StationSet,
     ) -> (Votes, Missing) {
         let mut votes = Votes::new();
-        let mut missing = Missing::NobodyInStep;
+        let mut missing = Missing::NotSynchronised;
         if let Some((word, holding)) = self.own_word(me)
             && holding.lineage == truth
             && word.sum.width() == width
@@ -115,7 +115,7 @@ impl<'a> Heard<'a> {
             if holding.lineage != truth {
                 continue;
             }
-            for word in turn.words.iter().filter(|word| word.members.contains(me)) {
+            for word in turn.words.iter().filter(|word| word.mask.contains(me)) {
                 let sum = self.reconstruct(me, turn, word);
                 let Some(outputs) = sum.and_then(|sum| sum.narrowed(width)) else {
                     missing = Missing::TwoErasures;
@@ -125,7 +125,7 @@ impl<'a> Heard<'a> {
                     station,
                     digest: holding.digest,
                     outputs,
-                    independent: word.members.len() == 1,
+                    independent: word.mask.len() == 1,
                 });
                 break;
             }
@@ -137,7 +137,7 @@ impl<'a> Heard<'a> {
     /// proved to be of the same history and of the same state as the word.
     fn reconstruct(&self, me: ProgramId, turn: &Turn, word: &Word) -> Option<Image> {
         let mut sum = word.sum.clone();
-        for other in word.members.without(ProgramSet::only(me)).iter() {
+        for other in word.mask.without(ProgramSet::only(me)).iter() {
             let (outputs, theirs) = self.own_word(other)?;
             let ours = holding_of(turn, other)?;
             if ours.lineage != theirs.lineage || ours.digest != theirs.digest {
@@ -155,7 +155,7 @@ impl<'a> Heard<'a> {
             Some(turn.words.iter().map(move |word| (understudy, turn, word)))
         });
         words.flatten().filter_map(move |(understudy, turn, word)| {
-            let me = word.members.iter().next()?;
+            let me = word.mask.iter().next()?;
             let (outputs, theirs) = self.own_word(me)?;
             let ours = holding_of(turn, me)?;
             let mut syndrome = self.reconstruct(me, turn, word)?;
@@ -163,7 +163,7 @@ impl<'a> Heard<'a> {
                 return None;
             }
             syndrome.add(&outputs.sum);
-            let accused = word.members.iter().map(|program| StationId(program.0));
+            let accused = word.mask.iter().map(|program| StationId(program.0));
             let accused = accused.chain([understudy]).collect();
             (!syndrome.is_zero()).then_some((syndrome, accused))
         })
@@ -213,7 +213,7 @@ impl<'a> Heard<'a> {
     fn own_word(&self, program: ProgramId) -> Option<(&'a Word, &'a Holding)> {
         let turn = self.turn_of(StationId(program.0))?;
         let own = ProgramSet::only(program);
-        let word = turn.words.iter().find(|word| word.members == own)?;
+        let word = turn.words.iter().find(|word| word.mask == own)?;
         Some((word, holding_of(turn, program)?))
     }
 }
@@ -227,7 +227,7 @@ fn holding_of(turn: &Turn, program: ProgramId) -> Option<&Holding> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use understudy_wire::{ClusterHash, ConfigurationHash, Digest, Header, Moment, Party};
+    use understudy_wire::{ClusterHash, ConfigurationHash, Digest, Header, Member, Moment};
 
     const WIDTHS: [usize; 3] = [3, 2, 3];
     const OUTPUTS: [u64; 3] = [0b101, 0b11, 0b110];
@@ -272,7 +272,7 @@ mod tests {
                 cluster: ClusterHash(1),
                 configuration: ConfigurationHash(1),
                 moment: Moment::default(),
-                sender: Party::Station(StationId(rank as u8)),
+                sender: Member::Station(StationId(rank as u8)),
                 alone: false,
             },
             body: Body::Turn(Turn {
@@ -294,7 +294,7 @@ mod tests {
             Controller::Corrupted => (TRUE, 2),
         };
         let word = Word {
-            members: ProgramSet::only(ProgramId(program as u8)),
+            mask: ProgramSet::only(ProgramId(program as u8)),
             sum: image(program, case != Controller::True),
         };
         Some(frame(
@@ -307,12 +307,12 @@ mod tests {
     /// An understudy that is right, with one word over `mask` and one for each other program of `alone`.
     fn understudy(mask: u64, alone: u64) -> Arc<Frame> {
         let holdings: Vec<Holding> = (0..3).map(|program| holding(program, TRUE, 1)).collect();
-        let word = |members: ProgramSet| {
+        let word = |mask: ProgramSet| {
             let mut sum = Image::default();
-            for program in members.iter() {
+            for program in mask.iter() {
                 sum.add(&image(program.index(), false));
             }
-            Word { members, sum }
+            Word { mask, sum }
         };
         let together = ProgramSet::from_bits(mask);
         let words: Vec<Word> = [together]
@@ -323,7 +323,7 @@ mod tests {
                     .iter()
                     .map(ProgramSet::only),
             )
-            .filter(|members| !members.is_empty())
+            .filter(|mask| !mask.is_empty())
             .map(word)
             .collect();
         frame(3, &holdings, &words)
@@ -407,7 +407,7 @@ mod tests {
                 .map(|program| controller(program, Controller::True))
                 .collect();
             let word = Word {
-                members: ProgramSet::only(ProgramId(program as u8)),
+                mask: ProgramSet::only(ProgramId(program as u8)),
                 sum: image(program, true),
             };
             turns[program] = Some(frame(program, &[holding(program, TRUE, 1)], &[word]));

@@ -6,8 +6,8 @@ use std::time::Duration;
 use understudy_remote_io::{Event, Missing, Release, RemoteIo, Settings, StaleState, ValueFault};
 use understudy_wire::{
     Agreement, Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Force, Frame, Header, Image,
-    Input, Join, Lineage, Machine, Mode, Moment, Output, Party, ProgramHash, ProgramId, ProgramSet,
-    Schedule, SignalPlace, Source, StationId, Time,
+    Input, Join, Lineage, Machine, Member, Mode, Moment, Output, ProgramHash, ProgramId,
+    ProgramSet, Schedule, SignalPlace, Source, StationId, Time,
 };
 
 const PERIOD: Duration = Duration::from_millis(10);
@@ -67,7 +67,7 @@ impl Bench {
                 epoch: Epoch(1),
                 cycle: Cycle(u64::from(self.cycle)),
             },
-            sender: Party::Station(StationId(0)),
+            sender: Member::Station(StationId(0)),
             alone: false,
         };
         let join = Join {

@@ -6,7 +6,7 @@ use std::time::Duration;
 use understudy_remote_io::{Event, Release, RemoteIo, Settings, StaleState, ValueFault};
 use understudy_wire::{
     Agreement, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding,
-    Image, Input, Join, Lineage, Machine, Mode, Moment, Output, Party, ProgramHash, ProgramId,
+    Image, Input, Join, Lineage, Machine, Member, Mode, Moment, Output, ProgramHash, ProgramId,
     ProgramSet, Recalled, Schedule, Source, StationId, StationSet, Time,
 };
 
@@ -68,7 +68,7 @@ fn run(held: [Held; 3], release: Release, released_at: u64, cycles: u64) -> Vec<
                     cluster: ClusterHash(1),
                     configuration: ConfigurationHash(2),
                     moment: moment(100 + cycle),
-                    sender: Party::Station(StationId(rank)),
+                    sender: Member::Station(StationId(rank)),
                     alone: false,
                 },
                 body: Body::Join(Join {

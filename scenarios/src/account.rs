@@ -2,7 +2,7 @@
 //!
 //! One account for both worlds: it numbers the cycles, finds the origin, asks a [`Referee`] for each remote I/O whether what was
 //! applied is true, and keeps what the summary, the table and the figure show. Cycles are closed in order, [`LAG_CYCLES`] behind the
-//! newest and when every remote I/O has told of a later one. The records of each party come on a way of their own, and a busy machine may
+//! newest and when every remote I/O has told of a later one. The records of each member come on a way of their own, and a busy machine may
 //! read one of them long before another: only [`MAXIMUM_OPEN_CYCLES`], which bound its memory, end the wait for a remote I/O that is gone.
 
 mod closing;
@@ -21,11 +21,11 @@ use understudy_node::Event as StationEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_simulator::{Action, Referee, Violation};
 use understudy_wire::{
-    Agreement, Moment, Party, ProgramId, ProgramSet, Source, StationId, StationSet,
+    Agreement, Member, Moment, ProgramId, ProgramSet, Source, StationId, StationSet,
 };
 
 use crate::figure::Signals;
-use crate::parties::Parties;
+use crate::members::Members;
 use crate::record::{Happening, Record, RunEvent, moment};
 use crate::scenario::{During, Scenario};
 
@@ -55,7 +55,7 @@ const MAXIMUM_DEATHS: usize = 100;
 #[derive(Debug, Clone)]
 pub struct Terms {
     /// Who is who.
-    pub parties: Parties,
+    pub members: Members,
     /// What all agreed on.
     pub agreement: Arc<Agreement>,
     /// One for each program, with the circuit and the remote I/O's settings.
@@ -69,7 +69,7 @@ pub struct Terms {
 /// Who says where the origin is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OriginRule {
-    /// The records: the first cycle in which everybody was in step, with every simulated plant there.
+    /// The records: the first cycle in which everybody was synchronised, with every simulated plant there.
     Found,
     /// Whoever runs the scenario.
     Told,
@@ -79,7 +79,7 @@ pub enum OriginRule {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct DoneStep {
     pub(crate) action: Action,
-    pub(crate) party: Party,
+    pub(crate) member: Member,
     pub(crate) asked: u64,
     /// The first cycle whose deadline came after it.
     pub(crate) measured: u64,
@@ -88,7 +88,7 @@ pub(crate) struct DoneStep {
 /// An unexpected end of a member.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Death {
-    pub(crate) party: Party,
+    pub(crate) member: Member,
     /// The first cycle whose deadline came after it; none before the origin.
     pub(crate) cycle: Option<u64>,
     /// The signal or the exit status.
@@ -115,7 +115,7 @@ struct OpenCycle {
     heard: StationSet,
     /// Remote I/Os that drove directly and heard everybody.
     content: ProgramSet,
-    /// Understudies that spoke for all programs.
+    /// Understudies that published for all programs.
     covering: StationSet,
 }
 
@@ -142,10 +142,10 @@ pub struct Account {
     pub(crate) violation_count: u64,
     pub(crate) during: Vec<(During, RangeFinding)>,
     pub(crate) refused: Vec<(String, String)>,
-    /// Records that parties could not write, because their journals were too slow.
-    pub(crate) unwritten: BTreeMap<Party, u64>,
+    /// Records that members could not write, because their journals were too slow.
+    pub(crate) unwritten: BTreeMap<Member, u64>,
     pub(crate) interrupted: bool,
-    /// Whether everybody was in step in the last cycle of the scenario.
+    /// Whether everybody was synchronised in the last cycle of the scenario.
     pub(crate) protected: bool,
     pub(crate) records: u64,
 }
@@ -204,7 +204,7 @@ impl Account {
 
     /// Remote I/Os that do not drive directly yet, understudies that do not speak for all programs, and plants that have not begun:
     /// why there is no origin.
-    pub fn awaited(&self) -> Vec<Party> {
+    pub fn awaited(&self) -> Vec<Member> {
         let schedule = &self.terms.agreement.schedule;
         let newest = self.open.iter().next_back().map(|(_, cycle)| cycle);
         let before = self.open.iter().rev().nth(1).map(|(_, cycle)| cycle);
@@ -213,7 +213,7 @@ impl Account {
         let remote_ios = (0..schedule.controllers() as u8)
             .map(ProgramId)
             .filter(|&program| !in_either(&|cycle| cycle.content.contains(program)))
-            .map(Party::RemoteIo);
+            .map(Member::RemoteIo);
         let stations = (0..schedule.stations() as u8)
             .map(StationId)
             .filter(|&station| {
@@ -226,8 +226,8 @@ impl Account {
                 };
                 !in_either(&test)
             })
-            .map(Party::Station);
-        let plants = self.starting_plants.iter().map(Party::Plant);
+            .map(Member::Station);
+        let plants = self.starting_plants.iter().map(Member::Plant);
         stations.chain(remote_ios).chain(plants).collect()
     }
 
@@ -245,40 +245,40 @@ impl Account {
     /// Takes the next record.
     pub fn observe(&mut self, record: &Record) {
         self.records += 1;
-        match (&record.event, record.party) {
-            (Happening::Station(event), Some(Party::Station(station))) => {
+        match (&record.event, record.member) {
+            (Happening::Station(event), Some(Member::Station(station))) => {
                 self.station(station, event);
             }
-            (Happening::RemoteIo(event), Some(Party::RemoteIo(program))) => {
+            (Happening::RemoteIo(event), Some(Member::RemoteIo(program))) => {
                 self.remote_io(program, event);
             }
-            (Happening::Plant(event), Some(Party::Plant(program))) => self.plant(program, event),
-            (Happening::Host(HostEvent::JournalLost { records }), Some(party)) => {
-                self.unwritten(party, *records);
+            (Happening::Plant(event), Some(Member::Plant(program))) => self.plant(program, event),
+            (Happening::Host(HostEvent::JournalLost { records }), Some(member)) => {
+                self.unwritten(member, *records);
             }
             (Happening::Run(event), _) => self.run(event),
             _ => {}
         }
-        if let Some((late, party)) = stall_of(record) {
+        if let Some((late, member)) = stall_of(record) {
             let number = moment(&record.event)
                 .and_then(|moment| self.numbering.of(moment))
                 .or_else(|| self.numbering.latest());
             if let Some(number) = number {
                 let period = self.terms.agreement.schedule.period();
-                self.stalls.stalled(number, party, late, period);
+                self.stalls.stalled(number, member, late, period);
             }
         }
     }
 
     fn station(&mut self, station: StationId, event: &StationEvent) {
         match event {
-            StationEvent::Spoke { moment, words } => {
-                let widest = words.iter().max_by_key(|word| word.members.len());
+            StationEvent::Published { moment, words } => {
+                let widest = words.iter().max_by_key(|word| word.mask.len());
                 let (Some(word), Some(number)) = (widest, self.numbering.of(*moment)) else {
                     return;
                 };
                 let programs = self.terms.agreement.schedule.controllers();
-                if word.members == ProgramSet::first(programs)
+                if word.mask == ProgramSet::first(programs)
                     && self.terms.agreement.schedule.is_understudy(station)
                     && let Some(cycle) = self.open_cycle(number)
                 {
@@ -290,17 +290,17 @@ impl Account {
                     self.traces.stations.get_mut(station.index()),
                 ) {
                     let mut sum = word.sum.clone();
-                    let others = words.iter().filter(|other| other.members != word.members);
+                    let others = words.iter().filter(|other| other.mask != word.mask);
                     others.for_each(|other| sum.add(&other.sum));
                     trace.push(at, &sum);
                 }
             }
             StationEvent::Refused {
-                party,
+                member,
                 theirs,
                 ours,
             } => {
-                self.refuse(*party, theirs.to_string(), ours.to_string());
+                self.refuse(*member, theirs.to_string(), ours.to_string());
             }
             _ => {}
         }
@@ -321,12 +321,12 @@ impl Account {
         } = event
         else {
             if let RemoteIoEvent::Refused {
-                party,
+                member,
                 theirs,
                 ours,
             } = event
             {
-                self.refuse(*party, theirs.to_string(), ours.to_string());
+                self.refuse(*member, theirs.to_string(), ours.to_string());
             }
             if let Some(violation) = violation {
                 self.violate(program, self.numbering.latest(), violation);
@@ -388,29 +388,29 @@ impl Account {
         match event {
             RunEvent::Fault {
                 action,
-                party,
+                member,
                 asked,
             } => {
-                if let (Party::RemoteIo(program), Action::Release | Action::Choose { .. }) =
-                    (*party, *action)
+                if let (Member::RemoteIo(program), Action::Release | Action::Choose { .. }) =
+                    (*member, *action)
                     && let Some(referee) = self.terms.referees.get_mut(program.index())
                 {
                     referee.operator_chooses();
                 }
-                let measured = self.disturb(*party, *action).unwrap_or(0);
+                let measured = self.disturb(*member, *action).unwrap_or(0);
                 self.steps.push(DoneStep {
                     action: *action,
-                    party: *party,
+                    member: *member,
                     asked: *asked,
                     measured,
                 });
             }
-            RunEvent::Ended { party, how, said } => {
-                let cycle = self.disturb(*party, Action::Crash);
+            RunEvent::Ended { member, how, said } => {
+                let cycle = self.disturb(*member, Action::Crash);
                 self.death_count += 1;
                 if self.deaths.len() < MAXIMUM_DEATHS {
                     self.deaths.push(Death {
-                        party: *party,
+                        member: *member,
                         cycle,
                         how: how.clone(),
                         said: said.clone(),
@@ -436,25 +436,25 @@ impl Account {
     }
 
     /// Something is done to a member, or happens to it: answers with the first cycle whose deadline comes after it.
-    fn disturb(&mut self, party: Party, action: Action) -> Option<u64> {
+    fn disturb(&mut self, member: Member, action: Action) -> Option<u64> {
         let number = self.numbering.latest().unwrap_or(0) + 1;
-        self.stalls.step(number, party, action);
+        self.stalls.step(number, member, action);
         let measured = self.since_origin(number);
-        self.presences.step(measured.unwrap_or(0), party, action);
+        self.presences.step(measured.unwrap_or(0), member, action);
         measured
     }
 
-    fn unwritten(&mut self, party: Party, records: u64) {
-        *self.unwritten.entry(party).or_default() += records;
-        if let Party::RemoteIo(program) = party
+    fn unwritten(&mut self, member: Member, records: u64) {
+        *self.unwritten.entry(member).or_default() += records;
+        if let Member::RemoteIo(program) = member
             && let Some(referee) = self.terms.referees.get_mut(program.index())
         {
             referee.misses_records();
         }
     }
 
-    fn refuse(&mut self, party: Party, theirs: String, ours: String) {
-        let name = self.terms.parties.name(party).to_owned();
+    fn refuse(&mut self, member: Member, theirs: String, ours: String) {
+        let name = self.terms.members.name(member).to_owned();
         let text = format!("it runs configuration {theirs}, the others {ours}");
         if !self.refused.iter().any(|(known, _)| *known == name) {
             self.refused.push((name, text));
@@ -520,10 +520,10 @@ impl Account {
     }
 }
 
-fn stall_of(record: &Record) -> Option<(Duration, Party)> {
+fn stall_of(record: &Record) -> Option<(Duration, Member)> {
     match &record.event {
         Happening::Station(StationEvent::Stalled { late, .. })
-        | Happening::RemoteIo(RemoteIoEvent::Stalled { late, .. }) => Some((*late, record.party?)),
+        | Happening::RemoteIo(RemoteIoEvent::Stalled { late, .. }) => Some((*late, record.member?)),
         _ => None,
     }
 }

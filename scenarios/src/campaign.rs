@@ -1,7 +1,7 @@
 //! Campaigns of failures: stations fail and are repaired by chance until a program is lost, again and again.
 //!
 //! Each replica starts whole. A station fails after an exponential time of being up; its repair takes an exponential time from its
-//! detection on (θ = 1 at any party), and then it takes over its states by the protocol, in as many cycles as that takes. The *system*
+//! detection on (θ = 1 at any member), and then it takes over its states by the protocol, in as many cycles as that takes. The *system*
 //! fails where a remote I/O has come to its fail-safe: nobody has held its program's state since the first deadline with nothing true to
 //! apply, which is the time of the failure. Invariant: a replica in virtual time is a function of the cluster, the plan and its own
 //! number, so that the campaign is the same on any number of processors.

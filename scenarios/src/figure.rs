@@ -199,7 +199,7 @@ fn panels(account: &Account, summary: &Summary) -> Vec<Panel> {
     });
     let mut letters = letters;
     let mut letter = || letters.next().unwrap_or_default();
-    for (program, plant_name) in terms.parties.plants() {
+    for (program, plant_name) in terms.members.plants() {
         let trace = &account.traces.plants[program.index()];
         let mut lanes = Vec::new();
         let mut shown = "sensors";
@@ -217,7 +217,7 @@ fn panels(account: &Account, summary: &Summary) -> Vec<Panel> {
             shades: summary.map_or_else(Vec::new, |plant| service_shades(&plant.intervals)),
         });
     }
-    for (station, name) in terms.parties.stations() {
+    for (station, name) in terms.members.stations() {
         let trace = &account.traces.stations[station.index()];
         let understudy = terms.agreement.schedule.is_understudy(station);
         let width = trace.spans().map(|(_, _, image)| image.width()).max();
@@ -339,7 +339,7 @@ fn service_shades(intervals: &[Interval<Service>]) -> Vec<(u64, u64, RGBColor)> 
             let colour = match interval.state {
                 Service::Functional => return None,
                 Service::Held => JOINING,
-                Service::FailSafe | Service::Wrong | Service::Unserved => OFF,
+                Service::FailSafe | Service::Wrong | Service::Missed => OFF,
             };
             Some((interval.from, interval.to, colour))
         })

@@ -1,6 +1,6 @@
 //! Fault injection campaigns in virtual time: runs with faults by chance, in search of one in which a property does not hold.
 //!
-//! Every run starts from a copy of the cluster in step. Invariant: a run is a function of the cluster, the seed of the campaign and the
+//! Every run starts from a copy of the cluster synchronised. Invariant: a run is a function of the cluster, the seed of the campaign and the
 //! number of the run, and everything in [`Findings`] is a sum over runs or sorted by their numbers. So the findings are the
 //! same, byte for byte, on any number of threads, and in shards that are merged again.
 

@@ -3,13 +3,13 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_simulator::{Action, Fault};
-use understudy_wire::{Party, Schedule, StationId};
+use understudy_wire::{Member, Schedule, StationId};
 
 use crate::account::Presence;
 use crate::scenario::Scenario;
 use crate::summary::Summary;
 
-/// Cycles within which everybody has to be in step again.
+/// Cycles within which everybody has to be synchronised again.
 pub const JOIN_CYCLES: u64 = 100;
 
 /// When the station of a trial is killed, and when it is started again.
@@ -22,7 +22,7 @@ pub fn join_trial(trial: u64, schedule: &Schedule) -> (StationId, Scenario) {
     let step = |at_cycle, action| Fault {
         at_cycle,
         phase: 0.0,
-        party: Party::Station(station),
+        member: Member::Station(station),
         action,
     };
     let scenario = Scenario {
@@ -40,7 +40,7 @@ pub fn join_trial(trial: u64, schedule: &Schedule) -> (StationId, Scenario) {
 /// What came of a trial; times in cycles, nothing where it never happened.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Joined {
-    /// From the first cycle that the cluster counted to the first one in which everybody was in step.
+    /// From the first cycle that the cluster counted to the first one in which everybody was synchronised.
     pub start: Option<u64>,
     /// From the restart of the station to its first turn.
     pub join: Option<u64>,

@@ -1,4 +1,4 @@
-//! A scenario on real processes: one for each party, over a real network, on real clocks.
+//! A scenario on real processes: one for each member, over a real network, on real clocks.
 //!
 //! The laboratory starts them, reads what they report, does the steps of the scenario when the cycles come that they are meant
 //! for, and ends everything that it started, whatever happens. It decides nothing about the cycle, and no frame passes through it
@@ -26,7 +26,7 @@ use tokio::sync::mpsc::{Receiver, Sender, channel};
 use understudy_bus::{Cuts, LinkKind};
 use understudy_cluster::Cluster;
 use understudy_simulator::Action;
-use understudy_wire::Party;
+use understudy_wire::Member;
 
 use crate::account::{Account, OriginRule, Terms};
 use crate::journal::{Journal, JournalState};
@@ -48,7 +48,7 @@ use recovery::Recovery;
 use site::Site;
 use steps::Steps;
 
-/// What the parties say and nobody has read yet, at most; then they wait, and lose records rather than cycles.
+/// What the members say and nobody has read yet, at most; then they wait, and lose records rather than cycles.
 const UNREAD_LINES: usize = 16_384;
 
 /// The folder of the keys of a run, in its directory.
@@ -60,7 +60,7 @@ const TICK: Duration = Duration::from_millis(50);
 /// What a laboratory is told besides its cluster and its scenario.
 #[derive(Debug, Clone)]
 pub struct LaboratorySettings {
-    /// The program whose commands `node`, `remote-io` and `plant` run a party.
+    /// The program whose commands `node`, `remote-io` and `plant` run a member.
     pub program: PathBuf,
     /// The cluster file that they read.
     pub cluster_file: PathBuf,
@@ -95,9 +95,9 @@ pub enum Progress {
         /// So many are ready.
         ready: usize,
         /// Of so many.
-        parties: usize,
+        members: usize,
     },
-    /// The processes are there, and the cluster is not in step yet.
+    /// The processes are there, and the cluster is not synchronised yet.
     ComingIntoStep {
         /// Who is not.
         names: Vec<String>,
@@ -285,13 +285,13 @@ struct Laboratory<'w> {
     site: Site,
     account: Account,
     journal: Option<Journal>,
-    processes: BTreeMap<Party, Process>,
-    lives: BTreeMap<Party, u32>,
-    /// Parties that have said that they listen.
-    ready: BTreeSet<Party>,
+    processes: BTreeMap<Member, Process>,
+    lives: BTreeMap<Member, u32>,
+    /// Members that have said that they listen.
+    ready: BTreeSet<Member>,
     machine: BTreeSet<String>,
     /// By receiver: of whom it drops the frames.
-    cuts: BTreeMap<Party, Cuts>,
+    cuts: BTreeMap<Member, Cuts>,
     recovery: Recovery,
     conductor: &'w mut dyn Conductor,
     afterwards: Option<Afterwards<'w>>,
@@ -330,15 +330,15 @@ impl Laboratory<'_> {
         let system = |what| move |source| LaboratoryError::System { what, source };
         let mut interrupt = signal(SignalKind::interrupt()).map_err(system("to hear SIGINT"))?;
         let mut terminate = signal(SignalKind::terminate()).map_err(system("to hear SIGTERM"))?;
-        let parties: Vec<Party> = self
+        let members: Vec<Member> = self
             .account
             .terms
-            .parties
+            .members
             .iter()
-            .map(|(party, _)| party)
+            .map(|(member, _)| member)
             .collect();
-        for party in parties {
-            self.start(party).await?;
+        for member in members {
+            self.start(member).await?;
         }
         let mut waits = Waits::new();
         let mut tick = tokio::time::interval(TICK);
@@ -365,8 +365,8 @@ impl Laboratory<'_> {
             while let Some(step) = self.conductor.take_due(now) {
                 self.do_step(&step).await?;
             }
-            while let Some(party) = self.recovery.take_due(now) {
-                self.restart(party).await;
+            while let Some(member) = self.recovery.take_due(now) {
+                self.restart(member).await;
             }
             self.show_progress(&mut waits);
             if self.judged.is_none() && self.is_over(now) && !self.stays() {
@@ -383,12 +383,15 @@ impl Laboratory<'_> {
         Ok(())
     }
 
-    fn name(&self, party: Party) -> String {
-        self.account.terms.parties.name(party).to_owned()
+    fn name(&self, member: Member) -> String {
+        self.account.terms.members.name(member).to_owned()
     }
 
-    fn names(&self, parties: impl IntoIterator<Item = Party>) -> Vec<String> {
-        parties.into_iter().map(|party| self.name(party)).collect()
+    fn names(&self, members: impl IntoIterator<Item = Member>) -> Vec<String> {
+        members
+            .into_iter()
+            .map(|member| self.name(member))
+            .collect()
     }
 
     /// A record of the laboratory's own.
@@ -417,7 +420,7 @@ impl Laboratory<'_> {
     }
 }
 
-/// The clock of the parties' records.
+/// The clock of the members' records.
 pub fn monotonic_ns() -> u64 {
     // It exists on every Linux; a journal without times is still a journal.
     clock_gettime(ClockId::CLOCK_MONOTONIC).map_or(0, |now| {

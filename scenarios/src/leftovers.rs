@@ -66,7 +66,7 @@ mod tests {
         let _ = fs::remove_dir_all(&runs);
         let run = |name: &str| {
             let run = runs.join(name);
-            fs::create_dir_all(run.join(KEYS).join("parties")).expect("a folder");
+            fs::create_dir_all(run.join(KEYS).join("members")).expect("a folder");
             for file in [SOCKET, "journal.jsonl"] {
                 fs::write(run.join(file), "").expect("a file");
             }

@@ -9,11 +9,11 @@ mod journal;
 mod kept;
 mod laboratory;
 mod leftovers;
+mod members;
 mod named_files;
 mod observed;
 mod operator;
 mod outlook;
-mod parties;
 mod read;
 mod record;
 mod report;
@@ -49,6 +49,7 @@ pub use laboratory::{
     Afterwards, Deaths, HostKind, LaboratoryError, LaboratoryRun, LaboratorySettings,
     NetworkSettings, Progress, monotonic_ns, run_commanded, run_laboratory,
 };
+pub use members::Members;
 pub use named_files::{ALLOWED_FOLDERS, named_file};
 pub use observed::{JournalView, ObservationError, observe_journal};
 pub use operator::{
@@ -56,7 +57,6 @@ pub use operator::{
     commands,
 };
 pub use outlook::{JournalOutlook, look_ahead};
-pub use parties::Parties;
 pub use read::{MAXIMUM_CYCLES, MAXIMUM_STEPS, ReadScenario, looks_like_a_scenario, read};
 pub use record::{Happening, LABORATORY, Record, RunEvent, moment};
 pub use report::{ReportError, report};

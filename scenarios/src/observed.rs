@@ -1,14 +1,14 @@
 //! What the journal of a run, or of a cluster that still runs, shows of failures, repairs and masking.
 //!
-//! A station has failed where a party flags it (θ = 1). It failed at the step of the scenario that killed or stopped it, where the
-//! journal has one, and otherwise when it last spoke; it is repaired when it speaks again. A flag beside a stall of the host is none.
-//! The journal itself says who the parties are; the observation begins when each station has spoken.
+//! A station has failed where a member flags it (θ = 1). It failed at the step of the scenario that killed or stopped it, where the
+//! journal has one, and otherwise when it last published; it is repaired when it speaks again. A flag beside a stall of the host is none.
+//! The journal itself says who the members are; the observation begins when each station has published.
 
 use std::collections::BTreeMap;
 
 use understudy_reliability::Observed;
 use understudy_simulator::Action;
-use understudy_wire::{Party, ProgramId, Source, StationId};
+use understudy_wire::{Member, ProgramId, Source, StationId};
 
 use crate::journal::JournalError;
 use crate::record::{Happening, Record, RunEvent};
@@ -47,7 +47,7 @@ pub enum ObservationError {
     Journal(#[from] JournalError),
     /// There is no time to observe.
     #[error(
-        "U0533: the journal has no time in which every station had spoken; silent until its end: {silent}"
+        "U0533: the journal has no time in which every station had published; silent until its end: {silent}"
     )]
     NeverWhole {
         /// Ranks of stations, or `all`.
@@ -68,7 +68,7 @@ impl ObservationError {
 /// What is kept of a record.
 #[derive(Debug, Clone, Copy)]
 enum Sign {
-    Spoke(StationId),
+    Published(StationId),
     Flagged(StationId),
     /// A step of the scenario took it away, or its process ended unexpectedly.
     Taken(StationId),
@@ -97,7 +97,7 @@ pub fn observe_journal(
             Err(error) => return Err(error.into()),
         }
     }
-    // Lines of different parties may be some cycles apart.
+    // Lines of different members may be some cycles apart.
     signs.sort_by_key(|(at, _)| *at);
     let frame = frame(&signs)?;
     let mut watch = Watch::new(&frame, &signs);
@@ -150,9 +150,9 @@ fn view(mut watch: Watch, frame: &Frame, cut: bool) -> JournalView {
 fn sign(record: &Record) -> Option<Sign> {
     use understudy_node::Event as Station;
     use understudy_remote_io::Event as RemoteIo;
-    match (&record.event, record.party) {
-        (Happening::Station(Station::Spoke { .. }), Some(Party::Station(rank))) => {
-            Some(Sign::Spoke(rank))
+    match (&record.event, record.member) {
+        (Happening::Station(Station::Published { .. }), Some(Member::Station(rank))) => {
+            Some(Sign::Published(rank))
         }
         (Happening::Station(Station::Flagged { station, .. }), _)
         | (Happening::RemoteIo(RemoteIo::Flagged { station, .. }), _) => {
@@ -160,20 +160,21 @@ fn sign(record: &Record) -> Option<Sign> {
         }
         (Happening::Station(Station::Stalled { .. }), _)
         | (Happening::RemoteIo(RemoteIo::Stalled { .. }), _) => Some(Sign::Stalled),
-        (Happening::RemoteIo(RemoteIo::Applied { source, .. }), Some(Party::RemoteIo(program))) => {
-            Some(Sign::Applied(program, *source))
-        }
+        (
+            Happening::RemoteIo(RemoteIo::Applied { source, .. }),
+            Some(Member::RemoteIo(program)),
+        ) => Some(Sign::Applied(program, *source)),
         (
             Happening::Run(RunEvent::Fault {
                 action: Action::Crash | Action::Stop,
-                party: Party::Station(rank),
+                member: Member::Station(rank),
                 ..
             }),
             _,
         )
         | (
             Happening::Run(RunEvent::Ended {
-                party: Party::Station(rank),
+                member: Member::Station(rank),
                 ..
             }),
             _,
@@ -184,8 +185,8 @@ fn sign(record: &Record) -> Option<Sign> {
 
 #[derive(Debug, Clone, Copy)]
 enum Life {
-    /// It last spoke then; a step of the scenario may have taken it away since.
-    Up { spoke: u64, taken: Option<u64> },
+    /// It last published then; a step of the scenario may have taken it away since.
+    Up { published: u64, taken: Option<u64> },
     /// θ = 1.
     Repaired { since: u64 },
 }
@@ -215,7 +216,7 @@ struct Watch {
     fail_safe: u64,
 }
 
-/// From when to when there is something to observe, and of how many parties.
+/// From when to when there is something to observe, and of how many members.
 struct Frame {
     stations: usize,
     programs: usize,
@@ -229,7 +230,7 @@ fn frame(signs: &[(u64, Sign)]) -> Result<Frame, ObservationError> {
     for &(at, sign) in signs {
         to = to.max(at);
         match sign {
-            Sign::Spoke(rank) => {
+            Sign::Published(rank) => {
                 stations = stations.max(rank.index() + 1);
                 first.entry(rank).or_insert(at);
             }
@@ -262,7 +263,7 @@ fn frame(signs: &[(u64, Sign)]) -> Result<Frame, ObservationError> {
 impl Watch {
     fn new(frame: &Frame, signs: &[(u64, Sign)]) -> Self {
         let up = Life::Up {
-            spoke: frame.from,
+            published: frame.from,
             taken: None,
         };
         let stalls = signs
@@ -287,7 +288,7 @@ impl Watch {
 
     fn see(&mut self, at: u64, sign: Sign) {
         match sign {
-            Sign::Spoke(rank) => self.spoke(at, rank),
+            Sign::Published(rank) => self.published(at, rank),
             Sign::Taken(rank) => {
                 if let Life::Up { taken, .. } = &mut self.lives[rank.index()] {
                     *taken = Some(at);
@@ -307,7 +308,7 @@ impl Watch {
         }
     }
 
-    fn spoke(&mut self, at: u64, rank: StationId) {
+    fn published(&mut self, at: u64, rank: StationId) {
         if let Life::Repaired { since } = self.lives[rank.index()] {
             self.repairs += 1;
             self.repairing += at - since;
@@ -317,18 +318,21 @@ impl Watch {
             Life::Up { taken, .. } => taken.filter(|taken| at < *taken),
             Life::Repaired { .. } => None,
         };
-        self.lives[rank.index()] = Life::Up { spoke: at, taken };
+        self.lives[rank.index()] = Life::Up {
+            published: at,
+            taken,
+        };
     }
 
     fn flagged(&mut self, at: u64, rank: StationId) {
-        let Life::Up { spoke, taken } = self.lives[rank.index()] else {
+        let Life::Up { published, taken } = self.lives[rank.index()] else {
             return;
         };
         if taken.is_none() && self.stands_still(at) {
             self.excused += 1;
             return;
         }
-        let failed = taken.unwrap_or(spoke).min(at);
+        let failed = taken.unwrap_or(published).min(at);
         let should_be_masked = !self.has_failed_with(rank);
         self.close_newest(failed);
         self.lives[rank.index()] = Life::Repaired { since: at };

@@ -1,4 +1,4 @@
-//! What a person does while a run is written: commands to its parties, and alarms that he has seen.
+//! What a person does while a run is written: commands to its members, and alarms that he has seen.
 //!
 //! ```text
 //!   page, terminal ──► Commander ──┬─ a queue in this process ──┬─► Commands ──► whoever writes the run: does it, and notes it
@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use tokio::sync::{mpsc, oneshot};
-use understudy_wire::{Force, Party, SignalPlace, StateChoice};
+use understudy_wire::{Force, Member, SignalPlace, StateChoice};
 
 pub use acknowledgement::Acknowledgement;
 pub use socket::RunSocket;
@@ -25,7 +25,7 @@ pub(crate) use socket::SOCKET;
 /// Commands that wait, at most; whoever gives another is told so.
 const WAITING: usize = 16;
 
-/// What is to be done to a party.
+/// What is to be done to a member.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "command", rename_all = "kebab-case")]
 pub enum Command {
@@ -69,15 +69,15 @@ pub enum Refusal {
     /// It stands still, or does not, already.
     #[error("U0553: {name} {is} already")]
     Already {
-        /// Which party.
+        /// Which member.
         name: String,
         /// How it is.
         is: &'static str,
     },
-    /// Only a remote I/O, or a party of another kind, can do that.
+    /// Only a remote I/O, or a member of another kind, can do that.
     #[error("U0554: {name} cannot do that: {needs}")]
-    WrongParty {
-        /// Which party.
+    WrongMember {
+        /// Which member.
         name: String,
         /// What is needed.
         needs: &'static str,
@@ -94,7 +94,7 @@ pub enum Refusal {
     /// The system refused it.
     #[error("U0558: {name}: {reason}")]
     System {
-        /// Which party.
+        /// Which member.
         name: String,
         /// What the system said.
         reason: String,
@@ -102,7 +102,7 @@ pub enum Refusal {
     /// Its process is not one of this laboratory.
     #[error("U0559: {name}: {reason}")]
     Elsewhere {
-        /// Which party.
+        /// Which member.
         name: String,
         /// What can be done there in its place.
         reason: String,
@@ -131,10 +131,10 @@ impl Refusal {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "action", rename_all = "kebab-case")]
 pub enum OperatorAction {
-    /// A command to a party.
+    /// A command to a member.
     Command {
         /// To whom.
-        party: Party,
+        member: Member,
         /// What.
         command: Command,
         /// Who gives it.
@@ -203,13 +203,13 @@ impl Commander {
     /// [`Refusal`].
     pub async fn give(
         &self,
-        party: Party,
+        member: Member,
         command: Command,
         owner: String,
         reason: String,
     ) -> Result<(), Refusal> {
         self.act(OperatorAction::Command {
-            party,
+            member,
             command,
             owner,
             reason,

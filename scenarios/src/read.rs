@@ -9,8 +9,8 @@
 //! | U0305 | a number out of its bounds |
 //! | U0306 | an action or a source that does not exist |
 //! | U0307 | a name that the cluster does not have |
-//! | U0308 | a step that cannot be done in the state in which the party is then |
-//! | U0309 | an action that does not fit its party |
+//! | U0308 | a step that cannot be done in the state in which the member is then |
+//! | U0309 | an action that does not fit its member |
 //! | U0310 | a range of cycles that is empty or past the end |
 
 mod steps;
@@ -23,9 +23,9 @@ use understudy_diagnostic::spelling::suggestion;
 use understudy_diagnostic::{Diagnostic, Report, has_errors};
 use understudy_form::{Codes, Fields, Placed, parse};
 use understudy_simulator::{Disturbance, Network};
-use understudy_wire::{Party, ProgramId, Source};
+use understudy_wire::{Member, ProgramId, Source};
 
-use crate::parties::Parties;
+use crate::members::Members;
 use crate::scenario::{During, Expectation, SOURCES, Scenario, source_word};
 
 /// Cycles of one scenario, at most.
@@ -60,12 +60,12 @@ pub struct ReadScenario {
     pub report: Report,
 }
 
-/// Reads the text of a scenario file; `parties` are those of the cluster that it is for.
+/// Reads the text of a scenario file; `members` are those of the cluster that it is for.
 ///
 /// Without a cluster, names are not known: then names are taken as they come and the scenario is only checked, not answered.
-pub fn read(name: &str, text: &str, parties: Option<&Parties>) -> ReadScenario {
+pub fn read(name: &str, text: &str, members: Option<&Members>) -> ReadScenario {
     let mut reader = Reader {
-        parties,
+        members,
         diagnostics: Vec::new(),
     };
     let root = parse(text, &CODES, &mut reader.diagnostics);
@@ -79,7 +79,7 @@ pub fn read(name: &str, text: &str, parties: Option<&Parties>) -> ReadScenario {
     let mut diagnostics = reader.diagnostics;
     diagnostics.sort_by_key(|diagnostic| (diagnostic.span.start, diagnostic.span.end));
     ReadScenario {
-        scenario: scenario.filter(|_| parties.is_some() && !has_errors(&diagnostics)),
+        scenario: scenario.filter(|_| members.is_some() && !has_errors(&diagnostics)),
         report: Report {
             name: name.to_owned(),
             text: text.to_owned(),
@@ -100,7 +100,7 @@ pub fn looks_like_a_scenario(text: &str) -> bool {
 pub(crate) const MAXIMUM_NUMBER: u16 = 1000;
 
 struct Reader<'p> {
-    parties: Option<&'p Parties>,
+    members: Option<&'p Members>,
     diagnostics: Vec<Diagnostic>,
 }
 
@@ -187,7 +187,7 @@ impl Reader<'_> {
         let wrong = count("wrong").unwrap_or(0);
         let held = count("held");
         let fail_safe = count("fail_safe");
-        let mishaps = count("mishaps");
+        let plant_faults = count("plant_faults");
         let protected = fields.flag("protected", found);
         let functional = fields.texts("functional", found);
         let finished = fields.get("finished").map_or_else(Vec::new, |finished| {
@@ -204,7 +204,7 @@ impl Reader<'_> {
             wrong,
             held,
             fail_safe,
-            mishaps,
+            plant_faults,
             protected: protected.unwrap_or(false),
             functional: functional
                 .iter()
@@ -246,11 +246,11 @@ impl Reader<'_> {
         let (from, to) = (from?.value, to?);
         self.range(from, to.value, end, to.span);
         let name = remote_io?;
-        let remote_io = match self.party(&name)? {
-            Party::RemoteIo(program) => program,
+        let remote_io = match self.member(&name)? {
+            Member::RemoteIo(program) => program,
             _ => {
-                let known = self.parties.map(|parties| {
-                    let names = parties.remote_ios().map(|(_, name)| name);
+                let known = self.members.map(|members| {
+                    let names = members.remote_ios().map(|(_, name)| name);
                     suggestion(name.value, names)
                 });
                 self.unfit(&name, "a remote I/O", known);
@@ -266,11 +266,11 @@ impl Reader<'_> {
     }
 
     fn plant(&mut self, name: &Placed<&str>) -> Option<ProgramId> {
-        match self.party(name)? {
-            Party::Plant(program) => Some(program),
+        match self.member(name)? {
+            Member::Plant(program) => Some(program),
             _ => {
-                let known = self.parties.map(|parties| {
-                    let names = parties.plants().map(|(_, name)| name);
+                let known = self.members.map(|members| {
+                    let names = members.plants().map(|(_, name)| name);
                     suggestion(name.value, names)
                 });
                 self.unfit(name, "a plant", known);
@@ -287,17 +287,17 @@ impl Reader<'_> {
     }
 
     /// Nothing without a cluster, too, where no name can be wrong.
-    fn party(&mut self, name: &Placed<&str>) -> Option<Party> {
-        let parties = self.parties?;
+    fn member(&mut self, name: &Placed<&str>) -> Option<Member> {
+        let members = self.members?;
         let Placed { value: name, span } = name;
-        let party = parties.find(name);
-        if party.is_none() {
+        let member = members.find(name);
+        if member.is_none() {
             let message = format!("the cluster has no station, remote I/O or plant `{name}`");
-            let help = suggestion(name, parties.iter().map(|(_, name)| name));
+            let help = suggestion(name, members.iter().map(|(_, name)| name));
             self.diagnostics
                 .push(Diagnostic::error("U0307", message, span.clone()).with_help(help));
         }
-        party
+        member
     }
 }
 

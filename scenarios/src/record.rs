@@ -1,4 +1,4 @@
-//! What the journal holds: one record a line, of every party and of whoever runs the scenario.
+//! What the journal holds: one record a line, of every member and of whoever runs the scenario.
 //!
 //! The same records come from the laboratory's processes and from the simulator, so that one account judges both.
 
@@ -6,25 +6,25 @@ use serde::de::{self, DeserializeOwned};
 use serde::{Deserialize, Deserializer, Serialize};
 use understudy_bus::{HostEvent, Noted};
 use understudy_simulator::Action;
-use understudy_wire::{Moment, Party};
+use understudy_wire::{Member, Moment};
 
+use crate::members::Members;
 use crate::operator::{Acknowledgement, Command};
-use crate::parties::Parties;
 
 /// One line of `journal.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Record {
-    /// Nanoseconds, on the clock of the host that the party runs on (CLOCK_MONOTONIC); virtual in the simulator.
+    /// Nanoseconds, on the clock of the host that the member runs on (CLOCK_MONOTONIC); virtual in the simulator.
     pub at_ns: u64,
-    /// The party's name; `laboratory` for whoever runs the scenario.
+    /// The member's name; `laboratory` for whoever runs the scenario.
     pub name: String,
     /// Nothing for whoever runs the scenario.
-    pub party: Option<Party>,
+    pub member: Option<Member>,
     /// What happened.
     pub event: Happening,
 }
 
-/// What happened, in the words of the party that says it.
+/// What happened, in the words of the member that says it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Happening {
@@ -34,7 +34,7 @@ pub enum Happening {
     RemoteIo(understudy_remote_io::Event),
     /// To a plant.
     Plant(understudy_plant::Event),
-    /// To the process that carries a party; never to a simulated one.
+    /// To the process that carries a member; never to a simulated one.
     Host(HostEvent),
     /// To the run as a whole.
     Run(RunEvent),
@@ -44,24 +44,24 @@ pub enum Happening {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "kebab-case")]
 pub enum RunEvent {
-    /// A party was started, for the first time or again.
+    /// A member was started, for the first time or again.
     Started {
         /// Who.
-        party: Party,
+        member: Member,
     },
     /// A step of the scenario was done.
     Fault {
         /// What.
         action: Action,
         /// To whom.
-        party: Party,
+        member: Member,
         /// The first cycle that was to feel it, counted from the origin.
         asked: u64,
     },
     /// Somebody gave a command; what it did stands before it.
     Commanded {
         /// To whom.
-        party: Party,
+        member: Member,
         /// What.
         command: Command,
         /// Who.
@@ -73,29 +73,29 @@ pub enum RunEvent {
     },
     /// Somebody has seen an alarm.
     Acknowledged(Acknowledgement),
-    /// What a party of a cluster elsewhere says is heard from now on.
+    /// What a member of a cluster elsewhere says is heard from now on.
     Attached {
         /// Who.
-        party: Party,
+        member: Member,
     },
-    /// What a party of a cluster elsewhere says is not heard; what it does is another matter.
+    /// What a member of a cluster elsewhere says is not heard; what it does is another matter.
     Detached {
         /// Who.
-        party: Party,
+        member: Member,
         /// Why, in words.
         reason: String,
     },
     /// The process of a member ended unexpectedly.
     Ended {
         /// Which member.
-        party: Party,
+        member: Member,
         /// By which signal or exit status, such as `signal: 9 (SIGKILL)`.
         how: String,
         /// Its last lines on standard error.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         said: Vec<String>,
     },
-    /// Everybody is in step: from here on cycles are counted.
+    /// Everybody is synchronised: from here on cycles are counted.
     Origin {
         /// A moment of the cluster.
         moment: Moment,
@@ -122,17 +122,17 @@ impl Record {
         Self {
             at_ns,
             name: LABORATORY.to_owned(),
-            party: None,
+            member: None,
             event: Happening::Run(event),
         }
     }
 
-    /// Of a party.
-    pub fn of_party(at_ns: u64, party: Party, parties: &Parties, event: Happening) -> Self {
+    /// Of a member.
+    pub fn of_member(at_ns: u64, member: Member, members: &Members, event: Happening) -> Self {
         Self {
             at_ns,
-            name: parties.name(party).to_owned(),
-            party: Some(party),
+            name: members.name(member).to_owned(),
+            member: Some(member),
             event,
         }
     }
@@ -144,14 +144,14 @@ pub fn moment(event: &Happening) -> Option<Moment> {
     use understudy_remote_io::Event as RemoteIo;
     match event {
         Happening::Station(event) => match event {
-            Station::Spoke { moment, .. }
+            Station::Published { moment, .. }
             | Station::Holds { moment, .. }
-            | Station::Paces { moment }
+            | Station::BecameCycleMaster { moment }
             | Station::Flagged { moment, .. }
             | Station::Cleared { moment, .. }
             | Station::Joins { moment, .. }
             | Station::Adopted { moment, .. }
-            | Station::InStep { moment, .. }
+            | Station::Synchronised { moment, .. }
             | Station::DigestDiffers { moment, .. }
             | Station::Excluded { moment, .. }
             | Station::Readmitted { moment, .. }
@@ -188,46 +188,46 @@ pub fn moment(event: &Happening) -> Option<Moment> {
     }
 }
 
-/// As it stands in a line, before the party has decided of which kind the event is.
+/// As it stands in a line, before the member has decided of which kind the event is.
 #[derive(Deserialize)]
 struct Line {
     at_ns: u64,
     name: String,
-    party: Option<Party>,
+    member: Option<Member>,
     event: serde_json::Value,
 }
 
 impl<'de> Deserialize<'de> for Record {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let line = Line::deserialize(deserializer)?;
-        let event = happening(line.party, line.event).map_err(de::Error::custom)?;
+        let event = happening(line.member, line.event).map_err(de::Error::custom)?;
         Ok(Self {
             at_ns: line.at_ns,
             name: line.name,
-            party: line.party,
+            member: line.member,
             event,
         })
     }
 }
 
 fn happening(
-    party: Option<Party>,
+    member: Option<Member>,
     event: serde_json::Value,
 ) -> Result<Happening, serde_json::Error> {
-    match party {
+    match member {
         None => serde_json::from_value(event).map(Happening::Run),
-        Some(Party::Station(_)) => noted(event, Happening::Station),
-        Some(Party::RemoteIo(_)) => noted(event, Happening::RemoteIo),
-        Some(Party::Plant(_)) => noted(event, Happening::Plant),
+        Some(Member::Station(_)) => noted(event, Happening::Station),
+        Some(Member::RemoteIo(_)) => noted(event, Happening::RemoteIo),
+        Some(Member::Plant(_)) => noted(event, Happening::Plant),
     }
 }
 
 fn noted<E: DeserializeOwned>(
     event: serde_json::Value,
-    of_party: fn(E) -> Happening,
+    of_member: fn(E) -> Happening,
 ) -> Result<Happening, serde_json::Error> {
     serde_json::from_value(event).map(|noted| match noted {
         Noted::Host(event) => Happening::Host(event),
-        Noted::Party(event) => of_party(event),
+        Noted::Member(event) => of_member(event),
     })
 }

@@ -29,7 +29,7 @@ pub fn report(summary: &Summary, figure: &str) -> Result<String, ReportError> {
             counts.held,
             counts.held_by_stall,
             counts.fail_safe + counts.fail_safe_by_stall,
-            counts.unserved,
+            counts.missed,
             counts.wrong,
         ]
     };

@@ -10,7 +10,7 @@ use serde::Serialize;
 use understudy_simulator::{Action, Disturbance, Fault, Network};
 use understudy_wire::{ProgramId, Source};
 
-use crate::parties::Parties;
+use crate::members::Members;
 
 /// A scenario whose names belong to a cluster.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -98,11 +98,11 @@ pub fn action_word(action: Action) -> &'static str {
 }
 
 /// An action with its numbers and names, as tables write it.
-pub(crate) fn action_text(action: Action, parties: &Parties) -> String {
+pub(crate) fn action_text(action: Action, members: &Members) -> String {
     let word = action_word(action);
     match action {
-        Action::Cut { to } | Action::Heal { to } => format!("{word} to {}", parties.name(to)),
-        Action::Delay { to, by } => format!("{word} to {} by {by:?}", parties.name(to)),
+        Action::Cut { to } | Action::Heal { to } => format!("{word} to {}", members.name(to)),
+        Action::Delay { to, by } => format!("{word} to {} by {by:?}", members.name(to)),
         Action::RestartInEpoch { epoch } => format!("{word} {epoch}"),
         Action::Slow { by } => format!("{word} by {by:?}"),
         Action::Corrupt { frames } => format!("{word} {frames} frames"),
@@ -124,9 +124,9 @@ pub struct Expectation {
     pub held: Option<u64>,
     /// Cycles with fail-safe outputs, at most.
     pub fail_safe: Option<u64>,
-    /// Mishaps of all plants, at most.
-    pub mishaps: Option<u64>,
-    /// Whether everybody must be in step at the end: each plant driven directly, and every station heard.
+    /// plant faults of all plants, at most.
+    pub plant_faults: Option<u64>,
+    /// Whether everybody must be synchronised at the end: each plant driven directly, and every station heard.
     pub protected: bool,
     /// Plants that must stay functional throughout.
     pub functional: Vec<ProgramId>,

@@ -64,7 +64,7 @@ pub fn scenario_schema() -> Schema {
                     "wrong": count(),
                     "held": count(),
                     "fail_safe": count(),
-                    "mishaps": count(),
+                    "plant_faults": count(),
                     "protected": { "type": "boolean" },
                     "functional": { "type": "array", "items": { "type": "string" } },
                     "finished": { "type": "object", "additionalProperties": count() },

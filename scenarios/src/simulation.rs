@@ -4,7 +4,7 @@ use understudy_cluster::Cluster;
 use understudy_plant::{Event as PlantEvent, Pace};
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_simulator::{Network, NotReady, Record as Simulated, Simulation};
-use understudy_wire::{Field, Image, Moment, Party};
+use understudy_wire::{Field, Image, Member, Moment};
 
 use crate::account::{Account, OriginRule, Terms};
 use crate::record::{Happening, Record, RunEvent};
@@ -30,7 +30,7 @@ pub fn simulate(
     journal: &mut dyn FnMut(&Record),
 ) -> Result<Account, NotInStep> {
     let terms = Terms::of(cluster);
-    let parties = terms.parties.clone();
+    let members = terms.members.clone();
     let mut account = Account::new(terms, scenario, OriginRule::Told);
     let mut simulation = Simulation::new(parts(cluster), Network::default(), seed);
     if let Some(disturbance) = scenario.disturbance() {
@@ -56,17 +56,17 @@ pub fn simulate(
     let ran = simulation.run(
         scenario.cycles,
         PATIENCE_CYCLES,
-        &mut |now, cycle, party, record| {
+        &mut |now, cycle, member, record| {
             let happening = match record {
                 Simulated::Station(event) => Happening::Station(event.clone()),
                 Simulated::RemoteIo(event) => Happening::RemoteIo(event.clone()),
                 Simulated::Fault(fault) => Happening::Run(RunEvent::Fault {
                     action: fault.action,
-                    party,
+                    member,
                     asked: fault.at_cycle,
                 }),
                 Simulated::Plant(field) => {
-                    if let Party::Plant(program) = party {
+                    if let Member::Plant(program) = member {
                         fields[program.index()] = Some(field.clone());
                     }
                     return;
@@ -77,11 +77,11 @@ pub fn simulate(
             let applied = applied(&happening);
             let record = match happening {
                 Happening::Run(event) => Record::of_run(now.0, event),
-                happening => Record::of_party(now.0, party, &parties, happening),
+                happening => Record::of_member(now.0, member, &members, happening),
             };
             let moment = applied.as_ref().map(|(moment, _)| *moment);
             take(&record, moment.zip(cycle));
-            let (Some((moment, outputs)), Party::RemoteIo(program)) = (applied, party) else {
+            let (Some((moment, outputs)), Member::RemoteIo(program)) = (applied, member) else {
                 return;
             };
             if let Some(field) = fields[program.index()].take() {
@@ -91,8 +91,8 @@ pub fn simulate(
                     outputs,
                     field,
                 });
-                let plant = Party::Plant(program);
-                take(&Record::of_party(now.0, plant, &parties, event), None);
+                let plant = Member::Plant(program);
+                take(&Record::of_member(now.0, plant, &members, event), None);
             }
         },
     );

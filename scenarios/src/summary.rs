@@ -4,7 +4,7 @@ use std::fmt;
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use understudy_wire::{Party, ProgramId, Source};
+use understudy_wire::{Member, ProgramId, Source};
 
 use crate::account::{Account, Counts, Interval, Presence, RangeFinding, Service, Stall};
 use crate::journal::JournalState;
@@ -27,7 +27,7 @@ pub struct Summary {
     pub cycles_asked: u64,
     /// Cycles that were run.
     pub cycles_run: u64,
-    /// The cluster's own epoch and cycle of cycle 0, as `epoch:cycle`; nothing where the cluster never was in step.
+    /// The cluster's own epoch and cycle of cycle 0, as `epoch:cycle`; nothing where the cluster never was synchronised.
     pub origin: Option<String>,
     /// Whether it was asked to end early.
     pub interrupted: bool,
@@ -47,7 +47,7 @@ pub struct Summary {
     pub violations: Vec<ViolationSummary>,
     /// How many there were.
     pub violation_count: u64,
-    /// Parties that run another configuration.
+    /// Members that run another configuration.
     pub refused: Vec<RefusedSummary>,
     /// Wake-ups of the host that came too late, at most 200 of them.
     pub stalls: Vec<Stall>,
@@ -122,7 +122,7 @@ pub struct PlantSummary {
     /// Parts that it finished.
     pub finished: u64,
     /// Things that must not happen to it and did.
-    pub mishaps: u64,
+    pub plant_faults: u64,
     /// How it was served when.
     pub intervals: Vec<Interval<Service>>,
 }
@@ -174,7 +174,7 @@ pub struct ViolationSummary {
     pub what: String,
 }
 
-/// A party with another configuration.
+/// A member with another configuration.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct RefusedSummary {
     /// Who.
@@ -206,9 +206,9 @@ impl Summary {
         journal: JournalState,
     ) -> (Self, Account) {
         let finished = account.finish();
-        let parties = &account.terms.parties;
-        let name = |party| parties.name(party).to_owned();
-        let stations = parties.stations().zip(finished.presences).map(
+        let members = &account.terms.members;
+        let name = |member| members.name(member).to_owned();
+        let stations = members.stations().zip(finished.presences).map(
             |((_, name), (intervals, silent_cycles))| StationSummary {
                 name: name.to_owned(),
                 intervals,
@@ -217,23 +217,23 @@ impl Summary {
         );
         let services = account.services.iter().enumerate();
         let remote_ios = services.clone().map(|(program, service)| RemoteIoSummary {
-            name: name(Party::RemoteIo(ProgramId(program as u8))),
+            name: name(Member::RemoteIo(ProgramId(program as u8))),
             counts: service.counts,
         });
         let plants = services.filter_map(|(program, service)| {
-            let plant = Party::Plant(ProgramId(program as u8));
-            let (_, name) = parties.iter().find(|(party, _)| *party == plant)?;
+            let plant = Member::Plant(ProgramId(program as u8));
+            let (_, name) = members.iter().find(|(member, _)| *member == plant)?;
             Some(PlantSummary {
                 name: name.to_owned(),
                 functional: service.functional(),
                 finished: service.finished(),
-                mishaps: service.mishaps(),
+                plant_faults: service.plant_faults(),
                 intervals: service.intervals.clone(),
             })
         });
         let steps = account.steps.iter().map(|step| StepSummary {
-            action: action_text(step.action, parties),
-            name: name(step.party),
+            action: action_text(step.action, members),
+            name: name(step.member),
             asked: step.asked,
             measured: step.measured,
         });
@@ -256,7 +256,7 @@ impl Summary {
                 .deaths
                 .iter()
                 .map(|death| DeathSummary {
-                    name: name(death.party),
+                    name: name(death.member),
                     cycle: death.cycle,
                     how: death.how.clone(),
                     said: death.said.clone(),
@@ -266,7 +266,7 @@ impl Summary {
             violations: violations
                 .map(|(cycle, program, violation)| ViolationSummary {
                     cycle: *cycle,
-                    name: name(Party::RemoteIo(*program)),
+                    name: name(Member::RemoteIo(*program)),
                     what: violation.to_string(),
                 })
                 .collect(),
@@ -322,7 +322,7 @@ impl Summary {
             total.held_by_stall += counts.held_by_stall;
             total.fail_safe += counts.fail_safe;
             total.fail_safe_by_stall += counts.fail_safe_by_stall;
-            total.unserved += counts.unserved;
+            total.missed += counts.missed;
             total.wrong += counts.wrong;
         }
         total
@@ -336,16 +336,16 @@ fn expectations(
 ) -> Vec<ExpectationSummary> {
     let expect = &scenario.expect;
     let total = summary.total();
-    let mishaps = summary.plants.iter().map(|plant| plant.mishaps).sum();
+    let plant_faults = summary.plants.iter().map(|plant| plant.plant_faults).sum();
     let wrong = at_most("wrong outputs", expect.wrong, summary.violation_count, 0);
     let mut list = vec![ExpectationSummary {
         needs_time: false,
         ..wrong
     }];
-    for (party, records) in &account.unwritten {
-        if matches!(party, Party::RemoteIo(_)) {
+    for (member, records) in &account.unwritten {
+        if matches!(member, Member::RemoteIo(_)) {
             list.push(ExpectationSummary {
-                expected: format!("all that {} drove is judged", account.terms.parties.name(*party)),
+                expected: format!("all that {} drove is judged", account.terms.members.name(*member)),
                 found: format!(
                     "its journal lost {records} records on a host that was too slow to write them; what came after was not judged"
                 ),
@@ -380,19 +380,24 @@ fn expectations(
             by_stall,
         ));
     }
-    if let Some(allowed) = expect.mishaps {
-        list.push(at_most("mishaps", allowed, mishaps, 0));
+    if let Some(allowed) = expect.plant_faults {
+        list.push(at_most("plant_faults", allowed, plant_faults, 0));
     }
     if expect.protected {
         let found = account.protected;
         list.push(ExpectationSummary {
-            expected: "everybody in step at the end".to_owned(),
-            found: if found { "in step" } else { "not in step" }.to_owned(),
+            expected: "everybody synchronised at the end".to_owned(),
+            found: if found {
+                "synchronised"
+            } else {
+                "not synchronised"
+            }
+            .to_owned(),
             met: found,
             needs_time: true,
         });
     }
-    let plant_name = |program| account.terms.parties.name(Party::Plant(program));
+    let plant_name = |program| account.terms.members.name(Member::Plant(program));
     let plant = |program| {
         let name = plant_name(program);
         summary.plants.iter().find(|plant| plant.name == name)
@@ -419,8 +424,8 @@ fn expectations(
     list.extend(ranges.map(|(during, finding)| {
         let remote_io = account
             .terms
-            .parties
-            .name(Party::RemoteIo(during.remote_io));
+            .members
+            .name(Member::RemoteIo(during.remote_io));
         range(remote_io, during, *finding)
     }));
     list

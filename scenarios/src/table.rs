@@ -120,7 +120,7 @@ fn service_word(service: Service) -> &'static str {
         Service::Held => "held",
         Service::FailSafe => "FAIL-SAFE",
         Service::Wrong => "WRONG",
-        Service::Unserved => "UNSERVED",
+        Service::Missed => "MISSED",
     }
 }
 

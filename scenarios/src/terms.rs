@@ -7,13 +7,13 @@ use understudy_wire::{ProgramId, ProgramSet};
 
 use crate::account::Terms;
 use crate::figure::Signals;
-use crate::parties::Parties;
+use crate::members::Members;
 
-impl Parties {
-    /// All parties of a cluster.
+impl Members {
+    /// All members of a cluster.
     pub fn of(cluster: &Cluster) -> Self {
-        let name = |party| cluster.party_name(party).unwrap_or_default().to_owned();
-        Self::new(cluster.parties().map(|party| (party, name(party))))
+        let name = |member| cluster.member_name(member).unwrap_or_default().to_owned();
+        Self::new(cluster.members().map(|member| (member, name(member))))
     }
 }
 
@@ -47,7 +47,7 @@ impl Terms {
             }
         }
         Self {
-            parties: Parties::of(cluster),
+            members: Members::of(cluster),
             agreement: cluster.agreement().clone(),
             referees: referees.collect(),
             signals: signals.collect(),

@@ -5,7 +5,7 @@ use rand_pcg::Pcg64Mcg;
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_simulator::{Action, Fault};
-use understudy_wire::{Party, ProgramId, Schedule, StationId};
+use understudy_wire::{Member, ProgramId, Schedule, StationId};
 
 use crate::scenario::{Expectation, Scenario};
 use crate::summary::Summary;
@@ -15,7 +15,7 @@ const RECOVERY_CYCLES: f64 = 40.0;
 /// Cycles from a kill to the restart.
 const DOWN_CYCLES: f64 = 20.0;
 
-/// What happens to a party.
+/// What happens to a member.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Trouble {
     /// It is killed, and started again 20 cycles later.
@@ -39,15 +39,15 @@ impl Target {
     /// All roles.
     pub const ALL: [Self; 3] = [Self::Controllers, Self::Understudies, Self::RemoteIos];
 
-    fn parties(self, schedule: &Schedule) -> Vec<Party> {
+    fn members(self, schedule: &Schedule) -> Vec<Member> {
         let controllers = schedule.controllers() as u8;
         let stations =
-            |ranks: std::ops::Range<u8>| ranks.map(|rank| Party::Station(StationId(rank)));
+            |ranks: std::ops::Range<u8>| ranks.map(|rank| Member::Station(StationId(rank)));
         match self {
             Self::Controllers => stations(0..controllers).collect(),
             Self::Understudies => stations(controllers..schedule.stations() as u8).collect(),
             Self::RemoteIos => (0..controllers)
-                .map(|program| Party::RemoteIo(ProgramId(program)))
+                .map(|program| Member::RemoteIo(ProgramId(program)))
                 .collect(),
         }
     }
@@ -73,7 +73,7 @@ impl Trouble {
     ///
     /// While a remote I/O is gone nobody drives its plant, so only for stations is it expected that nothing is held.
     pub fn scenario(self, target: Target, schedule: &Schedule, count: u64, seed: u64) -> Scenario {
-        let parties = target.parties(schedule);
+        let members = target.members(schedule);
         let mut random = Pcg64Mcg::seed_from_u64(seed);
         let (lasts, begins, ends) = match self {
             Self::Kill => (DOWN_CYCLES, Action::Crash, Action::Restart),
@@ -82,7 +82,7 @@ impl Trouble {
         let every = (lasts + RECOVERY_CYCLES).ceil();
         let mut steps = Vec::new();
         for number in 0..count {
-            let Some(&party) = parties.get(number as usize % parties.len().max(1)) else {
+            let Some(&member) = members.get(number as usize % members.len().max(1)) else {
                 break;
             };
             let begin = every * number as f64 + RECOVERY_CYCLES / 2.0 + random.random::<f64>();
@@ -90,7 +90,7 @@ impl Trouble {
                 steps.push(Fault {
                     at_cycle: at as u64,
                     phase: at.fract(),
-                    party,
+                    member,
                     action,
                 });
             }
@@ -130,7 +130,7 @@ pub struct TroubleRow {
     /// Cycles with the fail-safe output.
     pub fail_safe: u64,
     /// Cycles in which the remote I/O was not there.
-    pub unserved: u64,
+    pub missed: u64,
     /// Held and fail-safe cycles while the host itself stood still.
     pub by_stall: u64,
     /// Whether the run was whole and met what was expected.
@@ -148,7 +148,7 @@ impl TroubleRow {
             wrong: summary.violation_count,
             held: total.held,
             fail_safe: total.fail_safe,
-            unserved: total.unserved,
+            missed: total.missed,
             by_stall: total.held_by_stall + total.fail_safe_by_stall,
             passed: summary.passed,
         }
@@ -173,13 +173,13 @@ mod tests {
                     assert!(time(&two[0]) < time(&two[1]), "{two:?}");
                 }
                 for pair in scenario.steps.chunks(2) {
-                    assert_eq!(pair[0].party, pair[1].party);
+                    assert_eq!(pair[0].member, pair[1].member);
                 }
                 let last = scenario.steps.last().expect("there are some");
                 assert!(time(last) + RECOVERY_CYCLES / 2.0 < scenario.cycles as f64);
-                let parties: std::collections::BTreeSet<Party> =
-                    scenario.steps.iter().map(|step| step.party).collect();
-                assert_eq!(parties.len(), target.parties(&schedule).len());
+                let members: std::collections::BTreeSet<Member> =
+                    scenario.steps.iter().map(|step| step.member).collect();
+                assert_eq!(members.len(), target.members(&schedule).len());
             }
         }
     }

@@ -4,13 +4,13 @@ use std::fmt::Write as _;
 use std::time::Duration;
 
 use understudy_simulator::{Action, Disturbance, Fault, Network};
-use understudy_wire::{Party, StationId};
+use understudy_wire::{Member, StationId};
 
-use crate::parties::Parties;
+use crate::members::Members;
 use crate::scenario::{Expectation, Scenario, action_word, source_word};
 
-/// The text; `parties` are those of the scenario's cluster, and `remarks` stand above it for people.
-pub fn write(scenario: &Scenario, parties: &Parties, remarks: &[String]) -> String {
+/// The text; `members` are those of the scenario's cluster, and `remarks` stand above it for people.
+pub fn write(scenario: &Scenario, members: &Members, remarks: &[String]) -> String {
     let mut text = String::new();
     for line in remarks.iter().flat_map(|remark| remark.lines()) {
         let _ = writeln!(text, "# {line}");
@@ -24,9 +24,9 @@ pub fn write(scenario: &Scenario, parties: &Parties, remarks: &[String]) -> Stri
         write_network(&mut text, &disturbance);
     }
     for step in &scenario.steps {
-        write_step(&mut text, step, parties);
+        write_step(&mut text, step, members);
     }
-    write_expectation(&mut text, &scenario.expect, parties);
+    write_expectation(&mut text, &scenario.expect, members);
     text
 }
 
@@ -52,14 +52,14 @@ fn write_network(text: &mut String, disturbance: &Disturbance) {
     }
 }
 
-fn write_step(text: &mut String, step: &Fault, parties: &Parties) {
-    let name = |party| quoted(parties.name(party));
+fn write_step(text: &mut String, step: &Fault, members: &Members) {
+    let name = |member| quoted(members.name(member));
     let _ = writeln!(text, "\n[[step]]\nat = {}", step.at_cycle);
     if step.phase > 0.0 {
         let _ = writeln!(text, "phase = {:?}", step.phase);
     }
     let _ = writeln!(text, "action = {}", quoted(action_word(step.action)));
-    let _ = writeln!(text, "station = {}", name(step.party));
+    let _ = writeln!(text, "station = {}", name(step.member));
     let _ = match step.action {
         Action::Cut { to } | Action::Heal { to } => writeln!(text, "to = {}", name(to)),
         Action::Delay { to, by } => {
@@ -70,7 +70,7 @@ fn write_step(text: &mut String, step: &Fault, parties: &Parties) {
         Action::Corrupt { frames } => writeln!(text, "frames = {frames}"),
         Action::Replay { age } => writeln!(text, "age = {age}"),
         Action::FlipState { program, bit } => {
-            let controller = name(Party::Station(StationId(program.0)));
+            let controller = name(Member::Station(StationId(program.0)));
             writeln!(text, "program = {controller}\nbit = {bit}")
         }
         Action::FlipSample { bit, frames } | Action::FlipWord { bit, frames } => {
@@ -80,12 +80,12 @@ fn write_step(text: &mut String, step: &Fault, parties: &Parties) {
     };
 }
 
-fn write_expectation(text: &mut String, expect: &Expectation, parties: &Parties) {
+fn write_expectation(text: &mut String, expect: &Expectation, members: &Members) {
     let _ = writeln!(text, "\n[expect]\nwrong = {}", expect.wrong);
     let counts = [
         ("held", expect.held),
         ("fail_safe", expect.fail_safe),
-        ("mishaps", expect.mishaps),
+        ("plant_faults", expect.plant_faults),
     ];
     for (key, count) in counts {
         if let Some(count) = count {
@@ -95,7 +95,7 @@ fn write_expectation(text: &mut String, expect: &Expectation, parties: &Parties)
     if expect.protected {
         text.push_str("protected = true\n");
     }
-    let plant = |program| quoted(parties.name(Party::Plant(program)));
+    let plant = |program| quoted(members.name(Member::Plant(program)));
     if !expect.functional.is_empty() {
         let names: Vec<String> = expect.functional.iter().copied().map(plant).collect();
         let _ = writeln!(text, "functional = [{}]", names.join(", "));
@@ -118,7 +118,7 @@ fn write_expectation(text: &mut String, expect: &Expectation, parties: &Parties)
             "\n[[expect.during]]\nfrom = {}\nto = {}\nremote_io = {}\nsource = [{}]",
             during.from,
             during.to,
-            quoted(parties.name(Party::RemoteIo(during.remote_io))),
+            quoted(members.name(Member::RemoteIo(during.remote_io))),
             sources.join(", ")
         );
     }

@@ -3,24 +3,24 @@
 use std::fmt::Write as _;
 
 use insta::assert_snapshot;
-use understudy_scenarios::{Parties, looks_like_a_scenario, read};
-use understudy_wire::{Party, ProgramId, StationId};
+use understudy_scenarios::{Members, looks_like_a_scenario, read};
+use understudy_wire::{Member, ProgramId, StationId};
 
-fn parties() -> Parties {
-    Parties::new([
-        (Party::Station(StationId(0)), "robot".to_owned()),
-        (Party::Station(StationId(1)), "press".to_owned()),
-        (Party::Station(StationId(2)), "understudy".to_owned()),
-        (Party::RemoteIo(ProgramId(0)), "robot-io".to_owned()),
-        (Party::RemoteIo(ProgramId(1)), "press-io".to_owned()),
-        (Party::Plant(ProgramId(0)), "arm".to_owned()),
-        (Party::Plant(ProgramId(1)), "ram".to_owned()),
+fn members() -> Members {
+    Members::new([
+        (Member::Station(StationId(0)), "robot".to_owned()),
+        (Member::Station(StationId(1)), "press".to_owned()),
+        (Member::Station(StationId(2)), "understudy".to_owned()),
+        (Member::RemoteIo(ProgramId(0)), "robot-io".to_owned()),
+        (Member::RemoteIo(ProgramId(1)), "press-io".to_owned()),
+        (Member::Plant(ProgramId(0)), "arm".to_owned()),
+        (Member::Plant(ProgramId(1)), "ram".to_owned()),
     ])
 }
 
 /// One line for each finding.
 fn check(text: &str) -> String {
-    let found = read("scenario.toml", text, Some(&parties()));
+    let found = read("scenario.toml", text, Some(&members()));
     let mut lines = String::new();
     for diagnostic in &found.report.diagnostics {
         let place = found.report.line_and_column(diagnostic.span.start);
@@ -172,14 +172,14 @@ protected = 1
     ));
 }
 
-/// One step of a file may be many: a cut to several parties, both ways.
+/// One step of a file may be many: a cut to several members, both ways.
 #[test]
 fn a_cut_names_one_or_many_or_nobody() {
     let steps = |keys: &str| {
         let text = format!(
             "title = \"\"\ncycles = 100\n[[step]]\nat = 10\naction = \"cut\"\nstation = \"robot\"\n{keys}"
         );
-        let scenario = read("cut.toml", &text, Some(&parties())).scenario;
+        let scenario = read("cut.toml", &text, Some(&members())).scenario;
         scenario.expect("no errors").steps.len()
     };
     assert_eq!(steps("to = \"press\""), 1);
@@ -205,7 +205,7 @@ step = [
     { at = 10, phase = 0.25, action = "stop", station = "press" },
 ]
 "#;
-    let found = read("scenario.toml", text, Some(&parties()));
+    let found = read("scenario.toml", text, Some(&members()));
     let scenario = found.scenario.expect("it is right");
     let steps = scenario.steps.iter();
     let order: Vec<(u64, f64)> = steps.map(|step| (step.at_cycle, step.phase)).collect();
@@ -222,7 +222,7 @@ fn any_text_is_answered() {
     for (place, letter) in text.char_indices() {
         let without = format!("{}{}", &text[..place], &text[place + letter.len_utf8()..]);
         for text in [&text[..place], &without] {
-            let found = read("scenario.toml", text, Some(&parties()));
+            let found = read("scenario.toml", text, Some(&members()));
             found.report.diagnostics.len().hash(&mut seen);
             for diagnostic in &found.report.diagnostics {
                 assert!(diagnostic.span.end <= text.len(), "{diagnostic:?}");

@@ -2,7 +2,7 @@
 
 use understudy_cluster::{Cluster, Overrides, press_cell};
 use understudy_scenarios::{
-    Account, Circumstances, Journal, JournalState, OriginRule, Parties, Record, RunEvent, Scenario,
+    Account, Circumstances, Journal, JournalState, Members, OriginRule, Record, RunEvent, Scenario,
     Summary, Table, Terms, World, figure, read, records, report, simulate,
 };
 use understudy_wire::Mode;
@@ -23,7 +23,7 @@ fn cluster(mode: Mode) -> Cluster {
 }
 
 fn scenario(cluster: &Cluster, text: &str) -> Scenario {
-    let found = read("scenario.toml", text, Some(&Parties::of(cluster)));
+    let found = read("scenario.toml", text, Some(&Members::of(cluster)));
     assert_eq!(found.report.diagnostics, []);
     found.scenario.expect("no diagnostics")
 }
@@ -378,8 +378,8 @@ fn the_cycle_in_which_a_run_is_interrupted_is_none_of_it() {
         });
         assert!(summary.interrupted && summary.cycles_run > 100, "{teller}");
         assert!(summary.plants.iter().all(|plant| plant.functional));
-        let unserved = summary.remote_ios.iter().map(|one| one.counts.unserved);
-        assert_eq!(unserved.sum::<u64>(), 0, "{teller}");
+        let missed = summary.remote_ios.iter().map(|one| one.counts.missed);
+        assert_eq!(missed.sum::<u64>(), 0, "{teller}");
     }
 }
 

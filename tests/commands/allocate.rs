@@ -32,7 +32,7 @@ fn resources_are_counted_for_every_program_and_for_the_understudy() {
 }
 
 #[test]
-fn the_press_cell_gets_a_box_for_every_party() {
+fn the_press_cell_gets_a_box_for_every_member() {
     let answer = understudy(&["allocate", PRESS_CELL]);
     assert_snapshot!(answer.shown());
     let document = understudy(&["allocate", PRESS_CELL, "--json"]).json();

@@ -236,7 +236,7 @@ fn the_gallery_shows_what_its_commands_draw() {
 }
 
 /// Commands of this program as a page has them: in blocks of a shell, in indented lines, and between backticks.
-fn spoken(text: &str) -> Vec<String> {
+fn published(text: &str) -> Vec<String> {
     let text = text.replace("\\\n", " ");
     let shells = blocks(&text)
         .into_iter()
@@ -262,7 +262,7 @@ fn every_command_and_option_that_is_named_exists() {
     let mut wrong = Vec::new();
     for page in &pages {
         let text = fs::read_to_string(page).expect("a page");
-        for command in spoken(&text) {
+        for command in published(&text) {
             let command = command.split(" #").next().unwrap_or_default();
             let words: Vec<&str> = command.split_whitespace().skip(1).collect();
             let is_name = |word: &&&str| {

@@ -60,7 +60,7 @@ fn a_broken_property_is_a_scenario_that_is_replayed() {
 }
 
 #[test]
-fn a_run_may_begin_with_parties_that_have_restarted() {
+fn a_run_may_begin_with_members_that_have_restarted() {
     let cluster = "examples/press-cell/cluster.toml";
     let common = ["model-check", cluster, "--cycles", "1", "--kinds", "crash"];
     let ask = |start: &[&str]| understudy(&[&common[..], start, &["--json"]].concat());

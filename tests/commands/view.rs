@@ -62,10 +62,19 @@ fn a_journal_is_listed() {
         answer.output
     };
     assert_snapshot!(listed(&[
-        "--event", "source", "--event", "fault", "--event", "in-step", "--from", "0", "--to", "100"
+        "--event",
+        "source",
+        "--event",
+        "fault",
+        "--event",
+        "synchronised",
+        "--from",
+        "0",
+        "--to",
+        "100"
     ]));
     let ordinary = listed(&[
-        "--party", "press-io", "--event", "applied", "--from", "119", "--to", "121",
+        "--member", "press-io", "--event", "applied", "--from", "119", "--to", "121",
     ]);
     assert_snapshot!(ordinary);
     // A run that is over is followed to its end.
@@ -81,7 +90,7 @@ fn a_journal_is_listed() {
     );
     let wrong = understudy_in(
         &folder,
-        &["journal", "--party", "robbot", "--event", "flaged"],
+        &["journal", "--member", "robbot", "--event", "flaged"],
     );
     assert_eq!(wrong.status, 2);
     for hint in ["did you mean `robot`?", "did you mean `flagged`?"] {

@@ -24,7 +24,7 @@ fn the_main_burner_lights_at_the_flame_of_the_pilot_burner() {
         return;
     }
     for plant in summary["plants"].as_array().expect("plants") {
-        assert_eq!(plant["mishaps"], 0, "{plant:#}");
+        assert_eq!(plant["plant_faults"], 0, "{plant:#}");
         let flames = plant["finished"].as_u64();
         assert!(flames.is_some_and(|flames| flames >= 1), "{plant:#}");
     }

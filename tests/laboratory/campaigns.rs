@@ -78,7 +78,7 @@ fn an_interrupted_campaign_leaves_what_was_measured_and_no_orphan() {
         "--out",
     ];
     let arguments = [&MEASURE[..], &times].concat();
-    let (mut child, _errors) = running_with(&arguments, &out, &[], "in step");
+    let (mut child, _errors) = running_with(&arguments, &out, &[], "synchronised");
     signal(child.id(), Signal::SIGINT);
     let mut text = String::new();
     let output = child.stdout.take();

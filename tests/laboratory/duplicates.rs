@@ -23,7 +23,7 @@ impl Double {
         let keys = folder.join("keys");
         fs::create_dir(&keys).expect("a folder");
         fs::set_permissions(&keys, Permissions::from_mode(0o700)).expect("it is ours");
-        for entry in fs::read_dir(run.join("keys/parties/robot")).expect("keys") {
+        for entry in fs::read_dir(run.join("keys/members/robot")).expect("keys") {
             let path = entry.expect("it is ours").path();
             fs::copy(&path, keys.join(path.file_name().expect("a file"))).expect("copied");
         }

@@ -214,7 +214,7 @@ fn running_cluster(
     let arguments = [
         "lab", cluster, "--link", "udp", "--period", PERIOD, "--cycles", "100000", "--out",
     ];
-    running_with(&arguments, out, more, "in step: ")
+    running_with(&arguments, out, more, "synchronised: ")
 }
 
 /// Starts a command and waits until it says `words`.
@@ -236,7 +236,7 @@ fn running_with(
     while !line.contains(words) {
         line.clear();
         let length = errors.read_line(&mut line).expect("text");
-        assert_ne!(length, 0, "it ended before it was in step");
+        assert_ne!(length, 0, "it ended before it was synchronised");
     }
     (child, errors)
 }
@@ -289,7 +289,7 @@ fn a_killed_laboratory_leaves_no_orphan_and_the_next_run_cleans_up() {
     assert!(!out.join("latest").join("keys").exists());
 }
 
-/// The process id that a party of a running laboratory has told in its journal's first record.
+/// The process id that a member of a running laboratory has told in its journal's first record.
 fn process_of(out: &Path, name: &str) -> u32 {
     let out = out.to_str().expect("text");
     let folders = fs::read_dir("/proc")

@@ -1,4 +1,4 @@
-//! A page that looks at a cluster which runs already: a laboratory of another process, and parties with addresses and keys of their own.
+//! A page that looks at a cluster which runs already: a laboratory of another process, and members with addresses and keys of their own.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::shared::DEADLINE;
 use crate::shared::deployed::{Running, addressed_cell, text};
-use crate::{Page, answer, empty_folder, one_at_a_time, party, understudy};
+use crate::{Page, answer, empty_folder, member, one_at_a_time, understudy};
 
 const CELL: &str = "examples/press-cell/cluster.toml";
 const COMMON: [&str; 4] = ["--link", "udp", "--period", "50ms"];
@@ -18,15 +18,15 @@ fn page(cluster: &str, runs: &Path, more: &[&str]) -> Page {
     Page::start(command)
 }
 
-fn in_step(page: &Page) {
-    page.wait_for("a cluster in step", |state| {
-        let speaking = |name| party(state, name)["state"] == "speaking";
+fn synchronised(page: &Page) {
+    page.wait_for("a cluster synchronised", |state| {
+        let speaking = |name| member(state, name)["state"] == "speaking";
         ["robot", "press", "understudy"].into_iter().all(speaking)
     });
 }
 
 fn give(page: &Page, name: &str, command: &Value) -> (u16, String) {
-    let body = json!({ "party": name, "command": command, "owner": "anna", "reason": "a test" });
+    let body = json!({ "member": name, "command": command, "owner": "anna", "reason": "a test" });
     let answer = page.post("/api/command", &body.to_string());
     let code = match answer.status {
         200 => String::new(),
@@ -81,10 +81,10 @@ fn a_laboratory_of_another_process_is_looked_at_and_commanded() {
     assert_eq!(document["failures"][0]["code"], "U0614");
 
     let first = page(CELL, &runs, &COMMON);
-    in_step(&first);
+    synchronised(&first);
     let second = page(CELL, &runs, &[&COMMON[..], &["--allow-commands"]].concat());
     assert!(second.said.contains("it runs already"), "{}", second.said);
-    in_step(&second);
+    synchronised(&second);
     assert_eq!(give(&first, "robot", &json!({ "command": "kill" })).0, 403);
     let force =
         json!({ "command": "force", "signal": { "output": 0 }, "value": true, "seconds": 3600 });
@@ -131,11 +131,11 @@ fn a_laboratory_of_another_process_is_looked_at_and_commanded() {
     );
 }
 
-/// Every party of the press cell as a process with an address and keys of its own.
+/// Every member of the press cell as a process with an address and keys of its own.
 struct Deployed {
     cluster: PathBuf,
     keys: PathBuf,
-    _parties: Vec<Running>,
+    _members: Vec<Running>,
 }
 
 fn deployed(folder: &Path) -> Deployed {
@@ -147,7 +147,7 @@ fn deployed(folder: &Path) -> Deployed {
     let keys = folder.join("keys");
     let (status, made, _) = answer(&["keys", "init", text(&cluster), "--folder", text(&keys)]);
     assert_eq!(status, 0, "{made:#}");
-    let parties = [
+    let members = [
         ("node", "robot"),
         ("node", "press"),
         ("node", "understudy"),
@@ -157,26 +157,26 @@ fn deployed(folder: &Path) -> Deployed {
         ("plant", "ram"),
     ];
     let start = |(what, name): (&str, &str)| {
-        let own = keys.join("parties").join(name);
-        let party = [what, text(&cluster), "--name", name, "--keys", text(&own)];
-        Running::start(&[&party[..], &["--no-real-time"]].concat())
+        let own = keys.join("members").join(name);
+        let member = [what, text(&cluster), "--name", name, "--keys", text(&own)];
+        Running::start(&[&member[..], &["--no-real-time"]].concat())
     };
-    let parties = parties.into_iter().map(start).collect();
+    let members = members.into_iter().map(start).collect();
     Deployed {
         cluster,
         keys,
-        _parties: parties,
+        _members: members,
     }
 }
 
 #[test]
-fn parties_elsewhere_are_looked_at_with_an_operators_keys() {
+fn members_elsewhere_are_looked_at_with_an_operators_keys() {
     let _turn = one_at_a_time();
     let folder = empty_folder("attach-elsewhere");
     let runs = folder.join("runs");
     let running = deployed(&folder);
     let cluster = text(&running.cluster);
-    let operator = running.keys.join("parties/operator");
+    let operator = running.keys.join("members/operator");
 
     let top = |keys: &Path, cluster: &str| {
         let runs = text(&runs);
@@ -207,7 +207,7 @@ fn parties_elsewhere_are_looked_at_with_an_operators_keys() {
         &runs,
         &["--keys", text(&operator), "--allow-commands"],
     );
-    in_step(&elsewhere);
+    synchronised(&elsewhere);
     // The program is followed from a state that a station has told.
     elsewhere.wait_for("power flow", |_| {
         let picture = elsewhere.get("/api/ladder/0");
@@ -242,7 +242,7 @@ fn parties_elsewhere_are_looked_at_with_an_operators_keys() {
     let strange = folder.join("strange");
     let (status, made, _) = answer(&["keys", "init", cluster, "--folder", text(&strange)]);
     assert_eq!(status, 0, "{made:#}");
-    let (status, document, _) = top(&strange.join("parties/operator"), cluster);
+    let (status, document, _) = top(&strange.join("members/operator"), cluster);
     assert_eq!(status, 1, "{document:#}");
     assert_eq!(document["failures"][0]["code"], "U0562", "{document:#}");
     let other = running.cluster.with_file_name("other.toml");

@@ -99,11 +99,11 @@ async function scheme(value) {
 
 const text = (selector) => `(document.querySelector(${JSON.stringify(selector)})?.textContent ?? "")`;
 const click = (selector) => evaluate(`(() => { const found = document.querySelector(${JSON.stringify(selector)}); if (!found) throw new Error("nothing is there"); found.dispatchEvent(new MouseEvent("click", { bubbles: true })); })()`);
-const party = (name) => `g.party[data-name="${name}"]`;
-const stateOf = (name) => `document.querySelector('${party(name)}')?.dataset.state`;
+const member = (name) => `g.member[data-name="${name}"]`;
+const stateOf = (name) => `document.querySelector('${member(name)}')?.dataset.state`;
 const lampOf = (program) => `[...document.querySelectorAll("#protection-list li")].find((line) => line.textContent.includes(" ${program}: "))?.dataset.protection`;
 const command = async (name, what) => {
-  await click(party(name));
+  await click(member(name));
   await until(what, `document.querySelector("[data-command=${what}]")?.disabled === false`);
   await click(`[data-command=${what}]`);
   await until("it is done", "!document.getElementById('command').open");
@@ -128,7 +128,7 @@ async function drive() {
   await Promise.all(["Page.enable", "Runtime.enable", "Log.enable"].map((method) => call(method)));
   await size(1280, 900, false);
   await call("Page.navigate", { url });
-  await until("everybody", `['robot', 'press', 'understudy'].every((name) => document.querySelector('g.party[data-name="' + name + '"]')?.dataset.state === 'speaking')`);
+  await until("everybody", `['robot', 'press', 'understudy'].every((name) => document.querySelector('g.member[data-name="' + name + '"]')?.dataset.state === 'speaking')`);
   await scheme("light");
   await until("a margin", `${text("#survival-words")}.includes("any one further failure")`);
 
@@ -143,7 +143,7 @@ async function drive() {
   }
   await click("[data-tour=next]");
   await click("[data-tour=next]");
-  await until("its last step", `${tour(".tour-step")}.textContent === "3 of 3" && document.querySelectorAll(".party.tour-target").length === 3`);
+  await until("its last step", `${tour(".tour-step")}.textContent === "3 of 3" && document.querySelectorAll(".member.tour-target").length === 3`);
   await click("[data-tour=next]");
   await until("its end", `document.getElementById("tour") === null && document.querySelector(".tour-target") === null`);
   await call("Page.reload");
@@ -160,7 +160,7 @@ async function drive() {
   await accessible("cluster");
 
   // A kill: the outputs move on, and the margin shrinks.
-  await click(party("robot"));
+  await click(member("robot"));
   await until("the dialog", "document.getElementById('command').open");
   await picture("command");
   await accessible("command");
@@ -186,7 +186,7 @@ async function drive() {
   await click("#why .drawer-head button");
 
   // A button that cannot act says why.
-  await click(party("robot"));
+  await click(member("robot"));
   await until("a reason", `document.querySelector("[data-command=kill]")?.disabled && ${text("#command .actions")}.includes("cannot: it is down")`);
   await click("[data-command=restart]");
   await until("its return", `${stateOf("robot")} === "speaking"`);
@@ -220,7 +220,7 @@ async function drive() {
       if (opacity > 0.6) {
         problems.push(`old values look as new ones: ${opacity}`);
       }
-      await click(party("robot"));
+      await click(member("robot"));
       await until("a reason", `document.querySelector("[data-command=kill]").disabled && ${text("#command .obstacle")}.includes("no message")`);
       await evaluate("document.getElementById('command').close()");
     } finally {
@@ -230,12 +230,12 @@ async function drive() {
   }
 
   // Force an output, and take it back.
-  await click(party("robot-io"));
+  await click(member("robot-io"));
   await evaluate("document.getElementById('force-signal').value = 'output 0'");
   await click("[data-command=force]");
   await until("a forced output", `${text(".signal-forced:not(:empty)")}.includes("forced by")`);
   await picture("forced");
-  await click(party("robot-io"));
+  await click(member("robot-io"));
   await until("what can be taken back", `document.querySelector("[data-command=unforce]") !== null`);
   await click("[data-command=unforce]");
   await until("a free output", `document.querySelector(".signal-forced:not(:empty)") === null`);

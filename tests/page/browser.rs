@@ -3,7 +3,7 @@
 use std::process::Command;
 use understudy_testing::skip;
 
-use crate::{Page, empty_folder, one_at_a_time, party, understudy};
+use crate::{Page, empty_folder, member, one_at_a_time, understudy};
 
 /// The exit status of the script where no browser starts.
 const NOT_STARTED: i32 = 77;
@@ -29,8 +29,8 @@ fn a_browser_sees_a_kill_and_asks_why() {
         .arg("--out")
         .arg(folder.join("runs"));
     let page = Page::start(command);
-    page.wait_for("a cluster in step", |state| {
-        party(state, "robot")["state"] == "speaking"
+    page.wait_for("a cluster synchronised", |state| {
+        member(state, "robot")["state"] == "speaking"
     });
     let output = Command::new("node")
         .arg("tests/page/browser.mjs")

@@ -9,7 +9,7 @@ use nix::time::{ClockId, clock_gettime};
 use nix::unistd::Pid;
 use serde_json::{Value, json};
 
-use crate::{Page, empty_folder, one_at_a_time, party, understudy};
+use crate::{Page, empty_folder, member, one_at_a_time, understudy};
 
 const PERIOD: &str = "50ms";
 
@@ -22,15 +22,15 @@ fn started(name: &str) -> (Page, std::path::PathBuf) {
         .arg("--out")
         .arg(&runs);
     let page = Page::start(command);
-    page.wait_for("a cluster in step", |state| {
-        let speaking = |name| party(state, name)["state"] == "speaking";
+    page.wait_for("a cluster synchronised", |state| {
+        let speaking = |name| member(state, name)["state"] == "speaking";
         ["robot", "press", "understudy"].into_iter().all(speaking)
     });
     (page, runs)
 }
 
 pub(crate) fn give(page: &Page, name: &str, command: &Value) -> (u16, String) {
-    let body = json!({ "party": name, "command": command, "owner": "anna", "reason": "a test" });
+    let body = json!({ "member": name, "command": command, "owner": "anna", "reason": "a test" });
     let answer = page.post("/api/command", &body.to_string());
     let code = if answer.status == 200 {
         String::new()
@@ -110,12 +110,12 @@ fn the_page_shows_what_is_killed_from_outside_and_starts_it_again() {
     let (page, runs) = started("outside");
     for name in ["robot", "press-io"] {
         kill(process_of(&runs, name), Signal::SIGKILL).expect("it runs");
-        let state = page.wait_for("its end", |state| party(state, name)["state"] == "ended");
-        assert_eq!(party(&state, name)["down"], true);
+        let state = page.wait_for("its end", |state| member(state, name)["state"] == "ended");
+        assert_eq!(member(&state, name)["down"], true);
         let restart = json!({ "command": "restart" });
         assert_eq!(give(&page, name, &restart), (200, String::new()));
         page.wait_for("its return", |state| {
-            ["speaking", "serving"].contains(&party(state, name)["state"].as_str().expect("text"))
+            ["speaking", "serving"].contains(&member(state, name)["state"].as_str().expect("text"))
         });
     }
     let alarms = page.get("/api/events").json().to_string();
@@ -136,24 +136,24 @@ fn every_command_is_done_or_refused_and_is_in_the_journal() {
 
     assert_eq!(give(&page, "robot", &simple("kill")), done);
     page.wait_for("its end", |state| {
-        party(state, "robot")["state"] == "killed"
+        member(state, "robot")["state"] == "killed"
             && state["programs"][0]["source"] == "reconstructed"
     });
     assert_eq!(give(&page, "robot", &simple("kill")), refused("U0551"));
     assert_eq!(give(&page, "robot", &simple("restart")), done);
     assert_eq!(give(&page, "robot", &simple("restart")), refused("U0552"));
     page.wait_for("its return", |state| {
-        party(state, "robot")["state"] == "speaking"
+        member(state, "robot")["state"] == "speaking"
     });
 
     assert_eq!(give(&page, "press", &simple("continue")), refused("U0553"));
     assert_eq!(give(&page, "press", &simple("stop")), done);
     page.wait_for("its silence", |state| {
-        party(state, "press")["state"] == "stopped"
+        member(state, "press")["state"] == "stopped"
     });
     assert_eq!(give(&page, "press", &simple("continue")), done);
     page.wait_for("its return", |state| {
-        party(state, "press")["state"] == "speaking"
+        member(state, "press")["state"] == "speaking"
     });
 
     assert_eq!(give(&page, "press", &simple("isolate")), done);
@@ -162,7 +162,7 @@ fn every_command_is_done_or_refused_and_is_in_the_journal() {
     });
     assert_eq!(give(&page, "press", &simple("rejoin")), done);
     page.wait_for("its return", |state| {
-        party(state, "press")["state"] == "speaking"
+        member(state, "press")["state"] == "speaking"
     });
 
     assert_eq!(give(&page, "robot", &simple("release")), refused("U0554"));

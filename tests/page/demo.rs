@@ -5,7 +5,7 @@ use std::fs;
 use serde_json::Value;
 
 use crate::commands::give;
-use crate::{Page, empty_folder, one_at_a_time, party, understudy};
+use crate::{Page, empty_folder, member, one_at_a_time, understudy};
 
 #[test]
 fn the_cluster_of_a_demo_stays_up_for_the_visitor() {
@@ -19,7 +19,7 @@ fn the_cluster_of_a_demo_stays_up_for_the_visitor() {
     let page = Page::start(command);
     let kill = serde_json::json!({ "command": "kill" });
     page.wait_for("the first cycles", |state| {
-        party(state, "robot")["state"] == "speaking"
+        member(state, "robot")["state"] == "speaking"
     });
     // It would disturb the scenario.
     assert_eq!(give(&page, "robot", &kill), (409, "U0560".to_owned()));
@@ -27,7 +27,7 @@ fn the_cluster_of_a_demo_stays_up_for_the_visitor() {
     assert_eq!(over["finished"], false);
     assert_eq!(give(&page, "robot", &kill).0, 200);
     page.wait_for("outputs that go on", |state| {
-        party(state, "robot")["state"] == "killed"
+        member(state, "robot")["state"] == "killed"
             && state["programs"][0]["source"] == "reconstructed"
     });
     let run = fs::canonicalize(runs.join("latest")).expect("a run");

@@ -18,7 +18,7 @@ mod shared;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use shared::page::{Page, party};
+use shared::page::{Page, member};
 use shared::{answer, empty_folder, one_at_a_time, understudy};
 
 /// A simulated run in which the robot's station is killed in cycle 50 and started again in cycle 150: its directory.

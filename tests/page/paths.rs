@@ -2,7 +2,7 @@
 
 use std::process::Stdio;
 
-use crate::{Page, empty_folder, party, simulated_run, simulated_run_of, understudy};
+use crate::{Page, empty_folder, member, simulated_run, simulated_run_of, understudy};
 
 #[test]
 fn a_finished_run_answers_every_question() {
@@ -15,16 +15,16 @@ fn a_finished_run_answers_every_question() {
 
     // While the robot's station is down, its outputs are restored, and the understudy must not fail too.
     let down = page.get("/api/state?cycle=100").json();
-    assert_eq!(party(&down, "robot")["state"], "killed");
+    assert_eq!(member(&down, "robot")["state"], "killed");
     assert_eq!(down["programs"][0]["source"], "reconstructed");
     assert_eq!(down["programs"][0]["word_of"], "understudy");
     assert_eq!(down["survival"]["level"], "some", "{}", down["survival"]);
     let before = page.get("/api/state?cycle=20").json();
-    assert_eq!(party(&before, "robot")["state"], "speaking");
+    assert_eq!(member(&before, "robot")["state"], "speaking");
     assert_eq!(before["programs"][0]["source"], "direct");
     assert_eq!(before["survival"]["level"], "all", "{}", before["survival"]);
     let after = page.get("/api/state?cycle=280").json();
-    assert_eq!(party(&after, "robot")["state"], "speaking");
+    assert_eq!(member(&after, "robot")["state"], "speaking");
 
     let picture = page.get("/api/ladder/0?cycle=100").json();
     let svg = picture["svg"].as_str().expect("a picture");
@@ -99,7 +99,7 @@ fn a_lost_state_is_told_for_each_cycle() {
         (
             state["programs"][0].clone(),
             state["survival"].clone(),
-            party(&state, "robot-io").clone(),
+            member(&state, "robot-io").clone(),
         )
     };
     let (before, ..) = robot(50);
@@ -213,13 +213,14 @@ fn bad_questions_get_clear_answers_and_stop_nothing() {
     }
     let unread = page.get(&format!("/api/events?find={long}"));
     assert_eq!(unread.status, 200);
-    let kill = r#"{"party":"robot","command":{"command":"kill"},"owner":"anna","reason":"a test"}"#;
+    let kill =
+        r#"{"member":"robot","command":{"command":"kill"},"owner":"anna","reason":"a test"}"#;
     let post = [
         ("/api/command", kill, 403, "U0684"),
         ("/api/command", "", 400, "U0682"),
         ("/api/command", "{", 400, "U0682"),
         ("/api/command", "[]", 400, "U0682"),
-        ("/api/command", r#"{"party":"robot"}"#, 400, "U0682"),
+        ("/api/command", r#"{"member":"robot"}"#, 400, "U0682"),
         (
             "/api/alarms/77/acknowledge",
             r#"{"owner":"anna"}"#,

@@ -11,7 +11,7 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
 use crate::shared::DEADLINE;
-use crate::{Page, empty_folder, one_at_a_time, party, simulated_run_of, understudy};
+use crate::{Page, empty_folder, member, one_at_a_time, simulated_run_of, understudy};
 
 /// Longer than a reader may be away without noticing.
 const AWAY: Duration = Duration::from_millis(2_200);
@@ -182,7 +182,7 @@ fn the_page_shows_no_past() {
             return None;
         }
         assert_eq!(status, 200, "{body}");
-        let dead = party(&answer, "robot")["state"] == "killed";
+        let dead = member(&answer, "robot")["state"] == "killed";
         let cycle = answer["cycle"].as_i64().expect("a cycle");
         Some((cycle, dead && answer["survival"]["level"] != "all"))
     });

@@ -208,7 +208,7 @@ fn connections_of_strangers_take_no_plant_out_of_service() {
     let keys = folder.join("keys");
     let (status, made, _) = answer(&["keys", "init", &cluster, "--folder", text(&keys)]);
     assert_eq!(status, 0, "{made:#}");
-    let keys_of = |name: &str| format!("{}/parties/{name}", text(&keys));
+    let keys_of = |name: &str| format!("{}/members/{name}", text(&keys));
     let station = |name: &str| {
         let (own, common) = (keys_of(name), ["--link", "udp", "--no-real-time"]);
         let start = ["node", &cluster, "--name", name, "--keys", &own];

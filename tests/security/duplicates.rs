@@ -36,7 +36,7 @@ impl Plant {
         let (running, address) = (Arc::clone(&device), addresses[3]);
         spawn(move || running.run(address));
         let start = |command: &str, name: &str| {
-            let own = format!("{}/parties/{name}", text(&keys));
+            let own = format!("{}/members/{name}", text(&keys));
             let journal = folder.join(format!("{name}.jsonl"));
             let common = [
                 "--link",
@@ -71,7 +71,7 @@ impl Plant {
     fn copy_of_the_controller(&self, change: [&str; 2]) -> Running {
         let text_of_cluster = fs::read_to_string(&self.cluster).expect("it is ours");
         let image = self.folder.join("image");
-        let keys = self.folder.join("keys/parties/valve");
+        let keys = self.folder.join("keys/members/valve");
         let copied = Command::new("cp")
             .args(["-a", text(&keys), text(&image)])
             .status();
@@ -81,9 +81,9 @@ impl Plant {
         fs::write(&cluster, changed).expect("it is ours");
         let places = [0, 1, 2].map(|place| self.addresses[place]);
         let peers = json!([
-            { "party": { "station": 0 }, "name": "valve", "address": self.addresses[4] },
-            { "party": { "station": 1 }, "name": "understudy", "address": places[1] },
-            { "party": { "remote-io": 0 }, "name": "valve-io", "address": places[2] },
+            { "member": { "station": 0 }, "name": "valve", "address": self.addresses[4] },
+            { "member": { "station": 1 }, "name": "understudy", "address": places[1] },
+            { "member": { "remote-io": 0 }, "name": "valve-io", "address": places[2] },
         ]);
         let endpoints = self.folder.join("endpoints.json");
         fs::write(&endpoints, peers.to_string()).expect("it is ours");

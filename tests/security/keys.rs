@@ -1,4 +1,4 @@
-//! `understudy keys`, and parties that are started with the wrong ones.
+//! `understudy keys`, and members that are started with the wrong ones.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -39,7 +39,7 @@ fn keys_are_made_listed_revoked_and_made_again() {
     assert_eq!(state("press"), (Some("revoked".into()), Some(1)));
     assert_eq!(state("robot"), (Some("valid".into()), Some(1)));
 
-    let press = format!("{keys}/parties/press");
+    let press = format!("{keys}/members/press");
     let started = answer(&["node", cluster, "--name", "press", "--keys", &press]);
     assert_eq!((started.0, codes(&started.1)), (2, vec!["U0909"]));
 
@@ -54,7 +54,7 @@ fn keys_are_made_listed_revoked_and_made_again() {
 }
 
 #[test]
-fn a_party_without_its_own_keys_does_not_start() {
+fn a_member_without_its_own_keys_does_not_start() {
     let _one = one_at_a_time();
     let folder = empty_folder("wrong_keys");
     let cluster = addressed_cell(&folder);
@@ -70,7 +70,7 @@ fn a_party_without_its_own_keys_does_not_start() {
             .collect::<Vec<_>>();
         (status, codes)
     };
-    let of = |name: &str| format!("{keys}/parties/{name}");
+    let of = |name: &str| format!("{keys}/members/{name}");
     assert_eq!(node(&[]), (2, vec!["U0620".to_owned()]));
     assert_eq!(
         node(&["--keys", &of("press")]),

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use understudy_seal::{FrameKey, Seal};
 use understudy_wire::{
-    Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Frame, Header, Moment, Party, StationId,
+    Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Frame, Header, Member, Moment, StationId,
     encode,
 };
 
@@ -57,9 +57,9 @@ fn offers(heard: &[u8], kept: &[Vec<u8>]) -> Vec<Vec<u8>> {
     };
     let mut offers = vec![
         heard.to_vec(),
-        sealed(Party::Station(StationId(0))),
-        sealed(Party::Station(StationId(1))),
-        sealed(Party::Station(StationId(9))),
+        sealed(Member::Station(StationId(0))),
+        sealed(Member::Station(StationId(1))),
+        sealed(Member::Station(StationId(9))),
         b"nonsense".to_vec(),
     ];
     offers.push(bytes);
@@ -171,7 +171,7 @@ fn is_bound(address: SocketAddr) -> bool {
         .any(|line| line.split_whitespace().nth(1) == Some(place.as_str()))
 }
 
-/// Where each party listens, as its cluster file says.
+/// Where each member listens, as its cluster file says.
 fn addresses(cluster: &Path) -> BTreeMap<String, SocketAddr> {
     let text = fs::read_to_string(cluster).expect("it was written");
     let mut addresses = BTreeMap::new();

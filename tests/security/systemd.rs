@@ -122,20 +122,26 @@ impl Machine {
         });
     }
 
-    /// Waits until a line of a party's journal that came after `from` bytes has this in it.
-    fn wait_for_line(&self, party: &str, from: usize, part: &str) {
-        let path = format!("/proc/{}/root/var/log/understudy/{party}.jsonl", self.first);
+    /// Waits until a line of a member's journal that came after `from` bytes has this in it.
+    fn wait_for_line(&self, member: &str, from: usize, part: &str) {
+        let path = format!(
+            "/proc/{}/root/var/log/understudy/{member}.jsonl",
+            self.first
+        );
         let started = Instant::now();
         while !fs::read(&path).is_ok_and(|journal| {
             String::from_utf8_lossy(journal.get(from..).unwrap_or_default()).contains(part)
         }) {
-            assert!(started.elapsed() < DEADLINE, "{party} never says {part}");
+            assert!(started.elapsed() < DEADLINE, "{member} never says {part}");
             sleep(Duration::from_millis(50));
         }
     }
 
-    fn journal_bytes(&self, party: &str) -> usize {
-        let path = format!("/proc/{}/root/var/log/understudy/{party}.jsonl", self.first);
+    fn journal_bytes(&self, member: &str) -> usize {
+        let path = format!(
+            "/proc/{}/root/var/log/understudy/{member}.jsonl",
+            self.first
+        );
         fs::read(path).map_or(0, |journal| journal.len())
     }
 }
@@ -177,7 +183,7 @@ const UNITS: [&str; 7] = [
 ];
 
 #[test]
-fn systemd_starts_watches_and_restarts_the_parties() {
+fn systemd_starts_watches_and_restarts_the_members() {
     let _one = one_at_a_time();
     let folder = empty_folder("systemd");
     for part in ["cell", "units"] {

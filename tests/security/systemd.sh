@@ -1,5 +1,5 @@
 # Boots systemd over a copy of this machine that is thrown away, in namespaces of its own, with a cell installed as
-# docs/deployment.md says. Called as `systemd.sh BINARY FOLDER`: FOLDER has cell/, keys/parties/ and units/.
+# docs/deployment.md says. Called as `systemd.sh BINARY FOLDER`: FOLDER has cell/, keys/members/ and units/.
 set -e
 binary=$1 folder=$2
 mount --make-rprivate /
@@ -40,7 +40,7 @@ mount --bind "$binary" "$root/usr/local/bin/understudy"
 cp "$folder"/cell/* "$root/etc/understudy/"
 chmod -R a+rX "$root/etc/understudy"
 chroot "$root" install -d -m 700 -o understudy -g understudy /var/lib/understudy/keys /var/log/understudy
-cp -r "$folder"/keys/parties/* "$root/var/lib/understudy/keys/"
+cp -r "$folder"/keys/members/* "$root/var/lib/understudy/keys/"
 chroot "$root" chown -R understudy:understudy /var/lib/understudy
 install -m 644 "$folder"/units/*.service "$root/etc/systemd/system/"
 

@@ -1,4 +1,4 @@
-//! A cluster as it is deployed: every party at an address of its own, as a process of its own.
+//! A cluster as it is deployed: every member at an address of its own, as a process of its own.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ pub(crate) fn text(path: &Path) -> &str {
     path.to_str().expect("text")
 }
 
-/// The press cell in a folder of its own, every party on a port of its own.
+/// The press cell in a folder of its own, every member on a port of its own.
 pub(crate) fn addressed_cell(folder: &Path) -> PathBuf {
     let mut addresses = free_addresses(7).expect("seven free ports").into_iter();
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/press-cell");
@@ -25,7 +25,7 @@ pub(crate) fn addressed_cell(folder: &Path) -> PathBuf {
         addressed.push_str(line);
         addressed.push('\n');
         if line.starts_with("[[") {
-            let address = addresses.next().expect("seven parties");
+            let address = addresses.next().expect("seven members");
             addressed.push_str(&format!("address = \"{address}\"\n"));
         }
     }

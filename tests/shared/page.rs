@@ -176,10 +176,10 @@ impl Drop for Page {
     }
 }
 
-pub(crate) fn party<'a>(state: &'a Value, name: &str) -> &'a Value {
-    let parties = state["parties"].as_array().expect("parties");
-    parties
+pub(crate) fn member<'a>(state: &'a Value, name: &str) -> &'a Value {
+    let members = state["members"].as_array().expect("members");
+    members
         .iter()
-        .find(|party| party["name"] == name)
+        .find(|member| member["name"] == name)
         .unwrap_or_else(|| panic!("no {name}"))
 }

@@ -12,7 +12,9 @@ fn example() -> (Automaton, InputOutputMap) {
         "../../../examples/motivating-example/supervisor.ADS"
     ));
     assert_eq!(automaton.diagnostics, []);
-    let map = read_map(include_str!("../../../examples/motivating-example/map.toml"));
+    let map = read_map(include_str!(
+        "../../../examples/motivating-example/map.toml"
+    ));
     assert_eq!(map.diagnostics, []);
     let map = map.map.expect("a map without findings");
     let automaton = automaton.automaton.expect("an automaton without findings");

@@ -3,8 +3,8 @@
 #![allow(clippy::print_stderr, reason = "a finding names its file")]
 
 mod attack;
+mod members;
 mod other_tools;
-mod parties;
 mod questions;
 mod runs;
 

@@ -8,7 +8,7 @@ use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 use understudy_cluster::Cluster;
 use understudy_simulator::{Action, Fault, Network, NotReady, Parts, Simulation, parts};
-use understudy_wire::{Agreement, Party, Schedule, ScheduleError, StationId};
+use understudy_wire::{Agreement, Member, Schedule, ScheduleError, StationId};
 
 use crate::pairs::{Account, Pairs};
 use crate::partner::Redundancy;
@@ -227,7 +227,7 @@ fn cluster_failures(
     let controllers = agreement.schedule.controllers() as u64;
     let (mut total, mut worst) = (0, 0);
     for failure in 0..plan.failures {
-        let party = Party::Station(StationId((failure % controllers) as u8));
+        let member = Member::Station(StationId((failure % controllers) as u8));
         let at_cycle = FAILURE_EVERY * failure + 1;
         let phase = random.random();
         let repaired = at_cycle + REPAIR_AFTER;
@@ -235,7 +235,7 @@ fn cluster_failures(
             simulation.schedule(Fault {
                 at_cycle,
                 phase,
-                party,
+                member,
                 action,
             });
         }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use smallvec::smallvec;
 use understudy_wire::{
-    Agreement, Body, Copies, Cycle, Epoch, Frame, Header, Image, Input, Lineage, Machine, Moment,
-    Output, Party, ProgramHash, ProgramId, Sample, StationSet, Time,
+    Agreement, Body, Copies, Cycle, Epoch, Frame, Header, Image, Input, Lineage, Machine, Member,
+    Moment, Output, ProgramHash, ProgramId, Sample, StationSet, Time,
 };
 
 /// A deadline.
@@ -29,7 +29,7 @@ pub(crate) struct Module {
     began: Time,
     decided: bool,
     /// What came in this cycle, in the order in which it came.
-    driven: Vec<(Party, Image)>,
+    driven: Vec<(Member, Image)>,
     copies: Copies,
     outbox: VecDeque<Output<Deadline>>,
 }
@@ -72,7 +72,7 @@ impl Module {
                 cluster: self.agreement.cluster,
                 configuration: self.agreement.configuration,
                 moment,
-                sender: Party::RemoteIo(self.program),
+                sender: Member::RemoteIo(self.program),
                 alone: false,
             },
             body: Body::Sample(Sample {

@@ -11,7 +11,7 @@ use understudy_logic::Scan;
 use understudy_plant::Plant;
 use understudy_simulator::Network;
 use understudy_wire::{
-    Agreement, Body, Field, Frame, Image, Input, Machine, Output, Party, ProgramId, Time, encode,
+    Agreement, Body, Field, Frame, Image, Input, Machine, Member, Output, ProgramId, Time, encode,
 };
 
 use crate::module::Module;
@@ -289,7 +289,7 @@ impl Pairs {
         let mut bytes = Vec::new();
         encode(frame, &mut bytes).expect("a pair's frames keep the promises of frames");
         let sender = match frame.header.sender {
-            Party::Station(station) => Place::Partner(station.index()),
+            Member::Station(station) => Place::Partner(station.index()),
             _ => Place::Module,
         };
         let receivers: &[Place] = match (&frame.body, sender) {

@@ -15,7 +15,7 @@ use smallvec::smallvec;
 use understudy_logic::{Scan, Scratch};
 use understudy_wire::{
     Agreement, Body, Copies, Cycle, Digest, Epoch, Frame, Header, Holding, Image, Input, Lineage,
-    Machine, Moment, Output, Party, ProgramHash, ProgramId, ProgramSet, StationId, StationSet,
+    Machine, Member, Moment, Output, ProgramHash, ProgramId, ProgramSet, StationId, StationSet,
     Time, Transfer, Turn, Word,
 };
 
@@ -181,7 +181,7 @@ impl Partner {
                 digest: Digest::of(&self.state),
             }],
             words: smallvec![Word {
-                members: ProgramSet::only(program),
+                mask: ProgramSet::only(program),
                 sum: outputs,
             }],
             recalled: Vec::new(),
@@ -222,7 +222,7 @@ impl Partner {
                 cluster: agreement.cluster,
                 configuration: agreement.configuration,
                 moment: self.moment(self.cycle),
-                sender: Party::Station(StationId(self.settings.rank)),
+                sender: Member::Station(StationId(self.settings.rank)),
                 alone: false,
             },
             body,

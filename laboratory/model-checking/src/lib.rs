@@ -1,8 +1,8 @@
 //! Every schedule of a few faults over a few cycles, for the very state machines of stations and remote I/Os.
 //!
 //! A state is a whole [`understudy_simulator::Simulation`] between two slots of the schedule; a step waits for the next slot, or does one thing to a
-//! link or to a party first. So time is discrete, nothing is drawn, and all schedules within a [`Budget`] are tried, those that
-//! lead to one state only once. A run begins in step, or with parties that have just restarted or stood still ([`Start`]). Each property stands in a file of its own under `properties/`; what is wrong is said by the
+//! link or to a member first. So time is discrete, nothing is drawn, and all schedules within a [`Budget`] are tried, those that
+//! lead to one state only once. A run begins synchronised, or with members that have just restarted or stood still ([`Start`]). Each property stands in a file of its own under `properties/`; what is wrong is said by the
 //! simulator's referee. The faults that lead to a broken property are a schedule that the simulator replays.
 //!
 //! ```text

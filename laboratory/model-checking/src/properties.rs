@@ -17,7 +17,7 @@ pub enum Promise {
     NothingWrong,
     /// And no cycle is held or fail-safe.
     NothingHeld,
-    /// And everybody is in step at the end.
+    /// And everybody is synchronised at the end.
     Protected,
 }
 

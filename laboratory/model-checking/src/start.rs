@@ -4,64 +4,64 @@
 //! the run, all at one time; those who are behind stood still for the cycle before it.
 
 use understudy_simulator::{Action, Fault};
-use understudy_wire::{MAXIMUM_HISTORY, Party};
+use understudy_wire::{MAXIMUM_HISTORY, Member};
 
 use crate::step::Place;
 
-/// Of a cluster that was in step. The default is that nothing has happened.
+/// Of a cluster that was synchronised. The default is that nothing has happened.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Start {
     /// Who starts again as the run begins, and knows nothing.
-    pub restarted: Vec<Party>,
+    pub restarted: Vec<Member>,
     /// Who stood still for a cycle.
-    pub behind: Vec<Party>,
+    pub behind: Vec<Member>,
     /// Links, from a sender to a receiver, that were broken for longer than the history of a sample.
-    pub broken: Vec<(Party, Party)>,
+    pub broken: Vec<(Member, Member)>,
 }
 
 /// Cycles for which a link was broken: a sample carries no longer history.
 const BROKEN_CYCLES: u64 = MAXIMUM_HISTORY as u64 + 2;
 
 /// The first place after the cycle in which the cluster came into step.
-const IN_STEP: Place = Place { cycle: 1, slot: 0 };
+const SYNCHRONISED: Place = Place { cycle: 1, slot: 0 };
 
 impl Start {
     /// Where the run begins.
     pub(crate) fn first(&self) -> Place {
         Place {
             cycle: match (self.behind.is_empty(), self.broken.is_empty()) {
-                (true, true) => IN_STEP.cycle,
-                (false, true) => IN_STEP.cycle + 1,
-                (_, false) => IN_STEP.cycle + BROKEN_CYCLES,
+                (true, true) => SYNCHRONISED.cycle,
+                (false, true) => SYNCHRONISED.cycle + 1,
+                (_, false) => SYNCHRONISED.cycle + BROKEN_CYCLES,
             },
             slot: 0,
         }
     }
 
     /// All to whom something has happened, in the order of the schedule.
-    pub(crate) fn parties(&self) -> impl Iterator<Item = Party> + '_ {
+    pub(crate) fn members(&self) -> impl Iterator<Item = Member> + '_ {
         self.behind.iter().chain(&self.restarted).copied()
     }
 
     /// What has happened, in the order in which it has to be scheduled.
     pub(crate) fn faults(&self) -> Vec<Fault> {
-        let fault = |place: Place, party, action| Fault {
+        let fault = |place: Place, member, action| Fault {
             at_cycle: place.cycle,
             phase: place.phase(),
-            party,
+            member,
             action,
         };
         let first = self.first();
         let stops = self.behind.iter();
-        let stops = stops.map(|&party| fault(IN_STEP, party, Action::Stop));
+        let stops = stops.map(|&member| fault(SYNCHRONISED, member, Action::Stop));
         let goes_on = self.behind.iter();
-        let goes_on = goes_on.map(|&party| fault(first, party, Action::Continue));
-        let restarts = self.restarted.iter().flat_map(|&party| {
-            [Action::Crash, Action::Restart].map(|action| fault(first, party, action))
+        let goes_on = goes_on.map(|&member| fault(first, member, Action::Continue));
+        let restarts = self.restarted.iter().flat_map(|&member| {
+            [Action::Crash, Action::Restart].map(|action| fault(first, member, action))
         });
         let broken = self.broken.iter().flat_map(|&(from, to)| {
             [
-                fault(IN_STEP, from, Action::Cut { to }),
+                fault(SYNCHRONISED, from, Action::Cut { to }),
                 fault(first, from, Action::Heal { to }),
             ]
         });

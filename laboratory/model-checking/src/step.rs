@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use understudy_simulator::{Action, Fault};
-use understudy_wire::Party;
+use understudy_wire::Member;
 
 /// Where slots begin, as shares of T. A frame that is sent in a slot arrives in the next one.
 pub(crate) const SLOTS: [f64; 8] = [0.025, 0.075, 0.125, 0.175, 0.225, 0.675, 0.725, 0.975];
@@ -20,9 +20,9 @@ pub struct Budget {
     pub delays: u8,
     /// Senders of which the last frame of a slot arrives once more, at everybody.
     pub duplicates: u8,
-    /// Parties that crash; each may start again at any later slot.
+    /// Members that crash; each may start again at any later slot.
     pub crashes: u8,
-    /// Parties that stand still; each may go on at any later slot.
+    /// Members that stand still; each may go on at any later slot.
     pub stops: u8,
     /// All of them together.
     pub total: u8,
@@ -33,40 +33,40 @@ pub struct Budget {
 /// One step of the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Step {
-    /// What a party sends in this slot does not reach one other.
+    /// What a member sends in this slot does not reach one other.
     Lose {
         /// Who sends.
-        from: Party,
+        from: Member,
         /// Who does not hear it.
-        to: Party,
+        to: Member,
     },
-    /// What a party sends in this slot reaches nobody.
+    /// What a member sends in this slot reaches nobody.
     Mute {
         /// Who sends.
-        from: Party,
+        from: Member,
     },
-    /// What a party sends in this slot reaches one other late.
+    /// What a member sends in this slot reaches one other late.
     Late {
         /// Who sends.
-        from: Party,
+        from: Member,
         /// Who hears it late.
-        to: Party,
+        to: Member,
         /// By so many thousandths of T.
         per_mille: u32,
     },
-    /// The last frame of a party comes once more, to everybody.
+    /// The last frame of a member comes once more, to everybody.
     Twice {
         /// Whose.
-        from: Party,
+        from: Member,
     },
-    /// A party is gone, with all that it knew.
-    Crash(Party),
+    /// A member is gone, with all that it knew.
+    Crash(Member),
     /// It starts again.
-    Restart(Party),
-    /// A party stands still.
-    Stop(Party),
+    Restart(Member),
+    /// A member stands still.
+    Stop(Member),
     /// It goes on.
-    Continue(Party),
+    Continue(Member),
     /// The next slot begins.
     Wait,
 }
@@ -91,11 +91,11 @@ impl Place {
 }
 
 /// Everybody who is down, and whether it has crashed, comes back at `place`.
-pub(crate) fn revivals(down: &[(Party, bool)], place: Place) -> Vec<Fault> {
-    let back = |&(party, crashed): &(Party, bool)| Fault {
+pub(crate) fn revivals(down: &[(Member, bool)], place: Place) -> Vec<Fault> {
+    let back = |&(member, crashed): &(Member, bool)| Fault {
         at_cycle: place.cycle,
         phase: place.phase(),
-        party,
+        member,
         action: if crashed {
             Action::Restart
         } else {
@@ -105,24 +105,24 @@ pub(crate) fn revivals(down: &[(Party, bool)], place: Place) -> Vec<Fault> {
     down.iter().map(back).collect()
 }
 
-/// The faults that a step at `place` is; nothing for waiting. `parties` are all of the cluster.
-pub(crate) fn faults(step: Step, place: Place, parties: &[Party], period: Duration) -> Vec<Fault> {
-    let fault = |place: Place, party, action| Fault {
+/// The faults that a step at `place` is; nothing for waiting. `members` are all of the cluster.
+pub(crate) fn faults(step: Step, place: Place, members: &[Member], period: Duration) -> Vec<Fault> {
+    let fault = |place: Place, member, action| Fault {
         at_cycle: place.cycle,
         phase: place.phase(),
-        party,
+        member,
         action,
     };
-    let for_a_slot = |party, during, after| {
+    let for_a_slot = |member, during, after| {
         vec![
-            fault(place, party, during),
-            fault(place.next(), party, after),
+            fault(place, member, during),
+            fault(place.next(), member, after),
         ]
     };
     match step {
         Step::Lose { from, to } => for_a_slot(from, Action::Cut { to }, Action::Heal { to }),
         Step::Mute { from } => {
-            let others = parties.iter().filter(|&&other| other != from);
+            let others = members.iter().filter(|&&other| other != from);
             others
                 .flat_map(|&to| for_a_slot(from, Action::Cut { to }, Action::Heal { to }))
                 .collect()
@@ -138,10 +138,10 @@ pub(crate) fn faults(step: Step, place: Place, parties: &[Party], period: Durati
             for_a_slot(from, late, Action::Delay { to, by: on_time })
         }
         Step::Twice { from } => vec![fault(place, from, Action::Replay { age: 1 })],
-        Step::Crash(party) => vec![fault(place, party, Action::Crash)],
-        Step::Restart(party) => vec![fault(place, party, Action::Restart)],
-        Step::Stop(party) => vec![fault(place, party, Action::Stop)],
-        Step::Continue(party) => vec![fault(place, party, Action::Continue)],
+        Step::Crash(member) => vec![fault(place, member, Action::Crash)],
+        Step::Restart(member) => vec![fault(place, member, Action::Restart)],
+        Step::Stop(member) => vec![fault(place, member, Action::Stop)],
+        Step::Continue(member) => vec![fault(place, member, Action::Continue)],
         Step::Wait => Vec::new(),
     }
 }

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use stateright::Property as Checked;
 use understudy_simulator::{Fault, Network, NotReady, Parts, Simulation};
-use understudy_wire::{Party, ProgramId, StationId};
+use understudy_wire::{Member, ProgramId, StationId};
 
 use crate::properties::{Property, RECOVERY_CYCLES};
 use crate::start::Start;
@@ -20,7 +20,7 @@ pub struct Model {
     /// Where nothing has been done yet that the start asks for.
     origin: Simulation,
     pub(crate) start: Start,
-    pub(crate) parties: Vec<Party>,
+    pub(crate) members: Vec<Member>,
     period: Duration,
     pub(crate) budget: Budget,
     properties: Vec<Property>,
@@ -34,9 +34,9 @@ pub struct World {
     /// What has been done so far.
     pub(crate) used: Budget,
     /// Who is down, and whether it has crashed.
-    pub(crate) down: Vec<(Party, bool)>,
+    pub(crate) down: Vec<(Member, bool)>,
     /// Who has been down.
-    pub(crate) was_down: Vec<Party>,
+    pub(crate) was_down: Vec<Member>,
     /// The last step since the slot began: things that are done at one time are done in one order only.
     last: Option<Step>,
 }
@@ -52,17 +52,17 @@ impl Model {
         budget: Budget,
         properties: &[Property],
     ) -> Result<Self, NotReady> {
-        let stations = (0..parts.stations.len()).map(|rank| Party::Station(StationId(rank as u8)));
+        let stations = (0..parts.stations.len()).map(|rank| Member::Station(StationId(rank as u8)));
         let programs = 0..parts.remote_ios.len();
-        let remote_ios = programs.map(|program| Party::RemoteIo(ProgramId(program as u8)));
-        let parties = stations.chain(remote_ios).collect();
+        let remote_ios = programs.map(|program| Member::RemoteIo(ProgramId(program as u8)));
+        let members = stations.chain(remote_ios).collect();
         let period = parts.stations[0].agreement.schedule.period();
         let mut origin = Simulation::new(parts, Self::network(period), 0);
         origin.run(1, PATIENCE_CYCLES, &mut |_, _, _, _| {})?;
         Ok(Self {
             origin,
             start,
-            parties,
+            members,
             period,
             budget,
             properties: properties.to_vec(),
@@ -95,16 +95,16 @@ impl Model {
     pub fn faults(&self, steps: &[Step]) -> Vec<Fault> {
         let mut place = self.first();
         let mut all = self.start.faults();
-        let mut down: Vec<(Party, bool)> = Vec::new();
+        let mut down: Vec<(Member, bool)> = Vec::new();
         for &step in steps {
-            all.extend(faults(step, place, &self.parties, self.period));
+            all.extend(faults(step, place, &self.members, self.period));
             match step {
                 Step::Wait => place = place.next(),
-                Step::Crash(party) | Step::Stop(party) => {
-                    down.push((party, matches!(step, Step::Crash(_))));
+                Step::Crash(member) | Step::Stop(member) => {
+                    down.push((member, matches!(step, Step::Crash(_))));
                 }
-                Step::Restart(party) | Step::Continue(party) => {
-                    down.retain(|&(other, _)| other != party);
+                Step::Restart(member) | Step::Continue(member) => {
+                    down.retain(|&(other, _)| other != member);
                 }
                 _ => {}
             }
@@ -126,14 +126,14 @@ impl Model {
         self.first().cycle + self.budget.cycles
     }
 
-    /// Parties that send anything in the slot that begins here if nothing is done.
-    fn senders(&self, world: &World) -> Vec<Party> {
+    /// Members that send anything in the slot that begins here if nothing is done.
+    fn senders(&self, world: &World) -> Vec<Member> {
         let mut ahead = world.simulation.clone();
         let next = world.place.next();
         ahead.go_to(next.cycle, next.phase(), &mut |_, _, _, _| {});
         let sends =
-            |party: &&Party| ahead.sent_frames(**party) > world.simulation.sent_frames(**party);
-        self.parties.iter().filter(sends).copied().collect()
+            |member: &&Member| ahead.sent_frames(**member) > world.simulation.sent_frames(**member);
+        self.members.iter().filter(sends).copied().collect()
     }
 }
 
@@ -166,7 +166,7 @@ impl stateright::Model for Model {
             place,
             used: Budget::default(),
             down: Vec::new(),
-            was_down: self.start.parties().collect(),
+            was_down: self.start.members().collect(),
             last: None,
         }]
     }
@@ -176,18 +176,18 @@ impl stateright::Model for Model {
         if world.place.cycle >= self.last_cycle() {
             return;
         }
-        let is_down = |party: Party| world.down.iter().any(|&(down, _)| down == party);
-        for &(party, crashed) in &world.down {
+        let is_down = |member: Member| world.down.iter().any(|&(down, _)| down == member);
+        for &(member, crashed) in &world.down {
             steps.push(if crashed {
-                Step::Restart(party)
+                Step::Restart(member)
             } else {
-                Step::Continue(party)
+                Step::Continue(member)
             });
         }
         if used.total < budget.total {
             let senders = self.senders(world);
             for &from in &senders {
-                for &to in self.parties.iter().filter(|&&to| to != from) {
+                for &to in self.members.iter().filter(|&&to| to != from) {
                     if used.losses < budget.losses {
                         steps.push(Step::Lose { from, to });
                     }
@@ -204,14 +204,14 @@ impl stateright::Model for Model {
                 }
             }
             if used.duplicates < budget.duplicates {
-                steps.extend(self.parties.iter().map(|&from| Step::Twice { from }));
+                steps.extend(self.members.iter().map(|&from| Step::Twice { from }));
             }
-            for &party in self.parties.iter().filter(|&&party| !is_down(party)) {
+            for &member in self.members.iter().filter(|&&member| !is_down(member)) {
                 if used.crashes < budget.crashes {
-                    steps.push(Step::Crash(party));
+                    steps.push(Step::Crash(member));
                 }
                 if used.stops < budget.stops {
-                    steps.push(Step::Stop(party));
+                    steps.push(Step::Stop(member));
                 }
             }
         }
@@ -223,16 +223,16 @@ impl stateright::Model for Model {
         let mut next = world.clone();
         next.spend(step);
         next.last = Some(step);
-        for fault in faults(step, world.place, &self.parties, self.period) {
+        for fault in faults(step, world.place, &self.members, self.period) {
             next.simulation.schedule(fault);
         }
         match step {
-            Step::Crash(party) | Step::Stop(party) => {
-                next.down.push((party, matches!(step, Step::Crash(_))));
-                next.was_down.push(party);
+            Step::Crash(member) | Step::Stop(member) => {
+                next.down.push((member, matches!(step, Step::Crash(_))));
+                next.was_down.push(member);
             }
-            Step::Restart(party) | Step::Continue(party) => {
-                next.down.retain(|&(down, _)| down != party);
+            Step::Restart(member) | Step::Continue(member) => {
+                next.down.retain(|&(down, _)| down != member);
             }
             Step::Wait => {
                 next.last = None;

@@ -1,6 +1,6 @@
 //! Networks that misbehave on purpose.
 //!
-//! [`Proxy`] stands between a party and its peer, over UDP or TCP, and loses, delays, doubles, reorders, changes and slows down
+//! [`Proxy`] stands between a member and its peer, over UDP or TCP, and loses, delays, doubles, reorders, changes and slows down
 //! what passes, as an [`Impairment`] says. [`Hosts`] are network namespaces joined by a bridge, one for each host, whose links
 //! `nft` cuts and thins out. Neither knows anything of the cluster.
 

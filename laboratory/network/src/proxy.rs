@@ -1,4 +1,4 @@
-//! Stands between parties and their peers, and does to what passes what it was told.
+//! Stands between members and their peers, and does to what passes what it was told.
 //!
 //! ```text
 //!   client ──► listen │ route: forth ──► to      one socket towards `to` for each client, so that answers find back
@@ -206,7 +206,7 @@ impl Proxy {
         let thread = std::thread::Builder::new()
             .name("proxy".into())
             .spawn(move || {
-                run_before_parties();
+                run_before_members();
                 datagrams::carry(lanes, streams, &taken, &worker);
             })
             .map_err(NetworkError::system("a thread for the proxy"))?;
@@ -253,8 +253,8 @@ impl Drop for Proxy {
     }
 }
 
-/// A network does not wait for who uses it: before all parties of this machine, where the system grants it.
-fn run_before_parties() {
+/// A network does not wait for who uses it: before all members of this machine, where the system grants it.
+fn run_before_members() {
     let priority = ThreadPriorityValue::try_from(PRIORITY).map(ThreadPriority::Crossplatform);
     let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
     let set = priority.and_then(|priority| {

@@ -1,7 +1,7 @@
 //! What a plant reports, for the journal.
 
 use serde::{Deserialize, Serialize};
-use understudy_wire::{ConfigurationHash, Field, Image, Moment, Party};
+use understudy_wire::{ConfigurationHash, Field, Image, Member, Moment};
 
 /// One thing that happened to a plant.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -18,10 +18,10 @@ pub enum Event {
         /// What its sensors see afterwards, and what it has counted since its start.
         field: Field,
     },
-    /// A party of this cluster runs another configuration; its frames are dropped.
+    /// A member of this cluster runs another configuration; its frames are dropped.
     Refused {
         /// Who.
-        party: Party,
+        member: Member,
         /// Its configuration.
         theirs: ConfigurationHash,
         /// The configuration of this plant.

@@ -3,7 +3,7 @@
 //! Its inputs bear the names of the controller's outputs, its outputs those of the controller's inputs; a scan of it is one
 //! cycle of the plant. Besides, where they are declared: the input `part_arrives` is 1 for one scan for each part that the feeding
 //! plant hands over (parts that come together follow each other every other scan, so that each is an edge); the outputs `finished`, `handed_over` and
-//! `mishap` are counted at their rising edges. Without `finished`, what is handed over counts as finished.
+//! `plant_fault` are counted at their rising edges. Without `finished`, what is handed over counts as finished.
 
 use std::hash::{Hash, Hasher};
 
@@ -16,7 +16,7 @@ use crate::model::{Counts, Model};
 pub(crate) const PART_ARRIVES: &str = "part_arrives";
 pub(crate) const FINISHED: &str = "finished";
 pub(crate) const HANDED_OVER: &str = "handed_over";
-pub(crate) const MISHAP: &str = "mishap";
+pub(crate) const PLANT_FAULT: &str = "plant_fault";
 
 /// The inputs that the controller drives: all but `part_arrives`.
 pub(crate) fn actuators(circuit: &Circuit) -> Vec<String> {
@@ -31,7 +31,7 @@ pub(crate) fn actuators(circuit: &Circuit) -> Vec<String> {
 pub(crate) fn sensors(circuit: &Circuit) -> Vec<String> {
     let names = circuit.outputs().iter().map(|output| &output.name);
     names
-        .filter(|name| ![FINISHED, HANDED_OVER, MISHAP].contains(&name.as_str()))
+        .filter(|name| ![FINISHED, HANDED_OVER, PLANT_FAULT].contains(&name.as_str()))
         .cloned()
         .collect()
 }
@@ -51,14 +51,14 @@ pub(crate) struct LadderModel {
     queue: u64,
     finished: Counter,
     handed_over: Counter,
-    mishap: Counter,
+    plant_fault: Counter,
 }
 
 /// Two of one program that hash alike go on alike.
 impl Hash for LadderModel {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
         (&self.state, &self.inputs, &self.outputs, self.queue).hash(hasher);
-        (&self.finished, &self.handed_over, &self.mishap).hash(hasher);
+        (&self.finished, &self.handed_over, &self.plant_fault).hash(hasher);
     }
 }
 
@@ -111,7 +111,7 @@ impl LadderModel {
             let places = names.enumerate().filter(|(_, name)| kept(name));
             places.map(|(place, _)| place).collect::<Vec<_>>()
         };
-        let counted = [FINISHED, HANDED_OVER, MISHAP];
+        let counted = [FINISHED, HANDED_OVER, PLANT_FAULT];
         Self {
             actuator_places: places(&|name| name != PART_ARRIVES, &mut circuit.inputs().iter()),
             sensor_places: places(
@@ -125,7 +125,7 @@ impl LadderModel {
             queue: 0,
             finished: Counter::of(circuit, FINISHED, &outputs),
             handed_over: Counter::of(circuit, HANDED_OVER, &outputs),
-            mishap: Counter::of(circuit, MISHAP, &outputs),
+            plant_fault: Counter::of(circuit, PLANT_FAULT, &outputs),
             scan,
             scratch,
             state,
@@ -152,7 +152,11 @@ impl Model for LadderModel {
             self.inputs.words(),
             self.outputs.words_mut(),
         );
-        for counter in [&mut self.finished, &mut self.handed_over, &mut self.mishap] {
+        for counter in [
+            &mut self.finished,
+            &mut self.handed_over,
+            &mut self.plant_fault,
+        ] {
             counter.see(&self.outputs);
         }
     }
@@ -171,7 +175,7 @@ impl Model for LadderModel {
                 Some(_) => self.finished.count,
                 None => handed_over,
             },
-            mishaps: self.mishap.count,
+            plant_faults: self.plant_fault.count,
         }
     }
 

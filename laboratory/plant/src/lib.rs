@@ -1,4 +1,4 @@
-//! Small models of plants for the laboratory, and a plant as a party of its own.
+//! Small models of plants for the laboratory, and a plant as a member of its own.
 //!
 //! A [`Plant`] is stepped once a cycle with y(i) and shows u(i): it closes the loop of (1)-(2) through the outside. Invariant:
 //! a model sees and moves signals only by name, through the [`Signals`] that bind its terminals to the inputs and outputs of
@@ -9,7 +9,7 @@
 //! what another plant shows ([`Followed`]), such as the pilot flame that the main burner stands in.
 //!
 //! Counts ([`understudy_wire::Field`]) are all that a verdict needs: a plant is functional while `finished` grows, and nothing
-//! may ever be counted in `mishaps`.
+//! may ever be counted in `plant faults`.
 
 mod binding;
 mod event;

@@ -1,4 +1,4 @@
-//! A plant as a party of its own.
+//! A plant as a member of its own.
 //!
 //! ```text
 //!            ┌── each period: say the field ──┐
@@ -23,8 +23,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_wire::{
-    Admission, Agreement, Body, Field, Frame, Header, Image, Input, Machine, Moment, Output, Party,
-    ProgramId, Reception, Time,
+    Admission, Agreement, Body, Field, Frame, Header, Image, Input, Machine, Member, Moment,
+    Output, ProgramId, Reception, Time,
 };
 
 use crate::event::{Event, Pace};
@@ -109,7 +109,7 @@ impl PlantMachine {
             wakeup: now,
             feed: Feed::default(),
             hearings: vec![Hearing::default(); settings.follows.len()],
-            reception: Reception::new(Party::Plant(settings.program), &settings.agreement),
+            reception: Reception::new(Member::Plant(settings.program), &settings.agreement),
             settings,
             said: VecDeque::new(),
         }
@@ -136,7 +136,7 @@ impl PlantMachine {
             Admission::Admitted => {}
             Admission::Refused { theirs } => {
                 self.said.push_back(Output::Report(Event::Refused {
-                    party: header.sender,
+                    member: header.sender,
                     theirs,
                     ours: self.settings.agreement.configuration,
                 }));
@@ -145,12 +145,12 @@ impl PlantMachine {
             Admission::Dropped => return,
         }
         match (&frame.body, header.sender) {
-            (Body::Actuation(actuation), Party::RemoteIo(program))
+            (Body::Actuation(actuation), Member::RemoteIo(program))
                 if program == self.settings.program =>
             {
                 self.drive(now, header, &actuation.outputs);
             }
-            (Body::Field(field), Party::Plant(program)) => {
+            (Body::Field(field), Member::Plant(program)) => {
                 if Some(program) == self.settings.fed_by {
                     self.feed.hear(header.moment, field.handed_over);
                 }
@@ -226,7 +226,7 @@ impl PlantMachine {
                 cluster: agreement.cluster,
                 configuration: agreement.configuration,
                 moment,
-                sender: Party::Plant(self.settings.program),
+                sender: Member::Plant(self.settings.program),
                 alone: false,
             },
             body: Body::Field(field),

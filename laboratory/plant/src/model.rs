@@ -31,7 +31,7 @@ pub(crate) trait Model {
 pub(crate) struct Counts {
     pub(crate) handed_over: u64,
     pub(crate) finished: u64,
-    pub(crate) mishaps: u64,
+    pub(crate) plant_faults: u64,
 }
 
 /// Which model, with all that it needs.
@@ -251,7 +251,7 @@ impl Plant {
             sensors,
             handed_over: counts.handed_over,
             finished: counts.finished,
-            mishaps: counts.mishaps,
+            plant_faults: counts.plant_faults,
             positions: model.positions(),
         }
     }

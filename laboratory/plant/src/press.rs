@@ -1,6 +1,6 @@
 //! The press of section V: a ram that presses the part that lies under it.
 //!
-//! A part is finished, counted and taken away when the ram has gone down on it and has come back up. Mishap: a part that
+//! A part is finished, counted and taken away when the ram has gone down on it and has come back up. Plant fault: a part that
 //! arrives while another lies there, or while the ram is more than a step from up; such a part is lost.
 
 use serde::{Deserialize, Serialize};
@@ -72,7 +72,7 @@ impl Press {
         if fits == 1 {
             self.part = Some(Part::Raw);
         }
-        self.counts.mishaps += parts - fits;
+        self.counts.plant_faults += parts - fits;
     }
 }
 

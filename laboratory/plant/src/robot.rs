@@ -6,7 +6,7 @@
 //!   pick place                          where it hands over
 //! ```
 //!
-//! Driving an axis against its end stop is harmless, as is driving it both ways at once. Mishaps: moving sideways while not up, and
+//! Driving an axis against its end stop is harmless, as is driving it both ways at once. plant faults: moving sideways while not up, and
 //! opening the gripper with a part anywhere but at the two places below. A step short of an end is near enough for both: an output
 //! that is held for a cycle moves an axis a little further, and breaks nothing.
 
@@ -114,7 +114,7 @@ impl Robot {
         let sideways =
             self.horizontal != before && self.vertical > tolerance(self.parameters.vertical_cycles);
         if sideways && !self.sideways_while_low {
-            self.counts.mishaps += 1;
+            self.counts.plant_faults += 1;
         }
         self.sideways_while_low = sideways;
         self.vertical = moved(self.vertical, down, up, self.parameters.vertical_cycles);
@@ -134,7 +134,7 @@ impl Robot {
             } else if at_pick_place && self.is_low() && !self.part_at_pick_place {
                 self.part_at_pick_place = true;
             } else {
-                self.counts.mishaps += 1;
+                self.counts.plant_faults += 1;
             }
         }
         self.closed = closed;

@@ -167,8 +167,8 @@ fn run(reading: Reading, cycles: usize) -> (Field, Field) {
 #[test]
 fn the_working_reading_finishes_six_parts_in_300_cycles() {
     let (arm, ram) = run(Reading::Working, 300);
-    assert_eq!((arm.handed_over, arm.finished, arm.mishaps), (6, 6, 0));
-    assert_eq!((ram.finished, ram.mishaps), (6, 0));
+    assert_eq!((arm.handed_over, arm.finished, arm.plant_faults), (6, 6, 0));
+    assert_eq!((ram.finished, ram.plant_faults), (6, 0));
 }
 
 /// Whichever cycle it is, and whether the samples of the held cycles are scanned or lost: outputs that are held for one or two
@@ -200,10 +200,10 @@ fn outputs_that_are_held_for_two_cycles_break_nothing() {
                 let arrived = robot.field.handed_over - before;
                 step(&mut press, arrived, 2);
             }
-            let mishaps = (robot.field.mishaps, press.field.mishaps);
+            let plant_faults = (robot.field.plant_faults, press.field.plant_faults);
             let finished = press.field.finished;
-            if mishaps != (0, 0) || finished < 5 {
-                broken.push((begin, length, scanned, holds, mishaps, finished));
+            if plant_faults != (0, 0) || finished < 5 {
+                broken.push((begin, length, scanned, holds, plant_faults, finished));
             }
         }
     }
@@ -221,7 +221,7 @@ fn outputs(names: &[&str]) -> Image {
 }
 
 /// Drives the arm by hand: each entry is what is on, and for how many cycles.
-fn check_arm(script: &[(&[&str], usize)], handed_over: u64, mishaps: u64) {
+fn check_arm(script: &[(&[&str], usize)], handed_over: u64, plant_faults: u64) {
     let kind = ModelKind::Robot(RobotParameters::default());
     let (plant, _) = Plant::new(&kind, &robot(Reading::Working), &Signals::new(), false);
     let mut plant = plant.expect("it fits");
@@ -231,7 +231,10 @@ fn check_arm(script: &[(&[&str], usize)], handed_over: u64, mishaps: u64) {
         }
     }
     let field = plant.field();
-    assert_eq!((field.handed_over, field.mishaps), (handed_over, mishaps));
+    assert_eq!(
+        (field.handed_over, field.plant_faults),
+        (handed_over, plant_faults)
+    );
 }
 
 #[test]
@@ -253,7 +256,7 @@ fn the_arm_knows_what_must_not_happen() {
     check_arm(&[down, take, lift, carry, above, release], 0, 1);
     // Put back where it was.
     check_arm(&[down, take, release, take, lift], 0, 0);
-    // Sideways while low is one mishap, however long it lasts.
+    // Sideways while low is one plant fault, however long it lasts.
     check_arm(&[down, (&["move_right"], 7)], 0, 1);
     // Against the ends, and both ways at once.
     check_arm(
@@ -269,16 +272,16 @@ fn the_arm_knows_what_must_not_happen() {
 }
 
 #[test]
-fn a_part_on_an_occupied_press_or_under_its_ram_is_a_mishap() {
+fn a_part_on_an_occupied_press_or_under_its_ram_is_a_plant_fault() {
     let kind = ModelKind::Press(PressParameters::default());
     let (plant, _) = Plant::new(&kind, &press(), &Signals::new(), true);
     let mut plant = plant.expect("it fits");
     let still = Image::zero(2);
     let down = Image::from_bits([true, false]);
-    assert_eq!(plant.step(&still, 1).mishaps, 0);
-    assert_eq!(plant.step(&still, 1).mishaps, 1);
+    assert_eq!(plant.step(&still, 1).plant_faults, 0);
+    assert_eq!(plant.step(&still, 1).plant_faults, 1);
     plant.step(&down, 0);
-    assert_eq!(plant.step(&down, 2).mishaps, 3);
+    assert_eq!(plant.step(&down, 2).plant_faults, 3);
 }
 
 proptest! {
@@ -298,7 +301,7 @@ proptest! {
             prop_assert!(seen.handed_over - handed_over <= 1);
             let pressed = ram.step(&Image::from_bits([byte & 32 != 0, byte & 64 != 0]), seen.handed_over - handed_over);
             prop_assert!(pressed.finished >= finished);
-            prop_assert!(pressed.finished + pressed.mishaps <= seen.handed_over);
+            prop_assert!(pressed.finished + pressed.plant_faults <= seen.handed_over);
             prop_assert!(!(seen.sensors.get(1) && seen.sensors.get(2)));
             prop_assert!(!(seen.sensors.get(3) && seen.sensors.get(4)));
             prop_assert!(seen.positions.iter().chain(&pressed.positions).all(|&position| position <= 1000));

@@ -11,7 +11,7 @@ use understudy_plant::{
 };
 use understudy_wire::{
     Actuation, Agreement, Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Field, Frame, Header,
-    Image, Input, Machine, Mode, Moment, Output, Party, ProgramId, Schedule, Time,
+    Image, Input, Machine, Member, Mode, Moment, Output, ProgramId, Schedule, Time,
 };
 
 const PERIOD: Duration = Duration::from_millis(10);
@@ -113,7 +113,7 @@ fn machine() -> PlantMachine {
     )
 }
 
-fn frame(epoch: u64, cycle: u64, sender: Party, body: Body) -> Arc<Frame> {
+fn frame(epoch: u64, cycle: u64, sender: Member, body: Body) -> Arc<Frame> {
     let header = Header {
         cluster: ClusterHash(1),
         configuration: ConfigurationHash(2),
@@ -132,17 +132,17 @@ fn shows(epoch: u64, cycle: u64, sender: ProgramId, flame: bool) -> Arc<Frame> {
         sensors: Image::from_bits([!flame, true, flame]),
         handed_over: 0,
         finished: 0,
-        mishaps: 0,
+        plant_faults: 0,
         positions: Default::default(),
     });
-    frame(epoch, cycle, Party::Plant(sender), body)
+    frame(epoch, cycle, Member::Plant(sender), body)
 }
 
 /// Opens the gas in this cycle: whether it burns.
 fn burns(machine: &mut PlantMachine, cycle: u64) -> bool {
     let outputs = Image::from_bits([true]);
     let body = Body::Actuation(Actuation { outputs });
-    let actuation = frame(9, cycle, Party::RemoteIo(OWN), body);
+    let actuation = frame(9, cycle, Member::RemoteIo(OWN), body);
     let now = Time(0) + PERIOD * cycle as u32;
     machine.handle_input(now, Input::Frame(&actuation));
     let mut burns = None;

@@ -1,4 +1,4 @@
-//! The plant as a party: paced by its remote I/O, by time where that is silent, fed by another plant over a lossy network.
+//! The plant as a member: paced by its remote I/O, by time where that is silent, fed by another plant over a lossy network.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -10,7 +10,7 @@ use understudy_plant::{
 };
 use understudy_wire::{
     Actuation, Agreement, Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Field, Frame, Header,
-    Image, Input, Machine, Mode, Moment, Output, Party, ProgramId, Schedule, Time, decode, encode,
+    Image, Input, Machine, Member, Mode, Moment, Output, ProgramId, Schedule, Time, decode, encode,
 };
 
 const PERIOD: Duration = Duration::from_millis(10);
@@ -63,7 +63,7 @@ fn at(cycle: u64) -> Moment {
     }
 }
 
-fn frame(moment: Moment, sender: Party, body: Body) -> Arc<Frame> {
+fn frame(moment: Moment, sender: Member, body: Body) -> Arc<Frame> {
     let header = Header {
         cluster: ClusterHash(1),
         configuration: ConfigurationHash(2),
@@ -78,7 +78,7 @@ fn actuation(cycle: u64, down: bool) -> Arc<Frame> {
     let outputs = Image::from_bits([down, false]);
     frame(
         at(cycle),
-        Party::RemoteIo(PRESS),
+        Member::RemoteIo(PRESS),
         Body::Actuation(Actuation { outputs }),
     )
 }
@@ -86,12 +86,12 @@ fn actuation(cycle: u64, down: bool) -> Arc<Frame> {
 fn feeder(moment: Moment, handed_over: u64) -> Arc<Frame> {
     frame(
         moment,
-        Party::Plant(FEEDER),
+        Member::Plant(FEEDER),
         Body::Field(Field {
             sensors: Image::zero(0),
             handed_over,
             finished: 0,
-            mishaps: 0,
+            plant_faults: 0,
             positions: Default::default(),
         }),
     )
@@ -213,7 +213,7 @@ fn check_feed(frames: &[(u64, u64)], expected: u64) {
         );
     }
     let field = machine.field();
-    let seen = u64::from(field.sensors.get(0)) + field.mishaps;
+    let seen = u64::from(field.sensors.get(0)) + field.plant_faults;
     assert_eq!(seen, expected, "{frames:?}");
 }
 
@@ -249,7 +249,7 @@ fn another_configuration_is_refused_once_and_another_cluster_without_a_word() {
     assert_eq!(hear(&mut machine, periods(1), &Arc::new(foreign)), []);
     let stranger = frame(
         at(1),
-        Party::RemoteIo(FEEDER),
+        Member::RemoteIo(FEEDER),
         Body::Actuation(Actuation {
             outputs: Image::from_bits([true, false]),
         }),
@@ -308,7 +308,7 @@ fn a_program_can_be_a_plant() {
     }
     tank.output("full", below);
     tank.output("handed_over", below);
-    tank.output("mishap", arrives);
+    tank.output("plant_fault", arrives);
     let tank = tank.finish().expect("a circuit");
 
     let kind = ModelKind::Ladder(Box::new(tank));
@@ -331,9 +331,9 @@ fn a_program_can_be_a_plant() {
     assert_eq!((plant.field().finished, plant.field().handed_over), (1, 1));
     plant.step(&off, 0);
     plant.step(&off, 2);
-    assert_eq!(plant.field().mishaps, 1);
+    assert_eq!(plant.field().plant_faults, 1);
     plant.step(&off, 0);
-    assert_eq!(plant.step(&off, 0).mishaps, 2, "each part is an edge");
+    assert_eq!(plant.step(&off, 0).plant_faults, 2, "each part is an edge");
 }
 
 #[test]

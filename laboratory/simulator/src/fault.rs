@@ -1,24 +1,24 @@
-//! What is done to a party, and when.
+//! What is done to a member, and when.
 
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
-use understudy_wire::{Party, ProgramId, StateChoice};
+use understudy_wire::{Member, ProgramId, StateChoice};
 
-/// One thing done to one party.
+/// One thing done to one member.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Fault {
-    /// The cycle, counted from the first in which everybody was in step.
+    /// The cycle, counted from the first in which everybody was synchronised.
     pub at_cycle: u64,
     /// Where in that cycle, from 0 (its start) to below 1 (the start of the next).
     pub phase: f64,
     /// To whom.
-    pub party: Party,
+    pub member: Member,
     /// What.
     pub action: Action,
 }
 
-/// What can be done to a party. What does not concern a party (a state that it does not hold) does nothing.
+/// What can be done to a member. What does not concern a member (a state that it does not hold) does nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Action {
@@ -50,20 +50,20 @@ pub enum Action {
         /// Which.
         choice: StateChoice,
     },
-    /// Its frames reach one other party no more. A full cut is one each way; a partition is one for each pair.
+    /// Its frames reach one other member no more. A full cut is one each way; a partition is one for each pair.
     Cut {
         /// Who hears it no more.
-        to: Party,
+        to: Member,
     },
-    /// Its frames reach that party again.
+    /// Its frames reach that member again.
     Heal {
         /// Who hears it again.
-        to: Party,
+        to: Member,
     },
-    /// Its frames reach one other party so much later from now on, and are overtaken by later ones of others; zero ends this.
+    /// Its frames reach one other member so much later from now on, and are overtaken by later ones of others; zero ends this.
     Delay {
         /// Who hears it later.
-        to: Party,
+        to: Member,
         /// By this.
         by: Duration,
     },

@@ -11,7 +11,7 @@ use std::time::Duration;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use understudy_wire::{
-    Body, Frame, Image, Party, ProgramSet, StationId, StationSet, Time, decode, encode,
+    Body, Frame, Image, Member, ProgramSet, StationId, StationSet, Time, decode, encode,
 };
 
 use crate::fault::Action;
@@ -19,7 +19,7 @@ use crate::network::{Disturbance, Network};
 use crate::queue::{Delivery, Queue};
 use crate::stranger::forged;
 
-/// Frames of each party that can be said again, at most; older ones are forgotten. The last one is always remembered.
+/// Frames of each member that can be said again, at most; older ones are forgotten. The last one is always remembered.
 const REMEMBERED: usize = 1024;
 
 /// All links of a cluster.
@@ -37,7 +37,7 @@ pub(crate) struct Links {
     senders: Vec<Sender>,
     /// By rank: what flips in the next samples that a station takes in.
     intakes: Vec<Flips>,
-    /// By place: how much later a party hears.
+    /// By place: how much later a member hears.
     late: Vec<Duration>,
     anybody_late: bool,
     remembers: bool,
@@ -107,21 +107,21 @@ impl Links {
         }
     }
 
-    /// Frames that a party has sent so far; none for one that is not of the cluster.
-    pub(crate) fn sent(&self, party: Party) -> u64 {
-        self.place(party)
+    /// Frames that a member has sent so far; none for one that is not of the cluster.
+    pub(crate) fn sent(&self, member: Member) -> u64 {
+        self.place(member)
             .map_or(0, |place| self.senders[place].frames)
     }
 
-    /// Whether frames of one party reach another one, and on time.
-    pub(crate) fn reaches(&self, from: Party, to: Party) -> bool {
+    /// Whether frames of one member reach another one, and on time.
+    pub(crate) fn reaches(&self, from: Member, to: Member) -> bool {
         let (Some(sender), Some(receiver)) = (self.place(from), self.place(to)) else {
             return false;
         };
         let deaf = match to {
-            Party::Station(station) => self.senders[sender].deaf_stations.contains(station),
-            Party::RemoteIo(program) => self.senders[sender].deaf_remote_ios.contains(program),
-            Party::Plant(_) => true,
+            Member::Station(station) => self.senders[sender].deaf_stations.contains(station),
+            Member::RemoteIo(program) => self.senders[sender].deaf_remote_ios.contains(program),
+            Member::Plant(_) => true,
         };
         let delays = &self.senders[sender].delays;
         let late = delays.iter().any(|(place, _)| *place == receiver);
@@ -166,9 +166,9 @@ impl Links {
         self.disturbance = Some(disturbance);
     }
 
-    /// Does what concerns the links of `party`.
-    pub(crate) fn disturb(&mut self, now: Time, party: Party, action: Action) {
-        let Some(place) = self.place(party) else {
+    /// Does what concerns the links of `member`.
+    pub(crate) fn disturb(&mut self, now: Time, member: Member, action: Action) {
+        let Some(place) = self.place(member) else {
             return;
         };
         match action {
@@ -176,11 +176,11 @@ impl Links {
                 let sender = &mut self.senders[place];
                 let cut = matches!(action, Action::Cut { .. });
                 match to {
-                    Party::Station(station) if cut => sender.deaf_stations.insert(station),
-                    Party::Station(station) => sender.deaf_stations.remove(station),
-                    Party::RemoteIo(program) if cut => sender.deaf_remote_ios.insert(program),
-                    Party::RemoteIo(program) => sender.deaf_remote_ios.remove(program),
-                    Party::Plant(_) => {}
+                    Member::Station(station) if cut => sender.deaf_stations.insert(station),
+                    Member::Station(station) => sender.deaf_stations.remove(station),
+                    Member::RemoteIo(program) if cut => sender.deaf_remote_ios.insert(program),
+                    Member::RemoteIo(program) => sender.deaf_remote_ios.remove(program),
+                    Member::Plant(_) => {}
                 }
             }
             Action::Delay { to, by } => {
@@ -197,8 +197,8 @@ impl Links {
             Action::Corrupt { frames } => self.senders[place].corrupt = frames,
             Action::FlipSample { bit, frames } => {
                 let flips = Flips { bit, frames };
-                match party {
-                    Party::Station(station) => self.intakes[station.index()] = flips,
+                match member {
+                    Member::Station(station) => self.intakes[station.index()] = flips,
                     _ => self.senders[place].samples = flips,
                 }
             }
@@ -255,17 +255,17 @@ impl Links {
         flips_it.then(|| flipped(frame, flips))
     }
 
-    fn place(&self, party: Party) -> Option<usize> {
-        match party {
-            Party::Station(station) => {
+    fn place(&self, member: Member) -> Option<usize> {
+        match member {
+            Member::Station(station) => {
                 let is_there = self.stations.contains(station);
                 is_there.then_some(station.index())
             }
-            Party::RemoteIo(program) => {
+            Member::RemoteIo(program) => {
                 let is_there = self.remote_ios.contains(program);
                 is_there.then(|| self.stations.len() + program.index())
             }
-            Party::Plant(_) => None,
+            Member::Plant(_) => None,
         }
     }
 
@@ -303,9 +303,9 @@ impl Links {
         let mut stations = self.stations.without(sender.deaf_stations);
         let mut remote_ios = self.remote_ios.without(sender.deaf_remote_ios);
         match frame.header.sender {
-            Party::Station(sender) => stations.remove(sender),
-            Party::RemoteIo(program) => remote_ios.remove(program),
-            Party::Plant(_) => {}
+            Member::Station(sender) => stations.remove(sender),
+            Member::RemoteIo(program) => remote_ios.remove(program),
+            Member::Plant(_) => {}
         }
         match &frame.body {
             Body::Sample(_) => remote_ios = ProgramSet::EMPTY,
@@ -317,7 +317,7 @@ impl Links {
         }
         if let Some(metered) = &mut self.metered {
             let mut bytes = Vec::new();
-            // What cannot be encoded is no frame of a party.
+            // What cannot be encoded is no frame of a member.
             let _ = encode(&frame, &mut bytes);
             let receivers = (stations.len() + remote_ios.len()) as u64;
             metered.frames += receivers;

@@ -1,4 +1,4 @@
-//! Cycles as a scenario counts them: from the first in which everybody was in step, whatever number the cluster gives it.
+//! Cycles as a scenario counts them: from the first in which everybody was synchronised, whatever number the cluster gives it.
 
 use std::time::Duration;
 
@@ -56,7 +56,7 @@ impl Pace {
         true
     }
 
-    /// When a cycle without a pacemaker has to be counted.
+    /// When a cycle without a cycle master has to be counted.
     pub(crate) fn overdue_at(&self) -> Time {
         self.started + self.period * 2
     }

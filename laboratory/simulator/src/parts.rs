@@ -4,7 +4,7 @@ use understudy_cluster::Cluster;
 use understudy_plant::{Followed, Plant};
 use understudy_wire::{Epoch, ProgramId, StationId};
 
-/// The settings of every party. Remote I/Os and plants are indexed by program.
+/// The settings of every member. Remote I/Os and plants are indexed by program.
 #[derive(Debug, Clone)]
 pub struct Parts {
     /// By rank.
@@ -19,7 +19,7 @@ pub struct Parts {
     pub follows: Vec<Vec<Followed>>,
 }
 
-/// The parties of a cluster; the simulation gives each station its own epoch.
+/// The members of a cluster; the simulation gives each station its own epoch.
 pub fn parts(cluster: &Cluster) -> Parts {
     let stations = 0..cluster.agreement().schedule.stations();
     let programs = (0..cluster.controllers().len()).map(|index| ProgramId(index as u8));

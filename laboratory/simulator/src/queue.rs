@@ -107,7 +107,9 @@ impl Hash for Queue {
 
 #[cfg(test)]
 mod tests {
-    use understudy_wire::{Body, ClusterHash, ConfigurationHash, Header, Moment, Party, StationId};
+    use understudy_wire::{
+        Body, ClusterHash, ConfigurationHash, Header, Member, Moment, StationId,
+    };
 
     use super::*;
 
@@ -119,7 +121,7 @@ mod tests {
                 cluster: ClusterHash(1),
                 configuration: ConfigurationHash(1),
                 moment: Moment::default(),
-                sender: Party::Station(StationId(0)),
+                sender: Member::Station(StationId(0)),
                 alone: false,
             },
             body: Body::Sync,

@@ -1,7 +1,7 @@
 //! The run itself: virtual time goes from one event to the next.
 //!
-//! Three kinds of events: a frame arrives, a party wakes, a fault is due. At equal times frames come first, then wake-ups by
-//! party, then faults, so that a run is a function of its parts, faults and seed.
+//! Three kinds of events: a frame arrives, a member wakes, a fault is due. At equal times frames come first, then wake-ups by
+//! member, then faults, so that a run is a function of its parts, faults and seed.
 
 mod disturbance;
 
@@ -13,7 +13,7 @@ use serde::Serialize;
 use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
 use understudy_wire::{
-    Epoch, Field, Frame, Input, Lineage, Machine, Output, Party, ProgramId, ProgramSet, Source,
+    Epoch, Field, Frame, Input, Lineage, Machine, Member, Output, ProgramId, ProgramSet, Source,
     StateChoice, StationId, StationSet, Time,
 };
 
@@ -45,12 +45,12 @@ pub enum Record<'a> {
 }
 
 /// Takes the records of a run: when in virtual time, in which cycle of the scenario (none before its cycle 0), who.
-pub type Observe<'a> = dyn FnMut(Time, Option<u64>, Party, Record<'_>) + 'a;
+pub type Observe<'a> = dyn FnMut(Time, Option<u64>, Member, Record<'_>) + 'a;
 
-/// The cluster did not come to a cycle in which everybody was in step.
+/// The cluster did not come to a cycle in which everybody was synchronised.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "after {cycles} cycles not everybody was in step; remote I/Os that were not driving directly: {waiting:?}"
+    "after {cycles} cycles not everybody was synchronised; remote I/Os that were not driving directly: {waiting:?}"
 )]
 pub struct NotReady {
     /// How long it was waited for.
@@ -70,7 +70,7 @@ pub struct Simulation {
     plants: Plants,
     referees: Vec<Referee>,
     tallies: Vec<Tally>,
-    /// For each remote I/O, whether its last deadline was direct and everybody spoke.
+    /// For each remote I/O, whether its last deadline was direct and everybody published.
     ready: ProgramSet,
     /// For each remote I/O, the stations of which frames arrived since its last deadline, in the cycle before that, and in the one before.
     arrived: Vec<[StationSet; 3]>,
@@ -83,7 +83,7 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// All parties start at time 0.
+    /// All members start at time 0.
     ///
     /// # Panics
     /// If the parts have no station or not one remote I/O and plant place a program.
@@ -138,9 +138,9 @@ impl Simulation {
         self.faults.insert(place, fault);
     }
 
-    /// Faults of `party` that were scheduled and are not done yet will not be done.
-    pub fn forget(&mut self, party: Party) {
-        self.faults.retain(|fault| fault.party != party);
+    /// Faults of `member` that were scheduled and are not done yet will not be done.
+    pub fn forget(&mut self, member: Member) {
+        self.faults.retain(|fault| fault.member != member);
     }
 
     /// From here on all chance comes from `seed`. A run on a quiet network has drawn nothing until its first fault.
@@ -154,11 +154,11 @@ impl Simulation {
     }
 
     /// Whether at its last deadline each remote I/O drove directly and heard everybody.
-    pub fn in_step(&self) -> bool {
+    pub fn synchronised(&self) -> bool {
         self.ready == ProgramSet::first(self.remote_ios.len())
     }
 
-    /// Runs until everybody is in step, and from there `cycles` cycles more.
+    /// Runs until everybody is synchronised, and from there `cycles` cycles more.
     ///
     /// # Errors
     /// [`NotReady`] where that state is not reached in `patience` cycles.
@@ -202,7 +202,7 @@ impl Simulation {
     ) -> Result<(), NotReady> {
         let all = ProgramSet::first(self.remote_ios.len());
         let give_up = self.now + self.period() * u32::try_from(patience).unwrap_or(u32::MAX);
-        while !self.in_step() {
+        while !self.synchronised() {
             if self.now >= give_up {
                 let waiting = all.without(self.ready);
                 return Err(NotReady {
@@ -245,7 +245,7 @@ impl Simulation {
         self.cycle_of(self.now)
     }
 
-    /// What each remote I/O did since everybody was in step, by program.
+    /// What each remote I/O did since everybody was synchronised, by program.
     pub fn tallies(&self) -> &[Tally] {
         &self.tallies
     }
@@ -270,7 +270,7 @@ impl Simulation {
             self.schedule(Fault {
                 at_cycle: 0,
                 phase: 0.0,
-                party: Party::RemoteIo(program),
+                member: Member::RemoteIo(program),
                 action: Action::Choose { choice },
             });
         }
@@ -286,9 +286,9 @@ impl Simulation {
         self.links.refused()
     }
 
-    /// Frames that a party has sent so far.
-    pub fn sent_frames(&self, party: Party) -> u64 {
-        self.links.sent(party)
+    /// Frames that a member has sent so far.
+    pub fn sent_frames(&self, member: Member) -> u64 {
+        self.links.sent(member)
     }
 
     /// Counts what is sent from here on, for [`Self::metered`].
@@ -335,16 +335,16 @@ impl Simulation {
         }
     }
 
-    fn next_wakeup(&self) -> (Time, Party) {
-        let mut next = (Time(u64::MAX), Party::Station(StationId(0)));
+    fn next_wakeup(&self) -> (Time, Member) {
+        let mut next = (Time(u64::MAX), Member::Station(StationId(0)));
         for (rank, slot) in self.stations.iter().enumerate() {
             if slot.due() < next.0 {
-                next = (slot.due(), Party::Station(StationId(rank as u8)));
+                next = (slot.due(), Member::Station(StationId(rank as u8)));
             }
         }
         for (program, slot) in self.remote_ios.iter().enumerate() {
             if slot.due() < next.0 {
-                next = (slot.due(), Party::RemoteIo(ProgramId(program as u8)));
+                next = (slot.due(), Member::RemoteIo(ProgramId(program as u8)));
             }
         }
         next
@@ -363,44 +363,44 @@ impl Simulation {
         for station in delivery.stations.iter() {
             let changed = self.links.take_in(station, &delivery.frame);
             let frame = changed.as_ref().unwrap_or(&delivery.frame);
-            self.give(Party::Station(station), Input::Frame(frame), observe);
+            self.give(Member::Station(station), Input::Frame(frame), observe);
         }
         for program in delivery.remote_ios.iter() {
             let is_running = self.remote_ios[program.index()].running().is_some();
-            if let (Party::Station(station), true) = (delivery.frame.header.sender, is_running) {
+            if let (Member::Station(station), true) = (delivery.frame.header.sender, is_running) {
                 self.arrived[program.index()][0].insert(station);
             }
             self.give(
-                Party::RemoteIo(program),
+                Member::RemoteIo(program),
                 Input::Frame(&delivery.frame),
                 observe,
             );
         }
     }
 
-    fn give(&mut self, party: Party, input: Input<'_>, observe: &mut Observe<'_>) {
-        match party {
-            Party::Station(station) => {
+    fn give(&mut self, member: Member, input: Input<'_>, observe: &mut Observe<'_>) {
+        match member {
+            Member::Station(station) => {
                 if self.stations[station.index()].give(self.now, input) {
                     self.drain_station(station, observe);
                 }
             }
-            Party::RemoteIo(program) => {
+            Member::RemoteIo(program) => {
                 if self.remote_ios[program.index()].give(self.now, input) {
                     self.drain_remote_io(program, observe);
                 }
             }
-            Party::Plant(_) => {}
+            Member::Plant(_) => {}
         }
     }
 
     fn drain_station(&mut self, station: StationId, observe: &mut Observe<'_>) {
-        let party = Party::Station(station);
+        let member = Member::Station(station);
         while let Some(output) = self.poll_station(station) {
             match output {
                 Output::Send(frame) => self.send(frame),
                 Output::Report(event) => {
-                    observe(self.now, self.pace.cycle(), party, Record::Station(&event));
+                    observe(self.now, self.pace.cycle(), member, Record::Station(&event));
                 }
                 Output::Drive(_) => {}
             }
@@ -413,21 +413,26 @@ impl Simulation {
     }
 
     fn drain_remote_io(&mut self, program: ProgramId, observe: &mut Observe<'_>) {
-        let party = Party::RemoteIo(program);
+        let member = Member::RemoteIo(program);
         while let Some(output) = self.poll_remote_io(program) {
             match output {
                 Output::Send(frame) => self.send(frame),
                 Output::Drive(outputs) => {
                     self.plants.drive(program, &outputs);
                     if let Some(field) = self.plants.field(program) {
-                        let plant = Party::Plant(program);
+                        let plant = Member::Plant(program);
                         observe(self.now, self.pace.cycle(), plant, Record::Plant(field));
                     }
                     self.show_field(program);
                 }
                 Output::Report(event) => {
                     self.judge(program, &event, observe);
-                    observe(self.now, self.pace.cycle(), party, Record::RemoteIo(&event));
+                    observe(
+                        self.now,
+                        self.pace.cycle(),
+                        member,
+                        Record::RemoteIo(&event),
+                    );
                 }
             }
         }
@@ -474,11 +479,11 @@ impl Simulation {
             found = Some(Violation::NeedlessColdStart { moment, station });
         }
         if let Some(violation) = found {
-            let party = Party::RemoteIo(program);
+            let member = Member::RemoteIo(program);
             observe(
                 self.now,
                 self.pace.cycle(),
-                party,
+                member,
                 Record::Violation(&violation),
             );
             self.violations.push(violation);
@@ -511,13 +516,13 @@ impl Simulation {
 
     /// The stations that run, that the remote I/O of a program can receive and that can receive it, with a state that its next sample could extend.
     fn holders(&self, program: ProgramId) -> StationSet {
-        let remote_io = Party::RemoteIo(program);
+        let remote_io = Member::RemoteIo(program);
         let Some(running) = self.remote_ios[program.index()].running() else {
             return StationSet::EMPTY;
         };
         let (own, referee) = (running.configuration(), &self.referees[program.index()]);
         let holds = |rank: u8, slot: &Slot<Station>| {
-            let station = Party::Station(StationId(rank));
+            let station = Member::Station(StationId(rank));
             let connected =
                 self.links.reaches(station, remote_io) && self.links.reaches(remote_io, station);
             let admitted = slot.running().filter(|it| it.configuration() == own);
@@ -566,7 +571,7 @@ impl Hash for Simulation {
             (
                 fault.at_cycle,
                 fault.phase.to_bits(),
-                fault.party,
+                fault.member,
                 fault.action,
             )
                 .hash(hasher);

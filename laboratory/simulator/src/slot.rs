@@ -1,4 +1,4 @@
-//! The place of one party: running, stopped, or crashed.
+//! The place of one member: running, stopped, or crashed.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use understudy_wire::{Frame, Input, Machine, Time};
 
-/// Frames that wait for a stopped party, at most, as in a socket's buffer; later ones are lost.
+/// Frames that wait for a stopped member, at most, as in a socket's buffer; later ones are lost.
 const WAITING_FRAMES: usize = 256;
 
 const NEVER: Time = Time(u64::MAX);
@@ -36,7 +36,7 @@ impl<M: Machine> Slot<M> {
         self.due
     }
 
-    /// Gives an input to a running party. True if it took it.
+    /// Gives an input to a running member. True if it took it.
     pub(crate) fn give(&mut self, now: Time, input: Input<'_>) -> bool {
         if self.stopped {
             if let Input::Frame(frame) = input
@@ -53,7 +53,7 @@ impl<M: Machine> Slot<M> {
         true
     }
 
-    /// The party, where it is neither stopped nor crashed.
+    /// The member, where it is neither stopped nor crashed.
     pub(crate) fn running(&self) -> Option<&M> {
         self.machine.as_ref().filter(|_| !self.stopped)
     }

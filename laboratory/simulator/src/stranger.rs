@@ -1,9 +1,9 @@
-//! A stranger on the network, who speaks in the name of a party and lacks its key.
+//! A stranger on the network, who speaks in the name of a member and lacks its key.
 
 use std::sync::Arc;
 
 use understudy_seal::{ClusterSecret, FrameKey, Opener, Seal, Title};
-use understudy_wire::{Body, Frame, Image, Party, StationId, encode};
+use understudy_wire::{Body, Frame, Image, Member, StationId, encode};
 
 /// What comes through the authenticator of whoever hears `frame` when a stranger sends it, changed to its liking.
 pub(crate) fn forged(frame: &Frame) -> Option<Arc<Frame>> {
@@ -17,18 +17,18 @@ pub(crate) fn forged(frame: &Frame) -> Option<Arc<Frame>> {
     let mut seal = Seal::new(sender, key(2, sender), 1, []);
     seal.seal(&forged, &encoded, &mut datagram).ok()?;
     let hearer = match sender {
-        Party::Station(StationId(0)) => Party::Station(StationId(1)),
-        _ => Party::Station(StationId(0)),
+        Member::Station(StationId(0)) => Member::Station(StationId(1)),
+        _ => Member::Station(StationId(0)),
     };
     let senders = [(sender, key(1, sender))];
     let mut opener = Opener::new(hearer, senders, [], Arc::default());
     opener.open(&mut datagram).ok().flatten().map(Arc::new)
 }
 
-fn key(secret: u8, sender: Party) -> FrameKey {
+fn key(secret: u8, sender: Member) -> FrameKey {
     ClusterSecret::new([secret; 32]).frame_key(Title {
         cluster: "simulated",
-        party: &format!("{sender:?}"),
+        member: &format!("{sender:?}"),
         generation: 1,
     })
 }
@@ -63,9 +63,9 @@ mod tests {
     #[test]
     fn no_stranger_is_heard() {
         for sender in [
-            Party::Station(StationId(0)),
-            Party::Station(StationId(2)),
-            Party::RemoteIo(ProgramId(0)),
+            Member::Station(StationId(0)),
+            Member::Station(StationId(2)),
+            Member::RemoteIo(ProgramId(0)),
         ] {
             let frame = Frame {
                 header: Header {

@@ -1,4 +1,4 @@
-//! Random faults over all parties and links: whatever happens, nothing wrong is driven, nobody is accused of a value fault that
+//! Random faults over all members and links: whatever happens, nothing wrong is driven, nobody is accused of a value fault that
 //! there was not, and protection comes back.
 
 mod press_cell;
@@ -8,12 +8,12 @@ use std::time::Duration;
 use proptest::prelude::*;
 use understudy_remote_io::Event;
 use understudy_simulator::{Action, Disturbance, Fault, Network, Record, Simulation};
-use understudy_wire::{Mode, Party, ProgramId, StationId};
+use understudy_wire::{Member, Mode, ProgramId, StationId};
 
-/// Something is done to a party, and undone later where it lasts.
+/// Something is done to a member, and undone later where it lasts.
 #[derive(Debug, Clone)]
 struct Trouble {
-    party: Party,
+    member: Member,
     begins: Action,
     ends: Option<Action>,
     at_cycle: u64,
@@ -21,10 +21,10 @@ struct Trouble {
     cycles: u64,
 }
 
-fn party() -> impl Strategy<Value = Party> {
+fn member() -> impl Strategy<Value = Member> {
     prop_oneof![
-        4 => (0..4_u8).prop_map(|rank| Party::Station(StationId(rank))),
-        1 => (0..2_u8).prop_map(|program| Party::RemoteIo(ProgramId(program))),
+        4 => (0..4_u8).prop_map(|rank| Member::Station(StationId(rank))),
+        1 => (0..2_u8).prop_map(|program| Member::RemoteIo(ProgramId(program))),
     ]
 }
 
@@ -40,8 +40,8 @@ fn action() -> impl Strategy<Value = (Action, Option<Action>)> {
         4 => Just(lasting(Action::Crash, Action::Restart)),
         4 => Just(lasting(Action::Stop, Action::Continue)),
         1 => Just(lasting(Action::RestartMisconfigured, Action::Restart)),
-        4 => party().prop_map(move |to| lasting(Action::Cut { to }, Action::Heal { to })),
-        2 => (party(), late()).prop_map(move |(to, by)| {
+        4 => member().prop_map(move |to| lasting(Action::Cut { to }, Action::Heal { to })),
+        2 => (member(), late()).prop_map(move |(to, by)| {
             lasting(Action::Delay { to, by }, Action::Delay { to, by: on_time })
         }),
         1 => late().prop_map(move |by| lasting(Action::Slow { by }, Action::Slow { by: on_time })),
@@ -57,9 +57,9 @@ fn action() -> impl Strategy<Value = (Action, Option<Action>)> {
 
 fn trouble() -> impl Strategy<Value = Trouble> {
     let cycles = prop_oneof![4 => 0..3_u64, 4 => 3..40_u64, 1 => 40..500_u64];
-    (party(), action(), 0..150_u64, 0.0..1.0_f64, cycles).prop_map(
-        |(party, (begins, ends), at_cycle, phase, cycles)| Trouble {
-            party,
+    (member(), action(), 0..150_u64, 0.0..1.0_f64, cycles).prop_map(
+        |(member, (begins, ends), at_cycle, phase, cycles)| Trouble {
+            member,
             begins,
             ends,
             at_cycle,
@@ -112,7 +112,7 @@ fn check(mode: Mode, understudies: usize, troubles: &[Trouble], network: Network
             simulation.schedule(Fault {
                 at_cycle,
                 phase: trouble.phase,
-                party: trouble.party,
+                member: trouble.member,
                 action,
             });
         };

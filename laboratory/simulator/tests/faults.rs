@@ -6,17 +6,17 @@ use std::time::Duration;
 
 use understudy_node::Event;
 use understudy_simulator::{Action, Fault, Network, Record, Simulation, Tally};
-use understudy_wire::{ConfigurationHash, Mode, Party, ProgramId, StationId};
+use understudy_wire::{ConfigurationHash, Member, Mode, ProgramId, StationId};
 
-const ROBOT: Party = Party::Station(StationId(0));
-const UNDERSTUDY: Party = Party::Station(StationId(2));
-const ROBOT_IO: Party = Party::RemoteIo(ProgramId(0));
-const PARTIES: [Party; 5] = [
+const ROBOT: Member = Member::Station(StationId(0));
+const UNDERSTUDY: Member = Member::Station(StationId(2));
+const ROBOT_IO: Member = Member::RemoteIo(ProgramId(0));
+const MEMBERS: [Member; 5] = [
     ROBOT,
-    Party::Station(StationId(1)),
+    Member::Station(StationId(1)),
     UNDERSTUDY,
     ROBOT_IO,
-    Party::RemoteIo(ProgramId(1)),
+    Member::RemoteIo(ProgramId(1)),
 ];
 
 /// What a run came to.
@@ -24,33 +24,33 @@ struct Outcome {
     tallies: Vec<Tally>,
     refused_frames: u64,
     /// Who refused whom, with both hashes.
-    refusals: Vec<(Party, Party, ConfigurationHash, ConfigurationHash)>,
+    refusals: Vec<(Member, Member, ConfigurationHash, ConfigurationHash)>,
 }
 
 /// 200 cycles with the given faults, then all is well again: nothing wrong is driven, and protection is back.
-fn check(network: Network, faults: &[(u64, f64, Party, Action)]) -> Outcome {
+fn check(network: Network, faults: &[(u64, f64, Member, Action)]) -> Outcome {
     let mut simulation = Simulation::new(press_cell::parts(Mode::Full, 1), network, 1);
-    for &(at_cycle, phase, party, action) in faults {
+    for &(at_cycle, phase, member, action) in faults {
         simulation.schedule(Fault {
             at_cycle,
             phase,
-            party,
+            member,
             action,
         });
     }
     let mut refusals = Vec::new();
-    let mut observe = |_, _, party, record: Record<'_>| {
+    let mut observe = |_, _, member, record: Record<'_>| {
         let refused = match record {
             Record::Station(Event::Refused {
-                party: other,
+                member: other,
                 theirs,
                 ours,
             })
             | Record::RemoteIo(understudy_remote_io::Event::Refused {
-                party: other,
+                member: other,
                 theirs,
                 ours,
-            }) => Some((party, *other, *theirs, *ours)),
+            }) => Some((member, *other, *theirs, *ours)),
             _ => None,
         };
         refusals.extend(refused);
@@ -70,7 +70,7 @@ fn check(network: Network, faults: &[(u64, f64, Party, Action)]) -> Outcome {
     }
 }
 
-fn quiet(faults: &[(u64, f64, Party, Action)]) -> Outcome {
+fn quiet(faults: &[(u64, f64, Member, Action)]) -> Outcome {
     check(Network::default(), faults)
 }
 
@@ -81,10 +81,10 @@ fn untrue(outcome: &Outcome) -> u64 {
 
 #[test]
 fn a_corrupted_frame_is_refused_and_its_copy_serves() {
-    for party in PARTIES {
-        let outcome = quiet(&[(50, 0.0, party, Action::Corrupt { frames: 1 })]);
-        assert_eq!(outcome.refused_frames, 1, "{party:?}");
-        assert_eq!(untrue(&outcome), 0, "{party:?}");
+    for member in MEMBERS {
+        let outcome = quiet(&[(50, 0.0, member, Action::Corrupt { frames: 1 })]);
+        assert_eq!(outcome.refused_frames, 1, "{member:?}");
+        assert_eq!(untrue(&outcome), 0, "{member:?}");
     }
 }
 
@@ -100,33 +100,33 @@ fn a_network_that_corrupts_is_as_one_that_loses() {
 /// Old frames of everybody, at every tenth of a cycle, from within the cycle back to the start of the run.
 #[test]
 fn a_replayed_frame_is_harmless() {
-    for party in PARTIES {
+    for member in MEMBERS {
         for age in [1, 2, 3, 5, 20, 150] {
             let replays: Vec<_> = (0..10)
                 .map(|tenth| {
                     let phase = f64::from(tenth) / 10.0;
-                    (60 + tenth as u64, phase, party, Action::Replay { age })
+                    (60 + tenth as u64, phase, member, Action::Replay { age })
                 })
                 .collect();
-            assert_eq!(untrue(&quiet(&replays)), 0, "{party:?}, {age} frames ago");
+            assert_eq!(untrue(&quiet(&replays)), 0, "{member:?}, {age} frames ago");
         }
     }
 }
 
-/// While a party is down, others hear what it said before, as if it lived.
+/// While a member is down, others hear what it said before, as if it lived.
 #[test]
 fn a_replayed_frame_does_not_stand_in_for_the_dead() {
-    for party in PARTIES {
+    for member in MEMBERS {
         for age in [1, 2, 3, 5, 20, 150] {
-            let mut faults = vec![(50, 0.3, party, Action::Crash)];
+            let mut faults = vec![(50, 0.3, member, Action::Crash)];
             faults.extend((0..40).map(|cycle| {
                 let phase = cycle as f64 * 0.37 % 1.0;
-                (51 + cycle, phase, party, Action::Replay { age })
+                (51 + cycle, phase, member, Action::Replay { age })
             }));
-            faults.push((91, 0.3, party, Action::Restart));
+            faults.push((91, 0.3, member, Action::Restart));
             faults.extend((0..10).map(|cycle| {
                 let phase = cycle as f64 * 0.37 % 1.0;
-                (91 + cycle, phase, party, Action::Replay { age })
+                (91 + cycle, phase, member, Action::Replay { age })
             }));
             quiet(&faults);
         }
@@ -143,7 +143,7 @@ fn a_misconfigured_station_is_refused_with_both_hashes() {
     ]);
     assert_eq!(untrue(&outcome), 0);
     let (right, wrong) = (ConfigurationHash(2), ConfigurationHash(!2));
-    let mut named: Vec<_> = PARTIES[1..]
+    let mut named: Vec<_> = MEMBERS[1..]
         .iter()
         .flat_map(|&other| [(other, ROBOT, wrong, right), (ROBOT, other, right, wrong)])
         .collect();
@@ -156,35 +156,35 @@ fn a_misconfigured_station_is_refused_with_both_hashes() {
 /// Up to a slot and far beyond it: a slow station is late, then silent, and never wrong.
 #[test]
 fn a_slow_station_is_late_and_then_silent() {
-    for party in PARTIES {
+    for member in MEMBERS {
         for tenths_of_a_millisecond in [1, 5, 10, 30, 60, 100, 250, 1000] {
             let by = Duration::from_micros(tenths_of_a_millisecond * 100);
             let outcome = quiet(&[
-                (50, 0.0, party, Action::Slow { by }),
-                (150, 0.0, party, Action::Slow { by: Duration::ZERO }),
+                (50, 0.0, member, Action::Slow { by }),
+                (150, 0.0, member, Action::Slow { by: Duration::ZERO }),
             ]);
-            if matches!(party, Party::Station(_)) {
-                assert_eq!(untrue(&outcome), 0, "{party:?} slow by {by:?}");
+            if matches!(member, Member::Station(_)) {
+                assert_eq!(untrue(&outcome), 0, "{member:?} slow by {by:?}");
             }
         }
     }
 }
 
-/// A station that is started again and again before it is in step costs nothing but its own protection.
+/// A station that is started again and again before it is synchronised costs nothing but its own protection.
 #[test]
 fn a_restart_storm_costs_no_cycle() {
-    for party in [ROBOT, UNDERSTUDY] {
+    for member in [ROBOT, UNDERSTUDY] {
         for every in [1, 2, 3, 5, 8] {
             let storm: Vec<_> = (0..100 / every)
                 .flat_map(|restart| {
                     let cycle = 50 + restart * every;
                     [
-                        (cycle, 0.2, party, Action::Crash),
-                        (cycle, 0.6, party, Action::Restart),
+                        (cycle, 0.2, member, Action::Crash),
+                        (cycle, 0.6, member, Action::Restart),
                     ]
                 })
                 .collect();
-            assert_eq!(untrue(&quiet(&storm)), 0, "{party:?} every {every} cycles");
+            assert_eq!(untrue(&quiet(&storm)), 0, "{member:?} every {every} cycles");
         }
     }
 }
@@ -192,16 +192,16 @@ fn a_restart_storm_costs_no_cycle() {
 /// With keys a stranger is not heard, whatever it says in whose name.
 #[test]
 fn a_forged_frame_is_refused() {
-    for party in PARTIES {
+    for member in MEMBERS {
         let forged: Vec<_> = (0..40)
             .map(|number| {
                 let phase = f64::from(number) / 40.0;
-                (60 + number as u64, phase, party, Action::Forge)
+                (60 + number as u64, phase, member, Action::Forge)
             })
             .collect();
         let outcome = quiet(&forged);
-        assert_eq!(outcome.refused_frames, 40, "{party:?}");
-        assert_eq!(untrue(&outcome), 0, "{party:?}");
+        assert_eq!(outcome.refused_frames, 40, "{member:?}");
+        assert_eq!(untrue(&outcome), 0, "{member:?}");
     }
 }
 
@@ -212,13 +212,16 @@ fn a_wall_clock_that_jumps_renumbers_nobody() {
     for epoch in [0, 1, 2, 1000, u64::MAX] {
         let in_epoch = Action::RestartInEpoch { epoch };
         for rank in 0..3 {
-            let party = Party::Station(StationId(rank));
-            let faults = [(50, 0.3, party, Action::Crash), (80, 0.6, party, in_epoch)];
+            let member = Member::Station(StationId(rank));
+            let faults = [
+                (50, 0.3, member, Action::Crash),
+                (80, 0.6, member, in_epoch),
+            ];
             let outcome = quiet(&faults);
-            assert_eq!(untrue(&outcome), 0, "{party:?} in epoch {epoch}");
+            assert_eq!(untrue(&outcome), 0, "{member:?} in epoch {epoch}");
         }
-        let all = [0, 1, 2].map(|rank| Party::Station(StationId(rank)));
-        let crashes = all.map(|party| (50, 0.3, party, Action::Crash));
+        let all = [0, 1, 2].map(|rank| Member::Station(StationId(rank)));
+        let crashes = all.map(|member| (50, 0.3, member, Action::Crash));
         let restarts = [
             (60, 0.6, all[0], in_epoch),
             (64, 0.6, all[1], Action::RestartInEpoch { epoch: 7 }),
@@ -231,7 +234,7 @@ fn a_wall_clock_that_jumps_renumbers_nobody() {
 /// The only holder of a state is stopped while the others start cold in an epoch before its own: what it knows is history.
 #[test]
 fn a_state_from_a_later_epoch_is_not_newer_for_it() {
-    let all = [0, 1, 2].map(|rank| Party::Station(StationId(rank)));
+    let all = [0, 1, 2].map(|rank| Member::Station(StationId(rank)));
     let early = Action::RestartInEpoch { epoch: 0 };
     quiet(&[
         (50, 0.3, all[2], Action::Stop),
@@ -248,22 +251,22 @@ fn a_state_from_a_later_epoch_is_not_newer_for_it() {
 /// A state that is corrupted while it is computed in shadow never speaks.
 #[test]
 fn a_fault_in_shadow_is_found_in_shadow() {
-    for party in [ROBOT, UNDERSTUDY] {
+    for member in [ROBOT, UNDERSTUDY] {
         for cycle in 60..70 {
             for bit in 0..8 {
                 let program = ProgramId(0);
                 let outcome = quiet(&[
-                    (50, 0.0, party, Action::Crash),
-                    (60, 0.0, party, Action::Restart),
-                    (cycle, 0.8, party, Action::FlipState { program, bit }),
+                    (50, 0.0, member, Action::Crash),
+                    (60, 0.0, member, Action::Restart),
+                    (cycle, 0.8, member, Action::FlipState { program, bit }),
                     (100, 0.0, ROBOT_IO, Action::Release),
-                    (101, 0.0, party, Action::Crash),
-                    (101, 0.1, party, Action::Restart),
+                    (101, 0.0, member, Action::Crash),
+                    (101, 0.1, member, Action::Restart),
                     (120, 0.0, ROBOT_IO, Action::Release),
                 ]);
                 // Later it speaks, and is found by comparison with the others.
                 if cycle < 63 {
-                    assert_eq!(untrue(&outcome), 0, "{party:?}, cycle {cycle}, bit {bit}");
+                    assert_eq!(untrue(&outcome), 0, "{member:?}, cycle {cycle}, bit {bit}");
                 }
             }
         }
@@ -274,12 +277,12 @@ fn a_fault_in_shadow_is_found_in_shadow() {
 /// state of any program.
 #[test]
 fn a_changed_sample_is_no_history() {
-    for party in PARTIES {
+    for member in MEMBERS {
         for frames in [1, 3, 10, 30] {
             for restarted in [51, 52, 55] {
                 let flip = Action::FlipSample { bit: 0, frames };
                 quiet(&[
-                    (50, 0.0, party, flip),
+                    (50, 0.0, member, flip),
                     (restarted, 0.4, ROBOT_IO, Action::Crash),
                     (restarted, 0.5, ROBOT_IO, Action::Restart),
                 ]);

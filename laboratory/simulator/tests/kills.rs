@@ -1,15 +1,15 @@
-//! Parties are killed and repaired, and the plants go on.
+//! Members are killed and repaired, and the plants go on.
 
 mod press_cell;
 
 use understudy_simulator::{Action, Fault, Network, Simulation, Tally};
-use understudy_wire::{Mode, Party, ProgramId, StationId};
+use understudy_wire::{Member, Mode, ProgramId, StationId};
 
 fn fault(at_cycle: u64, phase: f64, rank: u8, action: Action) -> Fault {
     Fault {
         at_cycle,
         phase,
-        party: Party::Station(StationId(rank)),
+        member: Member::Station(StationId(rank)),
         action,
     }
 }

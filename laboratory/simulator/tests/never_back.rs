@@ -7,24 +7,24 @@ mod press_cell;
 
 use understudy_remote_io::{Event, LackingReason, StaleState};
 use understudy_simulator::{Action, Fault, Network, Record, Simulation};
-use understudy_wire::{Mode, Party, ProgramId, Source, StateChoice, StationId};
+use understudy_wire::{Member, Mode, ProgramId, Source, StateChoice, StationId};
 
 const PROGRAMS: u8 = 2;
 const UNDERSTUDY: StationId = StationId(PROGRAMS);
 const STATIONS: u8 = PROGRAMS + 1;
-const ROBOT_IO: Party = Party::RemoteIo(ProgramId(0));
+const ROBOT_IO: Member = Member::RemoteIo(ProgramId(0));
 
-fn fault(at_cycle: u64, phase: f64, party: Party, action: Action) -> Fault {
+fn fault(at_cycle: u64, phase: f64, member: Member, action: Action) -> Fault {
     Fault {
         at_cycle,
         phase,
-        party,
+        member,
         action,
     }
 }
 
-fn station(rank: u8) -> Party {
-    Party::Station(StationId(rank))
+fn station(rank: u8) -> Member {
+    Member::Station(StationId(rank))
 }
 
 /// Every link from a remote I/O to a station is cut for each length, then each station crashes: no cycle is lost, whether the
@@ -39,7 +39,7 @@ fn a_broken_link_of_a_remote_io_costs_no_protection() {
             .into_iter()
             .flat_map(|length| [Some(-1), Some(5), None].map(|heals| (length, heals)))
         {
-            let remote_io = Party::RemoteIo(ProgramId(program));
+            let remote_io = Member::RemoteIo(ProgramId(program));
             let to = station(deaf);
             let mut simulation = Simulation::new(
                 press_cell::parts(Mode::Full, 1),
@@ -81,7 +81,7 @@ fn a_broken_link_of_a_remote_io_costs_no_protection() {
 #[test]
 fn a_remote_io_that_receives_nobody_for_long_does_not_forget_its_history() {
     let mut simulation = Simulation::new(press_cell::parts(Mode::Full, 1), Network::default(), 1);
-    for from in [station(0), Party::Station(UNDERSTUDY)] {
+    for from in [station(0), Member::Station(UNDERSTUDY)] {
         simulation.schedule(fault(20, 0.0, from, Action::Cut { to: ROBOT_IO }));
         simulation.schedule(fault(1_300, 0.0, from, Action::Heal { to: ROBOT_IO }));
     }
@@ -108,21 +108,21 @@ fn a_station_that_comes_back_as_its_program_starts_cold_is_too_late_or_continues
         simulation.schedule(fault(
             crashes,
             phase,
-            Party::Station(UNDERSTUDY),
+            Member::Station(UNDERSTUDY),
             Action::Crash,
         ));
         simulation.schedule(fault(
             crashes,
             phase,
-            Party::Station(UNDERSTUDY),
+            Member::Station(UNDERSTUDY),
             Action::Restart,
         ));
         simulation.schedule(fault(continues, phase, station(0), Action::Continue));
         let mut cold = 0;
         simulation
-            .run(120, 100, &mut |_, cycle, party, record| {
+            .run(120, 100, &mut |_, cycle, member, record| {
                 let is_cold = matches!(record, Record::RemoteIo(Event::StartedCold { .. }));
-                cold += u32::from(is_cold && party == ROBOT_IO && cycle > Some(20));
+                cold += u32::from(is_cold && member == ROBOT_IO && cycle > Some(20));
             })
             .expect("the cluster gets ready");
         assert_eq!(simulation.violations(), [], "{continues} {phase}");
@@ -140,7 +140,7 @@ fn stale(length: u64, stale_state: StaleState, ends: Action) -> Simulation {
         remote_io.stale_state = stale_state;
     }
     let mut simulation = Simulation::new(parts, Network::default(), 1);
-    let to = Party::Station(UNDERSTUDY);
+    let to = Member::Station(UNDERSTUDY);
     for from in [ROBOT_IO, station(0), station(1)] {
         simulation.schedule(fault(10, 0.0, from, Action::Cut { to }));
         simulation.schedule(fault(10 + length + 5, 0.0, from, Action::Heal { to }));
@@ -159,9 +159,9 @@ struct Seen {
 }
 
 impl Seen {
-    fn note(&mut self, cycle: Option<u64>, party: Party, record: &Record<'_>) {
-        let (Some(cycle), Party::RemoteIo(ProgramId(0)), Record::RemoteIo(event)) =
-            (cycle, party, record)
+    fn note(&mut self, cycle: Option<u64>, member: Member, record: &Record<'_>) {
+        let (Some(cycle), Member::RemoteIo(ProgramId(0)), Record::RemoteIo(event)) =
+            (cycle, member, record)
         else {
             return;
         };
@@ -189,8 +189,8 @@ fn a_stale_state_is_not_adopted_and_the_operator_is_asked() {
         let mut simulation = stale(length, StaleState::Operator, Action::Crash);
         let mut seen = Seen::default();
         simulation
-            .run(10 + length + 100, 100, &mut |_, cycle, party, record| {
-                seen.note(cycle, party, &record)
+            .run(10 + length + 100, 100, &mut |_, cycle, member, record| {
+                seen.note(cycle, member, &record)
             })
             .expect("the cluster gets ready");
         assert_eq!(simulation.violations(), []);
@@ -242,8 +242,8 @@ fn a_stale_state_is_followed_by_a_cold_start_where_that_is_configured() {
     let mut simulation = stale(100, StaleState::Cold, Action::Crash);
     let mut seen = Seen::default();
     simulation
-        .run(300, 100, &mut |_, cycle, party, record| {
-            seen.note(cycle, party, &record)
+        .run(300, 100, &mut |_, cycle, member, record| {
+            seen.note(cycle, member, &record)
         })
         .expect("the cluster gets ready");
     assert_eq!(simulation.violations(), []);
@@ -289,8 +289,8 @@ fn a_remote_io_that_cannot_know_what_it_applied_asks() {
         simulation.schedule(fault(120, 0.3, ROBOT_IO, Action::Restart));
         let mut seen = Seen::default();
         simulation
-            .run(250, 100, &mut |_, cycle, party, record| {
-                seen.note(cycle, party, &record)
+            .run(250, 100, &mut |_, cycle, member, record| {
+                seen.note(cycle, member, &record)
             })
             .expect("the cluster gets ready");
         assert_eq!(simulation.violations(), []);
@@ -337,13 +337,13 @@ fn a_state_that_is_handed_over_while_a_remote_io_listens_is_waited_for() {
         for faults in [&cut_off[..], &restarted] {
             let parts = press_cell::parts(Mode::Full, 1);
             let mut simulation = Simulation::new(parts, Network::default(), 1);
-            for (cycle, phase, party, action) in faults {
-                simulation.schedule(fault(*cycle, *phase, *party, *action));
+            for (cycle, phase, member, action) in faults {
+                simulation.schedule(fault(*cycle, *phase, *member, *action));
             }
             let mut seen = Seen::default();
             simulation
-                .run(200, 100, &mut |_, cycle, party, record| {
-                    seen.note(cycle, party, &record)
+                .run(200, 100, &mut |_, cycle, member, record| {
+                    seen.note(cycle, member, &record)
                 })
                 .expect("the cluster gets ready");
             let starts = faults.len();
@@ -378,8 +378,8 @@ fn a_remote_io_that_was_suspended_decides_by_the_present() {
         simulation.schedule(fault(stopped + length, 0.0, ROBOT_IO, Action::Continue));
         let mut seen = Seen::default();
         simulation
-            .run(200, 100, &mut |_, cycle, party, record| {
-                seen.note(cycle, party, &record)
+            .run(200, 100, &mut |_, cycle, member, record| {
+                seen.note(cycle, member, &record)
             })
             .expect("the cluster gets ready");
         assert_eq!(simulation.violations(), [], "{stopped} {length}");
@@ -395,7 +395,7 @@ fn what_a_station_recalled_before_its_restart_proves_nothing() {
     for (dies, phase) in (64..75).flat_map(|dies| [0.0, 0.4, 0.8].map(|phase| (dies, phase))) {
         let parts = press_cell::parts(Mode::Full, 1);
         let mut simulation = Simulation::new(parts, Network::default(), 1);
-        let understudy = Party::Station(UNDERSTUDY);
+        let understudy = Member::Station(UNDERSTUDY);
         for other in [station(0), station(1), ROBOT_IO] {
             simulation.schedule(fault(63, 0.0, understudy, Action::Cut { to: other }));
             simulation.schedule(fault(63, 0.0, other, Action::Cut { to: understudy }));
@@ -422,21 +422,22 @@ fn a_station_that_was_given_the_state_is_gone_no_more() {
     for (deaf, phase) in (60..75).flat_map(|deaf| [0.0, 0.4, 0.7, 0.9].map(|phase| (deaf, phase))) {
         let parts = press_cell::parts(Mode::Full, 1);
         let mut simulation = Simulation::new(parts, Network::default(), 1);
-        let understudy = Party::Station(UNDERSTUDY);
+        let understudy = Member::Station(UNDERSTUDY);
         simulation.schedule(fault(20, 0.3, station(0), Action::Crash));
         simulation.schedule(fault(60, 0.3, station(0), Action::Restart));
         for other in [station(0), station(1), ROBOT_IO] {
             let to = understudy;
             simulation.schedule(fault(deaf, phase, other, Action::Cut { to }));
         }
-        for (at, party) in [(90, station(0)), (90, ROBOT_IO)] {
-            simulation.schedule(fault(at, 0.8, party, Action::Crash));
+        for (at, member) in [(90, station(0)), (90, ROBOT_IO)] {
+            simulation.schedule(fault(at, 0.8, member, Action::Crash));
         }
         simulation.schedule(fault(95, 0.0, ROBOT_IO, Action::Restart));
         let mut direct = 0;
         simulation
-            .run(200, 100, &mut |_, cycle, party, record| {
-                if let (Record::RemoteIo(Event::Applied { source, .. }), ROBOT_IO) = (record, party)
+            .run(200, 100, &mut |_, cycle, member, record| {
+                if let (Record::RemoteIo(Event::Applied { source, .. }), ROBOT_IO) =
+                    (record, member)
                 {
                     let is_alone = (deaf + 1..90).contains(&cycle.unwrap_or(0));
                     direct += u64::from(*source == Source::Direct && is_alone);

@@ -8,11 +8,11 @@ mod press_cell;
 
 use understudy_remote_io::Event;
 use understudy_simulator::{Action, Fault, Network, Record, Simulation};
-use understudy_wire::{Mode, Party, ProgramId, StationId};
+use understudy_wire::{Member, Mode, ProgramId, StationId};
 
 const PROGRAMS: usize = 3;
 const STATIONS: usize = 4;
-const PARTIES: usize = STATIONS + PROGRAMS;
+const MEMBERS: usize = STATIONS + PROGRAMS;
 
 /// Within the history of a sample, around it, around every other limit of the protocol, and far beyond all.
 const LENGTHS: [u64; 8] = [1, 2, 3, 5, 8, 13, 30, 100];
@@ -20,43 +20,43 @@ const LENGTHS: [u64; 8] = [1, 2, 3, 5, 8, 13, 30, 100];
 /// The longest ones take long; each cut gets one of these.
 const LONGEST: [u64; 4] = [200, 400, 700, 1000];
 
-/// Cycles after which everybody is in step again, at most.
+/// Cycles after which everybody is synchronised again, at most.
 const RECOVERY: u64 = 100;
 
-fn party(place: usize) -> Party {
+fn member(place: usize) -> Member {
     match place.checked_sub(STATIONS) {
-        None => Party::Station(StationId(place as u8)),
-        Some(program) => Party::RemoteIo(ProgramId(program as u8)),
+        None => Member::Station(StationId(place as u8)),
+        Some(program) => Member::RemoteIo(ProgramId(program as u8)),
     }
 }
 
-/// Which frames do not arrive: from each party, the set of those who do not hear it.
-type Cut = [u8; PARTIES];
+/// Which frames do not arrive: from each member, the set of those who do not hear it.
+type Cut = [u8; MEMBERS];
 
-/// Both ways between the parties of `side` and all others.
+/// Both ways between the members of `side` and all others.
 fn full(side: u8) -> Cut {
     std::array::from_fn(|place| if side >> place & 1 == 1 { !side } else { side })
 }
 
-/// The parties of `side` are heard by no others, and hear them.
+/// The members of `side` are heard by no others, and hear them.
 fn mute(side: u8) -> Cut {
     std::array::from_fn(|place| if side >> place & 1 == 1 { !side } else { 0 })
 }
 
 /// The links that `before` and `after` do not agree on change at a cycle.
 fn change(simulation: &mut Simulation, at_cycle: u64, before: Cut, after: Cut) {
-    for from in 0..PARTIES {
-        for to in (0..PARTIES).filter(|&to| to != from) {
+    for from in 0..MEMBERS {
+        for to in (0..MEMBERS).filter(|&to| to != from) {
             let [was, is] = [before, after].map(|cut| cut[from] >> to & 1 == 1);
             if was == is {
                 continue;
             }
-            let to = party(to);
+            let to = member(to);
             simulation.schedule(Fault {
                 at_cycle,
                 // Somewhere else in the cycle for each length.
                 phase: at_cycle as f64 * 0.37 % 1.0,
-                party: party(from),
+                member: member(from),
                 action: if is {
                     Action::Cut { to }
                 } else {
@@ -73,8 +73,8 @@ fn check(cut: Cut, seed: u64) {
         let parts = press_cell::line(PROGRAMS, Mode::Full, STATIONS - PROGRAMS);
         let mut simulation = Simulation::new(parts, Network::default(), seed);
         let at = 5 + seed % 7;
-        change(&mut simulation, at, [0; PARTIES], cut);
-        change(&mut simulation, at + length, cut, [0; PARTIES]);
+        change(&mut simulation, at, [0; MEMBERS], cut);
+        change(&mut simulation, at + length, cut, [0; MEMBERS]);
         let mut cold = 0;
         let mut observe = |_, cycle: Option<u64>, _, record: Record<'_>| {
             let starts = matches!(record, Record::RemoteIo(Event::StartedCold { .. }));
@@ -112,26 +112,26 @@ fn served(cut: &Cut, program: usize) -> bool {
 #[test]
 fn every_full_partition_heals() {
     // A side and its complement are one partition.
-    for side in 1..1 << (PARTIES - 1) {
+    for side in 1..1 << (MEMBERS - 1) {
         check(full(side), u64::from(side));
     }
 }
 
 #[test]
 fn every_one_way_partition_heals() {
-    for side in 1..(1 << PARTIES) - 1 {
+    for side in 1..(1 << MEMBERS) - 1 {
         check(mute(side), u64::from(side));
     }
 }
 
-/// One party does not hear one other.
+/// One member does not hear one other.
 #[test]
 fn every_single_link_heals() {
-    for from in 0..PARTIES {
-        for to in (0..PARTIES).filter(|&to| to != from) {
-            let mut cut = [0; PARTIES];
+    for from in 0..MEMBERS {
+        for to in (0..MEMBERS).filter(|&to| to != from) {
+            let mut cut = [0; MEMBERS];
             cut[from] = 1 << to;
-            check(cut, (from * PARTIES + to) as u64);
+            check(cut, (from * MEMBERS + to) as u64);
         }
     }
 }

@@ -7,7 +7,7 @@ mod press_cell;
 
 use understudy_remote_io::{Event, ValueFault};
 use understudy_simulator::{Action, Fault, Network, Record, Simulation, Tally, Violation};
-use understudy_wire::{Mode, Party, ProgramId, StationId, StationSet};
+use understudy_wire::{Member, Mode, ProgramId, StationId, StationSet};
 
 const AT: u64 = 20;
 const CYCLES: u64 = 60;
@@ -21,26 +21,26 @@ struct Outcome {
     accusations: Vec<(ProgramId, u64, StationSet, bool)>,
 }
 
-fn run(understudies: usize, answer: ValueFault, faults: &[(u64, f64, Party, Action)]) -> Outcome {
+fn run(understudies: usize, answer: ValueFault, faults: &[(u64, f64, Member, Action)]) -> Outcome {
     let mut parts = press_cell::parts(Mode::Full, understudies);
     for settings in &mut parts.remote_ios {
         settings.value_fault = answer;
     }
     let mut simulation = Simulation::new(parts, Network::default(), 1);
-    for &(at_cycle, phase, party, action) in faults {
+    for &(at_cycle, phase, member, action) in faults {
         simulation.schedule(Fault {
             at_cycle,
             phase,
-            party,
+            member,
             action,
         });
     }
     let mut accusations = Vec::new();
-    let mut observe = |_, cycle: Option<u64>, party, record: Record<'_>| {
+    let mut observe = |_, cycle: Option<u64>, member, record: Record<'_>| {
         if let Record::RemoteIo(Event::ValueFault {
             accused, located, ..
         }) = record
-            && let Party::RemoteIo(program) = party
+            && let Member::RemoteIo(program) = member
         {
             accusations.push((program, cycle.unwrap_or(0), *accused, *located));
         }
@@ -56,8 +56,8 @@ fn run(understudies: usize, answer: ValueFault, faults: &[(u64, f64, Party, Acti
     }
 }
 
-fn station(rank: usize) -> Party {
-    Party::Station(StationId(rank as u8))
+fn station(rank: usize) -> Member {
+    Member::Station(StationId(rank as u8))
 }
 
 fn untrue(tally: &Tally) -> u64 {
@@ -100,7 +100,7 @@ fn unseen(outcome: &Outcome) -> bool {
 fn one_understudy_sees_a_flipped_state_and_holds() {
     for (program, rank, action) in state_flips(1) {
         // The operator restarts the controller or the understudy, whichever is wrong, and releases the outputs.
-        let remote_io = Party::RemoteIo(ProgramId(program as u8));
+        let remote_io = Member::RemoteIo(ProgramId(program as u8));
         let outcome = run(
             1,
             ValueFault::Hold,
@@ -142,7 +142,7 @@ fn an_alarm_stops_nothing() {
 fn fail_safe_is_at_once_and_until_the_operator_releases_it() {
     let action = Action::FlipWord { bit: 0, frames: 2 };
     for rank in 0..2 {
-        let remote_io = Party::RemoteIo(ProgramId(rank as u8));
+        let remote_io = Member::RemoteIo(ProgramId(rank as u8));
         let outcome = run(
             1,
             ValueFault::FailSafe,
@@ -207,7 +207,7 @@ fn two_understudies_locate_a_flipped_state_and_exclude_its_station() {
         simulation.schedule(Fault {
             at_cycle: 0,
             phase: 0.0,
-            party: Party::RemoteIo(ProgramId(program as u8)),
+            member: Member::RemoteIo(ProgramId(program as u8)),
             action: Action::Release,
         });
         let back = simulation.run(1, 20, &mut |_, _, _, _| {});
@@ -220,7 +220,7 @@ fn two_understudies_locate_a_flipped_state_and_exclude_its_station() {
 #[test]
 fn who_is_excluded_stays_so_when_the_remote_io_restarts() {
     for (program, rank, action) in state_flips(2) {
-        let remote_io = Party::RemoteIo(ProgramId(program as u8));
+        let remote_io = Member::RemoteIo(ProgramId(program as u8));
         let outcome = run(
             2,
             ValueFault::Hold,
@@ -238,21 +238,21 @@ fn who_is_excluded_stays_so_when_the_remote_io_restarts() {
         let mut simulation = outcome.simulation;
         let readmitted = |simulation: &mut Simulation, cycles| {
             let mut count = 0;
-            let in_step = simulation.run(1, cycles, &mut |_, _, _, record| {
+            let synchronised = simulation.run(1, cycles, &mut |_, _, _, record| {
                 let is_back = matches!(
                     record,
                     Record::Station(understudy_node::Event::Readmitted { .. })
                 );
                 count += u64::from(is_back);
             });
-            (in_step.is_ok(), count, simulation.violations().len())
+            (synchronised.is_ok(), count, simulation.violations().len())
         };
         // Nobody waits for an understudy that is excluded.
         assert_eq!(readmitted(&mut simulation, 50), (rank >= 2, 0, 0), "{what}");
         simulation.schedule(Fault {
             at_cycle: 0,
             phase: 0.0,
-            party: remote_io,
+            member: remote_io,
             action: Action::Release,
         });
         assert_eq!(readmitted(&mut simulation, 20), (true, 1, 0), "{what}");
@@ -284,28 +284,28 @@ fn two_understudies_mask_a_flipped_word() {
 #[test]
 fn a_flipped_sample_is_a_lost_one() {
     for understudies in 0..3 {
-        for party in [0, 1, 2, 3]
+        for member in [0, 1, 2, 3]
             .map(station)
             .into_iter()
-            .chain([0, 1].map(|program| Party::RemoteIo(ProgramId(program))))
+            .chain([0, 1].map(|program| Member::RemoteIo(ProgramId(program))))
         {
-            if matches!(party, Party::Station(id) if id.index() >= 2 + understudies) {
+            if matches!(member, Member::Station(id) if id.index() >= 2 + understudies) {
                 continue;
             }
             for bit in 0..10 {
                 for frames in [1, 2, 7, 40] {
                     let action = Action::FlipSample { bit, frames };
-                    let outcome = run(understudies, ValueFault::Hold, &[(AT, 0.0, party, action)]);
-                    assert_eq!(outcome.violations, [], "{party:?} {action:?}");
-                    assert_eq!(outcome.accusations, [], "{party:?} {action:?}");
+                    let outcome = run(understudies, ValueFault::Hold, &[(AT, 0.0, member, action)]);
+                    assert_eq!(outcome.violations, [], "{member:?} {action:?}");
+                    assert_eq!(outcome.accusations, [], "{member:?} {action:?}");
                     let held: u64 = outcome.tallies.iter().map(untrue).sum();
-                    let masked = understudies > 0 && matches!(party, Party::Station(_));
+                    let masked = understudies > 0 && matches!(member, Member::Station(_));
                     // A copy serves where one frame was changed.
                     let most = if masked { 0 } else { u64::from(frames) / 2 };
-                    assert!(held <= most, "{party:?} {action:?} {held}");
+                    assert!(held <= most, "{member:?} {action:?} {held}");
                     let mut simulation = outcome.simulation;
                     let back = simulation.run(1, 20, &mut |_, _, _, _| {});
-                    assert_eq!(back, Ok(()), "{party:?} {action:?}");
+                    assert_eq!(back, Ok(()), "{member:?} {action:?}");
                 }
             }
         }

@@ -5,7 +5,8 @@ use std::collections::HashMap;
 use proptest::prelude::*;
 use understudy_logic::{Circuit, CircuitBuilder, Scan};
 use understudy_wire::{
-    ClusterHash, ConfigurationHash, Cycle, Epoch, Header, Party, ProgramHash, StationId, StationSet,
+    ClusterHash, ConfigurationHash, Cycle, Epoch, Header, Member, ProgramHash, StationId,
+    StationSet,
 };
 
 use super::*;
@@ -97,7 +98,7 @@ impl Truth {
                 cluster: ClusterHash(1),
                 configuration: ConfigurationHash(1),
                 moment: moment(self.cycle),
-                sender: Party::RemoteIo(ProgramId(0)),
+                sender: Member::RemoteIo(ProgramId(0)),
                 alone: false,
             },
             body: Body::Sample(Sample {
@@ -239,7 +240,10 @@ fn a_given_state_speaks_only_after_its_shadow() {
     let mut proved = Vec::new();
     for _ in 0..3 {
         let frame = truth.sample(true);
-        assert_eq!(follow(&mut replica, &mut scratch, &frame), Followed::InStep);
+        assert_eq!(
+            follow(&mut replica, &mut scratch, &frame),
+            Followed::Synchronised
+        );
         assert_eq!(
             replica.may_speak(frame.header.moment),
             proved.contains(&true)

@@ -1,7 +1,7 @@
 //! Where one cycle ends and the next begins.
 //!
-//! The pacemaker is the lowest-ranked living station. Every other one waits a guard time for each that comes before it, so that the
-//! next rank takes over when the pacemaker is silent; two that pace at once start the same cycle, which harms nobody.
+//! The cycle master is the lowest-ranked living station. Every other one waits a guard time for each that comes before it, so that the
+//! next rank takes over when the cycle master is silent; two that pace at once start the same cycle, which harms nobody.
 
 use understudy_wire::{Body, Change, Output, StationSet, Time};
 
@@ -14,7 +14,7 @@ impl Station {
         let Some(moment) = self.clock.moment() else {
             return;
         };
-        if self.cycle.spoken {
+        if self.cycle.published {
             self.attendance.heard(self.own());
         }
         let outbox = &mut self.outbox;
@@ -28,7 +28,7 @@ impl Station {
             if replica.close_cycle(moment) {
                 let program = replica.id();
                 self.outbox
-                    .push_back(Output::Report(Event::InStep { moment, program }));
+                    .push_back(Output::Report(Event::Synchronised { moment, program }));
             }
         }
         self.copies.clear();
@@ -61,7 +61,7 @@ impl Station {
 
     pub(super) fn pace(&mut self, now: Time, planned: Time) {
         self.close_cycle();
-        // A pacemaker keeps to its plan, so that late wake-ups do not add up; one that is far behind starts from now.
+        // A cycle master keeps to its plan, so that late wake-ups do not add up; one that is far behind starts from now.
         let schedule = &self.settings.agreement.schedule;
         let anchor = if now.since(planned) < schedule.guard() {
             planned
@@ -71,9 +71,9 @@ impl Station {
         let moment = self
             .clock
             .pace(now, self.settings.epoch, anchor, schedule.period());
-        if !self.paces {
-            self.paces = true;
-            self.report(Event::Paces { moment });
+        if !self.is_cycle_master {
+            self.is_cycle_master = true;
+            self.report(Event::BecameCycleMaster { moment });
         }
         self.send_cyclic(now, Body::Sync);
     }

@@ -12,7 +12,7 @@
 use std::sync::Arc;
 
 use understudy_wire::{
-    Body, Frame, Header, Holding, Party, ProgramSet, Recalled, Relayed, Sample, StationId, Turn,
+    Body, Frame, Header, Holding, Member, ProgramSet, Recalled, Relayed, Sample, StationId, Turn,
     encode,
 };
 
@@ -36,7 +36,7 @@ impl Station {
         self.cycle.lacked = self.cycle.lacked.or(turn.lacks);
         for Relayed { program, sample } in &turn.relayed {
             self.cycle.relayed.insert(*program);
-            let sender = Party::RemoteIo(*program);
+            let sender = Member::RemoteIo(*program);
             let in_cluster = program.index() < self.settings.agreement.schedule.controllers();
             if !in_cluster || self.has_sample(sender) {
                 continue;
@@ -78,7 +78,7 @@ impl Station {
     pub(super) fn has_what_others_lack(&self) -> bool {
         let relayed_by_others = self.cycle.relayed;
         let mut awaited = self.awaited.without(relayed_by_others).iter();
-        awaited.all(|program| self.has_sample(Party::RemoteIo(program)))
+        awaited.all(|program| self.has_sample(Member::RemoteIo(program)))
     }
 
     /// Ends a cycle: what others lacked in it they will lack in the next one.
@@ -89,7 +89,7 @@ impl Station {
             .samples
             .iter()
             .filter_map(|frame| match frame.header.sender {
-                Party::RemoteIo(program) => Some(program),
+                Member::RemoteIo(program) => Some(program),
                 _ => None,
             });
         self.awaited = self.lacked.and(had.collect());
@@ -104,7 +104,7 @@ impl Station {
         let samples = self.cycle.samples.iter();
         turn.relayed = samples
             .filter_map(|frame| match (frame.header.sender, &frame.body) {
-                (Party::RemoteIo(program), Body::Sample(sample)) if lacked.contains(program) => {
+                (Member::RemoteIo(program), Body::Sample(sample)) if lacked.contains(program) => {
                     Some(Relayed {
                         program,
                         sample: sample.clone(),
@@ -129,7 +129,7 @@ impl Station {
         Body::Turn(turn)
     }
 
-    fn has_sample(&self, sender: Party) -> bool {
+    fn has_sample(&self, sender: Member) -> bool {
         let mut samples = self.cycle.samples.iter();
         samples.any(|frame| frame.header.sender == sender)
     }

@@ -25,7 +25,7 @@ impl Station {
         for word in &turn.words {
             let mut holdings = turn.holdings.iter();
             if !understudy
-                && word.members == ProgramSet::only(own_program)
+                && word.mask == ProgramSet::only(own_program)
                 && let Some(own) = holdings.find(|holding| holding.program == own_program)
             {
                 self.cycle.said.push(Said {
@@ -36,7 +36,7 @@ impl Station {
                 });
             }
             if station < self.own() {
-                self.cycle.others_have = self.cycle.others_have.or(word.members);
+                self.cycle.others_have = self.cycle.others_have.or(word.mask);
             }
         }
         self.is_told(&turn.recalled);
@@ -94,7 +94,7 @@ impl Station {
         let Some(moment) = self.clock.moment() else {
             return;
         };
-        if self.cycle.spoken || !self.speaks() {
+        if self.cycle.published || !self.speaks() {
             return;
         }
         let due = self.speaks_by(moment);
@@ -105,11 +105,11 @@ impl Station {
         }
     }
 
-    /// Whether everybody whom it has to wait for has spoken: its predecessor, or for an understudy all before it.
+    /// Whether everybody whom it has to wait for has published: its predecessor, or for an understudy all before it.
     pub(super) fn has_token(&self) -> bool {
         let before = StationSet::first(self.own().index());
         let waited_for = before.without(self.attendance.flagged());
-        let missing = waited_for.without(self.attendance.spoke());
+        let missing = waited_for.without(self.attendance.published());
         if self.is_understudy() {
             missing.is_empty()
         } else {
@@ -147,7 +147,7 @@ impl Station {
     }
 
     pub(super) fn speak(&mut self, now: Time, moment: Moment) {
-        self.cycle.spoken = true;
+        self.cycle.published = true;
         let may_speak = |replica: &&Replica| replica.may_speak(moment);
         let words = if self.is_understudy() {
             let known = self.replicas.iter().filter(may_speak);
@@ -167,13 +167,13 @@ impl Station {
                 words::of_controller(replica.id(), replica.outputs())
             })
         };
-        self.report(Event::Spoke {
+        self.report(Event::Published {
             moment,
             words: words.clone(),
         });
         self.report_states(moment);
         let turn = Turn {
-            heard: self.attendance.spoke(),
+            heard: self.attendance.published(),
             holdings: self.holdings(),
             words,
             recalled: self.recalled(moment),
@@ -186,7 +186,7 @@ impl Station {
 
     pub(super) fn speaks_at(&self) -> Option<Time> {
         let moment = self.clock.moment()?;
-        let may = !self.cycle.spoken && self.speaks();
+        let may = !self.cycle.published && self.speaks();
         may.then(|| self.speaks_by(moment))
     }
 

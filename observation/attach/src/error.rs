@@ -15,7 +15,7 @@ pub enum AttachError {
         tried: Vec<Unheard>,
     },
     /// Somebody listens, and does not take calls from the holder of these keys; or is nobody whom these keys trust.
-    #[error("U0562: no party takes a call from the holder of these keys: {}", list(.tried))]
+    #[error("U0562: no member takes a call from the holder of these keys: {}", list(.tried))]
     NotAdmitted {
         /// Who was called where, and what came of it.
         tried: Vec<Unheard>,
@@ -34,9 +34,9 @@ pub enum AttachError {
         /// What the file says.
         ours: ConfigurationHash,
     },
-    /// Its parties take no calls.
+    /// Its members take no calls.
     #[error(
-        "U0564: the cluster file says security = \"off\": its parties have no keys and take no calls; look at the journals that they write (--journal)"
+        "U0564: the cluster file says security = \"off\": its members have no keys and take no calls; look at the journals that they write (--journal)"
     )]
     NoKeys,
     /// The system refused something.
@@ -49,7 +49,7 @@ pub enum AttachError {
     },
 }
 
-/// A party that was called in vain.
+/// A member that was called in vain.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Unheard {
     /// Its name.
@@ -61,12 +61,12 @@ pub struct Unheard {
 }
 
 fn list(tried: &[Unheard]) -> String {
-    let each = tried.iter().map(|party| {
+    let each = tried.iter().map(|member| {
         let Unheard {
             name,
             address,
             reason,
-        } = party;
+        } = member;
         format!("{name} at {address} ({reason})")
     });
     each.collect::<Vec<_>>().join(", ")

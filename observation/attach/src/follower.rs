@@ -1,4 +1,4 @@
-//! One party: its words as long as it is heard, and calls again when it is not.
+//! One member: its words as long as it is heard, and calls again when it is not.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -7,45 +7,45 @@ use std::time::Duration;
 
 use tokio::sync::mpsc::Sender;
 use understudy_bus::{Call, Peer};
-use understudy_wire::Party;
+use understudy_wire::Member;
 
 use crate::found::{Line, Vain};
 
-/// Between two calls to a party that was not heard.
+/// Between two calls to a member that was not heard.
 const AGAIN: Duration = Duration::from_secs(2);
 
 /// What the recorder is told.
 pub(crate) enum Told {
-    /// A line of the party's journal.
-    Line(Party, String),
+    /// A line of the member's journal.
+    Line(Member, String),
     /// It is heard from now on.
-    Attached(Party),
+    Attached(Member),
     /// It is not heard, and why.
-    Detached(Party, String),
+    Detached(Member, String),
 }
 
 /// The calls that stand, for commands.
 #[derive(Clone, Default)]
-pub(crate) struct Calls(Arc<Mutex<BTreeMap<Party, Arc<Call>>>>);
+pub(crate) struct Calls(Arc<Mutex<BTreeMap<Member, Arc<Call>>>>);
 
 impl Calls {
-    pub(crate) fn to(&self, party: Party) -> Option<Arc<Call>> {
-        self.lock(|calls| calls.get(&party).cloned())
+    pub(crate) fn to(&self, member: Member) -> Option<Arc<Call>> {
+        self.lock(|calls| calls.get(&member).cloned())
     }
 
-    fn set(&self, party: Party, call: Option<Arc<Call>>) {
+    fn set(&self, member: Member, call: Option<Arc<Call>>) {
         self.lock(|calls| match call {
-            Some(call) => calls.insert(party, call),
-            None => calls.remove(&party),
+            Some(call) => calls.insert(member, call),
+            None => calls.remove(&member),
         });
     }
 
-    fn lock<T>(&self, work: impl FnOnce(&mut BTreeMap<Party, Arc<Call>>) -> T) -> T {
+    fn lock<T>(&self, work: impl FnOnce(&mut BTreeMap<Member, Arc<Call>>) -> T) -> T {
         work(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
-/// Follows one party until it is told to end.
+/// Follows one member until it is told to end.
 pub(crate) struct Follower {
     pub(crate) peer: Peer,
     pub(crate) line: Line,
@@ -56,7 +56,7 @@ pub(crate) struct Follower {
 
 impl Follower {
     pub(crate) fn run(self, first: Result<Call, String>) {
-        let party = self.peer.party;
+        let member = self.peer.member;
         let mut call = first;
         let mut said = String::new();
         while !self.ends.load(Ordering::Relaxed) {
@@ -73,7 +73,7 @@ impl Follower {
                 said.clone_from(&reason);
                 if self
                     .told
-                    .blocking_send(Told::Detached(party, reason))
+                    .blocking_send(Told::Detached(member, reason))
                     .is_err()
                 {
                     return;
@@ -86,20 +86,20 @@ impl Follower {
 
     /// Until it is silent for too long.
     fn follow(&self, call: Call) {
-        let party = self.peer.party;
+        let member = self.peer.member;
         let call = Arc::new(call);
-        self.calls.set(party, Some(Arc::clone(&call)));
+        self.calls.set(member, Some(Arc::clone(&call)));
         let mut heard = false;
         // That it cannot be followed is said by whoever called this.
         let _ = call.follow(self.line.patience, |line| {
             if !std::mem::replace(&mut heard, true)
-                && self.told.blocking_send(Told::Attached(party)).is_err()
+                && self.told.blocking_send(Told::Attached(member)).is_err()
             {
                 return false;
             }
-            let told = Told::Line(party, line.to_owned());
+            let told = Told::Line(member, line.to_owned());
             self.told.blocking_send(told).is_ok() && !self.ends.load(Ordering::Relaxed)
         });
-        self.calls.set(party, None);
+        self.calls.set(member, None);
     }
 }

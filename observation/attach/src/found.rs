@@ -12,13 +12,13 @@ use crate::error::{AttachError, Unheard};
 /// A machine that is there says so within this time.
 const REACH: Duration = Duration::from_millis(1500);
 
-/// Parties that are called at once, at most.
+/// Members that are called at once, at most.
 const AT_ONCE: usize = 16;
 
 /// A cluster elsewhere of which somebody takes calls.
 pub struct Found {
     pub(crate) line: Line,
-    pub(crate) parties: Vec<(Peer, Result<Call, String>)>,
+    pub(crate) members: Vec<(Peer, Result<Call, String>)>,
     /// Inputs and outputs of each program.
     pub(crate) signals: Vec<(usize, usize)>,
 }
@@ -29,7 +29,7 @@ pub(crate) struct Line {
     pub(crate) cluster: ClusterHash,
     pub(crate) configuration: ConfigurationHash,
     pub(crate) keys: TlsKeys,
-    /// A party says something within this time.
+    /// A member says something within this time.
     pub(crate) patience: Duration,
 }
 
@@ -52,7 +52,7 @@ impl Vain {
     }
 }
 
-/// Calls all parties of a cluster at their addresses.
+/// Calls all members of a cluster at their addresses.
 ///
 /// # Errors
 /// Where none of them can be followed: [`AttachError`].
@@ -81,14 +81,14 @@ pub fn find(cluster: &Cluster, keys: TlsKeys, peers: Vec<Peer>) -> Result<Found,
     if called.iter().all(|(_, call)| call.is_err()) {
         return Err(why_nobody(called, line.configuration));
     }
-    let parties = called.into_iter();
+    let members = called.into_iter();
     let controllers = cluster.controllers().iter();
     Ok(Found {
         line,
         signals: controllers
             .map(|own| (own.program.inputs.len(), own.program.outputs.len()))
             .collect(),
-        parties: parties
+        members: members
             .map(|(peer, call)| (peer, call.map_err(Vain::words)))
             .collect(),
     })
@@ -124,7 +124,7 @@ fn why_nobody(called: Vec<(Peer, Result<Call, Vain>)>, ours: ConfigurationHash) 
 }
 
 impl Line {
-    /// Calls one party, and hears whether it runs the same.
+    /// Calls one member, and hears whether it runs the same.
     pub(crate) fn call(&self, peer: &Peer) -> Result<Call, Vain> {
         // Asked of the system first: Zenoh says the same of a machine that is not there and of a key that is not believed.
         TcpStream::connect_timeout(&peer.address, REACH)

@@ -1,20 +1,20 @@
 //! A cluster that runs elsewhere, as an operator sees it from his desk.
 //!
 //! ```text
-//!   party ──(mutual TLS: each line of its journal)──► a thread for each ──┐
-//!   party ──────────────────────────────────────────► …                  ├──► Recorder ──► runs/<time>/journal.jsonl
-//!   page, terminal ──► Commander ──(release, force)─► the party it is for ─┘
+//!   member ──(mutual TLS: each line of its journal)──► a thread for each ──┐
+//!   member ──────────────────────────────────────────► …                  ├──► Recorder ──► runs/<time>/journal.jsonl
+//!   page, terminal ──► Commander ──(release, force)─► the member it is for ─┘
 //! ```
 //!
-//! What the parties say becomes the journal of a run like any other, so that whatever shows a run shows a cluster elsewhere too. The
-//! parties say it anyhow: the cycle does not know whether somebody listens. Cycles are counted as the cluster itself counts them.
+//! What the members say becomes the journal of a run like any other, so that whatever shows a run shows a cluster elsewhere too. The
+//! members say it anyhow: the cycle does not know whether somebody listens. Cycles are counted as the cluster itself counts them.
 //!
-//! Invariants: a line counts only if it comes from the party that it speaks of, by a certificate of this cluster's authority; a party that is not
+//! Invariants: a line counts only if it comes from the member that it speaks of, by a certificate of this cluster's authority; a member that is not
 //! heard any more is called again, and the journal says since when it lacks its words.
 
 #![allow(
     clippy::disallowed_methods,
-    reason = "parties that do not answer are called again after a while"
+    reason = "members that do not answer are called again after a while"
 )]
 
 mod error;

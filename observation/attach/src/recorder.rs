@@ -1,4 +1,4 @@
-//! Writes what the parties say into the journal of a run, and passes commands on to them.
+//! Writes what the members say into the journal of a run, and passes commands on to them.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use understudy_scenarios::{
     Command, Commanded, Commander, Commands, Happening, Journal, OperatorAction, Record, Refusal,
     RunDirectory, RunEvent, RunSocket, commands, monotonic_ns,
 };
-use understudy_wire::Party;
+use understudy_wire::Member;
 
 use crate::error::AttachError;
 use crate::follower::{Calls, Follower, Told};
@@ -28,7 +28,7 @@ const SHOW: Duration = Duration::from_millis(50);
 
 const PROCESS: &str =
     "its process runs elsewhere: end it, start it or make it stand still on its own machine";
-const LINKS: &str = "nothing stands between the parties elsewhere that could cut their links";
+const LINKS: &str = "nothing stands between the members elsewhere that could cut their links";
 
 /// The commands that cannot be given to a cluster elsewhere, each with the reason.
 pub fn impossible() -> Vec<(&'static str, String)> {
@@ -57,18 +57,18 @@ impl Drop for Attached {
         self.ends.store(true, Ordering::Relaxed);
         self.end = None;
         if let Some(recorder) = self.recorder.take() {
-            // One that panicked has said so. Followers that wait for a party end with the process.
+            // One that panicked has said so. Followers that wait for a member end with the process.
             let _ = recorder.join();
         }
     }
 }
 
 impl Found {
-    /// Who of its parties is heard, and who is not, by their names.
+    /// Who of its members is heard, and who is not, by their names.
     pub fn names(&self) -> (Vec<&str>, Vec<&str>) {
         let names = |heard| {
-            let parties = self.parties.iter();
-            let those = parties.filter(move |(_, call)| call.is_ok() == heard);
+            let members = self.members.iter();
+            let those = members.filter(move |(_, call)| call.is_ok() == heard);
             those.map(|(peer, _)| peer.name.as_str()).collect()
         };
         (names(true), names(false))
@@ -96,8 +96,8 @@ impl Found {
         let ends = Arc::new(AtomicBool::new(false));
         let calls = Calls::default();
         let mut names = BTreeMap::new();
-        for (peer, call) in self.parties {
-            names.insert(peer.party, peer.name.clone());
+        for (peer, call) in self.members {
+            names.insert(peer.member, peer.name.clone());
             let follower = Follower {
                 peer,
                 line: self.line.clone(),
@@ -108,7 +108,7 @@ impl Found {
             std::thread::Builder::new()
                 .name("attach".to_owned())
                 .spawn(move || follower.run(call))
-                .map_err(system("a thread for a party"))?;
+                .map_err(system("a thread for a member"))?;
         }
         let recorder = Recorder {
             journal,
@@ -140,7 +140,7 @@ impl Found {
 struct Recorder {
     journal: Journal,
     calls: Calls,
-    names: BTreeMap<Party, String>,
+    names: BTreeMap<Member, String>,
     /// Inputs and outputs of each program.
     signals: Vec<(usize, usize)>,
     has_origin: bool,
@@ -175,18 +175,18 @@ impl Recorder {
     }
 
     fn note(&mut self, told: Told) {
-        let (party, line) = match told {
-            Told::Line(party, line) => (party, line),
-            Told::Attached(party) => return self.own(RunEvent::Attached { party }),
-            Told::Detached(party, reason) => {
-                return self.own(RunEvent::Detached { party, reason });
+        let (member, line) = match told {
+            Told::Line(member, line) => (member, line),
+            Told::Attached(member) => return self.own(RunEvent::Attached { member }),
+            Told::Detached(member, reason) => {
+                return self.own(RunEvent::Detached { member, reason });
             }
         };
         // Whoever says something else than a record of its own is not worth believing.
         let Ok(record) = serde_json::from_str::<Record>(&line) else {
             return;
         };
-        if record.party != Some(party) {
+        if record.member != Some(member) {
             return;
         }
         self.journal.write(&record);
@@ -206,14 +206,14 @@ impl Recorder {
                 Ok(())
             }
             OperatorAction::Command {
-                party,
+                member,
                 command,
                 owner,
                 reason,
             } => {
-                let done = self.command(party, &command).await;
+                let done = self.command(member, &command).await;
                 self.own(RunEvent::Commanded {
-                    party,
+                    member,
                     command,
                     owner,
                     reason,
@@ -226,8 +226,8 @@ impl Recorder {
         commanded.answer(done);
     }
 
-    async fn command(&self, party: Party, command: &Command) -> Result<(), Refusal> {
-        let name = self.names.get(&party).cloned().unwrap_or_default();
+    async fn command(&self, member: Member, command: &Command) -> Result<(), Refusal> {
+        let name = self.names.get(&member).cloned().unwrap_or_default();
         let elsewhere = |reason: &str| Refusal::Elsewhere {
             name: name.clone(),
             reason: reason.to_owned(),
@@ -242,8 +242,8 @@ impl Recorder {
                 return Err(elsewhere(PROCESS));
             }
         };
-        let Party::RemoteIo(program) = party else {
-            return Err(Refusal::WrongParty {
+        let Member::RemoteIo(program) = member else {
+            return Err(Refusal::WrongMember {
                 name,
                 needs: "it is for remote I/Os",
             });
@@ -254,7 +254,7 @@ impl Recorder {
         {
             return Err(refusal);
         }
-        let Some(call) = self.calls.to(party) else {
+        let Some(call) = self.calls.to(member) else {
             return Err(elsewhere("it takes no call now"));
         };
         // Zenoh waits in threads of its own only.

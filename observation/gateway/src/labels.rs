@@ -29,8 +29,8 @@ pub(crate) struct OfLacking {
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-pub(crate) struct OfParty {
-    pub(crate) party: String,
+pub(crate) struct OfMember {
+    pub(crate) member: String,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]

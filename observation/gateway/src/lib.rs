@@ -6,7 +6,7 @@
 //!                          └─► Snapshot and events ──► JSON under keys of Zenoh, at a limited rate
 //! ```
 //!
-//! A reader of the journal only: no party knows that somebody looks, and nothing here can be written.
+//! A reader of the journal only: no member knows that somebody looks, and nothing here can be written.
 
 #![allow(
     clippy::disallowed_methods,

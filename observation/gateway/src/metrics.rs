@@ -16,13 +16,13 @@ use understudy_bus::HostEvent;
 use understudy_cluster::Cluster;
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
-use understudy_scenarios::{Happening, Parties, Record, source_word};
+use understudy_scenarios::{Happening, Members, Record, source_word};
 use understudy_view::{Model, Run, Snapshot, StationState};
-use understudy_wire::{Party, ProgramId, StationId};
+use understudy_wire::{Member, ProgramId, StationId};
 
 use crate::error::GatewayError;
 use crate::followed::BOUNDS;
-use crate::labels::{OfLacking, OfParty, OfProgram, OfSource, OfState, OfTurn};
+use crate::labels::{OfLacking, OfMember, OfProgram, OfSource, OfState, OfTurn};
 
 /// Shares of a period that bound the buckets of times.
 const SHARES: [f64; 12] = [
@@ -46,7 +46,7 @@ const STATES: [(StationState, &str); 10] = [
 #[derive(Debug)]
 pub struct Metrics {
     registry: Mutex<Registry>,
-    parties: Parties,
+    members: Members,
     stations: u8,
     /// The newest cycle whose times were observed.
     timed: AtomicI64,
@@ -54,13 +54,13 @@ pub struct Metrics {
     silent_turns: Family<OfTurn, Counter>,
     voided_samples: Family<OfProgram, Counter>,
     substituted_inputs: Family<OfProgram, Counter>,
-    digest_differences: Family<OfParty, Counter>,
+    digest_differences: Family<OfMember, Counter>,
     value_faults: Family<OfProgram, Counter>,
-    flagged: Family<OfParty, Counter>,
-    refused_frames: Family<OfParty, Counter>,
-    stalls: Family<OfParty, Counter>,
-    stall_seconds: Family<OfParty, Counter<f64, AtomicU64>>,
-    records_lost: Family<OfParty, Counter>,
+    flagged: Family<OfMember, Counter>,
+    refused_frames: Family<OfMember, Counter>,
+    stalls: Family<OfMember, Counter>,
+    stall_seconds: Family<OfMember, Counter<f64, AtomicU64>>,
+    records_lost: Family<OfMember, Counter>,
     margin: Histogram,
     late_turns: Counter,
     token: Histogram,
@@ -79,7 +79,7 @@ pub struct Metrics {
     lost_state_age: Family<OfProgram, Gauge>,
     state_losses: Family<OfProgram, Counter>,
     finished: Family<OfProgram, Gauge>,
-    mishaps: Family<OfProgram, Gauge>,
+    plant_faults: Family<OfProgram, Gauge>,
     records: Gauge,
     left_out: Gauge,
     journal_age: Gauge<f64, AtomicU64>,
@@ -93,7 +93,7 @@ impl Metrics {
         let buckets = || Histogram::new(SHARES.map(|share| share * period));
         let mut metrics = Self {
             registry: Mutex::new(Registry::default()),
-            parties: Parties::of(cluster),
+            members: Members::of(cluster),
             stations: u8::try_from(schedule.stations()).unwrap_or(u8::MAX),
             timed: AtomicI64::new(i64::MIN),
             deadlines: Family::default(),
@@ -128,7 +128,7 @@ impl Metrics {
             lost_state_age: Family::default(),
             state_losses: Family::default(),
             finished: Family::default(),
-            mishaps: Family::default(),
+            plant_faults: Family::default(),
             records: Gauge::default(),
             left_out: Gauge::default(),
             journal_age: Gauge::default(),
@@ -140,17 +140,17 @@ impl Metrics {
 
     /// Whoever watches a counter has to see it at 0 before it counts.
     fn begin(&self, cluster: &Cluster) {
-        for (party, name) in self.parties.iter() {
-            let of_party = OfParty {
-                party: name.to_owned(),
+        for (member, name) in self.members.iter() {
+            let of_member = OfMember {
+                member: name.to_owned(),
             };
             for family in [&self.refused_frames, &self.stalls, &self.records_lost] {
-                let _ = family.get_or_create(&of_party);
+                let _ = family.get_or_create(&of_member);
             }
-            let _ = self.stall_seconds.get_or_create(&of_party);
-            if !matches!(party, Party::Plant(_)) {
-                let _ = self.digest_differences.get_or_create(&of_party);
-                let _ = self.flagged.get_or_create(&of_party);
+            let _ = self.stall_seconds.get_or_create(&of_member);
+            if !matches!(member, Member::Plant(_)) {
+                let _ = self.digest_differences.get_or_create(&of_member);
+                let _ = self.flagged.get_or_create(&of_member);
             }
         }
         for controller in cluster.controllers() {
@@ -189,12 +189,12 @@ impl Metrics {
             "silent_turns" silent_turns "Turns of a station that a remote I/O did not hear";
             "voided_samples" voided_samples "Samples that nobody heard, and that are void";
             "substituted_inputs" substituted_inputs "Changes of the channels that a remote I/O finds failed, whose last good value is used";
-            "digest_differences" digest_differences "Equal histories with unequal states, as the party says";
+            "digest_differences" digest_differences "Equal histories with unequal states, as the member says";
             "value_faults" value_faults "Outputs that differ in one history, or whose sum is not 0";
-            "flagged" flagged "Stations that were silent for too long, as the party says";
+            "flagged" flagged "Stations that were silent for too long, as the member says";
             "refused_frames" refused_frames "Datagrams that are no frames of this cluster";
-            "host_stalls" stalls "Wake-ups of the party that came too late";
-            "journal_records_lost" records_lost "Records that the party could not write";
+            "host_stalls" stalls "Wake-ups of the member that came too late";
+            "journal_records_lost" records_lost "Records that the member could not write";
             "late_turns" late_turns "Cycles whose last turn came after the deadline";
             "cycle" cycle "The newest cycle, from the origin of the run";
             "survivable_failures" survives "Further failures of stations that are masked whichever they are";
@@ -210,7 +210,7 @@ impl Metrics {
             "lost_state_age_cycles" lost_state_age "Cycles by which the newest available state of a lost one is too old";
             "state_losses" state_losses "Times that the state of the program was lost";
             "plant_finished" finished "Parts that the simulated plant has finished";
-            "plant_mishaps" mishaps "Things that must not happen to the simulated plant and did";
+            "plant_faults" plant_faults "Things that must not happen to the simulated plant and did";
             "journal_records" records "Records that were read";
             "journal_left_out" left_out "Records that were gone or could not be read, at least";
         }
@@ -220,7 +220,7 @@ impl Metrics {
             };
         }
         in_seconds! {
-            "host_stall" stall_seconds "By how much the wake-ups of the party came too late, in all";
+            "host_stall" stall_seconds "By how much the wake-ups of the member came too late, in all";
             "cycle_margin" margin "From the last turn of a cycle to its deadline; 0 where it came later";
             "token" token "From the first sample of a cycle to its last turn";
             "journal_age" journal_age "Age of the newest record: a live run whose journal does not grow is not seen any more";
@@ -231,8 +231,8 @@ impl Metrics {
 
     /// Counts a record.
     pub fn note(&self, record: &Record) {
-        match (&record.event, record.party) {
-            (Happening::RemoteIo(event), Some(Party::RemoteIo(program))) => {
+        match (&record.event, record.member) {
+            (Happening::RemoteIo(event), Some(Member::RemoteIo(program))) => {
                 self.remote_io(record, program, event);
             }
             (Happening::Station(event), Some(_)) => match event {
@@ -277,7 +277,7 @@ impl Metrics {
                 for station in (0..self.stations).map(StationId) {
                     if !heard.contains(station) {
                         let turn = OfTurn {
-                            station: self.parties.name(Party::Station(station)).to_owned(),
+                            station: self.members.name(Member::Station(station)).to_owned(),
                             remote_io: record.name.clone(),
                         };
                         self.silent_turns.get_or_create(&turn).inc();
@@ -320,8 +320,8 @@ impl Metrics {
     }
 
     fn program(&self, program: ProgramId) -> String {
-        self.parties
-            .name(Party::Station(StationId(program.0)))
+        self.members
+            .name(Member::Station(StationId(program.0)))
             .to_owned()
     }
 
@@ -377,8 +377,10 @@ impl Metrics {
                     .get_or_create(&of_program)
                     .set(whole(finished));
             }
-            if let Some(mishaps) = program.mishaps {
-                self.mishaps.get_or_create(&of_program).set(whole(mishaps));
+            if let Some(plant_faults) = program.plant_faults {
+                self.plant_faults
+                    .get_or_create(&of_program)
+                    .set(whole(plant_faults));
             }
         }
     }
@@ -447,9 +449,9 @@ impl Metrics {
     }
 }
 
-fn of(record: &Record) -> OfParty {
-    OfParty {
-        party: record.name.clone(),
+fn of(record: &Record) -> OfMember {
+    OfMember {
+        member: record.name.clone(),
     }
 }
 

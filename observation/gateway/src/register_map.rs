@@ -117,7 +117,7 @@ const PROGRAM_REGISTERS: [(u16, u16, &str, &str); 10] = [
     (8, 2, "held", "deadlines"),
     (10, 2, "fail_safe", "deadlines"),
     (12, 2, "finished", "parts"),
-    (14, 2, "mishaps", "things that must not happen"),
+    (14, 2, "plant_faults", "things that must not happen"),
 ];
 
 impl RegisterMap {
@@ -263,7 +263,11 @@ impl RegisterMap {
             set(registers, base + 8, program.held);
             set(registers, base + 10, program.fail_safe);
             set(registers, base + 12, program.finished.unwrap_or_default());
-            set(registers, base + 14, program.mishaps.unwrap_or_default());
+            set(
+                registers,
+                base + 14,
+                program.plant_faults.unwrap_or_default(),
+            );
             add_bits(&mut image.inputs, program.inputs.as_deref(), width.0);
             add_bits(&mut image.coils, program.outputs.as_deref(), width.1);
         }

@@ -450,10 +450,10 @@ impl Tree {
             count(|of| of.finished),
         );
         self.add(
-            "Mishaps",
+            "plant faults",
             Kind::UInt64,
             "things that must not happen, where its plant is simulated",
-            count(|of| of.mishaps),
+            count(|of| of.plant_faults),
         );
         self.signals(place, controller);
     }

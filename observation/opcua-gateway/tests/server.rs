@@ -18,7 +18,7 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
 use understudy_cluster::{Cluster, press_cell, read};
-use understudy_scenarios::{Journal, Parties, keep_cluster, read as read_scenario, simulate};
+use understudy_scenarios::{Journal, Members, keep_cluster, read as read_scenario, simulate};
 use understudy_testing::skip;
 use understudy_view::{Bounds, Run};
 
@@ -68,7 +68,7 @@ fn finished_run_of(name: &str, cycles: u64) -> PathBuf {
     let text = format!(
         "title = \"A crash\"\ncycles = {cycles}\n[[step]]\nat = 20\naction = \"crash\"\nstation = \"robot\"\n"
     );
-    let scenario = read_scenario("crash.toml", &text, Some(&Parties::of(&cluster)));
+    let scenario = read_scenario("crash.toml", &text, Some(&Members::of(&cluster)));
     let scenario = scenario.scenario.expect("it is right");
     let mut journal = Journal::create(&run.join("journal.jsonl"), 1_000_000_000).expect("created");
     simulate(&cluster, &scenario, 1, &mut |record| journal.write(record))

@@ -102,7 +102,7 @@ impl Alarms {
         }
     }
 
-    /// All that is wrong with one party is over.
+    /// All that is wrong with one member is over.
     pub(crate) fn all_over(&mut self, name: &str, alarms: &[&'static str], cycle: i64) {
         for alarm in alarms {
             self.over(&(name.to_owned(), alarm), cycle);

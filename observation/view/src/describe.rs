@@ -1,11 +1,11 @@
 //! Records in words.
 
-mod parties;
+mod members;
 mod processes;
 
 use understudy_remote_io::Missing;
-use understudy_scenarios::{Happening, Parties, Record};
-use understudy_wire::{Member, Party, ProgramId, ProgramSet, Set, StationId, StationSet};
+use understudy_scenarios::{Happening, Members, Record};
+use understudy_wire::{Element, Member, ProgramId, ProgramSet, Set, StationId, StationSet};
 
 use crate::event::Level;
 pub(crate) use processes::fault_text;
@@ -53,7 +53,7 @@ pub(crate) const EVENTS: [&str; 65] = [
     "flagged",
     "forced",
     "holds",
-    "in-step",
+    "synchronised",
     "interrupted",
     "joins",
     "journal-lost",
@@ -62,7 +62,7 @@ pub(crate) const EVENTS: [&str; 65] = [
     "new-life",
     "no-new-life",
     "origin",
-    "paces",
+    "became-cycle-master",
     "protected",
     "readmitted",
     "ready",
@@ -75,7 +75,7 @@ pub(crate) const EVENTS: [&str; 65] = [
     "sampled",
     "scenario-over",
     "source",
-    "spoke",
+    "published",
     "stalled",
     "started",
     "started-cold",
@@ -93,11 +93,11 @@ pub(crate) const EVENTS: [&str; 65] = [
 ];
 
 /// A record in words, with the names of its cluster.
-pub fn describe(record: &Record, names: &Parties) -> Description {
+pub fn describe(record: &Record, names: &Members) -> Description {
     let (event, level, text) = match &record.event {
-        Happening::Station(event) => parties::station(event, names),
-        Happening::RemoteIo(event) => parties::remote_io(event, names),
-        Happening::Plant(event) => parties::plant(event, names),
+        Happening::Station(event) => members::station(event, names),
+        Happening::RemoteIo(event) => members::remote_io(event, names),
+        Happening::Plant(event) => members::plant(event, names),
         Happening::Host(event) => processes::host(event, names),
         Happening::Run(event) => processes::run(event, names),
     };
@@ -105,7 +105,10 @@ pub fn describe(record: &Record, names: &Parties) -> Description {
         event,
         level,
         text,
-        is_ordinary: matches!(event, "spoke" | "holds" | "sampled" | "applied" | "stepped"),
+        is_ordinary: matches!(
+            event,
+            "published" | "holds" | "sampled" | "applied" | "stepped"
+        ),
     }
 }
 
@@ -121,30 +124,30 @@ pub(crate) fn missing_text(missing: Missing) -> &'static str {
         Missing::StateLost => "no living station can prove the program's state",
         Missing::NotReleased => "an operator has to release the outputs",
         Missing::ValueFault => "stations disagree, and nobody can say who is right",
-        Missing::NobodyInStep => "nobody who is in step spoke for it",
+        Missing::NotSynchronised => "nobody who is synchronised published for it",
         Missing::TwoErasures => "a word was there, and another member of it was not",
         Missing::SecondFailure => "two stations have failed, S2",
     }
 }
 
 /// A program is called by its controller.
-pub(crate) fn program_name(program: ProgramId, parties: &Parties) -> &str {
-    parties.name(Party::Station(StationId(program.0)))
+pub(crate) fn program_name(program: ProgramId, members: &Members) -> &str {
+    members.name(Member::Station(StationId(program.0)))
 }
 
-fn programs(set: ProgramSet, parties: &Parties) -> String {
+fn programs(set: ProgramSet, members: &Members) -> String {
     names(set, |program: ProgramId| {
-        program_name(program, parties).to_owned()
+        program_name(program, members).to_owned()
     })
 }
 
-pub(crate) fn stations(set: StationSet, parties: &Parties) -> String {
+pub(crate) fn stations(set: StationSet, members: &Members) -> String {
     names(set, |station: StationId| {
-        parties.name(Party::Station(station)).to_owned()
+        members.name(Member::Station(station)).to_owned()
     })
 }
 
-fn names<M: Member>(set: Set<M>, name: impl Fn(M) -> String) -> String {
+fn names<E: Element>(set: Set<E>, name: impl Fn(E) -> String) -> String {
     let names: Vec<String> = set.iter().map(name).collect();
     list(&names)
 }

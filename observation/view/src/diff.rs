@@ -18,7 +18,7 @@ pub enum Differing {
     Outputs,
     /// Where y(i) came from.
     Source,
-    /// What happened to a party.
+    /// What happened to a member.
     Events,
 }
 
@@ -27,7 +27,7 @@ pub enum Differing {
 pub struct Difference {
     /// From the origins of the runs.
     pub cycle: i64,
-    /// Of which program or party.
+    /// Of which program or member.
     pub name: String,
     /// What.
     pub what: Differing,
@@ -179,7 +179,7 @@ fn first<T: Clone + PartialEq>(
     found
 }
 
-/// For each party and event the first that only one run has. Cycles of equal events may be a little apart, for real clocks are;
+/// For each member and event the first that only one run has. Cycles of equal events may be a little apart, for real clocks are;
 /// so they are compared by their order.
 fn events(left: &Model, right: &Model, end: i64) -> Vec<Difference> {
     type Key<'m> = (&'m str, &'static str);

@@ -62,7 +62,7 @@ pub enum ViewError {
         /// Why.
         reason: String,
     },
-    /// No party or program has this name.
+    /// No member or program has this name.
     #[error("U0577: no {kind} is called `{name}`; {hint}")]
     NoName {
         /// What was looked for.

@@ -4,7 +4,7 @@
 
 mod picture;
 
-use understudy_wire::{Image, Party, ProgramId, Source, StationId};
+use understudy_wire::{Image, Member, ProgramId, Source, StationId};
 
 use crate::error::ViewError;
 use crate::history::History;
@@ -104,7 +104,7 @@ impl Model {
         Ok(Film {
             cluster: self.cluster().name().to_owned(),
             program: self.program_name(program).to_owned(),
-            remote_io: self.parties().name(Party::RemoteIo(program)).to_owned(),
+            remote_io: self.members().name(Member::RemoteIo(program)).to_owned(),
             period_us: self.snapshot().period_us,
             cycles: (from, to),
             outputs: self.filmed_outputs(program, (from, to)),
@@ -206,7 +206,7 @@ impl Model {
         let states = self.series().station(station);
         let spans = states.map(|states| states.spans(from, to).map(owned).collect());
         Station {
-            name: self.parties().name(Party::Station(station)).to_owned(),
+            name: self.members().name(Member::Station(station)).to_owned(),
             understudy: self.cluster().agreement().schedule.is_understudy(station),
             states: spans.unwrap_or_default(),
         }

@@ -295,5 +295,5 @@ fn is_of(sample: &Event, cycle: Moment) -> bool {
     matches!(sample, Event::Sampled { moment, .. } if *moment == cycle)
 }
 
-/// Lines of different parties are so many cycles apart, at most.
+/// Lines of different members are so many cycles apart, at most.
 const NEWEST: usize = 64;

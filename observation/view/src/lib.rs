@@ -7,7 +7,7 @@
 //!                                                └─► diff of two runs
 //! ```
 //!
-//! A reader of files only: no party knows that it is looked at. Memory is bounded ([`Bounds`]); what is older is forgotten.
+//! A reader of files only: no member knows that it is looked at. Memory is bounded ([`Bounds`]); what is older is forgotten.
 //! Cycles are counted from the origin of the run, as its report counts them; those before it are negative.
 
 mod alarm;
@@ -41,7 +41,7 @@ pub use film::{Film, Scene};
 pub use history::{Driven, History, Sampled, Step};
 pub use listing::{Filter, JournalLine, Listing};
 pub use margin::{Holders, Loss, Margin, Outcome};
-pub use model::{Bounds, Model, Spoken};
+pub use model::{Bounds, Model, SentTurn};
 pub use protection::{LackingStation, LostState, Protection};
 pub use run::{Run, find_run, find_run_of, find_running, find_running_of};
 pub use series::Series;

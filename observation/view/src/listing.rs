@@ -7,8 +7,8 @@ use serde::Serialize;
 use understudy_cluster::Cluster;
 use understudy_diagnostic::spelling::suggestion;
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
-use understudy_scenarios::{Happening, Parties, Record, RunEvent, moment};
-use understudy_wire::{Moment, Party, ProgramId, Source};
+use understudy_scenarios::{Happening, Members, Record, RunEvent, moment};
+use understudy_wire::{Member, Moment, ProgramId, Source};
 
 use crate::cycles::Cycles;
 use crate::describe::{EVENTS, describe};
@@ -18,8 +18,8 @@ use crate::event::Level;
 /// Which records are wanted; an empty list is all.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Filter {
-    /// Names of parties, or `laboratory`.
-    pub parties: Vec<String>,
+    /// Names of members, or `laboratory`.
+    pub members: Vec<String>,
     /// Words such as `flagged`.
     pub events: Vec<String>,
     /// Names of controllers: what they, their remote I/Os and their plants say.
@@ -28,7 +28,7 @@ pub struct Filter {
     pub from: Option<i64>,
     /// The last cycle.
     pub to: Option<i64>,
-    /// Also what every party says in every cycle. What is named in `events` is wanted anyhow.
+    /// Also what every member says in every cycle. What is named in `events` is wanted anyhow.
     pub ordinary: bool,
 }
 
@@ -53,8 +53,8 @@ pub struct JournalLine {
 #[derive(Debug, Clone)]
 pub struct Listing {
     filter: Filter,
-    parties: Parties,
-    wanted: Vec<Party>,
+    members: Members,
+    wanted: Vec<Member>,
     cycles: Cycles,
     sources: BTreeMap<ProgramId, Source>,
 }
@@ -65,8 +65,8 @@ impl Listing {
     /// # Errors
     /// Every name and word of the filter that does not exist.
     pub fn new(cluster: &Cluster, filter: Filter) -> Result<Self, Vec<ViewError>> {
-        let parties = Parties::of(cluster);
-        let names: Vec<&str> = parties
+        let members = Members::of(cluster);
+        let names: Vec<&str> = members
             .iter()
             .map(|(_, name)| name)
             .chain(["laboratory"])
@@ -86,24 +86,24 @@ impl Listing {
                 });
             }
         };
-        check("party", &filter.parties, &names);
+        check("member", &filter.members, &names);
         check("program", &filter.programs, &programs);
         check("event", &filter.events, &EVENTS);
         if !errors.is_empty() {
             return Err(errors);
         }
-        let of_program = |party: &Party| match party {
-            Party::Station(station) => Some(station.index()),
-            Party::RemoteIo(program) | Party::Plant(program) => Some(program.index()),
+        let of_program = |member: &Member| match member {
+            Member::Station(station) => Some(station.index()),
+            Member::RemoteIo(program) | Member::Plant(program) => Some(program.index()),
         };
-        let wanted = parties.iter().filter(|(party, _)| {
-            let program = of_program(party).and_then(|place| programs.get(place));
+        let wanted = members.iter().filter(|(member, _)| {
+            let program = of_program(member).and_then(|place| programs.get(place));
             program.is_some_and(|name| filter.programs.iter().any(|wanted| wanted == name))
         });
         Ok(Self {
-            wanted: wanted.map(|(party, _)| party).collect(),
+            wanted: wanted.map(|(member, _)| member).collect(),
             filter,
-            parties,
+            members,
             cycles: Cycles::default(),
             sources: BTreeMap::new(),
         })
@@ -136,7 +136,7 @@ impl Listing {
         if !self.is_wanted(record, cycle) {
             return None;
         }
-        let mut description = describe(record, &self.parties);
+        let mut description = describe(record, &self.members);
         let wants_source = self.filter.events.is_empty() || self.wants("source");
         if changed && wants_source && !self.filter.ordinary && !self.wants("applied") {
             description.event = "source";
@@ -162,9 +162,9 @@ impl Listing {
     /// Whether the outputs of a program come from elsewhere than at the deadline before.
     fn source_changed(&mut self, record: &Record) -> bool {
         let (
-            Some(Party::RemoteIo(program)),
+            Some(Member::RemoteIo(program)),
             Happening::RemoteIo(RemoteIoEvent::Applied { source, .. }),
-        ) = (record.party, &record.event)
+        ) = (record.member, &record.event)
         else {
             return false;
         };
@@ -172,12 +172,12 @@ impl Listing {
     }
 
     fn cycle_of(&mut self, record: &Record) -> i64 {
-        match (&record.event, record.party) {
+        match (&record.event, record.member) {
             (
                 Happening::RemoteIo(RemoteIoEvent::Applied {
                     moment, missing, ..
                 }),
-                Some(Party::RemoteIo(program)),
+                Some(Member::RemoteIo(program)),
             ) => {
                 let idle = *missing == Some(Missing::NoCycle);
                 self.cycles.deadline(program, *moment, idle)
@@ -200,17 +200,17 @@ impl Listing {
 
     fn is_wanted(&self, record: &Record, cycle: Option<i64>) -> bool {
         let Filter {
-            parties,
+            members,
             from,
             to,
             programs,
             ..
         } = &self.filter;
-        let by_name = parties.is_empty() || parties.contains(&record.name);
+        let by_name = members.is_empty() || members.contains(&record.name);
         let by_program = programs.is_empty()
             || record
-                .party
-                .is_some_and(|party| self.wanted.contains(&party));
+                .member
+                .is_some_and(|member| self.wanted.contains(&member));
         let after = from.is_none_or(|from| cycle.is_some_and(|cycle| cycle >= from));
         let before = to.is_none_or(|to| cycle.is_none_or(|cycle| cycle <= to));
         by_name && by_program && after && before
@@ -219,7 +219,7 @@ impl Listing {
     /// Whether records that are still to come are all behind the last wanted cycle.
     pub fn is_past(&self) -> bool {
         let latest = self.cycles.latest().filter(|_| self.cycles.has_origin());
-        // Lines of different parties may be a few cycles apart.
+        // Lines of different members may be a few cycles apart.
         self.filter
             .to
             .is_some_and(|to| latest.is_some_and(|latest| latest > to.saturating_add(64)))

@@ -9,8 +9,8 @@ use std::sync::Arc;
 use understudy_node::{words_of_controller, words_of_understudy};
 use understudy_remote_io::{Foreseen, Missing};
 use understudy_wire::{
-    Body, ClusterHash, ConfigurationHash, Digest, Frame, Header, Holding, Image, Lineage, Mode,
-    Moment, Party, ProgramId, ProgramSet, StationId, StationSet, Turn, Word,
+    Body, ClusterHash, ConfigurationHash, Digest, Frame, Header, Holding, Image, Lineage, Member,
+    Mode, Moment, ProgramId, ProgramSet, StationId, StationSet, Turn, Word,
 };
 
 /// Who is alive, and holds what.
@@ -34,7 +34,7 @@ pub struct Holders {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Outcome {
     /// Who fails, all at once.
-    pub failed: Vec<Party>,
+    pub failed: Vec<Member>,
     /// The programs whose outputs would be true no more; none where it is masked.
     pub lost: Vec<Loss>,
 }
@@ -60,7 +60,7 @@ impl Outcome {
 pub struct Margin {
     /// Programs with true outputs now.
     pub served: ProgramSet,
-    /// Each party alone: the stations that speak by rank, then the remote I/Os of the programs that are served.
+    /// Each member alone: the stations that speak by rank, then the remote I/Os of the programs that are served.
     pub singles: Vec<Outcome>,
     /// Each pair of stations that speak.
     pub pairs: Vec<Outcome>,
@@ -96,7 +96,7 @@ impl Holders {
             (true, true) => 2,
         };
         let remote_ios = served.iter().map(|program| Outcome {
-            failed: vec![Party::RemoteIo(program)],
+            failed: vec![Member::RemoteIo(program)],
             lost: vec![Loss {
                 program,
                 missing: None,
@@ -128,7 +128,7 @@ impl Holders {
             })
         });
         Outcome {
-            failed: failed.iter().map(Party::Station).collect(),
+            failed: failed.iter().map(Member::Station).collect(),
             lost: lost.collect(),
         }
     }
@@ -175,7 +175,7 @@ impl Holders {
             let holds = self.holds[station.index()];
             (!failed.contains(station) && !holds.is_empty()).then_some(holds)
         };
-        let spoke: ProgramSet = all
+        let published: ProgramSet = all
             .iter()
             .filter(|program| {
                 speaks(StationId(program.0)).is_some_and(|holds| holds.contains(*program))
@@ -189,7 +189,7 @@ impl Holders {
                     let own = ProgramId(station.0);
                     words_of_controller(own, outputs.get(own.index())?)
                 } else {
-                    words_of_understudy(self.mode, all, holds, spoke, |program| {
+                    words_of_understudy(self.mode, all, holds, published, |program| {
                         outputs.get(program.index())
                     })
                 };
@@ -217,7 +217,7 @@ fn turn(station: StationId, holds: ProgramSet, words: Vec<Word>) -> Arc<Frame> {
             cluster: ClusterHash::default(),
             configuration: ConfigurationHash::default(),
             moment: Moment::default(),
-            sender: Party::Station(station),
+            sender: Member::Station(station),
             alone: false,
         },
         body: Body::Turn(Turn {

@@ -11,8 +11,8 @@ use understudy_bus::HostEvent;
 use understudy_cluster::Cluster;
 use understudy_ladder::Observer;
 use understudy_node::Event as StationEvent;
-use understudy_scenarios::{Action, Happening, Parties, Record, RunEvent, moment};
-use understudy_wire::{Moment, Party, ProgramId, StationId};
+use understudy_scenarios::{Action, Happening, Members, Record, RunEvent, moment};
+use understudy_wire::{Member, Moment, ProgramId, StationId};
 
 use crate::alarm::Alarms;
 use crate::cycles::Cycles;
@@ -25,7 +25,7 @@ use crate::station::StationTrack;
 use crate::timing::Timings;
 
 pub(crate) use programs::ProgramTrack;
-pub use turns::Spoken;
+pub use turns::SentTurn;
 use turns::Turns;
 
 /// How much of a run is remembered.
@@ -57,7 +57,7 @@ impl Default for Bounds {
 #[derive(Debug, Clone)]
 pub struct Model {
     pub(crate) cluster: Arc<Cluster>,
-    pub(crate) parties: Parties,
+    pub(crate) members: Members,
     cycles: Cycles,
     pub(crate) stations: Vec<StationTrack>,
     pub(crate) programs: Vec<ProgramTrack>,
@@ -87,7 +87,7 @@ impl Model {
         let histories = (0..programs as u8)
             .filter_map(|program| History::new(&cluster, ProgramId(program), bounds.cycles));
         Self {
-            parties: Parties::of(&cluster),
+            members: Members::of(&cluster),
             cycles: Cycles::default(),
             stations: vec![StationTrack::default(); schedule.stations()],
             programs: vec![ProgramTrack::default(); programs],
@@ -114,17 +114,17 @@ impl Model {
         self.records += 1;
         self.at_ns = record.at_ns;
         self.alarms.now_ns = record.at_ns;
-        match (&record.event, record.party) {
-            (Happening::Station(event), Some(Party::Station(station))) => {
+        match (&record.event, record.member) {
+            (Happening::Station(event), Some(Member::Station(station))) => {
                 self.station(record, station, event);
             }
-            (Happening::RemoteIo(event), Some(Party::RemoteIo(program))) => {
+            (Happening::RemoteIo(event), Some(Member::RemoteIo(program))) => {
                 self.remote_io(record, program, event);
             }
-            (Happening::Plant(event), Some(Party::Plant(program))) => {
+            (Happening::Plant(event), Some(Member::Plant(program))) => {
                 self.plant(record, program, event);
             }
-            (Happening::Host(event), Some(party)) => self.host(record, party, event),
+            (Happening::Host(event), Some(member)) => self.host(record, member, event),
             (Happening::Run(event), _) => self.run(record, event),
             _ => {}
         }
@@ -181,7 +181,7 @@ impl Model {
         }
     }
 
-    // ── what the parties say ────────────────────────────────────────────────────────────────────────────────────────
+    // ── what the members say ────────────────────────────────────────────────────────────────────────────────────────
 
     fn station(&mut self, record: &Record, station: StationId, event: &StationEvent) {
         if station.index() >= self.stations.len() {
@@ -189,14 +189,14 @@ impl Model {
         }
         let cycle = self.cycles.of(moment(&record.event));
         match event {
-            StationEvent::Spoke { moment, words } => {
+            StationEvent::Published { moment, words } => {
                 let covers = words.iter().fold(
                     Default::default(),
-                    |covers: understudy_wire::ProgramSet, word| covers.or(word.members),
+                    |covers: understudy_wire::ProgramSet, word| covers.or(word.mask),
                 );
-                self.stations[station.index()].spoke(covers);
-                self.timings.spoke(*moment, record.at_ns);
-                self.turns.spoke(*moment, station, words);
+                self.stations[station.index()].published(covers);
+                self.timings.published(*moment, record.at_ns);
+                self.turns.published(*moment, station, words);
                 self.check_words(*moment);
                 return;
             }
@@ -215,8 +215,8 @@ impl Model {
             StationEvent::Adopted { program, from, .. } => {
                 self.stations[station.index()].adopted(*program, from.is_some());
             }
-            StationEvent::InStep { program, .. } => {
-                self.stations[station.index()].in_step(*program)
+            StationEvent::Synchronised { program, .. } => {
+                self.stations[station.index()].synchronised(*program)
             }
             StationEvent::Flagged {
                 station: silent, ..
@@ -234,7 +234,7 @@ impl Model {
             }
             StationEvent::Excluded { program, .. } => {
                 self.stations[station.index()].excluded.insert(*program);
-                let text = describe(record, &self.parties).text;
+                let text = describe(record, &self.members).text;
                 self.alarms
                     .raise((record.name.clone(), "excluded"), cycle, text);
             }
@@ -245,8 +245,8 @@ impl Model {
                     self.alarms.over(&(record.name.clone(), "excluded"), cycle);
                 }
             }
-            StationEvent::Refused { party, .. } => self.refused(*party),
-            StationEvent::Paces { .. }
+            StationEvent::Refused { member, .. } => self.refused(*member),
+            StationEvent::BecameCycleMaster { .. }
             | StationEvent::DigestDiffers { .. }
             | StationEvent::Stalled { .. } => {}
         }
@@ -258,40 +258,40 @@ impl Model {
         self.happened(record, cycle, cause);
     }
 
-    fn host(&mut self, record: &Record, party: Party, event: &HostEvent) {
+    fn host(&mut self, record: &Record, member: Member, event: &HostEvent) {
         let cycle = self.cycles.of(None);
-        match (event, party) {
-            (HostEvent::Ready { .. }, Party::Station(station)) => {
+        match (event, member) {
+            (HostEvent::Ready { .. }, Member::Station(station)) => {
                 if let Some(track) = self.stations.get_mut(station.index()) {
                     track.ready();
                 }
             }
-            (HostEvent::Ready { .. }, Party::RemoteIo(program)) => self.forget_protection(program),
-            (HostEvent::FieldLost { reason }, Party::RemoteIo(_)) => {
+            (HostEvent::Ready { .. }, Member::RemoteIo(program)) => self.forget_protection(program),
+            (HostEvent::FieldLost { reason }, Member::RemoteIo(_)) => {
                 let subject = (record.name.clone(), "field-lost");
                 let text = format!("its equipment cannot be read or written: {reason}");
                 self.alarms.raise(subject, cycle, text);
             }
-            (HostEvent::FieldContested, Party::RemoteIo(_)) => {
-                let text = describe(record, &self.parties).text;
+            (HostEvent::FieldContested, Member::RemoteIo(_)) => {
+                let text = describe(record, &self.members).text;
                 let subject = (record.name.clone(), "field-contested");
                 self.alarms.raise(subject, cycle, text);
             }
-            (HostEvent::FieldUncontested, Party::RemoteIo(_)) => {
+            (HostEvent::FieldUncontested, Member::RemoteIo(_)) => {
                 self.alarms
                     .over(&(record.name.clone(), "field-contested"), cycle);
             }
-            (HostEvent::FieldRegained, Party::RemoteIo(_)) => {
+            (HostEvent::FieldRegained, Member::RemoteIo(_)) => {
                 self.alarms
                     .over(&(record.name.clone(), "field-lost"), cycle);
             }
             (HostEvent::DuplicateFound { member }, _) => {
-                let text = describe(record, &self.parties).text;
-                let subject = (self.parties.name(*member).to_owned(), "duplicate");
+                let text = describe(record, &self.members).text;
+                let subject = (self.members.name(*member).to_owned(), "duplicate");
                 self.alarms.raise(subject, cycle, text);
             }
             (HostEvent::DuplicateGone { member }, _) => {
-                let subject = (self.parties.name(*member).to_owned(), "duplicate");
+                let subject = (self.members.name(*member).to_owned(), "duplicate");
                 self.alarms.over(&subject, cycle);
             }
             (HostEvent::LinkFailed { reason, .. }, _) => {
@@ -302,7 +302,7 @@ impl Model {
                 self.alarms
                     .over(&(record.name.clone(), "link-failed"), cycle);
             }
-            (HostEvent::JournalLost { .. }, Party::RemoteIo(program)) => {
+            (HostEvent::JournalLost { .. }, Member::RemoteIo(program)) => {
                 self.misses_records(program)
             }
             (HostEvent::Exchange(_), _) => return,
@@ -331,9 +331,9 @@ impl Model {
             self.close_up_to(latest);
         }
         match event {
-            RunEvent::Started { party } => {
-                let name = self.parties.name(*party).to_owned();
-                if let Party::Station(station) = party
+            RunEvent::Started { member } => {
+                let name = self.members.name(*member).to_owned();
+                if let Member::Station(station) = member
                     && let Some(track) = self.stations.get_mut(station.index())
                 {
                     track.started();
@@ -341,25 +341,26 @@ impl Model {
                 }
                 self.alarms.over(&(name, "ended"), cycle);
             }
-            RunEvent::Fault { action, party, .. } => {
-                if let (Action::Crash | Action::Restart, Party::RemoteIo(program)) = (action, party)
+            RunEvent::Fault { action, member, .. } => {
+                if let (Action::Crash | Action::Restart, Member::RemoteIo(program)) =
+                    (action, member)
                 {
                     self.forget_protection(*program);
                 }
-                let text = fault_text(*action, *party, &self.parties);
-                if let Party::Station(station) = party
+                let text = fault_text(*action, *member, &self.members);
+                if let Member::Station(station) = member
                     && let Some(track) = self.stations.get_mut(station.index())
                 {
                     track.fault(*action, cycle, text);
                 }
             }
-            RunEvent::Ended { party, how, .. } => {
-                if let Party::RemoteIo(program) = party {
+            RunEvent::Ended { member, how, .. } => {
+                if let Member::RemoteIo(program) = member {
                     self.forget_protection(*program);
                 }
-                let name = self.parties.name(*party).to_owned();
+                let name = self.members.name(*member).to_owned();
                 let text = format!("{name} ended unexpectedly: {how}");
-                if let Party::Station(station) = party
+                if let Member::Station(station) = member
                     && let Some(track) = self.stations.get_mut(station.index())
                 {
                     track.ended(cycle, text.clone());
@@ -378,15 +379,15 @@ impl Model {
             RunEvent::Acknowledged(seen) => self.alarms.acknowledged(seen, cycle),
             // What it said before it was heard again is not known here.
             RunEvent::Attached {
-                party: Party::RemoteIo(program),
+                member: Member::RemoteIo(program),
             } => self.misses_records(*program),
             RunEvent::Commanded { .. } | RunEvent::Attached { .. } | RunEvent::Detached { .. } => {}
         }
         self.happened(record, cycle, None);
     }
 
-    fn refused(&mut self, party: Party) {
-        if let Party::Station(station) = party
+    fn refused(&mut self, member: Member) {
+        if let Member::Station(station) = member
             && let Some(track) = self.stations.get_mut(station.index())
         {
             track.refused();
@@ -395,7 +396,7 @@ impl Model {
 
     /// A record that is an event.
     fn happened(&mut self, record: &Record, cycle: i64, cause: Option<String>) {
-        let description = describe(record, &self.parties);
+        let description = describe(record, &self.members);
         self.events.push(Event {
             number: 0,
             cycle,

@@ -246,5 +246,5 @@ impl Run {
     }
 }
 
-/// Lines of different parties may be a few cycles apart.
+/// Lines of different members may be a few cycles apart.
 const BEHIND: i64 = 64;

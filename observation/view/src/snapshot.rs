@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_scenarios::source_word;
-use understudy_wire::{Party, ProgramId, StationId};
+use understudy_wire::{Member, ProgramId, StationId};
 
 use crate::alarm::Alarm;
 use crate::describe::missing_text;
@@ -120,7 +120,7 @@ pub struct ProgramSnapshot {
     /// Parts that the plant has finished.
     pub finished: Option<u64>,
     /// Things that must not happen to the plant and did.
-    pub mishaps: Option<u64>,
+    pub plant_faults: Option<u64>,
 }
 
 /// Which further failures would be masked now.
@@ -220,7 +220,7 @@ impl Model {
                 .collect()
         };
         StationSnapshot {
-            name: self.parties.name(Party::Station(station)).to_owned(),
+            name: self.members.name(Member::Station(station)).to_owned(),
             rank: station.0,
             understudy: self.cluster.agreement().schedule.is_understudy(station),
             state,
@@ -240,18 +240,18 @@ impl Model {
 
     fn program_snapshot(&self, program: ProgramId) -> ProgramSnapshot {
         let track = &self.programs[program.index()];
-        let plant = Party::Plant(program);
-        let has_plant = self.cluster.party_name(plant).is_some();
+        let plant = Member::Plant(program);
+        let has_plant = self.cluster.member_name(plant).is_some();
         let [direct, reconstructed, held, fail_safe] = track.counts;
         ProgramSnapshot {
             program: self.program_name(program).to_owned(),
-            remote_io: self.parties.name(Party::RemoteIo(program)).to_owned(),
-            plant: has_plant.then(|| self.parties.name(plant).to_owned()),
+            remote_io: self.members.name(Member::RemoteIo(program)).to_owned(),
+            plant: has_plant.then(|| self.members.name(plant).to_owned()),
             source: track.source.map(source_word),
             since: track.since,
             word_of: track
                 .word_of
-                .map(|station| self.parties.name(Party::Station(station)).to_owned()),
+                .map(|station| self.members.name(Member::Station(station)).to_owned()),
             missing: track.missing.map(missing_text),
             inputs: track.inputs.as_ref().map(ToString::to_string),
             outputs: track.outputs.as_ref().map(ToString::to_string),
@@ -276,7 +276,7 @@ impl Model {
             protection: track.protection.clone(),
             lost: track.lost.clone(),
             finished: track.plant.as_ref().map(|field| field.finished),
-            mishaps: track.plant.as_ref().map(|field| field.mishaps),
+            plant_faults: track.plant.as_ref().map(|field| field.plant_faults),
         }
     }
 
@@ -286,7 +286,7 @@ impl Model {
             failed: outcome
                 .failed
                 .iter()
-                .map(|party| self.parties.name(*party).to_owned())
+                .map(|member| self.members.name(*member).to_owned())
                 .collect(),
             masked: outcome.is_masked(),
             lost: outcome.lost.iter().map(|loss| name(loss.program)).collect(),

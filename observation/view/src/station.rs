@@ -139,7 +139,7 @@ impl StationTrack {
     }
 
     /// It says so itself. What a killed one has said before may be read after its end.
-    pub(crate) fn spoke(&mut self, covers: ProgramSet) {
+    pub(crate) fn published(&mut self, covers: ProgramSet) {
         if matches!(self.process, Process::Killed | Process::Ended) {
             return;
         }
@@ -163,7 +163,7 @@ impl StationTrack {
         }
     }
 
-    pub(crate) fn in_step(&mut self, program: understudy_wire::ProgramId) {
+    pub(crate) fn synchronised(&mut self, program: understudy_wire::ProgramId) {
         self.shadow.remove(program);
     }
 

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_wire::{Moment, Schedule};
 
-/// Cycles that are open, at most: lines of different parties come a few cycles apart.
+/// Cycles that are open, at most: lines of different members come a few cycles apart.
 const OPEN: usize = 8;
 
 /// Times of one cycle, in nanoseconds.
@@ -60,7 +60,7 @@ impl Timings {
         }
     }
 
-    pub(crate) fn spoke(&mut self, moment: Moment, at_ns: u64) {
+    pub(crate) fn published(&mut self, moment: Moment, at_ns: u64) {
         if let Some(open) = self.of(moment) {
             open.last_turn = Some(open.last_turn.map_or(at_ns, |last| last.max(at_ns)));
         }

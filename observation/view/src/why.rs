@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_diagnostic::spelling::suggestion;
 use understudy_scenarios::source_word;
-use understudy_wire::{Party, ProgramId, Source, StationId};
+use understudy_wire::{Member, ProgramId, Source, StationId};
 
 use crate::describe::missing_text;
 use crate::error::ViewError;
@@ -148,7 +148,7 @@ impl Model {
         Ok(Why {
             signal: name.to_owned(),
             program: controller.name.clone(),
-            remote_io: self.parties.name(Party::RemoteIo(program)).to_owned(),
+            remote_io: self.members.name(Member::RemoteIo(program)).to_owned(),
             cycle: step.cycle,
             value,
             source: source.map(source_word),
@@ -207,21 +207,18 @@ impl Model {
         let station = driven
             .word_of
             .filter(|_| driven.source == Source::Reconstructed)?;
-        let turns = self.spoken(step.moment);
+        let turns = self.sent_turns(step.moment);
         let turn = turns.iter().find(|turn| turn.station == station)?;
-        let word = turn
-            .words
-            .iter()
-            .find(|word| word.members.contains(program))?;
+        let word = turn.words.iter().find(|word| word.mask.contains(program))?;
         let mut sum = word.sum.clone();
         let mut others = Vec::new();
-        for other in word.members.iter().filter(|other| *other != program) {
+        for other in word.mask.iter().filter(|other| *other != program) {
             let own = StationId(other.0);
             let said = turns.iter().find(|turn| turn.station == own);
             let said = said.and_then(|turn| turn.words.first())?;
             sum.add(&said.sum);
             others.push(Addend {
-                said_by: self.parties.name(Party::Station(own)).to_owned(),
+                said_by: self.members.name(Member::Station(own)).to_owned(),
                 outputs: said.sum.to_string(),
             });
         }
@@ -229,12 +226,12 @@ impl Model {
         let silent = (0..self.cluster.agreement().schedule.stations() as u8)
             .map(StationId)
             .filter(|station| !driven.heard.contains(*station))
-            .map(|station| self.parties.name(Party::Station(station)).to_owned());
+            .map(|station| self.members.name(Member::Station(station)).to_owned());
         let sampled = step.sampled.as_ref();
         Some(Restored {
-            word_of: self.parties.name(Party::Station(station)).to_owned(),
+            word_of: self.members.name(Member::Station(station)).to_owned(),
             members: word
-                .members
+                .mask
                 .iter()
                 .map(|member| self.program_name(member).to_owned())
                 .collect(),

@@ -3,7 +3,7 @@
 import { el, keyed, setText, setAttribute } from "/element.js";
 import { signalLegend, sourceLegend, stateLegend } from "/legend.js";
 import { STATES, makePicture } from "/picture.js";
-import { continueWords, openChoice, openParty } from "/commands.js";
+import { continueWords, openChoice, openMember } from "/commands.js";
 import { SOURCES } from "/sources.js";
 import { openWhy } from "/why.js";
 
@@ -16,7 +16,7 @@ let picture = null;
 
 export function prepare(facts) {
   run = facts;
-  picture = makePicture(run, openParty);
+  picture = makePicture(run, openMember);
   const table = (id, heads) =>
     el("table", { id }, el("thead", {}, el("tr", {}, heads.map((head) => el("th", { scope: "col" }, head)))), el("tbody"));
   const card = (id, heading, ...content) =>
@@ -104,7 +104,7 @@ function timing(state) {
     ["deadline", micro(run.deadline_us)],
     ["last turn before it", micro(timing.margin_us)],
     ["least so far", micro(timing.least_margin_us)],
-    ["cycle master", state.pacemaker ?? "none"],
+    ["cycle master", state.cycle_master ?? "none"],
     ["host stalls", timing.stalls === 1 ? "1 stall" : `${timing.stalls} stalls`],
   ];
   keyed(
@@ -166,6 +166,6 @@ function pick(program, kind, index) {
   if (kind === "output") {
     openWhy(program, index);
   } else {
-    openParty({ kind: "remote-io", program }, { kind, index });
+    openMember({ kind: "remote-io", program }, { kind, index });
   }
 }

@@ -1,4 +1,4 @@
-// What somebody does to a party. A button that cannot act says why beside it.
+// What somebody does to a member. A button that cannot act says why beside it.
 
 import { act, tell, toast } from "/ask.js";
 import { el } from "/element.js";
@@ -32,45 +32,45 @@ const DOWN = "it is down";
 const UP = "it is running";
 
 // Each action with the reason why it cannot act now, if there is one.
-function actions(party) {
-  const { down } = party;
-  const still = party.state === "stopped";
+function actions(member) {
+  const { down } = member;
+  const still = member.state === "stopped";
   const all = [
     ["kill", "Kill", "as kill -9", down ? DOWN : null],
     ["restart", "Start again", "", down ? null : UP],
     ["stop", "Suspend", "as SIGSTOP", down ? DOWN : still ? "it is suspended already" : null],
     ["continue", "Resume", "as SIGCONT", down ? DOWN : still ? null : "it is not suspended"],
   ];
-  if (party.kind !== "plant") {
-    const cut = party.cut;
-    all.push(["isolate", "Cut off", "from all other parties", cut ? "it is cut off already" : null]);
+  if (member.kind !== "plant") {
+    const cut = member.cut;
+    all.push(["isolate", "Cut off", "from all other members", cut ? "it is cut off already" : null]);
     all.push(["rejoin", "Connect again", "", cut ? null : "it is not cut off"]);
   }
-  if (party.kind === "remote-io") {
+  if (member.kind === "remote-io") {
     all.push(["release", "Release", "its outputs, and the stations that it excluded", down ? DOWN : null]);
   }
   return all;
 }
 
 function find(wanted) {
-  const parties = state()?.parties ?? [];
+  const members = state()?.members ?? [];
   if (wanted.name) {
-    return parties.find((party) => party.name === wanted.name);
+    return members.find((member) => member.name === wanted.name);
   }
-  return parties.find((party) => party.kind === wanted.kind && party.program === wanted.program);
+  return members.find((member) => member.kind === wanted.kind && member.program === wanted.program);
 }
 
-// Who gives a command to a party and why, and a function that gives it.
-function giver(party) {
+// Who gives a command to a member and why, and a function that gives it.
+function giver(member) {
   const dialog = document.getElementById("command");
   const reason = el("input", { id: "command-reason", type: "text", maxlength: "120", value: "try it", required: true });
   const who = el("input", { id: "command-owner", type: "text", maxlength: "40", value: owner(), required: true, disabled: Boolean(run.person) });
   const give = async (command) => {
     localStorage.setItem("owner", who.value);
-    const body = { party: party.name, command, owner: who.value, reason: reason.value };
+    const body = { member: member.name, command, owner: who.value, reason: reason.value };
     const done = await act(() => tell("/api/command", body));
     if (done) {
-      toast(`${party.name}: done`);
+      toast(`${member.name}: done`);
       dialog.close();
     }
   };
@@ -84,13 +84,13 @@ function open(content) {
   dialog.showModal();
 }
 
-export function openParty(wanted, signal) {
-  const party = find(wanted);
-  if (!party) {
+export function openMember(wanted, signal) {
+  const member = find(wanted);
+  if (!member) {
     return;
   }
   const because = obstacle();
-  const { asked, give } = giver(party);
+  const { asked, give } = giver(member);
   const button = ([name, words, meaning, why]) => {
     const reasonWhy = because ?? run.commands.impossible[name] ?? why;
     return el("li", {},
@@ -98,12 +98,12 @@ export function openParty(wanted, signal) {
       " ", el("span", { class: "soft" }, reasonWhy ? `cannot: ${reasonWhy}` : meaning));
   };
   open([
-    el("h2", { id: "command-title" }, party.name),
-    el("p", {}, `${party.kind}: ${party.state}${party.note ? `, ${party.note}` : ""}`),
+    el("h2", { id: "command-title" }, member.name),
+    el("p", {}, `${member.kind}: ${member.state}${member.note ? `, ${member.note}` : ""}`),
     because ? el("p", { class: "obstacle" }, because) : null,
     asked,
-    el("ul", { class: "plain actions" }, actions(party).map(button)),
-    party.kind === "remote-io" ? forcing(party, signal, because, give) : null,
+    el("ul", { class: "plain actions" }, actions(member).map(button)),
+    member.kind === "remote-io" ? forcing(member, signal, because, give) : null,
     el("form", { method: "dialog" }, el("button", { type: "submit", autofocus: true }, "Close")),
   ]);
 }
@@ -113,13 +113,13 @@ export const continueWords = (lost) =>
 
 // The operator's answer where the state of a program is lost: what it does is said, and it is done when it is confirmed.
 export function openChoice(name, which) {
-  const party = find({ name });
-  const lost = party && state().programs[party.program].lost;
+  const member = find({ name });
+  const lost = member && state().programs[member.program].lost;
   if (!lost) {
     return;
   }
-  const because = obstacle() ?? run.commands.impossible.choose ?? (party.down ? DOWN : null);
-  const { asked, give } = giver(party);
+  const because = obstacle() ?? run.commands.impossible.choose ?? (member.down ? DOWN : null);
+  const { asked, give } = giver(member);
   const cold = which === "cold";
   const command = { command: "choose", choice: cold ? "cold" : { newest: { cycle: lost.newest } } };
   const warning = cold
@@ -136,8 +136,8 @@ export function openChoice(name, which) {
   ]);
 }
 
-function forcing(party, signal, because, give) {
-  const facts = run.programs[party.program];
+function forcing(member, signal, because, give) {
+  const facts = run.programs[member.program];
   const option = (kind) => (item, index) =>
     el("option", { value: `${kind} ${index}`, selected: signal?.kind === kind && signal?.index === index }, `${kind} ${item.name}`);
   const which = el("select", { id: "force-signal" }, facts.inputs.map(option("input")), facts.outputs.map(option("output")));
@@ -147,8 +147,8 @@ function forcing(party, signal, because, give) {
     const [kind, index] = which.value.split(" ");
     return { [kind]: Number(index) };
   };
-  const down = because ?? (party.down ? DOWN : null);
-  const forces = state().programs[party.program].forced;
+  const down = because ?? (member.down ? DOWN : null);
+  const forces = state().programs[member.program].forced;
   const held = forces.map((force) =>
     el("li", {}, `${force.kind} ${facts[`${force.kind}s`][force.index].name} = ${Number(force.value)}, by ${force.owner}: ${force.reason} `,
       el("button", { type: "button", disabled: Boolean(down), "data-command": "unforce", click: () => give({ command: "unforce", signal: { [force.kind]: force.index } }) }, "Take back")));

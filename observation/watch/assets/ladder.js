@@ -149,7 +149,7 @@ const sumOf = (word) => word.members.join(" ⊕ ");
 function sum() {
   const now = state();
   const members = run.programs;
-  const station = now.parties.find((party) => party.name === program);
+  const station = now.members.find((member) => member.name === program);
   const width = Math.max(...members.map((item) => item.outputs.length));
   const words = station?.words ?? [];
   const column = (item, place) => {

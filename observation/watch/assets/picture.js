@@ -43,8 +43,8 @@ export function makePicture(run, pick) {
   const left = (column) => GAP + column * (WIDTH + GAP);
   const lines = svg("g", { class: "flows" });
   const boxes = new Map();
-  const box = (name, kind, column, top, party) => {
-    const made = makeBox(name, kind, left(column), top, WIDTH, letters, () => pick(party));
+  const box = (name, kind, column, top, member) => {
+    const made = makeBox(name, kind, left(column), top, WIDTH, letters, () => pick(member));
     boxes.set(name, made);
     return made.element;
   };
@@ -70,7 +70,7 @@ function makeBox(name, kind, x, y, width, letters, pick) {
   const state = svg("text", { class: "state", x: x + 12, y: y + 38 });
   const note = svg("text", { class: "note", x: x + 12, y: y + 54 });
   const element = svg("g", {
-    class: "party", tabindex: "0", role: "button", "data-name": name, "data-kind": kind, click: pick,
+    class: "member", tabindex: "0", role: "button", "data-name": name, "data-kind": kind, click: pick,
     keydown: (event) => {
       if (event.key === "Enter" || event.key === " ") {
         event.preventDefault();
@@ -99,10 +99,10 @@ function makeFlow(parent, x, letters, hasPlant) {
 }
 
 function showAll(run, boxes, flows, state) {
-  for (const party of state.parties) {
-    const box = boxes.get(party.name);
+  for (const member of state.members) {
+    const box = boxes.get(member.name);
     if (box) {
-      showBox(box, party);
+      showBox(box, member);
     }
   }
   state.programs.forEach((program, index) => {
@@ -118,9 +118,9 @@ function showAll(run, boxes, flows, state) {
   });
 }
 
-function showBox(box, party) {
-  const look = STATES[party.state] ?? { sign: "?", words: party.state };
-  setAttribute(box.element, "data-state", party.state);
+function showBox(box, member) {
+  const look = STATES[member.state] ?? { sign: "?", words: member.state };
+  setAttribute(box.element, "data-state", member.state);
   setText(box.state, `${look.sign} ${look.words}`);
-  setText(box.note, party.note || (party.paces ? `${box.kind}, cycle master` : box.kind));
+  setText(box.note, member.note || (member.is_cycle_master ? `${box.kind}, cycle master` : box.kind));
 }

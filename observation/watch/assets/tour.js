@@ -17,7 +17,7 @@ const STEPS = [
     words: "A program is protected while the failure of one station would be masked. The list names each station, and what its failure would do now.",
   },
   {
-    target: ".party[data-kind=controller], .party[data-kind=understudy], .timebar",
+    target: ".member[data-kind=controller], .member[data-kind=understudy], .timebar",
     title: "Try it",
     words: "",
   },

@@ -4,7 +4,7 @@
 #
 #   observation/watch/benches/cost.sh target/release/understudy 50 64
 #
-# It prints the share of a core that each party uses over half a minute, what wrk has reached, and what the run came to.
+# It prints the share of a core that each member uses over half a minute, what wrk has reached, and what the run came to.
 set -eu
 understudy=$(realpath "$1")
 viewers=$2
@@ -19,7 +19,7 @@ cd "$folder"
 laboratory=$!
 trap 'kill $laboratory $told 2> /dev/null || true; rm -rf "$folder"' EXIT
 told=
-until grep -q "in step: " said; do kill -0 $laboratory; sleep 0.2; done
+until grep -q "synchronised: " said; do kill -0 $laboratory; sleep 0.2; done
 
 for viewer in $(seq "$viewers"); do
     curl -sN http://127.0.0.1:$port/api/live > /dev/null &

@@ -1,4 +1,4 @@
-//! What was done to the parties, so that a page can show how they stood in any cycle: processes, cuts, forces, exclusions.
+//! What was done to the members, so that a page can show how they stood in any cycle: processes, cuts, forces, exclusions.
 //!
 //! The model of [`understudy_view`] says what was said and driven in each cycle; this says what stands behind it. Bounded: at the bound
 //! the oldest changes become the standing that all others start from.
@@ -9,7 +9,7 @@ use understudy_node::Event as StationEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_scenarios::{Action, Happening, Record, RunEvent};
 use understudy_view::{LostState, Protection};
-use understudy_wire::{Force, Party, ProgramId, SignalPlace, StationId, StationSet};
+use understudy_wire::{Force, Member, ProgramId, SignalPlace, StationId, StationSet};
 
 /// Changes that are kept apart.
 const MOST: usize = 10_000;
@@ -26,12 +26,12 @@ pub(crate) enum Process {
 /// How everything stood in a cycle.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Standing {
-    processes: BTreeMap<Party, Process>,
-    cuts: BTreeSet<(Party, Party)>,
+    processes: BTreeMap<Member, Process>,
+    cuts: BTreeSet<(Member, Member)>,
     /// Stations that have started cycles since their process began.
-    paced: BTreeSet<StationId>,
-    /// Parties of a cluster elsewhere whose journal is not told here.
-    detached: BTreeSet<Party>,
+    cycle_masters: BTreeSet<StationId>,
+    /// Members of a cluster elsewhere whose journal is not told here.
+    detached: BTreeSet<Member>,
     forced: BTreeMap<(ProgramId, SignalPlace), Force>,
     excluded: BTreeMap<ProgramId, StationSet>,
     protection: BTreeMap<ProgramId, Protected>,
@@ -45,27 +45,27 @@ pub(crate) struct Protected {
 }
 
 impl Standing {
-    /// Nothing where whoever runs the party has said nothing of it.
-    pub(crate) fn process(&self, party: Party) -> Option<Process> {
-        self.processes.get(&party).copied()
+    /// Nothing where whoever runs the member has said nothing of it.
+    pub(crate) fn process(&self, member: Member) -> Option<Process> {
+        self.processes.get(&member).copied()
     }
 
     /// Whom nothing reaches any more that it says.
-    pub(crate) fn cut_from(&self, party: Party) -> impl Iterator<Item = Party> {
+    pub(crate) fn cut_from(&self, member: Member) -> impl Iterator<Item = Member> {
         let cuts = self.cuts.iter();
-        cuts.filter(move |(from, _)| *from == party)
+        cuts.filter(move |(from, _)| *from == member)
             .map(|(_, to)| *to)
     }
 
     /// By rank, those that have started cycles. A host that stands still makes another one start a cycle now and then, and the first of
     /// those that live goes on without saying so again.
-    pub(crate) fn paced(&self) -> impl Iterator<Item = StationId> {
-        self.paced.iter().copied()
+    pub(crate) fn cycle_masters(&self) -> impl Iterator<Item = StationId> {
+        self.cycle_masters.iter().copied()
     }
 
     /// Whether its own journal is told here no more, so that only others say how it is.
-    pub(crate) fn is_detached(&self, party: Party) -> bool {
-        self.detached.contains(&party)
+    pub(crate) fn is_detached(&self, member: Member) -> bool {
+        self.detached.contains(&member)
     }
 
     pub(crate) fn forced(&self, program: ProgramId) -> impl Iterator<Item = &Force> {
@@ -88,19 +88,19 @@ impl Standing {
 
     fn apply(&mut self, change: &Change) {
         match change {
-            Change::Process(party, process) => {
-                self.processes.insert(*party, *process);
-                if let Party::Station(station) = party {
-                    self.paced.remove(station);
+            Change::Process(member, process) => {
+                self.processes.insert(*member, *process);
+                if let Member::Station(station) = member {
+                    self.cycle_masters.remove(station);
                 }
                 // What a remote I/O was told it forgets with its process.
-                if let (Party::RemoteIo(program), Process::Running) = (party, process) {
+                if let (Member::RemoteIo(program), Process::Running) = (member, process) {
                     self.forced.retain(|(of, _), _| of != program);
                     self.excluded.remove(program);
                 }
             }
-            Change::GoesOn(party) => {
-                self.processes.insert(*party, Process::Running);
+            Change::GoesOn(member) => {
+                self.processes.insert(*member, Process::Running);
             }
             Change::Cut(from, to) => {
                 self.cuts.insert((*from, *to));
@@ -108,14 +108,14 @@ impl Standing {
             Change::Healed(from, to) => {
                 self.cuts.remove(&(*from, *to));
             }
-            Change::Attached(party) => {
-                self.detached.remove(party);
+            Change::Attached(member) => {
+                self.detached.remove(member);
             }
-            Change::Detached(party) => {
-                self.detached.insert(*party);
+            Change::Detached(member) => {
+                self.detached.insert(*member);
             }
-            Change::Paces(station) => {
-                self.paced.insert(*station);
+            Change::BecameCycleMaster(station) => {
+                self.cycle_masters.insert(*station);
             }
             Change::Forced(program, force) => {
                 self.forced.insert((*program, force.signal), force.clone());
@@ -139,13 +139,13 @@ impl Standing {
 
 #[derive(Debug, Clone)]
 enum Change {
-    Process(Party, Process),
-    GoesOn(Party),
-    Cut(Party, Party),
-    Healed(Party, Party),
-    Attached(Party),
-    Detached(Party),
-    Paces(StationId),
+    Process(Member, Process),
+    GoesOn(Member),
+    Cut(Member, Member),
+    Healed(Member, Member),
+    Attached(Member),
+    Detached(Member),
+    BecameCycleMaster(StationId),
     Forced(ProgramId, Force),
     Unforced(ProgramId, SignalPlace),
     Excluded(ProgramId, StationSet),
@@ -198,12 +198,13 @@ impl Changes {
 }
 
 fn change_of(record: &Record) -> Option<Change> {
-    match (&record.event, record.party) {
+    match (&record.event, record.member) {
         (Happening::Run(event), _) => of_run(event),
-        (Happening::Station(StationEvent::Paces { .. }), Some(Party::Station(station))) => {
-            Some(Change::Paces(station))
-        }
-        (Happening::RemoteIo(event), Some(Party::RemoteIo(program))) => {
+        (
+            Happening::Station(StationEvent::BecameCycleMaster { .. }),
+            Some(Member::Station(station)),
+        ) => Some(Change::BecameCycleMaster(station)),
+        (Happening::RemoteIo(event), Some(Member::RemoteIo(program))) => {
             of_remote_io(program, event)
         }
         _ => None,
@@ -212,17 +213,17 @@ fn change_of(record: &Record) -> Option<Change> {
 
 fn of_run(event: &RunEvent) -> Option<Change> {
     match event {
-        RunEvent::Attached { party } => Some(Change::Attached(*party)),
-        RunEvent::Detached { party, .. } => Some(Change::Detached(*party)),
-        RunEvent::Started { party } => Some(Change::Process(*party, Process::Running)),
-        RunEvent::Ended { party, .. } => Some(Change::Process(*party, Process::Ended)),
-        RunEvent::Fault { action, party, .. } => match action {
-            Action::Crash => Some(Change::Process(*party, Process::Killed)),
-            Action::Stop => Some(Change::Process(*party, Process::StandsStill)),
-            Action::Continue => Some(Change::GoesOn(*party)),
-            Action::Cut { to } => Some(Change::Cut(*party, *to)),
-            Action::Heal { to } => Some(Change::Healed(*party, *to)),
-            Action::Restart => Some(Change::Process(*party, Process::Running)),
+        RunEvent::Attached { member } => Some(Change::Attached(*member)),
+        RunEvent::Detached { member, .. } => Some(Change::Detached(*member)),
+        RunEvent::Started { member } => Some(Change::Process(*member, Process::Running)),
+        RunEvent::Ended { member, .. } => Some(Change::Process(*member, Process::Ended)),
+        RunEvent::Fault { action, member, .. } => match action {
+            Action::Crash => Some(Change::Process(*member, Process::Killed)),
+            Action::Stop => Some(Change::Process(*member, Process::StandsStill)),
+            Action::Continue => Some(Change::GoesOn(*member)),
+            Action::Cut { to } => Some(Change::Cut(*member, *to)),
+            Action::Heal { to } => Some(Change::Healed(*member, *to)),
+            Action::Restart => Some(Change::Process(*member, Process::Running)),
             _ => None,
         },
         _ => None,
@@ -254,7 +255,7 @@ mod tests {
     fn fault(action: Action) -> Record {
         let event = RunEvent::Fault {
             action,
-            party: Party::Station(StationId(0)),
+            member: Member::Station(StationId(0)),
             asked: 0,
         };
         Record::of_run(0, event)
@@ -262,18 +263,21 @@ mod tests {
 
     #[test]
     fn a_cycle_shows_what_was_done_before_it() {
-        let (party, other) = (Party::Station(StationId(0)), Party::RemoteIo(ProgramId(1)));
+        let (member, other) = (
+            Member::Station(StationId(0)),
+            Member::RemoteIo(ProgramId(1)),
+        );
         let mut changes = Changes::default();
         changes.note(&fault(Action::Crash), 5);
         changes.note(&fault(Action::Restart), 9);
         changes.note(&fault(Action::Cut { to: other }), 12);
-        let process = |changes: &Changes, cycle| changes.at(cycle).process(party);
+        let process = |changes: &Changes, cycle| changes.at(cycle).process(member);
         assert_eq!(process(&changes, 4), None);
         assert_eq!(process(&changes, 5), Some(Process::Killed));
         assert_eq!(process(&changes, 8), Some(Process::Killed));
         assert_eq!(process(&changes, 9), Some(Process::Running));
-        let cut_from = |changes: &Changes, cycle| -> Vec<Party> {
-            changes.at(cycle).cut_from(party).collect()
+        let cut_from = |changes: &Changes, cycle| -> Vec<Member> {
+            changes.at(cycle).cut_from(member).collect()
         };
         assert_eq!(cut_from(&changes, 11), []);
         assert_eq!(cut_from(&changes, 12), [other]);
@@ -283,25 +287,26 @@ mod tests {
 
     #[test]
     fn who_is_killed_starts_no_cycles() {
-        let paces = |rank| {
+        let is_cycle_master = |rank| {
             let moment = Moment {
                 epoch: Epoch(1),
                 cycle: Cycle(0),
             };
-            let said = Happening::Station(StationEvent::Paces { moment });
+            let said = Happening::Station(StationEvent::BecameCycleMaster { moment });
             Record {
-                party: Some(Party::Station(StationId(rank))),
+                member: Some(Member::Station(StationId(rank))),
                 event: said,
                 ..fault(Action::Crash)
             }
         };
         let mut changes = Changes::default();
-        changes.note(&paces(1), 1);
-        changes.note(&paces(0), 2);
+        changes.note(&is_cycle_master(1), 1);
+        changes.note(&is_cycle_master(0), 2);
         changes.note(&fault(Action::Crash), 5);
-        let paced = |cycle| -> Vec<StationId> { changes.at(cycle).paced().collect() };
-        assert_eq!(paced(4), [StationId(0), StationId(1)]);
-        assert_eq!(paced(5), [StationId(1)]);
+        let cycle_masters =
+            |cycle| -> Vec<StationId> { changes.at(cycle).cycle_masters().collect() };
+        assert_eq!(cycle_masters(4), [StationId(0), StationId(1)]);
+        assert_eq!(cycle_masters(5), [StationId(1)]);
     }
 
     #[test]
@@ -311,7 +316,7 @@ mod tests {
             changes.note(&fault(Action::Stop), cycle);
         }
         assert_eq!(changes.later.len(), MOST);
-        let party = Party::Station(StationId(0));
-        assert_eq!(changes.at(0).process(party), Some(Process::StandsStill));
+        let member = Member::Station(StationId(0));
+        assert_eq!(changes.at(0).process(member), Some(Process::StandsStill));
     }
 }

@@ -1,4 +1,4 @@
-//! The margin of survival in any cycle that is remembered: who spoke for what then, and whom each remote I/O heard.
+//! The margin of survival in any cycle that is remembered: who published for what then, and whom each remote I/O heard.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -33,7 +33,7 @@ pub(crate) fn began(step: &Step) -> bool {
     missing != Some(Missing::NoCycle)
 }
 
-/// Who spoke for which programs in this cycle or the one before it: a single frame may be lost.
+/// Who published for which programs in this cycle or the one before it: a single frame may be lost.
 fn holders(known: &Known, cycle: i64, excluded: &[StationSet]) -> Holders {
     let run = &known.run;
     let cluster = run.cluster();
@@ -48,10 +48,13 @@ fn holders(known: &Known, cycle: i64, excluded: &[StationSet]) -> Holders {
     moments.sort();
     moments.dedup();
     let holds = known.stations().map(|station| {
-        let turns = moments.iter().rev().flat_map(|moment| run.spoken(*moment));
+        let turns = moments
+            .iter()
+            .rev()
+            .flat_map(|moment| run.sent_turns(*moment));
         let mut own = turns.filter(|turn| turn.station == station);
         let words = own.next().map(|turn| turn.words.iter());
-        let members = words.into_iter().flatten().map(|word| word.members);
+        let members = words.into_iter().flatten().map(|word| word.mask);
         members.fold(ProgramSet::EMPTY, ProgramSet::or)
     });
     let driven = |program, cycle| step(program, cycle).and_then(|step| step.driven.as_ref());

@@ -6,7 +6,7 @@
 //!                    questions by GET ────┘      commands by POST ──► the laboratory, where it runs in this process
 //! ```
 //!
-//! Invariant: it disturbs no cycle. The parties are other processes and do nothing for it; it reads what the journal holds, on two threads that run when
+//! Invariant: it disturbs no cycle. The members are other processes and do nothing for it; it reads what the journal holds, on two threads that run when
 //! nobody else wants to. A slow viewer costs nothing: it is given what is newest when it can take it, and never what it has missed.
 //!
 //! It looks only, unless it was told that it may command; it is served to this machine only, unless it was told who may log in, and then

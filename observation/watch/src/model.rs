@@ -1,4 +1,4 @@
-//! What the page knows of the run: the model of its journal, and what was done to its parties.
+//! What the page knows of the run: the model of its journal, and what was done to its members.
 
 use std::path::Path;
 use std::time::Instant;
@@ -6,7 +6,7 @@ use std::time::Instant;
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_scenarios::{Happening, Record};
 use understudy_view::{Bounds, Margin, Model as RunModel, Progress, Reading, Run, Source, Trouble};
-use understudy_wire::{Party, ProgramId, StationId, StationSet};
+use understudy_wire::{Member, ProgramId, StationId, StationSet};
 
 use crate::changes::{Changes, Protected};
 use crate::foreseen::Foresight;
@@ -86,8 +86,8 @@ impl Model {
         }
     }
 
-    pub(crate) fn party(&self, name: &str) -> Option<Party> {
-        self.known.as_ref()?.run.parties().find(name)
+    pub(crate) fn member(&self, name: &str) -> Option<Member> {
+        self.known.as_ref()?.run.members().find(name)
     }
 }
 

@@ -1,6 +1,6 @@
 //! What the page shows of one cycle, as JSON: who works, what is driven from which source, what could fail, what somebody has to look at.
 
-mod parties;
+mod members;
 
 use std::time::Instant;
 
@@ -8,9 +8,9 @@ use serde::Serialize;
 use understudy_remote_io::Missing;
 use understudy_scenarios::source_word;
 use understudy_view::{Alarm, LostState, Margin, Outcome, Protection};
-use understudy_wire::{Party, ProgramId, ProgramSet, SignalPlace, Source, StationId};
+use understudy_wire::{Member, ProgramId, ProgramSet, SignalPlace, Source, StationId};
 
-use self::parties::{ShownParty, words_of};
+use self::members::{ShownMember, words_of};
 use crate::changes::Standing;
 use crate::model::{Known, Model};
 
@@ -28,8 +28,8 @@ pub(crate) struct State {
     finished: bool,
     /// What the scenario came to, where it is over and the cluster stays up.
     scenario_over: Option<String>,
-    pacemaker: Option<String>,
-    parties: Vec<ShownParty>,
+    cycle_master: Option<String>,
+    members: Vec<ShownMember>,
     programs: Vec<ShownProgram>,
     timing: Timing,
     survival: Survival,
@@ -150,16 +150,16 @@ pub(crate) fn state(known: &Known, cycle: i64) -> Option<State> {
         .map(|program| standing.excluded(program))
         .collect();
     let margin = known.margin(cycle, &excluded);
-    let paces = parties::pacemaker(known, &standing, cycle);
+    let cycle_master = members::cycle_master(known, &standing, cycle);
     let stations = known
         .stations()
-        .map(|station| parties::station(known, &standing, station, cycle));
+        .map(|station| members::station(known, &standing, station, cycle));
     let remote_ios = known
         .programs()
-        .map(|program| parties::remote_io(known, &standing, program, cycle));
+        .map(|program| members::remote_io(known, &standing, program, cycle));
     let plants = known
         .programs()
-        .filter_map(|program| parties::plant(known, &standing, program));
+        .filter_map(|program| members::plant(known, &standing, program));
     Some(State {
         age_ms: 0,
         cycle,
@@ -167,8 +167,8 @@ pub(crate) fn state(known: &Known, cycle: i64) -> Option<State> {
         newest,
         finished: known.has_ended(),
         scenario_over: run.scenario_over(cycle).map(str::to_owned),
-        pacemaker: paces.map(|station| name(known, Party::Station(station))),
-        parties: stations.chain(remote_ios).chain(plants).collect(),
+        cycle_master: cycle_master.map(|station| name(known, Member::Station(station))),
+        members: stations.chain(remote_ios).chain(plants).collect(),
         programs: known
             .programs()
             .map(|program| shown_program(known, &standing, program, cycle))
@@ -186,13 +186,13 @@ pub(crate) fn state(known: &Known, cycle: i64) -> Option<State> {
     })
 }
 
-pub(crate) fn name(known: &Known, party: Party) -> String {
-    known.run.parties().name(party).to_owned()
+pub(crate) fn name(known: &Known, member: Member) -> String {
+    known.run.members().name(member).to_owned()
 }
 
 /// A program has the name of its controller.
 pub(crate) fn program_name(known: &Known, program: ProgramId) -> String {
-    name(known, Party::Station(StationId(program.0)))
+    name(known, Member::Station(StationId(program.0)))
 }
 
 fn program_names(known: &Known, programs: ProgramSet) -> Vec<String> {
@@ -218,7 +218,7 @@ fn shown_program(
         source: driven.map_or("unknown", |driven| source_word(driven.source)),
         word_of: driven
             .and_then(|driven| driven.word_of)
-            .map(|station| name(known, Party::Station(station))),
+            .map(|station| name(known, Member::Station(station))),
         missing: driven.and_then(|driven| driven.missing).map(missing_words),
         inputs: sampled.map(|sampled| sampled.inputs.to_string()),
         outputs: driven.map(|driven| driven.outputs.to_string()),
@@ -264,7 +264,7 @@ fn counts(known: &Known, program: ProgramId, cycle: i64) -> Counts {
     let Some(sources) = known.run.series().sources(program) else {
         return counts;
     };
-    // As the report counts: not before everybody was in step.
+    // As the report counts: not before everybody was synchronised.
     let first = if known.run.has_origin() { 0 } else { i64::MIN };
     for span in sources.spans(first, cycle + 1) {
         let cycles = u64::try_from(span.to - span.from).unwrap_or(0);
@@ -299,7 +299,7 @@ fn timing(known: &Known, cycle: i64) -> Timing {
 fn survival(known: &Known, margin: &Margin) -> Survival {
     let of_stations = |outcome: &&Outcome| {
         let mut failed = outcome.failed.iter();
-        failed.all(|party| matches!(party, Party::Station(_)))
+        failed.all(|member| matches!(member, Member::Station(_)))
     };
     let singles: Vec<&Outcome> = margin.singles.iter().filter(of_stations).collect();
     let masked = singles.iter().filter(|outcome| outcome.is_masked()).count();
@@ -362,7 +362,7 @@ fn failure(known: &Known, outcome: &Outcome) -> Failure {
     });
     let failed = outcome.failed.iter();
     Failure {
-        names: failed.map(|&party| name(known, party)).collect(),
+        names: failed.map(|&member| name(known, member)).collect(),
         masked: outcome.is_masked(),
         why: lost.collect::<Vec<_>>().join("; "),
     }

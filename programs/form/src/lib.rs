@@ -8,7 +8,7 @@ mod time;
 mod value;
 
 pub use fields::{Fields, unknown_key};
-pub use time::{parse_time, spoken};
+pub use time::{parse_time, written_time};
 pub use value::{Placed, Value};
 
 use toml::Spanned;

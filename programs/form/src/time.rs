@@ -10,7 +10,7 @@ const UNITS: [(&str, u128); 4] = [
 ];
 
 /// A time in the largest unit in which it is whole.
-pub fn spoken(time: Duration) -> String {
+pub fn written_time(time: Duration) -> String {
     let nanoseconds = time.as_nanos();
     let (unit, length) = UNITS
         .into_iter()
@@ -75,7 +75,7 @@ mod tests {
     fn a_time_is_said_as_it_can_be_read() {
         for nanoseconds in [1, 999, 1_000, 10_000_000, 1_500_000_000, 60_000_000_000] {
             check(
-                &spoken(Duration::from_nanos(nanoseconds)),
+                &written_time(Duration::from_nanos(nanoseconds)),
                 Some(nanoseconds),
             );
         }

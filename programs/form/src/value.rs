@@ -9,7 +9,7 @@ use understudy_diagnostic::Diagnostic;
 use understudy_diagnostic::spelling::suggestion;
 
 use crate::Codes;
-use crate::time::{parse_time, spoken};
+use crate::time::{parse_time, written_time};
 
 /// The largest whole number that TOML knows.
 const LARGEST: u64 = i64::MAX as u64;
@@ -129,12 +129,12 @@ impl<'a, 't> Value<'a, 't> {
         bounds: RangeInclusive<Duration>,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Option<Placed<Duration>> {
-        let (least, most) = (spoken(*bounds.start()), spoken(*bounds.end()));
+        let (least, most) = (written_time(*bounds.start()), written_time(*bounds.end()));
         let wanted = format!("a time with its unit in quotes, from \"{least}\" to \"{most}\"");
         let time = self.value.get_ref().as_str().and_then(parse_time);
         let time = self.expect(time, &wanted, diagnostics)?.value;
         let inside = bounds.contains(&time).then_some(time);
-        self.in_bounds(inside, &spoken(time), &wanted, diagnostics)
+        self.in_bounds(inside, &written_time(time), &wanted, diagnostics)
     }
 
     /// The place of a text among `words`.

@@ -1,4 +1,4 @@
-//! A cluster as all its parties know it.
+//! A cluster as all its members know it.
 
 use std::collections::BTreeSet;
 use std::net::SocketAddr;
@@ -12,7 +12,7 @@ use understudy_node::Program;
 use understudy_parity::ParityController;
 use understudy_plant::{Followed, Plant};
 use understudy_remote_io::{Diagnosis, Release, StaleState, ValueFault};
-use understudy_wire::{Agreement, Epoch, Image, Party, ProgramHash, ProgramId, StationId};
+use understudy_wire::{Agreement, Epoch, Image, Member, ProgramHash, ProgramId, StationId};
 
 /// What carries the frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -128,7 +128,7 @@ pub struct PlantPlace {
 
 /// Programs, stations, remote I/Os and plants.
 ///
-/// Invariant: names are unique over all parties; controller i, remote I/O i and plant i stand at index i; every image of
+/// Invariant: names are unique over all members; controller i, remote I/O i and plant i stand at index i; every image of
 /// the cluster fits into a frame.
 #[derive(Debug, Clone)]
 pub struct Cluster {
@@ -161,7 +161,7 @@ impl Cluster {
         self.security
     }
 
-    /// What all parties agree on.
+    /// What all members agree on.
     pub fn agreement(&self) -> &Arc<Agreement> {
         &self.agreement
     }
@@ -216,36 +216,36 @@ impl Cluster {
         &self.parity
     }
 
-    /// Every party: stations by rank, then remote I/Os, then plants.
-    pub fn parties(&self) -> impl Iterator<Item = Party> + '_ {
+    /// Every member: stations by rank, then remote I/Os, then plants.
+    pub fn members(&self) -> impl Iterator<Item = Member> + '_ {
         let stations = 0..self.agreement.schedule.stations();
         let plants = self.plants.iter().enumerate();
         let plants = plants.filter(|(_, plant)| plant.is_some());
         stations
-            .map(|rank| Party::Station(StationId(rank as u8)))
-            .chain((0..self.remote_ios.len()).map(|index| Party::RemoteIo(ProgramId(index as u8))))
-            .chain(plants.map(|(index, _)| Party::Plant(ProgramId(index as u8))))
+            .map(|rank| Member::Station(StationId(rank as u8)))
+            .chain((0..self.remote_ios.len()).map(|index| Member::RemoteIo(ProgramId(index as u8))))
+            .chain(plants.map(|(index, _)| Member::Plant(ProgramId(index as u8))))
     }
 
-    /// The name of a party; nothing where the cluster has no such party.
-    pub fn party_name(&self, party: Party) -> Option<&str> {
-        self.place(party).map(|(name, _)| name)
+    /// The name of a member; nothing where the cluster has no such member.
+    pub fn member_name(&self, member: Member) -> Option<&str> {
+        self.place(member).map(|(name, _)| name)
     }
 
-    /// The party of a name.
-    pub fn party(&self, name: &str) -> Option<Party> {
-        self.parties()
-            .find(|&party| self.party_name(party) == Some(name))
+    /// The member of a name.
+    pub fn member(&self, name: &str) -> Option<Member> {
+        self.members()
+            .find(|&member| self.member_name(member) == Some(name))
     }
 
-    /// Where a party listens; nothing where the file does not say so.
-    pub fn address(&self, party: Party) -> Option<SocketAddr> {
-        self.place(party).and_then(|(_, address)| address)
+    /// Where a member listens; nothing where the file does not say so.
+    pub fn address(&self, member: Member) -> Option<SocketAddr> {
+        self.place(member).and_then(|(_, address)| address)
     }
 
-    fn place(&self, party: Party) -> Option<(&str, Option<SocketAddr>)> {
-        match party {
-            Party::Station(station) => {
+    fn place(&self, member: Member) -> Option<(&str, Option<SocketAddr>)> {
+        match member {
+            Member::Station(station) => {
                 let rank = station.index();
                 let controller = self.controllers.get(rank);
                 let controller = controller.map(|found| (found.name.as_str(), found.address));
@@ -255,11 +255,11 @@ impl Cluster {
                     Some((&found.name, found.address))
                 })
             }
-            Party::RemoteIo(program) => {
+            Member::RemoteIo(program) => {
                 let found = self.remote_ios.get(program.index())?;
                 Some((&found.name, found.address))
             }
-            Party::Plant(program) => {
+            Member::Plant(program) => {
                 let found = self.plants.get(program.index())?.as_ref()?;
                 Some((&found.name, found.address))
             }
@@ -274,7 +274,7 @@ impl Cluster {
         station: StationId,
         epoch: Epoch,
     ) -> Option<understudy_node::Settings> {
-        self.party_name(Party::Station(station))?;
+        self.member_name(Member::Station(station))?;
         Some(understudy_node::Settings {
             station,
             agreement: Arc::clone(&self.agreement),

@@ -1,4 +1,4 @@
-//! The canonical text of a configuration: everything that the parties have to agree on, and nothing else.
+//! The canonical text of a configuration: everything that the members have to agree on, and nothing else.
 //!
 //! Not in it: addresses, the link, file names, comments, titles, and the names inside of programs' texts that are not signals.
 

@@ -7,7 +7,7 @@ mod stub;
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use understudy_form::spoken;
+use understudy_form::written_time;
 use understudy_ladder::{Program, Signal};
 
 use crate::fields::MAXIMUM_NAME_LENGTH;
@@ -92,7 +92,7 @@ impl Draft {
     }
 
     fn cluster_file(&self, stubs: &[Stub<'_>]) -> String {
-        let period = spoken(self.period);
+        let period = written_time(self.period);
         let mut text = format!(
             "\
 # Drafted by `understudy init --from`. It runs as it is, with stand-ins for the plants.
@@ -186,7 +186,7 @@ cycles = {at}
 [expect]
 wrong = 0
 held = 0
-mishaps = 0
+plant_faults = 0
 functional = [{plants}]
 {during}"
         )

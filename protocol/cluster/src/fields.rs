@@ -15,7 +15,7 @@ use understudy_form::{Codes, Value, unknown_key};
 
 use crate::format::{Key, Kind, Section};
 
-/// The longest name of a party, in characters.
+/// The longest name of a member, in characters.
 pub const MAXIMUM_NAME_LENGTH: usize = 48;
 
 /// Names of one place that are looked up and not found; those past it are only counted, so that no file takes long.
@@ -45,7 +45,7 @@ pub fn why_unreachable(address: SocketAddr) -> Option<&'static str> {
     }
 }
 
-/// Whether a party can have this name.
+/// Whether a member can have this name.
 pub fn is_name(text: &str) -> bool {
     let legal = |character: char| character.is_ascii_alphanumeric() || "-_".contains(character);
     let starts = text.starts_with(|first: char| first.is_ascii_alphabetic());
@@ -113,7 +113,7 @@ impl<'a, 't> Fields<'a, 't> {
         Some(text.map(str::to_owned))
     }
 
-    /// The name of a party.
+    /// The name of a member.
     pub(crate) fn name(
         &self,
         name: &'static str,

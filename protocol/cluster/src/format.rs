@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use understudy_form::spoken;
+use understudy_form::written_time;
 use understudy_wire::MAXIMUM_HISTORY;
 
 /// The bounds of a cluster's period.
@@ -33,7 +33,7 @@ pub(crate) struct Key {
 /// What may stand behind a key.
 #[derive(Debug)]
 pub(crate) enum Kind {
-    /// The name of a party.
+    /// The name of a member.
     Name,
     /// Any text.
     Text,
@@ -446,8 +446,8 @@ impl Kind {
             Self::Count { least, most, .. } => format!("a whole number from {least} to {most}"),
             Self::Time { least, most, .. } => format!(
                 "a time with its unit in quotes, from \"{}\" to \"{}\"",
-                spoken(*least),
-                spoken(*most)
+                written_time(*least),
+                written_time(*most)
             ),
             Self::Word { words, .. } => {
                 let quoted: Vec<String> = words.iter().map(|word| format!("\"{word}\"")).collect();
@@ -468,7 +468,7 @@ impl Kind {
     pub(crate) fn default(&self) -> Option<String> {
         match self {
             Self::Count { default, .. } => Some(default.to_string()),
-            Self::Time { default, .. } => Some(format!("\"{}\"", spoken(*default))),
+            Self::Time { default, .. } => Some(format!("\"{}\"", written_time(*default))),
             Self::Word {
                 words,
                 default: true,

@@ -94,7 +94,7 @@ pub fn read(
     read_with(name, text, Overrides::default(), open)
 }
 
-/// As [`read`], with some values of the file replaced. All parties of a cluster have to replace the same.
+/// As [`read`], with some values of the file replaced. All members of a cluster have to replace the same.
 pub fn read_with(
     name: &str,
     text: &str,

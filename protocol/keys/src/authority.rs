@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 use rcgen::{Issuer, KeyPair};
 use understudy_cluster::Cluster;
 use understudy_seal::{ClusterSecret, Title};
-use understudy_wire::{Party, Topic};
+use understudy_wire::{Member, Topic};
 
 use crate::certificate::{self, Subject};
 use crate::date::Date;
 use crate::error::KeysError;
 use crate::files;
-use crate::party::{Heard, KeysFile, Shared};
+use crate::member::{Heard, KeysFile, Shared};
 use crate::register::{Holder, Register, Revoked, Role, common_name};
 use crate::revoked::RevokedFile;
 
@@ -55,7 +55,7 @@ pub struct Authority {
 pub struct Issued {
     /// Who has new keys.
     pub holders: Vec<Holder>,
-    /// The folders that changed; each is to be copied to the machine of its party.
+    /// The folders that changed; each is to be copied to the machine of its member.
     pub folders: Vec<PathBuf>,
 }
 
@@ -86,7 +86,7 @@ impl Authority {
         };
         files::make_folder(folder)?;
         files::make_folder(&own)?;
-        files::make_folder(&folder.join("parties"))?;
+        files::make_folder(&folder.join("members"))?;
         files::write(&own.join("certificate.pem"), &pair.certificate)?;
         files::write(&own.join("private-key.pem"), &pair.private_key)?;
         let hexadecimal = files::to_hexadecimal(secret.bytes());
@@ -155,10 +155,10 @@ impl Authority {
 
     /// The folder of one holder.
     pub fn folder_of(&self, name: &str) -> PathBuf {
-        self.folder.join("parties").join(name)
+        self.folder.join("members").join(name)
     }
 
-    /// Makes new keys for each of `names`, parties of the cluster, and of `operators`. Their earlier ones no longer count as soon
+    /// Makes new keys for each of `names`, members of the cluster, and of `operators`. Their earlier ones no longer count as soon
     /// as the others have their changed folders.
     ///
     /// # Errors
@@ -174,11 +174,11 @@ impl Authority {
     ) -> Result<Issued, Vec<KeysError>> {
         self.check(cluster, names, operators.names)?;
         let address = |name: &String| {
-            let party = cluster.party(name);
-            let address = party.and_then(|party| cluster.address(party));
+            let member = cluster.member(name);
+            let address = member.and_then(|member| cluster.address(member));
             address.map(|address| address.ip())
         };
-        let all = names.iter().map(|name| (name, Role::Party, address(name)));
+        let all = names.iter().map(|name| (name, Role::Member, address(name)));
         let operator = |name| (name, Role::Operator, operators.address);
         let all = all.chain(operators.names.iter().map(operator));
         let mut renewed = BTreeSet::new();
@@ -256,27 +256,27 @@ impl Authority {
                 wanted: format!("the cluster {}", cluster.name()),
             });
         }
-        let parties: Vec<&str> = cluster
-            .parties()
-            .filter_map(|party| cluster.party_name(party))
+        let members: Vec<&str> = cluster
+            .members()
+            .filter_map(|member| cluster.member_name(member))
             .collect();
         let unknown = names
             .iter()
-            .filter(|name| !parties.contains(&name.as_str()));
+            .filter(|name| !members.contains(&name.as_str()));
         errors.extend(unknown.map(|name| KeysError::NoHolder {
             name: name.clone(),
-            known: format!("the cluster has {}", parties.join(", ")),
+            known: format!("the cluster has {}", members.join(", ")),
         }));
         let legal = |name: &str| {
             let plain = |letter: char| letter.is_ascii_alphanumeric() || "-_".contains(letter);
             (1..=understudy_cluster::MAXIMUM_NAME_LENGTH).contains(&name.len())
                 && name.chars().all(plain)
-                && !parties.contains(&name)
+                && !members.contains(&name)
         };
         let illegal = operators.iter().filter(|name| !legal(name));
         errors.extend(illegal.map(|name| KeysError::NoHolder {
             name: name.clone(),
-            known: "an operator's name has letters, digits, `-` and `_`, and is no party's".into(),
+            known: "an operator's name has letters, digits, `-` and `_`, and is no member's".into(),
         }));
         if errors.is_empty() {
             Ok(())
@@ -336,7 +336,7 @@ impl Authority {
     fn distribute(&self, cluster: &Cluster) -> Result<Vec<PathBuf>, KeysError> {
         for holder in &self.register.holders {
             let file = self.folder_of(&holder.name).join("keys.toml");
-            let title = "Made by `understudy keys`; keep it to this party alone.";
+            let title = "Made by `understudy keys`; keep it to this member alone.";
             files::write_toml(&file, title, &self.keys_of(holder, cluster))?;
         }
         self.distribute_revoked()
@@ -355,7 +355,7 @@ impl Authority {
 
     fn keys_of(&self, holder: &Holder, cluster: &Cluster) -> KeysFile {
         let neighbours = cluster.neighbours();
-        let own = cluster.party(&holder.name);
+        let own = cluster.member(&holder.name);
         let mut file = KeysFile {
             cluster: self.register.cluster.clone(),
             name: holder.name.clone(),
@@ -371,7 +371,7 @@ impl Authority {
         };
         for other in &self.register.holders {
             match other.role {
-                Role::Party => file.members.push(other.common_name()),
+                Role::Member => file.members.push(other.common_name()),
                 Role::Operator => file.operators.push(other.common_name()),
             }
         }
@@ -380,10 +380,10 @@ impl Authority {
         };
         file.own = files::to_hexadecimal(self.secret.frame_key(self.title(holder)).bytes());
         for other in &self.register.holders {
-            let Some(party) = cluster.party(&other.name) else {
+            let Some(member) = cluster.member(&other.name) else {
                 continue;
             };
-            if Topic::between(party, own, &neighbours).is_some() {
+            if Topic::between(member, own, &neighbours).is_some() {
                 let key = self.secret.frame_key(self.title(other));
                 file.heard.push(Heard {
                     name: other.name.clone(),
@@ -391,8 +391,8 @@ impl Authority {
                     key: files::to_hexadecimal(key.bytes()),
                 });
             }
-            if let (Party::Station(_), Party::Station(_)) = (own, party)
-                && own != party
+            if let (Member::Station(_), Member::Station(_)) = (own, member)
+                && own != member
             {
                 let to = self
                     .secret
@@ -413,7 +413,7 @@ impl Authority {
     fn title<'a>(&'a self, holder: &'a Holder) -> Title<'a> {
         Title {
             cluster: &self.register.cluster,
-            party: &holder.name,
+            member: &holder.name,
             generation: holder.generation,
         }
     }

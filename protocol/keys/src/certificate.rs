@@ -73,7 +73,7 @@ pub(crate) fn holder(
         ExtendedKeyUsagePurpose::ServerAuth,
         ExtendedKeyUsagePurpose::ClientAuth,
     ];
-    // A laboratory's parties are all at home.
+    // A laboratory's members are all at home.
     let address = subject.address.filter(|address| !address.is_unspecified());
     let address = address.unwrap_or(IpAddr::from([127, 0, 0, 1]));
     parameters.subject_alt_names = vec![SanType::IpAddress(address)];

@@ -52,7 +52,7 @@ pub enum KeysError {
         /// What is wrong with it.
         reason: String,
     },
-    /// A name that is neither a party's nor an operator's.
+    /// A name that is neither a member's nor an operator's.
     #[error("U0907: nobody is called `{name}`; {known}")]
     NoHolder {
         /// The name.
@@ -102,7 +102,7 @@ pub enum KeysError {
         /// Whose they should be.
         wanted: String,
     },
-    /// The cluster file names a party that was issued nothing, or has grown since.
+    /// The cluster file names a member that was issued nothing, or has grown since.
     #[error("U0911: {} has no key for {name}; issue the keys again and copy the folder anew", folder.display())]
     NoKey {
         /// Where.

@@ -19,7 +19,7 @@ pub struct Register {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Holder {
-    /// A party's name in the cluster file, or an operator's.
+    /// A member's name in the cluster file, or an operator's.
     pub name: String,
     /// What it may do.
     pub role: Role,
@@ -53,9 +53,9 @@ pub struct Revoked {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
-    /// Be a party of the cluster.
-    Party,
-    /// Command the parties, and read what they say of themselves.
+    /// Be a member of the cluster.
+    Member,
+    /// Command the members, and read what they say of themselves.
     Operator,
 }
 

@@ -1,4 +1,4 @@
-//! Whose keys no longer count, and how a running party learns of it.
+//! Whose keys no longer count, and how a running member learns of it.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -8,14 +8,14 @@ use std::time::{Duration, SystemTime};
 
 use serde::{Deserialize, Serialize};
 use understudy_seal::Revocations;
-use understudy_wire::Party;
+use understudy_wire::Member;
 
 use crate::date::Date;
 use crate::error::KeysError;
 use crate::files;
 use crate::register::Register;
 
-/// How often a running party looks whether its list has changed.
+/// How often a running member looks whether its list has changed.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
 
 /// `revoked.toml`.
@@ -56,7 +56,7 @@ impl RevokedFile {
     }
 
     pub(crate) fn write(&self, path: &Path) -> Result<(), KeysError> {
-        let title = "Whose keys no longer count. Made by `understudy keys revoke`; read again while a party runs.";
+        let title = "Whose keys no longer count. Made by `understudy keys revoke`; read again while a member runs.";
         files::write_toml(path, title, self)
     }
 
@@ -76,7 +76,7 @@ impl RevokedFile {
     }
 }
 
-/// Follows `revoked.toml` of a running party. A list that is away or damaged changes nothing: what was revoked stays so.
+/// Follows `revoked.toml` of a running member. A list that is away or damaged changes nothing: what was revoked stays so.
 #[derive(Debug)]
 pub struct RevocationWatch {
     stop: Option<Sender<()>>,
@@ -84,7 +84,7 @@ pub struct RevocationWatch {
 }
 
 /// A sender, by the name and the generation of its key.
-pub(crate) type HeardSender = (Party, String, u32);
+pub(crate) type HeardSender = (Member, String, u32);
 
 impl RevocationWatch {
     pub(crate) fn start(
@@ -134,11 +134,11 @@ impl Drop for RevocationWatch {
 }
 
 /// Those of `heard` whose key is revoked.
-pub(crate) fn senders(file: &RevokedFile, heard: &[HeardSender]) -> impl Iterator<Item = Party> {
+pub(crate) fn senders(file: &RevokedFile, heard: &[HeardSender]) -> impl Iterator<Item = Member> {
     heard
         .iter()
         .filter(|(_, name, generation)| file.holds(name, *generation))
-        .map(|(party, _, _)| *party)
+        .map(|(member, _, _)| *member)
 }
 
 /// Tells one state of a file from the next.

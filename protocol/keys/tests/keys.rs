@@ -12,10 +12,10 @@ use std::time::{Duration, Instant};
 
 use understudy_cluster::{Cluster, press_cell, read};
 use understudy_keys::{
-    Authority, DEFAULT_OPERATOR, Date, KeysError, OperatorKeys, Operators, PartyKeys, Role,
+    Authority, DEFAULT_OPERATOR, Date, KeysError, MemberKeys, OperatorKeys, Operators, Role,
 };
 use understudy_seal::Refusal;
-use understudy_wire::{Body, Frame, Header, Moment, Party, Topic, encode};
+use understudy_wire::{Body, Frame, Header, Member, Moment, Topic, encode};
 
 const DAYS: u32 = 365;
 
@@ -43,8 +43,8 @@ fn empty(name: &str) -> PathBuf {
 }
 
 fn names(cluster: &Cluster) -> Vec<String> {
-    let parties = cluster.parties();
-    let names = parties.filter_map(|party| cluster.party_name(party));
+    let members = cluster.members();
+    let names = members.filter_map(|member| cluster.member_name(member));
     names.map(str::to_owned).collect()
 }
 
@@ -68,33 +68,33 @@ fn issued(name: &str) -> (Cluster, Authority) {
 fn load(
     authority: &Authority,
     cluster: &Cluster,
-    party: Party,
-) -> Result<PartyKeys, Vec<KeysError>> {
-    let name = cluster.party_name(party).expect("it is in the cluster");
-    PartyKeys::load(&authority.folder_of(name), cluster, party, now())
+    member: Member,
+) -> Result<MemberKeys, Vec<KeysError>> {
+    let name = cluster.member_name(member).expect("it is in the cluster");
+    MemberKeys::load(&authority.folder_of(name), cluster, member, now())
 }
 
-fn loaded(authority: &Authority, cluster: &Cluster, party: Party) -> PartyKeys {
-    load(authority, cluster, party).expect("they were just issued")
+fn loaded(authority: &Authority, cluster: &Cluster, member: Member) -> MemberKeys {
+    load(authority, cluster, member).expect("they were just issued")
 }
 
 fn codes(errors: &[KeysError]) -> Vec<&'static str> {
     errors.iter().map(KeysError::code).collect()
 }
 
-/// Something that any party could say.
-fn datagram(cluster: &Cluster, keys: &PartyKeys, sender: Party) -> Vec<u8> {
+/// Something that any member could say.
+fn datagram(cluster: &Cluster, keys: &MemberKeys, sender: Member) -> Vec<u8> {
     let agreement = cluster.agreement();
     let body = match sender {
-        Party::Station(_) => Body::Sync,
-        Party::RemoteIo(_) => Body::Actuation(understudy_wire::Actuation {
+        Member::Station(_) => Body::Sync,
+        Member::RemoteIo(_) => Body::Actuation(understudy_wire::Actuation {
             outputs: understudy_wire::Image::zero(1),
         }),
-        Party::Plant(_) => Body::Field(understudy_wire::Field {
+        Member::Plant(_) => Body::Field(understudy_wire::Field {
             sensors: understudy_wire::Image::zero(1),
             handed_over: 0,
             finished: 0,
-            mishaps: 0,
+            plant_faults: 0,
             positions: [].into_iter().collect(),
         }),
     };
@@ -117,12 +117,12 @@ fn datagram(cluster: &Cluster, keys: &PartyKeys, sender: Party) -> Vec<u8> {
 }
 
 #[test]
-fn each_party_hears_whom_it_has_to_hear_and_has_no_other_key() {
-    let (cluster, authority) = issued("each_party");
+fn each_member_hears_whom_it_has_to_hear_and_has_no_other_key() {
+    let (cluster, authority) = issued("each_member");
     let neighbours = cluster.neighbours();
-    for speaker in cluster.parties() {
+    for speaker in cluster.members() {
         let keys = loaded(&authority, &cluster, speaker);
-        for listener in cluster.parties() {
+        for listener in cluster.members() {
             let mut said = datagram(&cluster, &keys, speaker);
             let found = loaded(&authority, &cluster, listener)
                 .opener()
@@ -146,7 +146,7 @@ fn nobody_but_the_owner_may_read_any_of_it() {
     let root = root
         .parent()
         .and_then(Path::parent)
-        .expect("keys/parties/robot");
+        .expect("keys/members/robot");
     let mut folders = vec![root.to_owned()];
     let mut files = 0;
     while let Some(folder) = folders.pop() {
@@ -172,14 +172,14 @@ fn nobody_but_the_owner_may_read_any_of_it() {
     assert_eq!(
         files,
         4 + 8 * 5,
-        "of the authority, of seven parties and of an operator"
+        "of the authority, of seven members and of an operator"
     );
 }
 
 #[test]
 fn a_life_never_comes_again() {
     let (cluster, authority) = issued("life");
-    let robot = cluster.party("robot").expect("it is in the cluster");
+    let robot = cluster.member("robot").expect("it is in the cluster");
     let keys = loaded(&authority, &cluster, robot);
     let file = authority.folder_of("robot").join("life");
     let life = || -> u32 {
@@ -222,8 +222,8 @@ fn a_life_never_comes_again() {
 #[test]
 fn what_is_revoked_no_longer_counts_and_new_keys_do() {
     let (cluster, mut authority) = issued("revoked");
-    let robot = cluster.party("robot").expect("it is in the cluster");
-    let press = cluster.party("press").expect("it is in the cluster");
+    let robot = cluster.member("robot").expect("it is in the cluster");
+    let press = cluster.member("press").expect("it is in the cluster");
     let stolen = loaded(&authority, &cluster, robot);
     let witness = loaded(&authority, &cluster, press);
     let mut listening = witness.opener();
@@ -301,7 +301,7 @@ fn the_book_is_kept() {
     let root = folder
         .parent()
         .and_then(Path::parent)
-        .expect("keys/parties/robot");
+        .expect("keys/members/robot");
     let again = Authority::open(root).expect("it was made here");
     assert_eq!(again.register(), authority.register());
     let holders = &again.register().holders;
@@ -327,23 +327,23 @@ fn the_book_is_kept() {
 #[test]
 fn everything_that_is_wrong_is_said_at_once() {
     let (cluster, mut authority) = issued("wrong");
-    let robot = cluster.party("robot").expect("it is in the cluster");
-    let press = cluster.party("press").expect("it is in the cluster");
+    let robot = cluster.member("robot").expect("it is in the cluster");
+    let press = cluster.member("press").expect("it is in the cluster");
     let folder = authority.folder_of("robot");
 
     let late = now().plus_days(DAYS);
-    let refused = PartyKeys::load(&folder, &cluster, robot, late).expect_err("too late");
+    let refused = MemberKeys::load(&folder, &cluster, robot, late).expect_err("too late");
     assert_eq!(codes(&refused), ["U0908"]);
-    let refused = PartyKeys::load(&folder, &cluster, press, now()).expect_err("another's");
+    let refused = MemberKeys::load(&folder, &cluster, press, now()).expect_err("another's");
     assert_eq!(codes(&refused), ["U0910"]);
-    let refused = OperatorKeys::load(&folder, &cluster, now()).expect_err("a party's");
+    let refused = OperatorKeys::load(&folder, &cluster, now()).expect_err("a member's");
     assert_eq!(codes(&refused), ["U0910"]);
     let operator = authority.folder_of(DEFAULT_OPERATOR);
     OperatorKeys::load(&operator, &cluster, now()).expect("they were just issued");
 
     // Clocks may differ by a day; one that is further behind cannot take part in TLS.
     let early =
-        |text: &str| PartyKeys::load(&folder, &cluster, robot, text.parse().expect("a date"));
+        |text: &str| MemberKeys::load(&folder, &cluster, robot, text.parse().expect("a date"));
     early("2026-11-20T18:00:00Z").expect("a day before the issue");
     let refused = early("2026-11-20T17:59:59Z").expect_err("too early");
     assert_eq!(codes(&refused), ["U0914"]);
@@ -355,7 +355,7 @@ fn everything_that_is_wrong_is_said_at_once() {
     fs::set_permissions(&keys, fs::Permissions::from_mode(0o644)).expect("it is ours");
     fs::remove_file(folder.join("certificate.pem")).expect("it is ours");
     fs::write(folder.join("revoked.toml"), "revoked = 3").expect("it is ours");
-    let refused = PartyKeys::load(&folder, &cluster, robot, late).expect_err("all is wrong");
+    let refused = MemberKeys::load(&folder, &cluster, robot, late).expect_err("all is wrong");
     assert_eq!(codes(&refused), ["U0903", "U0901", "U0906", "U0908"]);
 
     let text = fs::read_to_string(&keys).expect("it is ours");

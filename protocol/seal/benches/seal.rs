@@ -8,11 +8,11 @@ use smallvec::smallvec;
 use understudy_seal::{ClusterSecret, FrameKey, Opener, Revocations, Seal, Title};
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
-    Lineage, Moment, Party, ProgramId, ProgramSet, StationId, StationSet, Turn, Word, decode,
+    Lineage, Member, Moment, ProgramId, ProgramSet, StationId, StationSet, Turn, Word, decode,
     encode,
 };
 
-const OWN: Party = Party::Station(StationId(0));
+const OWN: Member = Member::Station(StationId(0));
 
 fn main() {
     divan::main();
@@ -32,7 +32,7 @@ fn turn() -> (Frame, Vec<u8>) {
         digest: Digest(u64::MAX),
     };
     let word = Word {
-        members: ProgramSet::only(ProgramId(0)),
+        mask: ProgramSet::only(ProgramId(0)),
         sum: Image::from_words(64, &[u64::MAX]).expect("it fits"),
     };
     let frame = Frame {
@@ -60,7 +60,7 @@ fn turn() -> (Frame, Vec<u8>) {
 fn key() -> FrameKey {
     ClusterSecret::new([7; 32]).frame_key(Title {
         cluster: "cell",
-        party: "robot",
+        member: "robot",
         generation: 1,
     })
 }
@@ -100,7 +100,7 @@ fn decode_alone(bencher: Bencher<'_, '_>) {
 fn open(bencher: Bencher<'_, '_>) {
     let (frame, bytes) = turn();
     let mut seal = Seal::new(OWN, key(), 1, []);
-    let listener = Party::Station(StationId(1));
+    let listener = Member::Station(StationId(1));
     let mut opener = Opener::new(
         listener,
         [(OWN, key())],

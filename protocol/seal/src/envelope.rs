@@ -1,6 +1,6 @@
 //! What stands before and behind a frame in its datagram; drawn in the documentation of the crate.
 
-use understudy_wire::{Party, ProgramId, StationId};
+use understudy_wire::{Member, ProgramId, StationId};
 
 pub(crate) const MAGIC: [u8; 4] = *b"UNDS";
 /// With which a frame begins that nobody has sealed.
@@ -17,7 +17,7 @@ pub const OVERHEAD_BYTES: usize = HEADER_BYTES + TAG_BYTES + AUTHENTICATOR_BYTES
 /// The readable part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Envelope {
-    pub(crate) sender: Party,
+    pub(crate) sender: Member,
     /// Nobody in particular, or the station for whom alone the frame is.
     pub(crate) to: Option<StationId>,
     pub(crate) life: u32,
@@ -27,9 +27,9 @@ pub(crate) struct Envelope {
 impl Envelope {
     pub(crate) fn to_bytes(self) -> [u8; HEADER_BYTES] {
         let (kind, index) = match self.sender {
-            Party::Station(station) => (0, station.0),
-            Party::RemoteIo(program) => (1, program.0),
-            Party::Plant(program) => (2, program.0),
+            Member::Station(station) => (0, station.0),
+            Member::RemoteIo(program) => (1, program.0),
+            Member::Plant(program) => (2, program.0),
         };
         let mut bytes = [0; HEADER_BYTES];
         bytes[..4].copy_from_slice(&MAGIC);
@@ -48,9 +48,9 @@ impl Envelope {
             return None;
         }
         let sender = match bytes[5] {
-            0 => Party::Station(StationId(bytes[6])),
-            1 => Party::RemoteIo(ProgramId(bytes[6])),
-            2 => Party::Plant(ProgramId(bytes[6])),
+            0 => Member::Station(StationId(bytes[6])),
+            1 => Member::RemoteIo(ProgramId(bytes[6])),
+            2 => Member::Plant(ProgramId(bytes[6])),
             _ => return None,
         };
         let field = |from: usize, to: usize| &bytes[from..to];
@@ -78,9 +78,9 @@ mod tests {
     #[test]
     fn an_envelope_is_read_back() {
         let senders = [
-            Party::Station(StationId(63)),
-            Party::RemoteIo(ProgramId(0)),
-            Party::Plant(ProgramId(7)),
+            Member::Station(StationId(63)),
+            Member::RemoteIo(ProgramId(0)),
+            Member::Plant(ProgramId(7)),
         ];
         for sender in senders {
             for to in [None, Some(StationId(0)), Some(StationId(63))] {

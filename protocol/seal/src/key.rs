@@ -11,13 +11,13 @@ pub const KEY_BYTES: usize = 32;
 const FRAME_CONTEXT: &str = "understudy 2026-11 the authenticator of a sender's frames, version 1";
 const TRANSFER_CONTEXT: &str = "understudy 2026-11 a state from one station to another, version 1";
 
-/// Under what name a party holds its keys.
+/// Under what name a member holds its keys.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Title<'a> {
     /// The name of the cluster.
     pub cluster: &'a str,
-    /// The name of the party in it.
-    pub party: &'a str,
+    /// The name of the member in it.
+    pub member: &'a str,
     /// Which of its keys: one more each time that it is issued new ones.
     pub generation: u32,
 }
@@ -60,7 +60,7 @@ impl ClusterSecret {
         hasher.update(&self.0);
         for title in titles {
             // Lengths go first, so that no two lists of titles are the same bytes.
-            for text in [title.cluster, title.party] {
+            for text in [title.cluster, title.member] {
                 hasher.update(&(text.len() as u64).to_le_bytes());
                 hasher.update(text.as_bytes());
             }
@@ -117,10 +117,10 @@ mod tests {
 
     use super::*;
 
-    fn title<'a>(cluster: &'a str, party: &'a str, generation: u32) -> Title<'a> {
+    fn title<'a>(cluster: &'a str, member: &'a str, generation: u32) -> Title<'a> {
         Title {
             cluster,
-            party,
+            member,
             generation,
         }
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use ring::aead::{Aad, LessSafeKey, Nonce};
 use understudy_wire::{
-    Body, ClusterHash, ConfigurationHash, Frame, FrameError, Header, MAXIMUM_FRAME_BYTES, Party,
+    Body, ClusterHash, ConfigurationHash, Frame, FrameError, Header, MAXIMUM_FRAME_BYTES, Member,
     StationId, decode,
 };
 
@@ -25,26 +25,26 @@ pub enum Refusal {
         /// How many.
         bytes: usize,
     },
-    /// A frame, and nobody has sealed it: a party without keys, or of another cluster.
+    /// A frame, and nobody has sealed it: a member without keys, or of another cluster.
     #[error("a frame without an authenticator")]
     Unsealed,
-    /// In the name of a party whose frames do not concern this one, or that is in no cluster of this size.
-    #[error("{sender:?} has nothing to say to this party")]
+    /// In the name of a member whose frames do not concern this one, or that is in no cluster of this size.
+    #[error("{sender:?} has nothing to say to this member")]
     Foreign {
         /// The name that it bears.
-        sender: Party,
+        sender: Member,
     },
     /// The authenticator is not the one of the sender that it names: made by somebody else, or changed on its way.
     #[error("the authenticator is not by {sender:?}")]
     Forged {
         /// The name that it bears.
-        sender: Party,
+        sender: Member,
     },
     /// It counted before, or is older than anything that may still come.
     #[error("a frame of {sender:?} came again, or too late")]
     Replayed {
         /// Who said it when it was new.
-        sender: Party,
+        sender: Member,
     },
     /// New, and of a life before the newest one: two processes have the keys of its sender.
     #[error(
@@ -52,38 +52,38 @@ pub enum Refusal {
     )]
     OfAnotherLife {
         /// Whose keys they have.
-        sender: Party,
+        sender: Member,
     },
-    /// By a party whose keys were revoked.
+    /// By a member whose keys were revoked.
     #[error("the keys of {sender:?} are revoked")]
     Revoked {
         /// Who.
-        sender: Party,
+        sender: Member,
     },
     /// Authentic, and no frame: a mistake in the sender's program, or another version of it.
     #[error("{sender:?} sealed what is no frame: {error}")]
     Broken {
         /// Who.
-        sender: Party,
+        sender: Member,
         /// What is wrong with it.
         error: FrameError,
     },
 }
 
-/// Opens what arrives at one party.
+/// Opens what arrives at one member.
 pub struct Opener {
-    own: Party,
-    senders: BTreeMap<Party, (FrameKey, Window)>,
+    own: Member,
+    senders: BTreeMap<Member, (FrameKey, Window)>,
     transfers: BTreeMap<StationId, LessSafeKey>,
     revoked: Arc<Revocations>,
     agreed: Option<(ClusterHash, ConfigurationHash)>,
 }
 
 impl Opener {
-    /// `senders` are those whom this party hears; `transfers` the keys of the states that it is given, by who gives.
+    /// `senders` are those whom this member hears; `transfers` the keys of the states that it is given, by who gives.
     pub fn new(
-        own: Party,
-        senders: impl IntoIterator<Item = (Party, FrameKey)>,
+        own: Member,
+        senders: impl IntoIterator<Item = (Member, FrameKey)>,
         transfers: impl IntoIterator<Item = (StationId, TransferKey)>,
         revoked: Arc<Revocations>,
     ) -> Self {
@@ -94,7 +94,7 @@ impl Opener {
         Self {
             own,
             senders: senders
-                .map(|(party, key)| (party, (key, Window::default())))
+                .map(|(member, key)| (member, (key, Window::default())))
                 .collect(),
             transfers: ciphers.collect(),
             revoked,
@@ -149,7 +149,7 @@ impl Opener {
         let text = &mut sealed[HEADER_BYTES..];
         let encoded = match envelope.to {
             None => &*text,
-            Some(to) if Party::Station(to) != self.own => return Ok(None),
+            Some(to) if Member::Station(to) != self.own => return Ok(None),
             Some(_) => decrypt(&self.transfers, envelope, header, text)
                 .ok_or(Refusal::Forged { sender })?,
         };
@@ -195,7 +195,7 @@ fn decrypt<'t>(
     header: [u8; HEADER_BYTES],
     text: &'t mut [u8],
 ) -> Option<&'t [u8]> {
-    let Party::Station(from) = envelope.sender else {
+    let Member::Station(from) = envelope.sender else {
         return None;
     };
     let cipher = ciphers.get(&from)?;

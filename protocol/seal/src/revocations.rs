@@ -2,9 +2,9 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use understudy_wire::Party;
+use understudy_wire::Member;
 
-/// A set of parties that another thread may change while frames are opened.
+/// A set of members that another thread may change while frames are opened.
 #[derive(Debug, Default)]
 pub struct Revocations {
     stations: AtomicU64,
@@ -14,10 +14,10 @@ pub struct Revocations {
 
 impl Revocations {
     /// From now on exactly these are revoked.
-    pub fn set(&self, revoked: impl IntoIterator<Item = Party>) {
+    pub fn set(&self, revoked: impl IntoIterator<Item = Member>) {
         let mut masks = [0_u64; 3];
-        for party in revoked {
-            let (kind, bit) = place(party);
+        for member in revoked {
+            let (kind, bit) = place(member);
             masks[kind] |= bit;
         }
         for (word, mask) in self.words().into_iter().zip(masks) {
@@ -25,9 +25,9 @@ impl Revocations {
         }
     }
 
-    /// Whether a party's keys no longer count.
-    pub fn holds(&self, party: Party) -> bool {
-        let (kind, bit) = place(party);
+    /// Whether a member's keys no longer count.
+    pub fn holds(&self, member: Member) -> bool {
+        let (kind, bit) = place(member);
         self.words()[kind].load(Ordering::Relaxed) & bit != 0
     }
 
@@ -36,12 +36,12 @@ impl Revocations {
     }
 }
 
-/// The kind of a party and its bit; no bit where its index is past every bound.
-fn place(party: Party) -> (usize, u64) {
-    let (kind, index) = match party {
-        Party::Station(station) => (0, station.0),
-        Party::RemoteIo(program) => (1, program.0),
-        Party::Plant(program) => (2, program.0),
+/// The kind of a member and its bit; no bit where its index is past every bound.
+fn place(member: Member) -> (usize, u64) {
+    let (kind, index) = match member {
+        Member::Station(station) => (0, station.0),
+        Member::RemoteIo(program) => (1, program.0),
+        Member::Plant(program) => (2, program.0),
     };
     (kind, 1_u64.checked_shl(u32::from(index)).unwrap_or(0))
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use ring::aead::{Aad, LessSafeKey, Nonce};
-use understudy_wire::{Body, Frame, Party, StationId};
+use understudy_wire::{Body, Frame, Member, StationId};
 
 use crate::envelope::{AUTHENTICATOR_BYTES, Envelope, HEADER_BYTES};
 use crate::key::{FrameKey, TransferKey};
@@ -21,15 +21,15 @@ pub enum SealError {
     #[error("a frame of {sender:?} cannot be sealed by {own:?}")]
     NotOwn {
         /// Who seals.
-        own: Party,
+        own: Member,
         /// Whose it is.
-        sender: Party,
+        sender: Member,
     },
 }
 
-/// Seals the frames of one party in one life.
+/// Seals the frames of one member in one life.
 pub struct Seal {
-    own: Party,
+    own: Member,
     key: FrameKey,
     transfers: BTreeMap<StationId, LessSafeKey>,
     life: u32,
@@ -37,9 +37,9 @@ pub struct Seal {
 }
 
 impl Seal {
-    /// `life` must be one that this party never had; `transfers` are the keys of the states that it gives, by who asks.
+    /// `life` must be one that this member never had; `transfers` are the keys of the states that it gives, by who asks.
     pub fn new(
-        own: Party,
+        own: Member,
         key: FrameKey,
         life: u32,
         transfers: impl IntoIterator<Item = (StationId, TransferKey)>,

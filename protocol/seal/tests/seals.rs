@@ -10,51 +10,52 @@ use understudy_seal::{
 };
 use understudy_wire::{
     Actuation, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Field, Frame,
-    FrameError, Header, Image, Lineage, MAXIMUM_IMAGE_BITS, Moment, Party, ProgramHash, ProgramId,
+    FrameError, Header, Image, Lineage, MAXIMUM_IMAGE_BITS, Member, Moment, ProgramHash, ProgramId,
     StationId, Transfer, encode,
 };
 
-const ROBOT: Party = Party::Station(StationId(0));
-const PRESS: Party = Party::Station(StationId(1));
-const UNDERSTUDY: Party = Party::Station(StationId(2));
-const ROBOT_IO: Party = Party::RemoteIo(ProgramId(0));
-const ARM: Party = Party::Plant(ProgramId(0));
+const ROBOT: Member = Member::Station(StationId(0));
+const PRESS: Member = Member::Station(StationId(1));
+const UNDERSTUDY: Member = Member::Station(StationId(2));
+const ROBOT_IO: Member = Member::RemoteIo(ProgramId(0));
+const ARM: Member = Member::Plant(ProgramId(0));
 
 fn secret() -> ClusterSecret {
     ClusterSecret::new([7; 32])
 }
 
-fn title(party: Party, name: &mut String) -> Title<'_> {
-    *name = format!("{party:?}");
+fn title(member: Member, name: &mut String) -> Title<'_> {
+    *name = format!("{member:?}");
     Title {
         cluster: "cell",
-        party: name,
+        member: name,
         generation: 1,
     }
 }
 
-fn frame_key(party: Party) -> FrameKey {
-    secret().frame_key(title(party, &mut String::new()))
+fn frame_key(member: Member) -> FrameKey {
+    secret().frame_key(title(member, &mut String::new()))
 }
 
-fn transfer_key(from: Party, to: Party) -> TransferKey {
+fn transfer_key(from: Member, to: Member) -> TransferKey {
     let (mut first, mut second) = (String::new(), String::new());
     secret().transfer_key(title(from, &mut first), title(to, &mut second))
 }
 
-fn stations() -> [(StationId, Party); 3] {
-    [0, 1, 2].map(|rank| (StationId(rank), Party::Station(StationId(rank))))
+fn stations() -> [(StationId, Member); 3] {
+    [0, 1, 2].map(|rank| (StationId(rank), Member::Station(StationId(rank))))
 }
 
-/// A party in one of its lives.
-fn seal(own: Party, life: u32) -> Seal {
+/// A member in one of its lives.
+fn seal(own: Member, life: u32) -> Seal {
     let transfers = stations().map(|(rank, to)| (rank, transfer_key(own, to)));
     Seal::new(own, frame_key(own), life, transfers)
 }
 
 /// Somebody who hears all of them.
-fn opener(own: Party, revoked: Arc<Revocations>) -> Opener {
-    let senders = [ROBOT, PRESS, UNDERSTUDY, ROBOT_IO, ARM].map(|party| (party, frame_key(party)));
+fn opener(own: Member, revoked: Arc<Revocations>) -> Opener {
+    let senders =
+        [ROBOT, PRESS, UNDERSTUDY, ROBOT_IO, ARM].map(|member| (member, frame_key(member)));
     let transfers = stations().map(|(rank, from)| (rank, transfer_key(from, own)));
     Opener::new(own, senders, transfers, revoked)
 }
@@ -63,23 +64,23 @@ fn listener() -> Opener {
     opener(UNDERSTUDY, Arc::default())
 }
 
-fn frame(sender: Party, cycle: u64) -> Frame {
+fn frame(sender: Member, cycle: u64) -> Frame {
     let image = Image::from_words(4, &[0b1010]).expect("it fits");
     let body = match sender {
-        Party::Station(_) => Body::Sync,
-        Party::RemoteIo(_) => Body::Actuation(Actuation { outputs: image }),
-        Party::Plant(_) => Body::Field(Field {
+        Member::Station(_) => Body::Sync,
+        Member::RemoteIo(_) => Body::Actuation(Actuation { outputs: image }),
+        Member::Plant(_) => Body::Field(Field {
             sensors: image,
             handed_over: 1,
             finished: 2,
-            mishaps: 0,
+            plant_faults: 0,
             positions: smallvec![0, 500],
         }),
     };
     framed(sender, cycle, body)
 }
 
-fn framed(sender: Party, cycle: u64, body: Body) -> Frame {
+fn framed(sender: Member, cycle: u64, body: Body) -> Frame {
     Frame {
         header: Header {
             cluster: ClusterHash(1),
@@ -95,7 +96,7 @@ fn framed(sender: Party, cycle: u64, body: Body) -> Frame {
     }
 }
 
-fn transfer(from: Party, to: StationId, state: Image) -> Frame {
+fn transfer(from: Member, to: StationId, state: Image) -> Frame {
     let body = Body::Transfer(Transfer {
         to,
         program: ProgramId(0),
@@ -266,7 +267,7 @@ fn strangers_are_told_apart() {
     check(&mut opener, b"nonsense", Refusal::Bytes { bytes: 8 });
     check(&mut opener, &[0; 40_000], Refusal::Bytes { bytes: 40_000 });
 
-    let unheard = Party::Plant(ProgramId(1));
+    let unheard = Member::Plant(ProgramId(1));
     let datagram = sealed(&mut seal(unheard, 1), &frame(unheard, 1));
     check(&mut opener, &datagram, Refusal::Foreign { sender: unheard });
 
@@ -282,7 +283,7 @@ fn strangers_are_told_apart() {
 }
 
 #[test]
-fn a_revoked_party_is_heard_no_more_and_again_when_it_is_let() {
+fn a_revoked_member_is_heard_no_more_and_again_when_it_is_let() {
     let revoked = Arc::new(Revocations::default());
     let mut opener = opener(UNDERSTUDY, Arc::clone(&revoked));
     let mut seal = seal(ROBOT, 1);

@@ -1,11 +1,11 @@
-//! What all parties of one cluster have agreed on, because they read the same cluster file.
+//! What all members of one cluster have agreed on, because they read the same cluster file.
 
 use serde::{Deserialize, Serialize};
 
 use crate::identifier::{ClusterHash, ConfigurationHash};
 use crate::schedule::Schedule;
 
-/// Equal in every party; its hash is `configuration`, and a party with another hash is refused.
+/// Equal in every member; its hash is `configuration`, and a member with another hash is refused.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Agreement {
     /// Whose frames these are.
@@ -30,7 +30,7 @@ pub struct Agreement {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
-    /// A parity word for those who are in step, and one for each that was silent in this cycle: any number of failed
+    /// A parity word for those who are synchronised, and one for each that was silent in this cycle: any number of failed
     /// controllers, as long as one understudy lives.
     #[default]
     Full,

@@ -1,19 +1,19 @@
-//! Who spoke in this cycle, and who has been silent for too long: the paper's failure flags θ.
+//! Who published in this cycle, and who has been silent for too long: the paper's failure flags θ.
 //!
-//! Detection is by turns alone. Each party keeps its own view; nothing is decided on it but whose slot is closed, whom the
-//! pacemaker's successor waits for, and which stations count as living.
+//! Detection is by turns alone. Each member keeps its own view; nothing is decided on it but whose slot is closed, whom the
+//! cycle master's successor waits for, and which stations count as living.
 
 use crate::identifier::StationId;
 use crate::set::StationSet;
 
-/// One party's view of all stations.
+/// One member's view of all stations.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Attendance {
     flag_after: u32,
     /// Cycles of silence in a row, by rank; at `flag_after` a station is flagged, and the count stays there.
     silent: Vec<u32>,
     flagged: StationSet,
-    spoke: StationSet,
+    published: StationSet,
 }
 
 /// What became of a flag.
@@ -26,40 +26,40 @@ pub enum Change {
 }
 
 impl Attendance {
-    /// Nobody has spoken yet, so all `stations` are flagged.
+    /// Nobody has published yet, so all `stations` are flagged.
     pub fn new(stations: usize, flag_after: u32) -> Self {
         Self {
             flag_after,
             silent: vec![flag_after; stations],
             flagged: StationSet::first(stations),
-            spoke: StationSet::EMPTY,
+            published: StationSet::EMPTY,
         }
     }
 
     /// A turn of this cycle was heard. True for the first of a station in a cycle.
     pub fn heard(&mut self, station: StationId) -> bool {
-        let first = station.index() < self.silent.len() && !self.spoke.contains(station);
+        let first = station.index() < self.silent.len() && !self.published.contains(station);
         if first {
-            self.spoke.insert(station);
+            self.published.insert(station);
         }
         first
     }
 
-    /// Who spoke in this cycle.
-    pub fn spoke(&self) -> StationSet {
-        self.spoke
+    /// Who published in this cycle.
+    pub fn published(&self) -> StationSet {
+        self.published
     }
 
-    /// θ: who was silent for too long, up to the last cycle, and has not spoken in this one.
+    /// θ: who was silent for too long, up to the last cycle, and has not published in this one.
     pub fn flagged(&self) -> StationSet {
-        self.flagged.without(self.spoke)
+        self.flagged.without(self.published)
     }
 
-    /// Ends a cycle that this party took part in; `change` is told of every flag that changes.
+    /// Ends a cycle that this member took part in; `change` is told of every flag that changes.
     pub fn close_cycle(&mut self, mut change: impl FnMut(Change)) {
         for (rank, silent) in self.silent.iter_mut().enumerate() {
             let station = StationId(rank as u8);
-            if self.spoke.contains(station) {
+            if self.published.contains(station) {
                 *silent = 0;
                 if self.flagged.contains(station) {
                     self.flagged.remove(station);
@@ -73,7 +73,7 @@ impl Attendance {
                 }
             }
         }
-        self.spoke = StationSet::EMPTY;
+        self.published = StationSet::EMPTY;
     }
 }
 

@@ -1,6 +1,6 @@
 //! Who is to hear whom.
 //!
-//! Invariant: a party hears another one on one topic at most, so that one subscription and one key for each are enough.
+//! Invariant: a member hears another one on one topic at most, so that one subscription and one key for each are enough.
 //!
 //! | topic | said by | heard by |
 //! |---|---|---|
@@ -10,7 +10,7 @@
 //! | actuation | remote I/O i | plant i |
 
 use crate::frame::Body;
-use crate::identifier::{Party, ProgramId};
+use crate::identifier::{Member, ProgramId};
 
 /// What a frame is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -41,8 +41,8 @@ impl Topic {
     /// On which topic `listener` hears `speaker`, if at all; a pair (i, j) in `neighbours` says that plant j
     /// hears plant i.
     pub fn between(
-        speaker: Party,
-        listener: Party,
+        speaker: Member,
+        listener: Member,
         neighbours: &[(ProgramId, ProgramId)],
     ) -> Option<Self> {
         if speaker == listener {
@@ -50,20 +50,21 @@ impl Topic {
         }
         match (speaker, listener) {
             // What a remote I/O samples concerns no other one.
-            (Party::RemoteIo(_), Party::RemoteIo(_)) => None,
-            (Party::Station(_) | Party::RemoteIo(_), Party::Station(_) | Party::RemoteIo(_)) => {
-                Some(Self::Cycle)
-            }
-            (Party::RemoteIo(program), Party::Plant(plant)) => {
+            (Member::RemoteIo(_), Member::RemoteIo(_)) => None,
+            (
+                Member::Station(_) | Member::RemoteIo(_),
+                Member::Station(_) | Member::RemoteIo(_),
+            ) => Some(Self::Cycle),
+            (Member::RemoteIo(program), Member::Plant(plant)) => {
                 (program == plant).then_some(Self::Actuation)
             }
-            (Party::Plant(plant), Party::RemoteIo(program)) => {
+            (Member::Plant(plant), Member::RemoteIo(program)) => {
                 (program == plant).then_some(Self::Field)
             }
-            (Party::Plant(speaker), Party::Plant(listener)) => neighbours
+            (Member::Plant(speaker), Member::Plant(listener)) => neighbours
                 .contains(&(speaker, listener))
                 .then_some(Self::Field),
-            (Party::Station(_), Party::Plant(_)) | (Party::Plant(_), Party::Station(_)) => None,
+            (Member::Station(_), Member::Plant(_)) | (Member::Plant(_), Member::Station(_)) => None,
         }
     }
 }

@@ -14,7 +14,7 @@
 use bincode::config::{Configuration, Limit};
 
 use crate::frame::{Body, Frame, Holding, MAXIMUM_HISTORY, Recalled, Relayed, Sample, Word};
-use crate::identifier::{MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, Party};
+use crate::identifier::{MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, Member};
 use crate::set::ProgramSet;
 
 /// A frame is never longer; one UDP datagram can carry it.
@@ -140,17 +140,19 @@ fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
     let sender = frame.header.sender;
     kept(
         match sender {
-            Party::Station(station) => station.index() < MAXIMUM_STATIONS,
-            Party::RemoteIo(program) | Party::Plant(program) => program.index() < MAXIMUM_PROGRAMS,
+            Member::Station(station) => station.index() < MAXIMUM_STATIONS,
+            Member::RemoteIo(program) | Member::Plant(program) => {
+                program.index() < MAXIMUM_PROGRAMS
+            }
         },
         "the sender's index is below 64",
     )?;
-    let station = matches!(sender, Party::Station(_));
+    let station = matches!(sender, Member::Station(_));
     match &frame.body {
         Body::Sync => kept(station, "only a station paces"),
         Body::Sample(sample) => {
             kept(
-                matches!(sender, Party::RemoteIo(_)),
+                matches!(sender, Member::RemoteIo(_)),
                 "only a remote I/O samples",
             )?;
             kept_sample(sample)
@@ -164,8 +166,7 @@ fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
                 turn.words.len() <= MAXIMUM_PROGRAMS + 1,
                 "a turn has at most 65 words",
             )?;
-            let covered =
-                |word: &Word| !word.members.is_empty() && word.members.without(held).is_empty();
+            let covered = |word: &Word| !word.mask.is_empty() && word.mask.without(held).is_empty();
             kept(
                 turn.words.iter().all(covered),
                 "a word is over states that are held",
@@ -186,7 +187,7 @@ fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
         }
         Body::Field(field) => {
             kept(
-                matches!(sender, Party::Plant(_)),
+                matches!(sender, Member::Plant(_)),
                 "only a plant has a field",
             )?;
             kept(
@@ -195,7 +196,7 @@ fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
             )
         }
         Body::Actuation(_) => kept(
-            matches!(sender, Party::RemoteIo(_)),
+            matches!(sender, Member::RemoteIo(_)),
             "only a remote I/O drives",
         ),
     }

@@ -1,6 +1,6 @@
 //! The copies of a cyclic frame that are still to be sent.
 //!
-//! Bounded: a party has at most two kinds of cyclic frames, and an older frame's copies are dropped when a newer one of the
+//! Bounded: a member has at most two kinds of cyclic frames, and an older frame's copies are dropped when a newer one of the
 //! same kind is sent.
 
 use std::sync::Arc;
@@ -68,7 +68,7 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::{Body, ClusterHash, ConfigurationHash, Header, Moment, Party, StationId};
+    use crate::{Body, ClusterHash, ConfigurationHash, Header, Member, Moment, StationId};
 
     #[test]
     fn a_frame_leaves_as_often_as_configured() {
@@ -79,7 +79,7 @@ mod tests {
                     cluster: ClusterHash(1),
                     configuration: ConfigurationHash(2),
                     moment: Moment::default(),
-                    sender: Party::Station(StationId(0)),
+                    sender: Member::Station(StationId(0)),
                     alone: false,
                 },
                 body: Body::Sync,

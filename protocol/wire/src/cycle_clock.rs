@@ -1,6 +1,6 @@
-//! In which cycle a party is, and when that cycle started on its own clock.
+//! In which cycle a member is, and when that cycle started on its own clock.
 //!
-//! Any frame of a later cycle starts that cycle, so a lost Sync costs nothing. A party never goes back, with one exception:
+//! Any frame of a later cycle starts that cycle, so a lost Sync costs nothing. A member never goes back, with one exception:
 //! one that has heard nobody in its epoch for a few periods gives that epoch up for any that has company. So a
 //! restarted station whose link comes up late does not renumber the cluster's cycles, and nobody waits for ever in an epoch that
 //! its founder has left.
@@ -11,7 +11,7 @@ use crate::frame::{Body, Frame};
 use crate::identifier::{Epoch, Moment};
 use crate::time::Time;
 
-/// The current cycle of one party.
+/// The current cycle of one member.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub struct CycleClock {
     moment: Option<Moment>,
@@ -19,21 +19,21 @@ pub struct CycleClock {
     /// When somebody else was last heard in this epoch.
     company: Option<Time>,
     alone: bool,
-    /// Whether this party started the current cycle itself.
+    /// Whether this member started the current cycle itself.
     founder: bool,
 }
 
 /// Periods of silence after which an epoch binds no more.
 const LONELY_PERIODS: u32 = 4;
 
-/// What a frame's moment means to this party.
+/// What a frame's moment means to this member.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Arrival {
     /// Of a cycle that is over, or of an epoch that binds nobody.
     Stale,
     /// Of the current cycle.
     Present,
-    /// Its cycle starts with it, and started on this party's clock at the time given; [`CycleClock::begin`] makes it so.
+    /// Its cycle starts with it, and started on this member's clock at the time given; [`CycleClock::begin`] makes it so.
     Begins(Time),
 }
 
@@ -99,7 +99,7 @@ impl CycleClock {
         self.founder = false;
     }
 
-    /// Starts the next cycle of the epoch at `now`, or a new epoch where there is none yet, as the pacemaker does.
+    /// Starts the next cycle of the epoch at `now`, or a new epoch where there is none yet, as the cycle master does.
     pub fn pace(&mut self, now: Time, founded: Epoch, anchor: Time, period: Duration) -> Moment {
         let next = match self.moment {
             Some(moment) => moment.plus(1),

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!  0 ─ Sync ─ Samples ─┬─ Turn of controller 1 ─ … ─ Turn of controller N ─ Turn of each understudy ─┬─ Join, Transfer ─ T
-//!      pacemaker       │  the token: speaking passes it on, a silent holder is passed over by time   │  rest
+//!      cycle master       │  the token: speaking passes it on, a silent holder is passed over by time   │  rest
 //!                      └─ Field comes before, Actuation at the deadline ──────────────────────────────┘
 //! ```
 //!
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
 use crate::identifier::{
-    ClusterHash, ConfigurationHash, Moment, Party, ProgramHash, ProgramId, StationId,
+    ClusterHash, ConfigurationHash, Member, Moment, ProgramHash, ProgramId, StationId,
 };
 use crate::image::Image;
 use crate::lineage::{Digest, Lineage};
@@ -41,7 +41,7 @@ pub struct Header {
     /// Epoch and cycle in which it was made.
     pub moment: Moment,
     /// Who made it.
-    pub sender: Party,
+    pub sender: Member,
     /// Whether the sender has heard nobody else in this epoch yet; an epoch that only its founder knows binds nobody.
     pub alone: bool,
 }
@@ -49,7 +49,7 @@ pub struct Header {
 /// The kinds of frames.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Body {
-    /// The pacemaker starts a cycle.
+    /// The cycle master starts a cycle.
     Sync,
     /// A remote I/O says what it sampled.
     Sample(Sample),
@@ -105,7 +105,7 @@ pub enum Source {
 /// What a station says when it holds the token.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Turn {
-    /// Whom it heard in this cycle before it spoke.
+    /// Whom it heard in this cycle before it published.
     pub heard: StationSet,
     /// The states that it has, one for each program at most, in the order of programs.
     pub holdings: SmallVec<[Holding; 2]>,
@@ -147,7 +147,7 @@ pub struct Holding {
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Word {
     /// Never empty.
-    pub members: ProgramSet,
+    pub mask: ProgramSet,
     /// Σ h(j)(x(j), u(j)) over the members, as wide as the widest.
     pub sum: Image,
 }
@@ -216,7 +216,7 @@ pub struct Field {
     /// Parts that it has finished, since its start.
     pub finished: u64,
     /// Things that must not happen to a plant and did (a part dropped, a crash against an end), since its start.
-    pub mishaps: u64,
+    pub plant_faults: u64,
     /// Where its moving parts are, for the figures; each from 0 to 1000.
     pub positions: SmallVec<[u16; 4]>,
 }

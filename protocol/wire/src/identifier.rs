@@ -37,7 +37,7 @@ impl StationId {
 /// Who speaks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Party {
+pub enum Member {
     /// A controller or an understudy, by rank.
     Station(StationId),
     /// The remote I/O of a program.

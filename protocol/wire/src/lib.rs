@@ -1,6 +1,6 @@
-//! What travels between the parties of a cluster: identifiers, images, lineages and frames.
+//! What travels between the members of a cluster: identifiers, images, lineages and frames.
 //!
-//! Everything that two parties must agree on is here and nowhere else: who they are ([`Party`]), when who speaks
+//! Everything that two members must agree on is here and nowhere else: who they are ([`Member`]), when who speaks
 //! ([`Schedule`]), which states are the same ([`Lineage`]), and the bytes of a [`Frame`] ([`encode`], [`decode`]).
 
 mod agreement;
@@ -37,15 +37,15 @@ pub use frame::{
     Sample, Source, Transfer, Turn, Word,
 };
 pub use identifier::{
-    ClusterHash, ConfigurationHash, Cycle, Epoch, MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, Moment,
-    Party, ProgramHash, ProgramId, StationId,
+    ClusterHash, ConfigurationHash, Cycle, Epoch, MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, Member,
+    Moment, ProgramHash, ProgramId, StationId,
 };
 pub use image::{Image, ImageError, MAXIMUM_IMAGE_BITS};
 pub use lineage::{Digest, Lineage};
 pub use machine::{Input, Machine, Output};
 pub use reception::{Admission, Reception};
 pub use schedule::{Schedule, ScheduleError};
-pub use set::{Member, ProgramSet, Set, StationSet};
+pub use set::{Element, ProgramSet, Set, StationSet};
 pub use state_choice::StateChoice;
 pub use time::Time;
 pub use waking::Waking;

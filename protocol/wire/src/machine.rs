@@ -1,4 +1,4 @@
-//! The shape of every party: a pure state machine with time as an argument.
+//! The shape of every member: a pure state machine with time as an argument.
 //!
 //! Feed it with [`Machine::handle_input`], then drain it with [`Machine::poll_output`] until it has nothing more to say, then
 //! wait until [`Machine::wakeup`] or the next input. The same machine runs on real clocks and networks, in the simulator
@@ -12,7 +12,7 @@ use crate::image::Image;
 use crate::state_choice::StateChoice;
 use crate::time::Time;
 
-/// What a party is told.
+/// What a member is told.
 #[derive(Debug, Clone, Copy)]
 pub enum Input<'a> {
     /// The time that it asked for has come.
@@ -33,7 +33,7 @@ pub enum Input<'a> {
     Unforce(SignalPlace),
 }
 
-/// What a party says.
+/// What a member says.
 #[derive(Debug, Clone)]
 pub enum Output<Event> {
     /// A frame for all who are concerned by its kind.
@@ -44,7 +44,7 @@ pub enum Output<Event> {
     Report(Event),
 }
 
-/// A party.
+/// A member.
 pub trait Machine {
     /// What it reports.
     type Event;

@@ -4,17 +4,17 @@ use std::collections::BTreeSet;
 
 use crate::agreement::Agreement;
 use crate::frame::Header;
-use crate::identifier::{ClusterHash, ConfigurationHash, Party};
+use crate::identifier::{ClusterHash, ConfigurationHash, Member};
 
-/// Decides on headers alone. Remembers whom it has refused, at most once for each party of the cluster.
+/// Decides on headers alone. Remembers whom it has refused, at most once for each member of the cluster.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Reception {
-    own: Party,
+    own: Member,
     cluster: ClusterHash,
     configuration: ConfigurationHash,
     stations: usize,
     programs: usize,
-    refused: BTreeSet<Party>,
+    refused: BTreeSet<Member>,
 }
 
 /// What becomes of a frame.
@@ -22,9 +22,9 @@ pub struct Reception {
 pub enum Admission {
     /// It counts.
     Admitted,
-    /// Of another cluster, of nobody in this one, one's own, or of a party that was refused before: dropped without a word.
+    /// Of another cluster, of nobody in this one, one's own, or of a member that was refused before: dropped without a word.
     Dropped,
-    /// The first of a party with another configuration: dropped, and worth a word.
+    /// The first of a member with another configuration: dropped, and worth a word.
     Refused {
         /// The configuration that it runs.
         theirs: ConfigurationHash,
@@ -32,8 +32,8 @@ pub enum Admission {
 }
 
 impl Reception {
-    /// For one party.
-    pub fn new(own: Party, agreement: &Agreement) -> Self {
+    /// For one member.
+    pub fn new(own: Member, agreement: &Agreement) -> Self {
         Self {
             own,
             cluster: agreement.cluster,
@@ -47,17 +47,17 @@ impl Reception {
     /// Decides on one header.
     pub fn admit(&mut self, header: &Header) -> Admission {
         let known = match header.sender {
-            Party::Station(station) => station.index() < self.stations,
-            Party::RemoteIo(program) | Party::Plant(program) => program.index() < self.programs,
+            Member::Station(station) => station.index() < self.stations,
+            Member::RemoteIo(program) | Member::Plant(program) => program.index() < self.programs,
         };
         if header.cluster != self.cluster || header.sender == self.own {
             return Admission::Dropped;
         }
         if header.configuration != self.configuration {
-            // A party that is in no cluster of this size is still worth a word, once for all of them.
-            let party = if known { header.sender } else { self.own };
+            // A member that is in no cluster of this size is still worth a word, once for all of them.
+            let member = if known { header.sender } else { self.own };
             let theirs = header.configuration;
-            return if self.refused.insert(party) {
+            return if self.refused.insert(member) {
                 Admission::Refused { theirs }
             } else {
                 Admission::Dropped

@@ -1,4 +1,4 @@
-//! When who speaks in a cycle of period T: the slots that every party computes for itself from the same configuration.
+//! When who speaks in a cycle of period T: the slots that every member computes for itself from the same configuration.
 //!
 //! ```text
 //! 0        0.12 T                    0.45 T        0.55 T     0.65 T    0.70 T        T
@@ -6,7 +6,7 @@
 //!                                                      last call
 //! ```
 //!
-//! When its slot starts, a station waits for nobody any more; it speaks earlier when its predecessor has spoken. One that does not
+//! When its slot starts, a station waits for nobody any more; it speaks earlier when its predecessor has published. One that does not
 //! know its outputs by then, because a sample is late, waits for that until the last call. Copies of a frame follow it
 //! `copy_spacing` apart, and the last copy of the last turn leaves before the deadline.
 
@@ -174,7 +174,7 @@ impl Schedule {
         self.rest
     }
 
-    /// How long the next rank waits for a silent pacemaker.
+    /// How long the next rank waits for a silent cycle master.
     pub fn guard(&self) -> Duration {
         self.guard
     }
@@ -184,7 +184,7 @@ impl Schedule {
         self.grace
     }
 
-    /// How late a host may wake a party before it has to say so.
+    /// How late a host may wake a member before it has to say so.
     pub fn stall(&self) -> Duration {
         self.stall
     }

@@ -9,14 +9,14 @@ use serde::{Deserialize, Serialize};
 use crate::identifier::{ProgramId, StationId};
 
 /// What a [`Set`] may hold: an index below 64.
-pub trait Member: Copy {
+pub trait Element: Copy {
     /// From an index below 64.
     fn from_index(index: u8) -> Self;
     /// Its index; a member at 64 or above is in no set.
     fn to_index(self) -> u8;
 }
 
-impl Member for ProgramId {
+impl Element for ProgramId {
     fn from_index(index: u8) -> Self {
         Self(index)
     }
@@ -25,7 +25,7 @@ impl Member for ProgramId {
     }
 }
 
-impl Member for StationId {
+impl Element for StationId {
     fn from_index(index: u8) -> Self {
         Self(index)
     }
@@ -37,7 +37,7 @@ impl Member for StationId {
 /// A set of members, bit k being the member with index k.
 #[derive(Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct Set<M>(u64, #[serde(skip)] PhantomData<M>);
+pub struct Set<E>(u64, #[serde(skip)] PhantomData<E>);
 
 /// Which programs, such as the mask of a parity word.
 pub type ProgramSet = Set<ProgramId>;
@@ -45,7 +45,7 @@ pub type ProgramSet = Set<ProgramId>;
 /// Which stations, such as those heard in a cycle.
 pub type StationSet = Set<StationId>;
 
-impl<M: Member> Set<M> {
+impl<E: Element> Set<E> {
     /// No member.
     pub const EMPTY: Self = Self(0, PhantomData);
 
@@ -69,22 +69,22 @@ impl<M: Member> Set<M> {
     }
 
     /// One member.
-    pub fn only(member: M) -> Self {
+    pub fn only(member: E) -> Self {
         Self::from_bits(bit(member))
     }
 
     /// Whether it holds `member`.
-    pub fn contains(self, member: M) -> bool {
+    pub fn contains(self, member: E) -> bool {
         self.0 & bit(member) != 0
     }
 
     /// Adds a member.
-    pub fn insert(&mut self, member: M) {
+    pub fn insert(&mut self, member: E) {
         self.0 |= bit(member);
     }
 
     /// Takes a member out.
-    pub fn remove(&mut self, member: M) {
+    pub fn remove(&mut self, member: E) {
         self.0 &= !bit(member);
     }
 
@@ -117,24 +117,24 @@ impl<M: Member> Set<M> {
     }
 
     /// In ascending order.
-    pub fn iter(self) -> impl Iterator<Item = M> {
+    pub fn iter(self) -> impl Iterator<Item = E> {
         let mut rest = self.0;
         std::iter::from_fn(move || {
             (rest != 0).then(|| {
                 let index = rest.trailing_zeros();
                 rest &= rest - 1;
-                M::from_index(index as u8)
+                E::from_index(index as u8)
             })
         })
     }
 }
 
-fn bit<M: Member>(member: M) -> u64 {
+fn bit<E: Element>(member: E) -> u64 {
     1_u64.checked_shl(u32::from(member.to_index())).unwrap_or(0)
 }
 
-impl<M: Member> FromIterator<M> for Set<M> {
-    fn from_iter<T: IntoIterator<Item = M>>(members: T) -> Self {
+impl<E: Element> FromIterator<E> for Set<E> {
+    fn from_iter<T: IntoIterator<Item = E>>(members: T) -> Self {
         let mut set = Self::EMPTY;
         for member in members {
             set.insert(member);
@@ -143,36 +143,36 @@ impl<M: Member> FromIterator<M> for Set<M> {
     }
 }
 
-// Written out, because a derive would ask the same of `M`, which is only a marker.
-impl<M> Hash for Set<M> {
+// Written out, because a derive would ask the same of `E`, which is only a marker.
+impl<E> Hash for Set<E> {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
         self.0.hash(hasher);
     }
 }
 
-impl<M> Clone for Set<M> {
+impl<E> Clone for Set<E> {
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<M> Copy for Set<M> {}
+impl<E> Copy for Set<E> {}
 
-impl<M> PartialEq for Set<M> {
+impl<E> PartialEq for Set<E> {
     fn eq(&self, other: &Self) -> bool {
         self.0 == other.0
     }
 }
 
-impl<M> Eq for Set<M> {}
+impl<E> Eq for Set<E> {}
 
-impl<M> Default for Set<M> {
+impl<E> Default for Set<E> {
     fn default() -> Self {
         Self(0, PhantomData)
     }
 }
 
-impl<M: Member + fmt::Debug> fmt::Debug for Set<M> {
+impl<E: Element + fmt::Debug> fmt::Debug for Set<E> {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.debug_set().entries(self.iter()).finish()
     }

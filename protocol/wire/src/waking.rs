@@ -1,11 +1,11 @@
-//! When a party wants to be woken, and whether its host does it.
+//! When a member wants to be woken, and whether its host does it.
 
 use std::time::Duration;
 
 use crate::schedule::Schedule;
 use crate::time::Time;
 
-/// The next wake-up of one party.
+/// The next wake-up of one member.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub struct Waking {
     /// When it wants to be woken, as of its last input.

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use smallvec::smallvec;
 use understudy_wire::{
     Actuation, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Field, Frame,
-    FrameError, Header, Holding, Image, Join, Lineage, MAXIMUM_FRAME_BYTES, Moment, Party,
+    FrameError, Header, Holding, Image, Join, Lineage, MAXIMUM_FRAME_BYTES, Member, Moment,
     ProgramHash, ProgramId, ProgramSet, Recalled, Relayed, Sample, StationId, StationSet, Transfer,
     Turn, Word, decode, encode,
 };
@@ -20,7 +20,7 @@ fn image(width: usize, word: u64) -> Image {
     Image::from_words(width, &[word]).expect("it fits")
 }
 
-fn frame(sender: Party, body: Body) -> Frame {
+fn frame(sender: Member, body: Body) -> Frame {
     Frame {
         header: Header {
             cluster: ClusterHash(1),
@@ -56,9 +56,9 @@ fn recalled(program: u8) -> Recalled {
 
 /// One frame of every kind.
 fn every_kind() -> Vec<(&'static str, Frame)> {
-    let station = Party::Station(StationId(2));
-    let remote_io = Party::RemoteIo(ProgramId(1));
-    let plant = Party::Plant(ProgramId(0));
+    let station = Member::Station(StationId(2));
+    let remote_io = Member::RemoteIo(ProgramId(1));
+    let plant = Member::Plant(ProgramId(0));
     let sample = Sample {
         born: moment(1, 2),
         base: Lineage(5),
@@ -77,7 +77,7 @@ fn every_kind() -> Vec<(&'static str, Frame)> {
         heard: StationSet::from_bits(0b11),
         holdings: smallvec![holding(0), holding(1)],
         words: smallvec![Word {
-            members: ProgramSet::from_bits(0b11),
+            mask: ProgramSet::from_bits(0b11),
             sum: image(5, 0b10101),
         }],
         recalled: vec![recalled(0)],
@@ -104,7 +104,7 @@ fn every_kind() -> Vec<(&'static str, Frame)> {
         sensors: image(6, 0b1010),
         handed_over: 1,
         finished: 2,
-        mishaps: 0,
+        plant_faults: 0,
         positions: smallvec![0, 500, 1000],
     };
     let actuation = Actuation {
@@ -166,7 +166,7 @@ fn no_flipped_bit_goes_unseen() {
     }
 }
 
-fn check_refused(sender: Party, body: Body) {
+fn check_refused(sender: Member, body: Body) {
     let frame = frame(sender, body);
     let mut bytes = Vec::new();
     let refused = encode(&frame, &mut bytes);
@@ -179,10 +179,10 @@ fn check_refused(sender: Party, body: Body) {
 
 #[test]
 fn a_frame_that_breaks_a_promise_never_leaves() {
-    let station = Party::Station(StationId(2));
-    let remote_io = Party::RemoteIo(ProgramId(0));
+    let station = Member::Station(StationId(2));
+    let remote_io = Member::RemoteIo(ProgramId(0));
     check_refused(remote_io, Body::Sync);
-    check_refused(Party::Station(StationId(64)), Body::Sync);
+    check_refused(Member::Station(StationId(64)), Body::Sync);
     let empty = Sample {
         born: Moment::default(),
         base: Lineage(0),
@@ -200,7 +200,7 @@ fn a_frame_that_breaks_a_promise_never_leaves() {
     };
     check_refused(remote_io, Body::Sample(uneven));
     let word = |members| Word {
-        members: ProgramSet::from_bits(members),
+        mask: ProgramSet::from_bits(members),
         sum: Image::default(),
     };
     let turn = |members, programs: &[u8]| Turn {
@@ -252,7 +252,7 @@ fn a_frame_past_the_bound_never_leaves() {
         digest: Digest(0),
         state: Image::from_bits((0..understudy_wire::MAXIMUM_IMAGE_BITS).map(|_| true)),
     };
-    let widest = frame(Party::Station(StationId(0)), Body::Transfer(transfer));
+    let widest = frame(Member::Station(StationId(0)), Body::Transfer(transfer));
     let bytes = bytes_of(&widest);
     assert!(bytes.len() <= MAXIMUM_FRAME_BYTES);
     assert_eq!(decode(&bytes), Ok(widest));

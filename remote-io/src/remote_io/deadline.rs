@@ -115,7 +115,7 @@ impl RemoteIo {
             }
             Selection::Missing(missing) => {
                 let missing = match (missing, self.question) {
-                    (Missing::NobodyInStep | Missing::NoHistory, Some(Question::StateLost)) => {
+                    (Missing::NotSynchronised | Missing::NoHistory, Some(Question::StateLost)) => {
                         Missing::StateLost
                     }
                     _ => missing,
@@ -158,7 +158,7 @@ impl RemoteIo {
             source,
             word_of,
             missing,
-            heard: self.attendance.spoke(),
+            heard: self.attendance.published(),
         });
     }
 

@@ -85,7 +85,7 @@ impl RemoteIo {
         if self.settings.agreement.mode == Mode::Paper {
             let all = StationSet::first(self.turns.len());
             let part: StationSet = self.witnesses.stations().collect();
-            let failed = all.without(part).without(self.attendance.spoke());
+            let failed = all.without(part).without(self.attendance.published());
             let reason = LackingReason::Failed;
             lacking.extend(failed.iter().map(|station| Lacking { station, reason }));
         }
@@ -110,7 +110,7 @@ impl RemoteIo {
         let Some(holding) = holdings.find(|holding| holding.program == program) else {
             return Some(LackingReason::Joining);
         };
-        let says = turn.words.iter().any(|word| word.members.contains(program));
+        let says = turn.words.iter().any(|word| word.mask.contains(program));
         let stepped = holding.stepped;
         (!says || holding.lineage != head).then_some(LackingReason::Behind { stepped })
     }

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use understudy_bus::LinkKind;
 use understudy_bus::exchange::{
-    Carrier, Exchange, ExchangeParty, ExchangeSettings, measure, run_exchange_party,
+    Carrier, Exchange, ExchangeMember, ExchangeSettings, measure, run_exchange_member,
 };
 
 /// Before the part of a process that this program starts of itself.
@@ -17,8 +17,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         if argument == PART {
-            let part: ExchangeParty = serde_json::from_str(&arguments.next().unwrap_or_default())?;
-            run_exchange_party(part, std::io::stdout())?;
+            let part: ExchangeMember = serde_json::from_str(&arguments.next().unwrap_or_default())?;
+            run_exchange_member(part, std::io::stdout())?;
             return Ok(());
         }
     }

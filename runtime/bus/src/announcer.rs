@@ -1,6 +1,6 @@
 //! Texts under keys of Zenoh, for other systems: said when they change, and to be asked for.
 //!
-//! A session of its own, over TCP and without the cluster's keys: nothing that it does reaches a party.
+//! A session of its own, over TCP and without the cluster's keys: nothing that it does reaches a member.
 
 use std::collections::BTreeMap;
 use std::net::{SocketAddr, TcpListener};

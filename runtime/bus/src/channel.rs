@@ -1,9 +1,9 @@
-//! What concerns people and not the cycle goes over mutual TLS: commands, the configuration, and what a party says of itself.
+//! What concerns people and not the cycle goes over mutual TLS: commands, the configuration, and what a member says of itself.
 //!
-//! Every party with keys listens on the TCP port of its own address. There, by the common name of the certificate that a caller
+//! Every member with keys listens on the TCP port of its own address. There, by the common name of the certificate that a caller
 //! shows, and denied to everybody else (Zenoh's access control, default deny):
 //!
-//! | key, under `understudy/<cluster>/<party>/` | what | operators | members |
+//! | key, under `understudy/<cluster>/<member>/` | what | operators | members |
 //! |---|---|---|---|
 //! | `configuration` | asked: the canonical text of the configuration | yes | yes |
 //! | `status` | asked: what it said when it was ready | yes | yes |
@@ -11,10 +11,10 @@
 //! | `command/force`, `command/unforce` | asked with a force or a signal as JSON: done, or why not | yes | no |
 //! | `journal` | told: the lines of its journal, those of a moment at once | yes | no |
 //!
-//! and under `understudy/cluster/<party>`, for callers whose cluster file may be another one: asked, the hash of the configuration.
+//! and under `understudy/cluster/<member>`, for callers whose cluster file may be another one: asked, the hash of the configuration.
 //!
 //! Invariants: the cycle never waits for the channel, which has a thread and a bounded queue of its own; a channel that cannot be
-//! opened is tried again, and the party runs without it; who is revoked is cut off as soon as the list of the admitted changes.
+//! opened is tried again, and the member runs without it; who is revoked is cut off as soon as the list of the admitted changes.
 
 mod followed;
 mod tls;
@@ -71,13 +71,13 @@ const PATIENCE: Duration = Duration::from_secs(30);
 /// Refused connections are reported together, so often at most.
 const REFUSALS_EVERY: Duration = Duration::from_secs(1);
 
-/// A party that ends waits so long for its channel to end, at most.
+/// A member that ends waits so long for its channel to end, at most.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// The answer to a command that was taken.
 pub const DONE: &str = "done";
 
-/// What a party needs for its channel.
+/// What a member needs for its channel.
 pub struct ChannelSettings {
     /// Its files.
     pub keys: TlsKeys,
@@ -114,7 +114,7 @@ impl Drop for RunningChannel {
     }
 }
 
-/// A party's end of the channel.
+/// A member's end of the channel.
 pub(crate) struct Channel<E> {
     settings: ChannelSettings,
     prefix: String,
@@ -128,7 +128,7 @@ pub(crate) struct Channel<E> {
     clock: Clock,
     connections: Connections,
     stop: Arc<AtomicBool>,
-    /// An operator wants the party to end.
+    /// An operator wants the member to end.
     stop_wanted: Arc<AtomicBool>,
 }
 
@@ -155,7 +155,7 @@ impl<E: Send + 'static> Channel<E> {
         let stop = Arc::new(AtomicBool::new(false));
         let wake = telemetry.wake.clone();
         let (closing, closed) = channel();
-        let party = Self {
+        let member = Self {
             settings,
             prefix: prefix(endpoints.cluster(), &own.name),
             name: own.name.clone(),
@@ -173,7 +173,7 @@ impl<E: Send + 'static> Channel<E> {
             .name("channel".into())
             .spawn(move || {
                 run_in_background();
-                party.run();
+                member.run();
                 drop(closing);
             })
             .map_err(|source| BusError::System {

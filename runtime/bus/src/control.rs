@@ -1,4 +1,4 @@
-//! What comes from outside while a party runs: commands on standard input, and signals.
+//! What comes from outside while a member runs: commands on standard input, and signals.
 
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd};
@@ -19,7 +19,7 @@ pub enum Commands {
     None,
     /// Commands are read; the end of standard input means nothing.
     Read,
-    /// Commands are read, and `cut {...}` with a [`Cuts`] as JSON; the party ends with standard input: whoever started it is gone then.
+    /// Commands are read, and `cut {...}` with a [`Cuts`] as JSON; the member ends with standard input: whoever started it is gone then.
     ReadAndEndWithInput,
 }
 

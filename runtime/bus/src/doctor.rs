@@ -1,4 +1,4 @@
-//! What a machine lacks that a party is to run on, each with its remedy, and with the command that repairs it where one does.
+//! What a machine lacks that a member is to run on, each with its remedy, and with the command that repairs it where one does.
 //!
 //! Nothing is changed, and no frame is sent: peers are found by listening for as long as they surely speak.
 
@@ -12,7 +12,7 @@ use std::time::Duration;
 use nix::poll::{PollFd, PollFlags, ppoll};
 use nix::sys::time::TimeSpec;
 use serde::Serialize;
-use understudy_wire::{ConfigurationHash, Party};
+use understudy_wire::{ConfigurationHash, Member};
 
 use crate::clock::Clock;
 use crate::endpoints::Endpoints;
@@ -31,7 +31,7 @@ pub enum Health {
     Good,
     /// It works, and could be better.
     Warning,
-    /// The party would not start, or not do its part.
+    /// The member would not start, or not do its part.
     Bad,
 }
 
@@ -84,7 +84,7 @@ impl Finding {
     }
 }
 
-/// Whether a party can listen where it should: for its frames over `link`, and by TCP for its operators.
+/// Whether a member can listen where it should: for its frames over `link`, and by TCP for its operators.
 pub fn examine_ports(endpoints: &Endpoints, link: LinkKind) -> Vec<Finding> {
     let operators = endpoints.own().address;
     let frames = match link.frames_address(operators) {
@@ -115,7 +115,7 @@ pub fn examine_ports(endpoints: &Endpoints, link: LinkKind) -> Vec<Finding> {
                 Health::Warning,
                 format!("{address} is in use ({protocol})"),
                 format!(
-                    "none where this party runs already; otherwise `ss -lpn 'sport = :{}'` names who has it",
+                    "none where this member runs already; otherwise `ss -lpn 'sport = :{}'` names who has it",
                     address.port()
                 ),
             ),
@@ -123,7 +123,7 @@ pub fn examine_ports(endpoints: &Endpoints, link: LinkKind) -> Vec<Finding> {
                 "ports",
                 Health::Bad,
                 error.to_string(),
-                "`ip address` lists the addresses of this machine; the cluster file has to name one of them for this party",
+                "`ip address` lists the addresses of this machine; the cluster file has to name one of them for this member",
             ),
         },
     };
@@ -140,10 +140,10 @@ fn ports_of(link: LinkKind, address: SocketAddr) -> String {
     }
 }
 
-/// Listens in the place of a party that does not run, for so long, and says of each peer whether it was heard.
+/// Listens in the place of a member that does not run, for so long, and says of each peer whether it was heard.
 ///
 /// # Errors
-/// As [`LinkKind::open`] has; [`BusError::PortInUse`] where the party runs.
+/// As [`LinkKind::open`] has; [`BusError::PortInUse`] where the member runs.
 pub fn examine_peers(
     endpoints: &Endpoints,
     link: LinkKind,
@@ -154,8 +154,8 @@ pub fn examine_peers(
     let mut opened = link.open(endpoints)?;
     let clock = Clock::start();
     let end = clock.now() + patience;
-    let mut heard: BTreeMap<Party, ConfigurationHash> = BTreeMap::new();
-    let mut refused: BTreeMap<Option<Party>, String> = BTreeMap::new();
+    let mut heard: BTreeMap<Member, ConfigurationHash> = BTreeMap::new();
+    let mut refused: BTreeMap<Option<Member>, String> = BTreeMap::new();
     let expected = endpoints.heard().count();
     let mut bytes = Vec::new();
     while clock.now() < end && heard.len() < expected {
@@ -183,7 +183,7 @@ pub fn examine_peers(
         .heard()
         .map(|(peer, _)| {
             let name = format!("{} ({})", peer.name, peer.address);
-            match (heard.get(&peer.party), refused.get(&Some(peer.party))) {
+            match (heard.get(&peer.member), refused.get(&Some(peer.member))) {
                 (Some(theirs), _) if *theirs == configuration => {
                     Finding::good("peer", format!("{name} is heard"))
                 }
@@ -212,7 +212,7 @@ pub fn examine_peers(
                 "peer",
                 Health::Warning,
                 format!("something else arrives at {}: {reason}", endpoints.own().address),
-                "find who sends it; a party without keys, or another program",
+                "find who sends it; a member without keys, or another program",
             )
         }))
         .collect())

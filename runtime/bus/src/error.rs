@@ -1,25 +1,25 @@
-//! Why a party cannot run.
+//! Why a member cannot run.
 
 use std::io;
 use std::net::SocketAddr;
 
-use understudy_wire::Party;
+use understudy_wire::Member;
 
 use crate::link::ZENOH_PORT_OFFSET;
 
-/// What stops a party before or while it runs. The codes are stable.
+/// What stops a member before or while it runs. The codes are stable.
 #[derive(Debug, thiserror::Error)]
 pub enum BusError {
     /// Another process listens there.
     #[error("U0501: port {} of {} is in use by another process", address.port(), address.ip())]
     PortInUse {
-        /// Where this party was to listen.
+        /// Where this member was to listen.
         address: SocketAddr,
     },
     /// The address is none of this machine, or may not be used.
     #[error("U0502: cannot listen on {address}: {source}")]
     Listen {
-        /// Where this party was to listen.
+        /// Where this member was to listen.
         address: SocketAddr,
         /// What the system said.
         source: io::Error,
@@ -27,7 +27,7 @@ pub enum BusError {
     /// Zenoh did not start.
     #[error("U0503: Zenoh does not start on {address}: {reason}")]
     Zenoh {
-        /// Where this party was to listen.
+        /// Where this member was to listen.
         address: SocketAddr,
         /// What Zenoh said.
         reason: String,
@@ -38,13 +38,13 @@ pub enum BusError {
         /// Of the member.
         address: SocketAddr,
     },
-    /// A party is not in the list, so that it has no address.
-    #[error("U0504: {party:?} has no address in the cluster")]
+    /// A member is not in the list, so that it has no address.
+    #[error("U0504: {member:?} has no address in the cluster")]
     NoAddress {
         /// Who.
-        party: Party,
+        member: Member,
     },
-    /// Two parties with one address.
+    /// Two members with one address.
     #[error("U0505: {first} and {second} have the same address {address}")]
     SharedAddress {
         /// One name.
@@ -91,10 +91,10 @@ pub enum BusError {
         request: &'static str,
     },
     /// A process of a benchmark did not do its part.
-    #[error("U0508: {party:?} of the benchmark {reason}")]
+    #[error("U0508: {member:?} of the benchmark {reason}")]
     Benchmark {
-        /// Which of its parties.
-        party: Party,
+        /// Which of its members.
+        member: Member,
         /// What it did instead.
         reason: String,
     },

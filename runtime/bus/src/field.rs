@@ -2,9 +2,11 @@
 
 use std::sync::Arc;
 
-use understudy_wire::{Actuation, Agreement, Body, Frame, Header, Image, Moment, Party, ProgramId};
+use understudy_wire::{
+    Actuation, Agreement, Body, Frame, Header, Image, Member, Moment, ProgramId,
+};
 
-/// Drives and senses the field of one party; never blocks.
+/// Drives and senses the field of one member; never blocks.
 pub trait FieldDriver: Send {
     /// Drives y(i) in the cycle `moment`; answers with a frame where the field is reached over the link.
     fn drive(&mut self, moment: Moment, outputs: &Image) -> Option<Frame>;
@@ -67,7 +69,7 @@ impl FieldDriver for SimulatedField {
                 cluster: self.agreement.cluster,
                 configuration: self.agreement.configuration,
                 moment,
-                sender: Party::RemoteIo(self.program),
+                sender: Member::RemoteIo(self.program),
                 alone: false,
             },
             body: Body::Actuation(Actuation {
@@ -80,7 +82,7 @@ impl FieldDriver for SimulatedField {
         let header = &frame.header;
         let ours = header.cluster == self.agreement.cluster
             && header.configuration == self.agreement.configuration
-            && header.sender == Party::Plant(self.program);
+            && header.sender == Member::Plant(self.program);
         match &frame.body {
             Body::Field(field) if ours => Some(&field.sensors),
             _ => None,

@@ -4,12 +4,12 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 
 use understudy_seal::{Opener, Refusal, Seal};
-use understudy_wire::{Frame, FrameError, Party, decode};
+use understudy_wire::{Frame, FrameError, Member, decode};
 
 use crate::journal::RefusedAs;
 use crate::rights::run_in_background;
 
-/// Closes what a party says and opens what it hears.
+/// Closes what a member says and opens what it hears.
 #[derive(Debug, Default)]
 pub enum Guard {
     /// Everybody on the network is believed.
@@ -19,10 +19,10 @@ pub enum Guard {
     Keys(Box<Keys>),
 }
 
-/// Begins a life that the party never had; it may take its time.
+/// Begins a life that the member never had; it may take its time.
 pub type NewLife = Arc<dyn Fn() -> Result<Seal, String> + Send + Sync>;
 
-/// Both sides of one party.
+/// Both sides of one member.
 pub struct Keys {
     seal: Seal,
     opener: Opener,
@@ -41,17 +41,17 @@ impl std::fmt::Debug for Keys {
     }
 }
 
-/// Why a datagram is not passed on to the party.
+/// Why a datagram is not passed on to the member.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Refused {
     pub(crate) kind: RefusedAs,
     /// In whose name it came, where it bears one.
-    pub(crate) sender: Option<Party>,
+    pub(crate) sender: Option<Member>,
     pub(crate) reason: String,
 }
 
 impl Guard {
-    /// With the keys of one party.
+    /// With the keys of one member.
     pub fn with_keys(seal: Seal, opener: Opener) -> Self {
         Self::Keys(Box::new(Keys {
             seal,
@@ -62,7 +62,7 @@ impl Guard {
         }))
     }
 
-    /// The same, and the party may begin a further life while it runs.
+    /// The same, and the member may begin a further life while it runs.
     #[must_use]
     pub fn with_lives(mut self, new_life: NewLife) -> Self {
         if let Self::Keys(keys) = &mut self {
@@ -84,7 +84,7 @@ impl Guard {
             .name("new-life".into())
             .spawn(move || {
                 run_in_background();
-                // The party may have ended meanwhile.
+                // The member may have ended meanwhile.
                 let _ = sender.send(new_life());
             });
         if begun.is_ok() {

@@ -1,7 +1,7 @@
-//! The loop that runs one party on real time: drain what it says, sleep until something arrives or its time has come.
+//! The loop that runs one member on real time: drain what it says, sleep until something arrives or its time has come.
 //!
-//! Invariants: the loop never waits for anything but [`ppoll`]; it never spins; and between two looks at the party's own
-//! times it takes [`INPUTS_IN_A_ROW`] datagrams at most, so that no flood keeps a party from its turn.
+//! Invariants: the loop never waits for anything but [`ppoll`]; it never spins; and between two looks at the member's own
+//! times it takes [`INPUTS_IN_A_ROW`] datagrams at most, so that no flood keeps a member from its turn.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -23,16 +23,16 @@ use crate::orders::{Order, Orders};
 use crate::trouble::{Duplicates, Refusals};
 use crate::unreceived::Unreceived;
 
-/// Datagrams taken before the party's own times are looked at again.
+/// Datagrams taken before the member's own times are looked at again.
 const INPUTS_IN_A_ROW: usize = 64;
-/// Times that a party is woken without sleep in between, when it asks for times that have passed.
+/// Times that a member is woken without sleep in between, when it asks for times that have passed.
 const WAKEUPS_IN_A_ROW: u32 = 16;
 /// How long it sleeps then.
 const BREATH: Duration = Duration::from_millis(1);
 /// Troubles of one kind are reported together, so often at most.
 const TROUBLE_PERIOD: Duration = Duration::from_secs(1);
 
-/// What a party did while it ran.
+/// What a member did while it ran.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Summary {
     /// Frames that it said.
@@ -49,9 +49,9 @@ pub struct Summary {
     pub link: LinkCounters,
 }
 
-/// One party with everything that it needs of the world.
+/// One member with everything that it needs of the world.
 pub struct Host<'a, M: Machine> {
-    /// The party.
+    /// The member.
     pub machine: &'a mut M,
     /// Carries its frames.
     pub link: &'a mut dyn Link,
@@ -105,7 +105,7 @@ struct Round {
 }
 
 impl<M: Machine> Host<'_, M> {
-    /// Runs the party on the calling thread until it is told to stop, or its observer is satisfied.
+    /// Runs the member on the calling thread until it is told to stop, or its observer is satisfied.
     ///
     /// # Errors
     /// [`BusError::System`] where the system refuses to let it sleep.
@@ -169,7 +169,7 @@ impl<M: Machine> Host<'_, M> {
         false
     }
 
-    /// Tells the party what its field shows, where that comes by another way than the link.
+    /// Tells the member what its field shows, where that comes by another way than the link.
     fn look(&mut self, round: &mut Round) {
         if let Some(contested) = self.field.contested() {
             let event = if contested {
@@ -218,7 +218,7 @@ impl<M: Machine> Host<'_, M> {
                     {
                         self.guard.ask_for_life();
                     }
-                    // Which epoch counts is for the party to say, by its own frames; another's Sync only moves it on in that one.
+                    // Which epoch counts is for the member to say, by its own frames; another's Sync only moves it on in that one.
                     let (known, said) = (round.moment, frame.header.moment);
                     let moves_on = said.epoch == known.epoch && said > known;
                     if matches!(frame.body, Body::Sync) && (known == Moment::default() || moves_on)
@@ -257,7 +257,7 @@ impl<M: Machine> Host<'_, M> {
                         self.say(now, &frame, round);
                     }
                 }
-                Output::Report(event) => self.sink.record(now, Noted::Party(event)),
+                Output::Report(event) => self.sink.record(now, Noted::Member(event)),
             }
         }
     }

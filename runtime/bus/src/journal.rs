@@ -1,4 +1,4 @@
-//! What a party reports, one JSON object a line.
+//! What a member reports, one JSON object a line.
 //!
 //! The cycle never waits for the journal: records go through a bounded queue to a thread of their own; what does not fit is
 //! dropped, counted, and said in the journal as soon as it takes something again. When writing fails (a full disk, a reader that is gone)
@@ -13,7 +13,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
 use serde::{Deserialize, Serialize};
-use understudy_wire::{Party, Time};
+use understudy_wire::{Member, Time};
 
 use crate::clock::Clock;
 use crate::error::BusError;
@@ -21,7 +21,7 @@ use crate::host::Summary;
 use crate::link::LinkKind;
 use crate::rights::Rights;
 
-/// Records that wait to be written, at most: some seconds of a party at 10 ms.
+/// Records that wait to be written, at most: some seconds of a member at 10 ms.
 pub const JOURNAL_RECORDS: usize = 4096;
 
 /// One line of the journal.
@@ -30,24 +30,24 @@ pub struct Record<'name, E> {
     /// Nanoseconds of the host's CLOCK_MONOTONIC; comparable among the processes of one host.
     pub at_ns: u64,
     /// Who reports.
-    pub party: Party,
+    pub member: Member,
     /// Its name in the cluster file.
     pub name: Cow<'name, str>,
     /// What happened.
     pub event: Noted<E>,
 }
 
-/// Something that a party reports, or the process that it runs in; told apart by the value of `event`.
+/// Something that a member reports, or the process that it runs in; told apart by the value of `event`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Noted<E> {
     /// By the process.
     Host(HostEvent),
-    /// By the party.
-    Party(E),
+    /// By the member.
+    Member(E),
 }
 
-/// What the process of a party reports.
+/// What the process of a member reports.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "kebab-case")]
 pub enum HostEvent {
@@ -76,7 +76,7 @@ pub enum HostEvent {
         /// Why.
         refused_as: RefusedAs,
         /// In whose name they came, where they bear one.
-        sender: Option<Party>,
+        sender: Option<Member>,
         /// The same in words.
         reason: String,
     },
@@ -95,12 +95,12 @@ pub enum HostEvent {
     /// Frames of two lives of a member arrive in turn: two processes run with its keys, for example one of an old disk image.
     DuplicateFound {
         /// Whose keys they have.
-        member: Party,
+        member: Member,
     },
     /// The earlier life of the member has sent nothing for some seconds.
     DuplicateGone {
         /// Whose keys they had.
-        member: Party,
+        member: Member,
     },
     /// The others do not receive this member, so it goes on in a new life.
     NewLife {
@@ -120,7 +120,7 @@ pub enum HostEvent {
         /// Where the last one came from.
         address: IpAddr,
     },
-    /// The party said frames that break a bound of the wire, since the last such record: a mistake in this program.
+    /// The member said frames that break a bound of the wire, since the last such record: a mistake in this program.
     UnsendableFrames {
         /// How many.
         frames: u64,
@@ -162,7 +162,7 @@ pub enum HostEvent {
     },
     /// From the first frame of a cycle to the last turn heard, over all cycles that were complete.
     Exchange(crate::exchange::Exchange),
-    /// The party ends as it was told to.
+    /// The member ends as it was told to.
     Stopped(Summary),
 }
 
@@ -241,7 +241,7 @@ impl Journal {
     pub fn start<E>(
         bound: usize,
         clock: Clock,
-        party: Party,
+        member: Member,
         name: String,
         output: impl Write + Send + 'static,
     ) -> Result<(JournalSender<E>, Self), BusError>
@@ -257,7 +257,7 @@ impl Journal {
                 let mut output = BufWriter::new(output);
                 let unwritten = write_all(&receiver, &mut output, |(now, event)| Record {
                     at_ns: clock.host_ns(now),
-                    party,
+                    member,
                     name: Cow::Borrowed(&name),
                     event,
                 });
@@ -356,12 +356,12 @@ mod tests {
             let_go: held,
             written: Arc::clone(&written),
         };
-        let party = Party::Station(StationId(0));
+        let member = Member::Station(StationId(0));
         let (mut sender, journal) =
-            Journal::start::<u32>(8, Clock::start(), party, "robot".into(), output)
+            Journal::start::<u32>(8, Clock::start(), member, "robot".into(), output)
                 .expect("a thread");
         for number in 0..RECORDS {
-            sender.record(Time(u64::from(number)), Noted::Party(number));
+            sender.record(Time(u64::from(number)), Noted::Member(number));
         }
         drop(let_go);
         // The thread takes records again from here on; whoever reports next says what was lost before.
@@ -375,7 +375,7 @@ mod tests {
                 clock.now() < Time(0) + Duration::from_secs(20),
                 "nothing is said"
             );
-            sender.record(Time(0), Noted::Party(number));
+            sender.record(Time(0), Noted::Member(number));
             number += 1;
             std::thread::yield_now();
         }
@@ -384,7 +384,7 @@ mod tests {
         let events = events(&written.lock().expect("no panic"));
         let kept = events
             .iter()
-            .filter(|event| matches!(event, Noted::Party(_)))
+            .filter(|event| matches!(event, Noted::Member(_)))
             .count() as u64;
         let lost: u64 = events
             .iter()
@@ -408,11 +408,11 @@ mod tests {
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         #[serde(tag = "event", rename_all = "kebab-case")]
         enum Event {
-            Paces { cycle: u64 },
+            BecameCycleMaster { cycle: u64 },
         }
         let record = |event| Record {
             at_ns: 12,
-            party: Party::RemoteIo(ProgramId(1)),
+            member: Member::RemoteIo(ProgramId(1)),
             name: "press-io".into(),
             event,
         };
@@ -427,7 +427,7 @@ mod tests {
                     lacking: Vec::new(),
                 },
             })),
-            record(Noted::Party(Event::Paces { cycle: 3 })),
+            record(Noted::Member(Event::BecameCycleMaster { cycle: 3 })),
             record(Noted::Host(HostEvent::JournalLost { records: 5 })),
             record(Noted::Host(HostEvent::Stopped(Summary::default()))),
         ];
@@ -454,12 +454,12 @@ mod tests {
                 Err(io::ErrorKind::StorageFull.into())
             }
         }
-        let party = Party::Station(StationId(0));
+        let member = Member::Station(StationId(0));
         let (mut sender, journal) =
-            Journal::start::<u32>(8, Clock::start(), party, "robot".into(), Full)
+            Journal::start::<u32>(8, Clock::start(), member, "robot".into(), Full)
                 .expect("a thread");
         for number in 0..1000 {
-            sender.record(Time(0), Noted::Party(number));
+            sender.record(Time(0), Noted::Member(number));
         }
         drop(sender);
         assert!(journal.finish() > 0);

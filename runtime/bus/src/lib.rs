@@ -1,7 +1,7 @@
-//! Parties on real clocks, threads and networks.
+//! Members on real clocks, threads and networks.
 //!
-//! A party (a station, a remote I/O, a plant) is a pure [`understudy_wire::Machine`]. This crate gives it a thread, a clock,
-//! a link to its peers ([`LinkKind`]: Zenoh or plain UDP) and a journal, and runs it ([`Host`], or [`run_party`] for a process
+//! A member (a station, a remote I/O, a plant) is a pure [`understudy_wire::Machine`]. This crate gives it a thread, a clock,
+//! a link to its peers ([`LinkKind`]: Zenoh or plain UDP) and a journal, and runs it ([`Host`], or [`run_member`] for a process
 //! of its own). Nothing here decides anything about the cycle.
 
 mod announcer;
@@ -20,10 +20,10 @@ mod host;
 mod interruption;
 mod journal;
 mod link;
+mod member;
 mod observer;
 mod operator;
 mod orders;
-mod party;
 mod ports;
 mod rights;
 mod segments;
@@ -52,10 +52,10 @@ pub use journal::{
     EventSink, HostEvent, JOURNAL_RECORDS, Journal, JournalSender, Noted, Record, RefusedAs,
 };
 pub use link::{Link, LinkCounters, LinkKind, NoSuchLink, Reopening, ZENOH_PORT_OFFSET};
+pub use member::{MemberSettings, run_member};
 pub use observer::{NoObserver, Observer};
 pub use operator::{Call, Request};
 pub use orders::{Control, Cuts, Order, Orders, orders};
-pub use party::{PartySettings, run_party};
 pub use ports::free_addresses;
 pub use rights::Rights;
 pub use segments::{Segments, closed_segments, segments_of};

@@ -17,9 +17,9 @@ use crate::zenoh_link::ZenohLink;
 /// From the port of a member's address to the TCP port of its frames over Zenoh.
 pub const ZENOH_PORT_OFFSET: u16 = 8192;
 
-/// Carries frames between this party and its peers. Any frame may be lost, doubled, late or changed; nothing blocks.
+/// Carries frames between this member and its peers. Any frame may be lost, doubled, late or changed; nothing blocks.
 pub trait Link: Send {
-    /// Where this party listens.
+    /// Where this member listens.
     fn address(&self) -> SocketAddr;
 
     /// Sends `bytes`, which are `frame` encoded, to all whom it concerns.
@@ -54,7 +54,7 @@ pub struct Reopening {
 pub struct LinkCounters {
     /// Frames that the system or the library did not take, one for each receiver where they are counted apart.
     pub unsent: u64,
-    /// Datagrams that found this party's own queue full.
+    /// Datagrams that found this member's own queue full.
     pub overrun: u64,
     /// Times that the link was opened anew because no peer was received.
     pub reopened: u64,
@@ -89,7 +89,7 @@ impl LinkKind {
         Ok(SocketAddr::new(address.ip(), port))
     }
 
-    /// Opens the link of one party.
+    /// Opens the link of one member.
     ///
     /// # Errors
     /// [`BusError::PortInUse`], [`BusError::Listen`], [`BusError::NoZenohPort`] or [`BusError::Zenoh`].

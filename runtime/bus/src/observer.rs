@@ -1,26 +1,26 @@
-//! Who looks on while a party runs.
+//! Who looks on while a member runs.
 
 use understudy_wire::{Frame, Time};
 
 use crate::journal::HostEvent;
 
-/// Sees every frame that a party says or hears, copies included; changes nothing.
+/// Sees every frame that a member says or hears, copies included; changes nothing.
 pub trait Observer: Send {
-    /// One frame: before it is sent, or before the party is told.
+    /// One frame: before it is sent, or before the member is told.
     fn frame(&mut self, now: Time, frame: &Frame);
 
-    /// The party was woken for one of its own times.
+    /// The member was woken for one of its own times.
     fn woken(&mut self, _now: Time) {}
 
-    /// The party has nothing left to do, and sleeps until its own next time, `until`, or until something comes.
+    /// The member has nothing left to do, and sleeps until its own next time, `until`, or until something comes.
     fn rests(&mut self, _now: Time, _until: Time) {}
 
-    /// Whether it has seen all that it came for; the party stops then.
+    /// Whether it has seen all that it came for; the member stops then.
     fn satisfied(&self) -> bool {
         false
     }
 
-    /// What it has to report when the party stops.
+    /// What it has to report when the member stops.
     fn finish(&mut self) -> Option<HostEvent>;
 }
 

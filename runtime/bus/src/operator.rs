@@ -10,13 +10,13 @@ use zenoh::Wait;
 use crate::channel::{TlsKeys, hash_key, insert, prefix, tls_config};
 use crate::error::{BusError, reason};
 
-/// Longer than it takes a party on a network that works.
+/// Longer than it takes a member on a network that works.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Lines of a journal that wait to be taken.
 const WAITING_LINES: usize = 4096;
 
-/// What can be asked of a party.
+/// What can be asked of a member.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Request {
     /// The hash of its configuration, also where the caller has another one.
@@ -63,7 +63,7 @@ impl Request {
     }
 }
 
-/// A call to one party.
+/// A call to one member.
 pub struct Call {
     session: zenoh::Session,
     prefix: String,
@@ -72,7 +72,7 @@ pub struct Call {
 }
 
 impl Call {
-    /// Calls the party `name` of a cluster, which listens at `address`.
+    /// Calls the member `name` of a cluster, which listens at `address`.
     ///
     /// # Errors
     /// [`BusError::Uncalled`] where nobody is there, or one side does not believe the other's certificate.
@@ -140,7 +140,7 @@ impl Call {
         Err(unanswered())
     }
 
-    /// Gives each line of the party's journal to `take` until that says false, or `patience` passes without a line.
+    /// Gives each line of the member's journal to `take` until that says false, or `patience` passes without a line.
     ///
     /// # Errors
     /// [`BusError::Unanswered`] where the journal cannot be followed.

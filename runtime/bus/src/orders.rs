@@ -1,11 +1,11 @@
-//! What is wanted of a running party.
+//! What is wanted of a running member.
 
 use std::os::fd::BorrowedFd;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use serde::{Deserialize, Serialize};
-use understudy_wire::{Force, Party, ProgramSet, SignalPlace, StateChoice, StationSet};
+use understudy_wire::{Force, Member, ProgramSet, SignalPlace, StateChoice, StationSet};
 
 use crate::doorbell::{Inbox, Outbox, doorbell};
 use crate::error::BusError;
@@ -39,21 +39,21 @@ pub struct Cuts {
 
 impl Cuts {
     /// Cuts the link from a member, or heals it. A plant stays with its remote I/O.
-    pub fn set(&mut self, party: Party, cut: bool) {
-        match (party, cut) {
-            (Party::Station(station), true) => self.stations.insert(station),
-            (Party::Station(station), false) => self.stations.remove(station),
-            (Party::RemoteIo(program), true) => self.remote_ios.insert(program),
-            (Party::RemoteIo(program), false) => self.remote_ios.remove(program),
-            (Party::Plant(_), _) => {}
+    pub fn set(&mut self, member: Member, cut: bool) {
+        match (member, cut) {
+            (Member::Station(station), true) => self.stations.insert(station),
+            (Member::Station(station), false) => self.stations.remove(station),
+            (Member::RemoteIo(program), true) => self.remote_ios.insert(program),
+            (Member::RemoteIo(program), false) => self.remote_ios.remove(program),
+            (Member::Plant(_), _) => {}
         }
     }
 
-    pub(crate) fn contains(self, party: Party) -> bool {
-        match party {
-            Party::Station(station) => self.stations.contains(station),
-            Party::RemoteIo(program) => self.remote_ios.contains(program),
-            Party::Plant(_) => false,
+    pub(crate) fn contains(self, member: Member) -> bool {
+        match member {
+            Member::Station(station) => self.stations.contains(station),
+            Member::RemoteIo(program) => self.remote_ios.contains(program),
+            Member::Plant(_) => false,
         }
     }
 }
@@ -66,7 +66,7 @@ struct Standing {
     cut_remote_ios: AtomicU64,
 }
 
-/// The party's end.
+/// The member's end.
 #[derive(Debug)]
 pub struct Orders {
     inbox: Inbox<Order>,
@@ -124,12 +124,12 @@ impl Orders {
     }
 
     /// Whether the link from a member is cut.
-    pub(crate) fn is_cut(&self, party: Party) -> bool {
+    pub(crate) fn is_cut(&self, member: Member) -> bool {
         let cuts = Cuts {
             stations: StationSet::from_bits(self.standing.cut_stations.load(Ordering::Relaxed)),
             remote_ios: ProgramSet::from_bits(self.standing.cut_remote_ios.load(Ordering::Relaxed)),
         };
-        cuts.contains(party)
+        cuts.contains(member)
     }
 
     pub(crate) fn readiness(&self) -> BorrowedFd<'_> {
@@ -143,8 +143,8 @@ mod tests {
 
     use super::*;
 
-    const ROBOT: Party = Party::Station(StationId(0));
-    const PRESS_IO: Party = Party::RemoteIo(ProgramId(1));
+    const ROBOT: Member = Member::Station(StationId(0));
+    const PRESS_IO: Member = Member::RemoteIo(ProgramId(1));
 
     #[test]
     fn a_cut_is_not_lost_where_orders_are() {
@@ -157,8 +157,8 @@ mod tests {
         cuts.set(PRESS_IO, true);
         control.give(Order::Cut(cuts));
         assert!(orders.is_cut(ROBOT) && orders.is_cut(PRESS_IO));
-        assert!(!orders.is_cut(Party::Station(StationId(1))));
-        assert!(!orders.is_cut(Party::RemoteIo(ProgramId(0))));
+        assert!(!orders.is_cut(Member::Station(StationId(1))));
+        assert!(!orders.is_cut(Member::RemoteIo(ProgramId(0))));
         cuts.set(ROBOT, false);
         control.give(Order::Cut(cuts));
         assert!(!orders.is_cut(ROBOT) && orders.is_cut(PRESS_IO));
@@ -166,7 +166,7 @@ mod tests {
 
     #[test]
     fn a_plant_stays_with_its_remote_io() {
-        let plant = Party::Plant(ProgramId(1));
+        let plant = Member::Plant(ProgramId(1));
         let mut cuts = Cuts::default();
         cuts.set(plant, true);
         assert_eq!(cuts, Cuts::default());

@@ -1,4 +1,4 @@
-//! Free ports of the loopback interface, for parties whose cluster file names no address.
+//! Free ports of the loopback interface, for members whose cluster file names no address.
 
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU16, Ordering};
 
 use crate::link::ZENOH_PORT_OFFSET;
 
-/// Ports that no system gives to outgoing connections of its own accord, so that a party that is restarted finds its port
+/// Ports that no system gives to outgoing connections of its own accord, so that a member that is restarted finds its port
 /// again: Linux begins at 32768, others at 49152. So do the ports of their frames over Zenoh.
 const PORTS: Range<u16> = 16_384..32_768 - ZENOH_PORT_OFFSET;
 /// A process that begins here leaves the next process, whose number is one higher, as many ports.
@@ -18,7 +18,7 @@ static NEXT: AtomicU16 = AtomicU16::new(0);
 
 /// So many addresses on 127.0.0.1 that nobody uses, neither by UDP nor by TCP, nor for frames over Zenoh.
 ///
-/// They are only found free: another process may take one before it is used, and the party then says so.
+/// They are only found free: another process may take one before it is used, and the member then says so.
 ///
 /// # Errors
 /// Where fewer are free, or no socket can be had.

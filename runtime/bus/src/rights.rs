@@ -18,7 +18,7 @@ pub(crate) const CYCLE_PRIORITY: u8 = 40;
 /// Of SCHED_FIFO, for the threads on which a link hears, which run only when there is something to carry.
 const LINK_PRIORITY: u8 = 30;
 
-/// Of SCHED_FIFO, for a process that starts: before programs that are not in real time, and behind every party that runs.
+/// Of SCHED_FIFO, for a process that starts: before programs that are not in real time, and behind every member that runs.
 const START_PRIORITY: u8 = 10;
 
 /// Whether this process has claimed its rights, so that the threads of its link may raise themselves.

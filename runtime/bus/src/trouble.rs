@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use understudy_wire::{Party, Time};
+use understudy_wire::{Member, Time};
 
 use crate::guard::Refused;
 use crate::journal::{HostEvent, RefusedAs};
@@ -20,7 +20,7 @@ const DUPLICATE_GONE_AFTER: Duration = Duration::from_secs(5);
 /// Members that two processes run as, and when each was last seen to. Bounded by the number of members: only they have keys.
 #[derive(Debug, Default)]
 pub(crate) struct Duplicates {
-    seen: BTreeMap<Party, Time>,
+    seen: BTreeMap<Member, Time>,
 }
 
 impl Duplicates {
@@ -35,8 +35,8 @@ impl Duplicates {
 
     /// The events of those that are over.
     pub(crate) fn over(&mut self, now: Time) -> impl Iterator<Item = HostEvent> + use<> {
-        let gone = |_: &Party, seen: &mut Time| now.since(*seen) >= DUPLICATE_GONE_AFTER;
-        let gone: Vec<(Party, Time)> = self.seen.extract_if(.., gone).collect();
+        let gone = |_: &Member, seen: &mut Time| now.since(*seen) >= DUPLICATE_GONE_AFTER;
+        let gone: Vec<(Member, Time)> = self.seen.extract_if(.., gone).collect();
         gone.into_iter()
             .map(|(member, _)| HostEvent::DuplicateGone { member })
     }
@@ -51,7 +51,7 @@ pub(crate) struct Refusals {
 #[derive(Debug)]
 struct Entry {
     kind: RefusedAs,
-    sender: Option<Party>,
+    sender: Option<Member>,
     datagrams: u64,
     reason: String,
 }
@@ -80,7 +80,7 @@ impl Refusals {
         }
     }
 
-    fn place(&self, kind: RefusedAs, sender: Option<Party>) -> Option<usize> {
+    fn place(&self, kind: RefusedAs, sender: Option<Member>) -> Option<usize> {
         let same = |entry: &Entry| entry.kind == kind && entry.sender == sender;
         self.entries.iter().position(same)
     }
@@ -121,7 +121,7 @@ mod tests {
                 for kind in kinds {
                     refusals.note(Refused {
                         kind,
-                        sender: Some(Party::Station(StationId(rank))),
+                        sender: Some(Member::Station(StationId(rank))),
                         reason: round.to_string(),
                     });
                 }

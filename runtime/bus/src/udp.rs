@@ -8,19 +8,19 @@ use std::os::fd::{AsFd, BorrowedFd};
 
 use nix::sys::socket::{setsockopt, sockopt};
 use understudy_seal::OVERHEAD_BYTES;
-use understudy_wire::{Body, Frame, MAXIMUM_FRAME_BYTES, Party, Topic};
+use understudy_wire::{Body, Frame, MAXIMUM_FRAME_BYTES, Member, Topic};
 
 use crate::endpoints::Endpoints;
 use crate::error::BusError;
 use crate::link::{Link, LinkCounters};
 
-/// Asked of the system for datagrams that wait while this party is not scheduled; the system may give less.
+/// Asked of the system for datagrams that wait while this member is not scheduled; the system may give less.
 pub(crate) const RECEIVE_BUFFER_BYTES: usize = 1024 * 1024;
 
 pub(crate) struct UdpLink {
     socket: UdpSocket,
     address: SocketAddr,
-    audiences: [Vec<(Party, SocketAddr)>; Topic::ALL.len()],
+    audiences: [Vec<(Member, SocketAddr)>; Topic::ALL.len()],
     datagram: Box<[u8]>,
     unsent: u64,
 }
@@ -35,7 +35,7 @@ impl UdpLink {
             .map_err(BusError::system("a receive buffer for the socket"))?;
         let audience = |topic| {
             let peers = endpoints.audience(topic);
-            peers.map(|peer| (peer.party, peer.address)).collect()
+            peers.map(|peer| (peer.member, peer.address)).collect()
         };
         Ok(Self {
             address: socket.local_addr().map_err(failed)?,
@@ -55,11 +55,11 @@ impl Link for UdpLink {
 
     fn send(&mut self, frame: &Frame, bytes: &[u8]) {
         let only = match &frame.body {
-            Body::Transfer(transfer) => Some(Party::Station(transfer.to)),
+            Body::Transfer(transfer) => Some(Member::Station(transfer.to)),
             _ => None,
         };
-        for (party, address) in &self.audiences[Topic::of(&frame.body) as usize] {
-            if only.is_none_or(|only| only == *party)
+        for (member, address) in &self.audiences[Topic::of(&frame.body) as usize] {
+            if only.is_none_or(|only| only == *member)
                 && self.socket.send_to(bytes, address).is_err()
             {
                 self.unsent += 1;

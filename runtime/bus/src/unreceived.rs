@@ -13,7 +13,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use understudy_wire::{Body, Frame, Party, Time};
+use understudy_wire::{Body, Frame, Member, Time};
 
 /// The evidence has to last so long for the first new life, and twice as long for each further one.
 const FIRST_PATIENCE: Duration = Duration::from_secs(3);
@@ -24,14 +24,14 @@ const LONGEST_PATIENCE: Duration = Duration::from_secs(300);
 /// What one member gathers.
 #[derive(Debug)]
 pub(crate) struct Unreceived {
-    own: Party,
+    own: Member,
     patience: Duration,
     /// Since when each other member says in every frame that it does not receive this one.
-    since: BTreeMap<Party, Time>,
+    since: BTreeMap<Member, Time>,
 }
 
 impl Unreceived {
-    pub(crate) fn new(own: Party) -> Self {
+    pub(crate) fn new(own: Member) -> Self {
         Self {
             own,
             patience: FIRST_PATIENCE,
@@ -43,11 +43,11 @@ impl Unreceived {
     pub(crate) fn shown_by(&mut self, now: Time, frame: &Frame) -> bool {
         let sender = frame.header.sender;
         let unreceived = match (self.own, &frame.body) {
-            (Party::Station(own), Body::Sample(sample)) => sample.gone.contains(own),
-            (Party::RemoteIo(own), Body::Turn(turn)) => {
+            (Member::Station(own), Body::Sample(sample)) => sample.gone.contains(own),
+            (Member::RemoteIo(own), Body::Turn(turn)) => {
                 turn.recalled.iter().any(|recalled| recalled.program == own)
             }
-            (Party::RemoteIo(own), Body::Join(join)) => {
+            (Member::RemoteIo(own), Body::Join(join)) => {
                 join.recalled.iter().any(|recalled| recalled.program == own)
             }
             _ => return false,
@@ -83,7 +83,7 @@ mod tests {
                 cluster: ClusterHash::of(b"cell"),
                 configuration: ConfigurationHash(1),
                 moment: Moment::default(),
-                sender: Party::RemoteIo(ProgramId(of)),
+                sender: Member::RemoteIo(ProgramId(of)),
                 alone: false,
             },
             body: Body::Sample(Sample {
@@ -102,7 +102,7 @@ mod tests {
     /// The seconds in which a new life began, where station 2 gets `gone(second)` from two remote I/Os.
     fn check(seconds: u64, gone: impl Fn(u64, u8) -> bool, expected: &[u64]) {
         let own = StationId(2);
-        let mut unreceived = Unreceived::new(Party::Station(own));
+        let mut unreceived = Unreceived::new(Member::Station(own));
         let mut began = Vec::new();
         for second in 0..seconds {
             for of in [0, 1] {

@@ -1,9 +1,9 @@
 //! Signs of life for systemd: `Type=notify` and `WatchdogSec=` of a unit.
 //!
-//! Invariant: a sign is given from the loop of the cycle itself, and only where the party keeps its own times: it was woken for one, or it
+//! Invariant: a sign is given from the loop of the cycle itself, and only where the member keeps its own times: it was woken for one, or it
 //! rests and the next comes before systemd's patience ends. (A plant that is driven in every cycle is never woken: its time comes only
 //! where an actuation does not.) A loop that hangs, that is kept from its times by a flood, or that waits for nothing is not
-//! alive, and systemd starts the party again. Whether other parties are there makes no difference: a remote I/O that holds its outputs
+//! alive, and systemd starts the member again. Whether other members are there makes no difference: a remote I/O that holds its outputs
 //! alone is well.
 
 use std::env;
@@ -17,7 +17,7 @@ use understudy_wire::{Frame, Time};
 use crate::journal::HostEvent;
 use crate::observer::Observer;
 
-/// Signs in the time after which systemd believes a party dead.
+/// Signs in the time after which systemd believes a member dead.
 const SIGNS: u32 = 4;
 
 /// Where signs go, and how often.
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn signs_are_given_while_the_party_is_woken_and_not_too_often() {
+    fn signs_are_given_while_the_member_is_woken_and_not_too_often() {
         let (path, socket) = systemd("signs");
         let timeout = Some(Duration::from_millis(400));
         let watchdog = Watchdog::at(&path, timeout).expect("somebody listens");
@@ -166,9 +166,9 @@ mod tests {
         assert_eq!(all.last().map(String::as_str), Some("STOPPING=1"));
     }
 
-    /// A plant whose next time is put off in every cycle, and a party that has none any more.
+    /// A plant whose next time is put off in every cycle, and a member that has none any more.
     #[test]
-    fn a_party_that_rests_lives_if_it_has_a_time_to_come() {
+    fn a_member_that_rests_lives_if_it_has_a_time_to_come() {
         let (path, socket) = systemd("rests");
         let timeout = Duration::from_millis(400);
         let mut watchdog = Watchdog::at(&path, Some(timeout)).expect("somebody listens");

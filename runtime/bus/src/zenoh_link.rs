@@ -19,7 +19,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use understudy_wire::{ClusterHash, Frame, Party, Time, Topic};
+use understudy_wire::{ClusterHash, Frame, Member, Time, Topic};
 use zenoh::Wait;
 use zenoh::key_expr::KeyExpr;
 use zenoh::pubsub::{Publisher, Subscriber};
@@ -74,14 +74,14 @@ enum Never {}
 type Publishers = [Option<Publisher<'static>>; Topic::ALL.len()];
 
 /// Whether something was published since the last pulse, by topic.
-type Spoke = [AtomicBool; Topic::ALL.len()];
+type Published = [AtomicBool; Topic::ALL.len()];
 
 pub(crate) struct ZenohLink {
     address: SocketAddr,
     inbox: Inbox<Vec<u8>>,
     /// Replaced by the keeper with those of a new session.
     publishers: Arc<Mutex<Arc<Publishers>>>,
-    spoke: Arc<Spoke>,
+    published: Arc<Published>,
     unsent: u64,
     reopened: Arc<AtomicU64>,
     reopenings: Receiver<Reopening>,
@@ -108,7 +108,7 @@ impl ZenohLink {
         })?;
         let publishers = Arc::new(Mutex::new(Arc::clone(&session.publishers)));
         let reopened = Arc::new(AtomicU64::new(0));
-        let spoke = Arc::new(Spoke::default());
+        let published = Arc::new(Published::default());
         let (stop, stopped) = channel::<Never>();
         let (closing, closed) = channel();
         let (report, reopenings) = channel();
@@ -117,7 +117,7 @@ impl ZenohLink {
             endpoints: endpoints.clone(),
             session: Some(session),
             publishers: Arc::clone(&publishers),
-            spoke: Arc::clone(&spoke),
+            published: Arc::clone(&published),
             ears,
             silence: Silence::new(clock.now()),
             failed: false,
@@ -143,7 +143,7 @@ impl ZenohLink {
             address,
             inbox,
             publishers,
-            spoke,
+            published,
             unsent: 0,
             reopened,
             reopenings,
@@ -169,7 +169,7 @@ impl Link for ZenohLink {
         let topic = Topic::of(&frame.body) as usize;
         if let Some(publisher) = &publishers[topic] {
             match publisher.put(bytes).wait() {
-                Ok(()) => self.spoke[topic].store(true, Ordering::Relaxed),
+                Ok(()) => self.published[topic].store(true, Ordering::Relaxed),
                 Err(_) => self.unsent += 1,
             }
         }
@@ -228,7 +228,7 @@ struct Session {
 impl Session {
     fn open(endpoints: &Endpoints, ears: &Ears) -> zenoh::Result<Self> {
         let session = zenoh::open(settings(endpoints)?).wait()?;
-        let (cluster, own) = (endpoints.cluster(), endpoints.own().party);
+        let (cluster, own) = (endpoints.cluster(), endpoints.own().member);
         let mut publishers = [const { None }; Topic::ALL.len()];
         for topic in Topic::ALL {
             if endpoints.audience(topic).next().is_some() {
@@ -243,7 +243,7 @@ impl Session {
         }
         let mut exact = Vec::new();
         for (peer, topic) in endpoints.heard() {
-            let key = key(cluster, topic, peer.party);
+            let key = key(cluster, topic, peer.member);
             exact.push(session.declare_keyexpr(key).wait()?);
         }
         let subscribers = subscriptions(endpoints).into_iter().map(|key| {
@@ -293,7 +293,7 @@ struct Keeper {
     /// None where it could not be opened anew.
     session: Option<Session>,
     publishers: Arc<Mutex<Arc<Publishers>>>,
-    spoke: Arc<Spoke>,
+    published: Arc<Published>,
     ears: Ears,
     silence: Silence,
     /// Whether that it could not be opened is reported.
@@ -305,9 +305,9 @@ struct Keeper {
 impl Keeper {
     fn pulse(&mut self, now: Time) {
         if let Some(session) = &self.session {
-            for (publisher, spoke) in session.publishers.iter().zip(self.spoke.iter()) {
+            for (publisher, published) in session.publishers.iter().zip(self.published.iter()) {
                 if let Some(publisher) = publisher
-                    && !spoke.swap(false, Ordering::Relaxed)
+                    && !published.swap(false, Ordering::Relaxed)
                 {
                     // One that is not sent is missed like one that is lost.
                     let _ = publisher.put([]).wait();
@@ -385,11 +385,11 @@ impl Silence {
     }
 }
 
-fn key(cluster: ClusterHash, topic: Topic, speaker: Party) -> String {
+fn key(cluster: ClusterHash, topic: Topic, speaker: Member) -> String {
     let (kind, number) = match speaker {
-        Party::Station(station) => ("station", station.0),
-        Party::RemoteIo(program) => ("remote-io", program.0),
-        Party::Plant(program) => ("plant", program.0),
+        Member::Station(station) => ("station", station.0),
+        Member::RemoteIo(program) => ("remote-io", program.0),
+        Member::Plant(program) => ("plant", program.0),
     };
     format!("{}/{kind}-{number}", prefix(cluster, topic))
 }
@@ -409,12 +409,12 @@ fn subscriptions(endpoints: &Endpoints) -> BTreeSet<String> {
     let cluster = endpoints.cluster();
     let heard = endpoints.heard();
     heard
-        .map(|(peer, topic)| match (topic, peer.party) {
-            (Topic::Cycle, Party::Station(_)) => format!("{}/station-$*", prefix(cluster, topic)),
-            (Topic::Cycle, Party::RemoteIo(_)) => {
+        .map(|(peer, topic)| match (topic, peer.member) {
+            (Topic::Cycle, Member::Station(_)) => format!("{}/station-$*", prefix(cluster, topic)),
+            (Topic::Cycle, Member::RemoteIo(_)) => {
                 format!("{}/remote-io-$*", prefix(cluster, topic))
             }
-            (_, party) => key(cluster, topic, party),
+            (_, member) => key(cluster, topic, member),
         })
         .collect()
 }
@@ -428,7 +428,7 @@ fn settings(endpoints: &Endpoints) -> zenoh::Result<zenoh::Config> {
     let connect = connect.collect::<zenoh::Result<Vec<String>>>()?;
     let peers = endpoints.others().iter();
     let peers = peers
-        .filter(|peer| endpoints.talks_with(peer.party))
+        .filter(|peer| endpoints.talks_with(peer.member))
         .count();
     let mut config = zenoh::Config::default();
     for (setting, value) in [

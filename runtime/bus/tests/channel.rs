@@ -7,7 +7,7 @@
 )]
 
 #[allow(dead_code, reason = "each test uses its part")]
-mod parties;
+mod members;
 
 use std::fs;
 use std::net::{SocketAddr, TcpListener};
@@ -15,11 +15,11 @@ use std::path::{Path, PathBuf};
 use std::thread::spawn;
 use std::time::{Duration, Instant, SystemTime};
 
-use parties::{Chatter, endpoints, peers, station};
+use members::{Chatter, endpoints, peers, station};
 use serde_json::json;
 use understudy_bus::{
-    Admitted, BusError, Call, ChannelSettings, Commands, DONE, Guard, LinkKind, NoField,
-    NoObserver, PartySettings, Request, TlsKeys, run_party,
+    Admitted, BusError, Call, ChannelSettings, Commands, DONE, Guard, LinkKind, MemberSettings,
+    NoField, NoObserver, Request, TlsKeys, run_member,
 };
 use understudy_cluster::{Cluster, press_cell, read};
 use understudy_keys::{Authority, Date, Operators};
@@ -54,7 +54,7 @@ fn issued() -> PathBuf {
     authority
         .issue(&cluster, &["robot".to_owned()], operators, 1, now)
         .expect("names of the cluster");
-    folder.join("parties")
+    folder.join("members")
 }
 
 fn keys(folder: &Path, name: &str) -> TlsKeys {
@@ -67,13 +67,13 @@ fn keys(folder: &Path, name: &str) -> TlsKeys {
 }
 
 /// A router as it stands in the file, but for its addresses and its keys.
-fn router(folder: &Path, party: SocketAddr, own: SocketAddr) -> zenoh::Session {
+fn router(folder: &Path, member: SocketAddr, own: SocketAddr) -> zenoh::Session {
     let text = include_str!("../../../deployment/site-router.json5");
     let mut config = zenoh::Config::from_json5(text).expect("Zenoh reads it");
     let keys = keys(folder, "site-router");
     let tls = "transport/link/tls";
     for (setting, value) in [
-        ("connect/endpoints", json!([format!("tls/{party}")])),
+        ("connect/endpoints", json!([format!("tls/{member}")])),
         ("listen/endpoints", json!([format!("tls/{own}")])),
         (&format!("{tls}/root_ca_certificate"), json!(keys.authority)),
         (
@@ -116,14 +116,14 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
     let mut peers = peers(&[station(0)]);
     peers[0].name = "robot".into();
     let endpoint = endpoints(station(0), &peers);
-    let (party, hash) = (endpoint.own().address, endpoint.cluster());
+    let (member, hash) = (endpoint.own().address, endpoint.cluster());
     let own = keys(&folder, "robot");
     let running = spawn(move || {
         let admitted = || Admitted {
             operators: vec!["site-router.1".into(), "shift-leader.1".into()],
             members: vec!["robot.1".into()],
         };
-        let settings = PartySettings {
+        let settings = MemberSettings {
             endpoints: endpoint,
             link: LinkKind::Udp,
             guard: Guard::Off,
@@ -138,16 +138,16 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
             ends_with_parent: false,
             real_time: false,
         };
-        run_party(Chatter::new(station(0), 1), settings, std::io::sink())
+        run_member(Chatter::new(station(0), 1), settings, std::io::sink())
     });
     let call = |address, who: &str| Call::to(address, hash, "robot", &keys(&folder, who));
     let asked = |address, who: &str, request| call(address, who)?.ask(&request);
 
-    let text = until("the party itself", || {
-        asked(party, "shift-leader", Request::Configuration)
+    let text = until("the member itself", || {
+        asked(member, "shift-leader", Request::Configuration)
     });
     assert_eq!(text, "what everybody has to agree on");
-    let hash_there = asked(party, "shift-leader", Request::Cluster);
+    let hash_there = asked(member, "shift-leader", Request::Cluster);
     let expected = ConfigurationHash::of(text.as_bytes()).to_string();
     assert_eq!(hash_there.ok(), Some(expected));
     let force = Request::Force(Force {
@@ -157,20 +157,20 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
         owner: "anna".to_owned(),
         reason: "to see it".to_owned(),
     });
-    let refused = asked(party, "shift-leader", force);
+    let refused = asked(member, "shift-leader", force);
     assert!(
         refused.as_ref().is_ok_and(|answer| answer != DONE),
         "no time: {refused:?}"
     );
     let unforce = Request::Unforce(SignalPlace::Output(0));
-    let taken = asked(party, "shift-leader", unforce.clone());
+    let taken = asked(member, "shift-leader", unforce.clone());
     assert_eq!(taken.ok().as_deref(), Some(DONE));
-    let denied = asked(party, "passer-by", unforce);
+    let denied = asked(member, "passer-by", unforce);
     assert!(
         matches!(denied, Err(BusError::Unanswered { .. })),
         "{denied:?}"
     );
-    let denied = asked(party, "passer-by", Request::Status);
+    let denied = asked(member, "passer-by", Request::Status);
     assert!(
         matches!(denied, Err(BusError::Unanswered { .. })),
         "{denied:?}"
@@ -179,7 +179,7 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
     let listener = TcpListener::bind(("127.0.0.1", 0)).expect("a free port");
     let site = listener.local_addr().expect("bound");
     drop(listener);
-    let router = router(&folder, party, site);
+    let router = router(&folder, member, site);
     let status = until("the router", || {
         asked(site, "control-room", Request::Status)
     });
@@ -196,7 +196,7 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
     );
     let started = Instant::now();
     while !running.is_finished() {
-        // Where the answer is lost, the party ends all the same.
+        // Where the answer is lost, the member ends all the same.
         let _ = asked(site, "shift-leader", Request::Stop);
         assert!(started.elapsed() < DEADLINE, "the leader is not obeyed");
     }

@@ -1,4 +1,4 @@
-//! Parties in threads over each link: all hear all, whatever arrives beside the frames.
+//! Members in threads over each link: all hear all, whatever arrives beside the frames.
 
 #![allow(missing_docs, reason = "a test")]
 #![allow(
@@ -7,7 +7,7 @@
 )]
 #![allow(clippy::print_stderr, reason = "a measurement is shown")]
 
-mod parties;
+mod members;
 
 use std::collections::BTreeSet;
 use std::io::{Read, Write};
@@ -18,19 +18,19 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use parties::{Chat, Chatter, agreement, endpoints, guard, peers, plant, remote_io, station};
+use members::{Chat, Chatter, agreement, endpoints, guard, peers, plant, remote_io, station};
 use understudy_bus::{
     Clock, Control, EventSink, FieldDriver, Host, HostEvent, LinkKind, NoField, NoObserver, Noted,
     Order, Peer, SimulatedField, Summary, free_addresses, orders,
 };
-use understudy_wire::{Party, Time};
+use understudy_wire::{Member, Time};
 
 /// Past it a test has failed; nothing waits for it otherwise.
 const DEADLINE: Duration = Duration::from_secs(60);
 
 struct Sink {
-    own: Party,
-    reports: Sender<(Party, Noted<Chat>)>,
+    own: Member,
+    reports: Sender<(Member, Noted<Chat>)>,
 }
 
 impl EventSink<Chat> for Sink {
@@ -47,11 +47,11 @@ struct Running {
 
 impl Running {
     fn start(
-        own: Party,
+        own: Member,
         life: u64,
         link: LinkKind,
         peers: &[Peer],
-        reports: &Sender<(Party, Noted<Chat>)>,
+        reports: &Sender<(Member, Noted<Chat>)>,
     ) -> Self {
         let mut link = link.open(&endpoints(own, peers)).expect("a free port");
         let mut guard = guard(own, life, peers);
@@ -62,7 +62,7 @@ impl Running {
         };
         let thread = std::thread::spawn(move || {
             let mut field: Box<dyn FieldDriver> = match own {
-                Party::RemoteIo(program) => Box::new(SimulatedField::new(program, agreement())),
+                Member::RemoteIo(program) => Box::new(SimulatedField::new(program, agreement())),
                 _ => Box::new(NoField),
             };
             Host {
@@ -87,7 +87,7 @@ impl Running {
     }
 }
 
-const CELL: [fn() -> Party; 7] = [
+const CELL: [fn() -> Member; 7] = [
     || station(0),
     || station(1),
     || station(2),
@@ -97,25 +97,25 @@ const CELL: [fn() -> Party; 7] = [
     || plant(1),
 ];
 
-fn cell() -> Vec<Party> {
-    CELL.iter().map(|party| party()).collect()
+fn cell() -> Vec<Member> {
+    CELL.iter().map(|member| member()).collect()
 }
 
-/// Everything that the parties of the cell have to report when `changed` lives its `life` and all others their first.
-fn expected(changed: Party, life: u64) -> BTreeSet<(Party, Chat)> {
+/// Everything that the members of the cell have to report when `changed` lives its `life` and all others their first.
+fn expected(changed: Member, life: u64) -> BTreeSet<(Member, Chat)> {
     let mut expected = BTreeSet::new();
     let life_of = |speaker| if speaker == changed { life } else { 1 };
     for listener in cell() {
         for speaker in cell() {
             let heard = match (speaker, listener) {
-                (Party::Plant(plant), Party::RemoteIo(program)) if plant == program => {
+                (Member::Plant(plant), Member::RemoteIo(program)) if plant == program => {
                     expected.insert((listener, Chat::Sensed));
                     false
                 }
-                (Party::RemoteIo(program), Party::Plant(plant)) => program == plant,
-                (Party::Plant(feeder), Party::Plant(fed)) => feeder.0 == 0 && fed.0 == 1,
-                (Party::Plant(_), _) | (_, Party::Plant(_)) => false,
-                (Party::RemoteIo(_), Party::RemoteIo(_)) => false,
+                (Member::RemoteIo(program), Member::Plant(plant)) => program == plant,
+                (Member::Plant(feeder), Member::Plant(fed)) => feeder.0 == 0 && fed.0 == 1,
+                (Member::Plant(_), _) | (_, Member::Plant(_)) => false,
+                (Member::RemoteIo(_), Member::RemoteIo(_)) => false,
                 _ => speaker != listener,
             };
             if heard {
@@ -129,18 +129,18 @@ fn expected(changed: Party, life: u64) -> BTreeSet<(Party, Chat)> {
 
 /// Takes reports until all of `missing` have come.
 fn wait_for(
-    reports: &Receiver<(Party, Noted<Chat>)>,
-    mut missing: BTreeSet<(Party, Chat)>,
+    reports: &Receiver<(Member, Noted<Chat>)>,
+    mut missing: BTreeSet<(Member, Chat)>,
     what: &str,
 ) -> Duration {
     let start = Instant::now();
     while !missing.is_empty() {
         let left = DEADLINE.saturating_sub(start.elapsed());
-        let Ok((party, event)) = reports.recv_timeout(left) else {
+        let Ok((member, event)) = reports.recv_timeout(left) else {
             panic!("{what}: these are still missing: {missing:?}");
         };
-        if let Noted::Party(chat) = event {
-            missing.remove(&(party, chat));
+        if let Noted::Member(chat) = event {
+            missing.remove(&(member, chat));
         }
     }
     start.elapsed()
@@ -199,8 +199,8 @@ fn restarts(link: LinkKind, count: u64, busy: usize) -> Vec<Duration> {
         // What was reported before is of the former life.
         while reports.try_recv().is_ok() {}
         running.insert(place, start(own, lives[place]));
-        let life_of = |party| {
-            let place = cell().iter().position(|one| *one == party);
+        let life_of = |member| {
+            let place = cell().iter().position(|one| *one == member);
             place.map_or(0, |place| lives[place])
         };
         let again = expected(own, 0).into_iter().filter_map(|(listener, chat)| {
@@ -283,14 +283,14 @@ fn a_session_without_peers_is_opened_anew_over_zenoh() {
     // The one connects to peers that are not there, and nobody connects to the other.
     let (first, plant) = (station(0), plant(1));
     let mut running = vec![start(first), start(plant)];
-    let mut missing: BTreeSet<Party> = [first, plant].into();
+    let mut missing: BTreeSet<Member> = [first, plant].into();
     while !missing.is_empty() {
-        let (party, event) = reports.recv_timeout(DEADLINE).expect("it is reported");
+        let (member, event) = reports.recv_timeout(DEADLINE).expect("it is reported");
         if let Noted::Host(event) = event {
             match event {
                 HostEvent::LinkReopened { silence_ms } => {
                     assert!(silence_ms >= 1000, "after {silence_ms} ms");
-                    missing.remove(&party);
+                    missing.remove(&member);
                 }
                 event => panic!("{event:?}"),
             }
@@ -486,9 +486,9 @@ impl Loss {
 /// All hear all where each is reached at another address than its own.
 fn all_hear_all_by(link: LinkKind, peers: &[Peer], addresses: &[SocketAddr]) {
     let (sender, reports) = channel();
-    let seen_by = |own: Party| -> Vec<Peer> {
+    let seen_by = |own: Member| -> Vec<Peer> {
         let seen = peers.iter().zip(addresses).map(|(peer, &address)| Peer {
-            address: if peer.party == own {
+            address: if peer.member == own {
                 peer.address
             } else {
                 address

@@ -1,4 +1,4 @@
-//! Parties as processes: killed, told to stop, left alone. Has a main of its own, because the parties are this program again.
+//! Members as processes: killed, told to stop, left alone. Has a main of its own, because the members are this program again.
 
 #![allow(missing_docs, reason = "a test")]
 #![allow(
@@ -11,7 +11,7 @@
     reason = "it reports what it tests"
 )]
 
-mod parties;
+mod members;
 
 use std::collections::{BTreeSet, HashMap};
 use std::io::{BufRead, BufReader, Write};
@@ -20,15 +20,15 @@ use std::process::{Child, ChildStdin, Command, ExitCode, Stdio};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
+use members::{Chat, Chatter, agreement, endpoints, peers, plant, remote_io, station};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use parties::{Chat, Chatter, agreement, endpoints, peers, plant, remote_io, station};
 use serde::{Deserialize, Serialize};
 use understudy_bus::{
-    Commands, FieldDriver, Guard, HostEvent, LinkKind, NoField, NoObserver, Noted, PartySettings,
-    Peer, Record, SimulatedField, ZENOH_RUNTIME, run_party,
+    Commands, FieldDriver, Guard, HostEvent, LinkKind, MemberSettings, NoField, NoObserver, Noted,
+    Peer, Record, SimulatedField, ZENOH_RUNTIME, run_member,
 };
-use understudy_wire::Party;
+use understudy_wire::Member;
 
 /// Past it a test has failed; nothing waits for it otherwise.
 const DEADLINE: Duration = Duration::from_secs(60);
@@ -56,11 +56,11 @@ fn main() -> ExitCode {
             stopped(LinkKind::Zenoh)
         }),
         (
-            "a_party_says_that_it_is_ready_and_that_it_has_stopped",
+            "a_member_says_that_it_is_ready_and_that_it_has_stopped",
             ready_and_stopped,
         ),
         (
-            "a_party_ends_with_its_input_where_it_is_told_to",
+            "a_member_ends_with_its_input_where_it_is_told_to",
             ends_with_input,
         ),
         ("commands_are_obeyed", commands_are_obeyed),
@@ -82,7 +82,7 @@ fn main() -> ExitCode {
 /// What one process does.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Part {
-    own: Party,
+    own: Member,
     life: u64,
     link: LinkKind,
     peers: Vec<Peer>,
@@ -91,10 +91,10 @@ struct Part {
 
 fn act(part: &Part) -> ExitCode {
     let field: Box<dyn FieldDriver> = match part.own {
-        Party::RemoteIo(program) => Box::new(SimulatedField::new(program, agreement())),
+        Member::RemoteIo(program) => Box::new(SimulatedField::new(program, agreement())),
         _ => Box::new(NoField),
     };
-    let settings = PartySettings {
+    let settings = MemberSettings {
         guard: Guard::Off,
         channel: None,
         endpoints: endpoints(part.own, &part.peers),
@@ -109,7 +109,7 @@ fn act(part: &Part) -> ExitCode {
         ends_with_parent: true,
         real_time: true,
     };
-    match run_party(
+    match run_member(
         Chatter::new(part.own, part.life),
         settings,
         std::io::stdout(),
@@ -122,7 +122,7 @@ fn act(part: &Part) -> ExitCode {
     }
 }
 
-type Reports = (Party, Noted<Chat>);
+type Reports = (Member, Noted<Chat>);
 
 /// A process that does not outlive its test.
 struct Process {
@@ -145,7 +145,7 @@ impl Process {
             for line in output.lines().map_while(Result::ok) {
                 let record: Record<'_, Chat> = serde_json::from_str(&line).expect(&line);
                 // A test that has ended listens no more.
-                let _ = reports.send((record.party, record.event));
+                let _ = reports.send((record.member, record.event));
             }
         });
         let input = child.stdin.take();
@@ -196,14 +196,14 @@ fn wait_until(reports: &Receiver<Reports>, what: &str, mut good: impl FnMut(&Rep
     }
 }
 
-const TALKERS: [fn() -> Party; 4] = [|| station(0), || station(1), || station(2), || remote_io(0)];
+const TALKERS: [fn() -> Member; 4] = [|| station(0), || station(1), || station(2), || remote_io(0)];
 
-fn talkers() -> impl Iterator<Item = Party> {
-    TALKERS.iter().map(|party| party())
+fn talkers() -> impl Iterator<Item = Member> {
+    TALKERS.iter().map(|member| member())
 }
 
 /// Every listener with every speaker.
-fn pairs() -> BTreeSet<(Party, Party)> {
+fn pairs() -> BTreeSet<(Member, Member)> {
     let all = talkers().flat_map(|listener| talkers().map(move |speaker| (listener, speaker)));
     all.filter(|(listener, speaker)| listener != speaker)
         .collect()
@@ -212,9 +212,9 @@ fn pairs() -> BTreeSet<(Party, Party)> {
 fn started(
     link: LinkKind,
     sender: &Sender<Reports>,
-) -> (impl Fn(Party, u64) -> Part, HashMap<Party, Process>) {
-    let parties: Vec<Party> = talkers().chain([plant(0)]).collect();
-    let peers = peers(&parties);
+) -> (impl Fn(Member, u64) -> Part, HashMap<Member, Process>) {
+    let members: Vec<Member> = talkers().chain([plant(0)]).collect();
+    let peers = peers(&members);
     let part = move |own, life| Part {
         own,
         life,
@@ -222,7 +222,7 @@ fn started(
         peers: peers.clone(),
         ends_with_input: true,
     };
-    let running = parties
+    let running = members
         .iter()
         .map(|&own| (own, Process::start(&part(own, 1), sender)))
         .collect();
@@ -237,7 +237,7 @@ fn stopped(link: LinkKind) {
         let mut newest = 0;
         let mut missing = pairs();
         wait_until(&reports, "somebody before the stop", |(listener, event)| {
-            if let Noted::Party(Chat::StillHears { speaker, hundreds }) = event {
+            if let Noted::Member(Chat::StillHears { speaker, hundreds }) = event {
                 missing.remove(&(*listener, *speaker));
                 newest = newest.max(*hundreds);
             }
@@ -245,10 +245,10 @@ fn stopped(link: LinkKind) {
         });
         running[&own].signal(Signal::SIGSTOP);
         // A hundred frames take a second.
-        let mut missing: BTreeSet<(Party, Party)> = pairs();
+        let mut missing: BTreeSet<(Member, Member)> = pairs();
         missing.retain(|(listener, speaker)| *listener != own && *speaker != own);
         wait_until(&reports, "somebody during the stop", |(listener, event)| {
-            if let Noted::Party(Chat::StillHears { speaker, hundreds }) = event
+            if let Noted::Member(Chat::StillHears { speaker, hundreds }) = event
                 && *hundreds >= newest + 2
             {
                 missing.remove(&(*listener, *speaker));
@@ -257,10 +257,10 @@ fn stopped(link: LinkKind) {
         });
         running[&own].signal(Signal::SIGCONT);
         let continued = Instant::now();
-        let mut missing: BTreeSet<(Party, Party)> = pairs();
+        let mut missing: BTreeSet<(Member, Member)> = pairs();
         missing.retain(|(listener, speaker)| *listener == own || *speaker == own);
         wait_until(&reports, "somebody after the stop", |(listener, event)| {
-            if let Noted::Party(Chat::StillHears { speaker, hundreds }) = event {
+            if let Noted::Member(Chat::StillHears { speaker, hundreds }) = event {
                 // The one who was stopped is behind the others by as many frames as it did not say.
                 if *speaker == own || *hundreds > newest + 2 {
                     missing.remove(&(*listener, *speaker));
@@ -280,7 +280,7 @@ fn killed(link: LinkKind) {
     let (part, mut running) = started(link, &sender);
     let mut missing = pairs();
     wait_until(&reports, "somebody at first", |(listener, event)| {
-        if let Noted::Party(Chat::Heard { speaker, .. }) = event {
+        if let Noted::Member(Chat::Heard { speaker, .. }) = event {
             missing.remove(&(*listener, *speaker));
         }
         missing.is_empty()
@@ -292,10 +292,10 @@ fn killed(link: LinkKind) {
         let restarted = Instant::now();
         running.insert(own, Process::start(&part(own, 2), &sender));
         let others = || talkers().filter(|other| *other != own);
-        let mut deaf: BTreeSet<Party> = others().collect();
-        let mut unheard: BTreeSet<Party> = others().collect();
+        let mut deaf: BTreeSet<Member> = others().collect();
+        let mut unheard: BTreeSet<Member> = others().collect();
         wait_until(&reports, "somebody after a kill", |(listener, event)| {
-            if let Noted::Party(Chat::Heard { speaker, life }) = event {
+            if let Noted::Member(Chat::Heard { speaker, life }) = event {
                 if *speaker == own && *life == 2 {
                     deaf.remove(listener);
                 } else if *listener == own {
@@ -401,7 +401,7 @@ fn commands_are_obeyed() {
     let (mut process, reports, _peer) = alone(true);
     process.command("release");
     wait_until(&reports, "the release", |(_, event)| {
-        *event == Noted::Party(Chat::Released)
+        *event == Noted::Member(Chat::Released)
     });
     process.command("stop");
     assert!(process.ended());

@@ -1,4 +1,4 @@
-//! Somebody on the network who says what he should not: nothing of it reaches a party, and the journal names it.
+//! Somebody on the network who says what he should not: nothing of it reaches a member, and the journal names it.
 
 #![allow(missing_docs, reason = "a test")]
 #![allow(
@@ -7,7 +7,7 @@
 )]
 
 #[allow(dead_code, reason = "each test uses its part")]
-mod parties;
+mod members;
 
 use std::collections::BTreeSet;
 use std::net::UdpSocket;
@@ -17,13 +17,13 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::{JoinHandle, spawn};
 use std::time::{Duration, Instant};
 
-use parties::{Chat, Chatter, agreement, endpoints, guard, key, peers, plant, remote_io, station};
+use members::{Chat, Chatter, agreement, endpoints, guard, key, peers, plant, remote_io, station};
 use understudy_bus::{
     Clock, Control, EventSink, Host, HostEvent, LinkKind, NoObserver, Noted, Order, Peer,
     RefusedAs, SimulatedField, orders,
 };
 use understudy_seal::{FrameKey, Seal};
-use understudy_wire::{Body, Cycle, Epoch, Frame, Header, Moment, Party, ProgramId, Time, encode};
+use understudy_wire::{Body, Cycle, Epoch, Frame, Header, Member, Moment, ProgramId, Time, encode};
 
 const DEADLINE: Duration = Duration::from_secs(30);
 
@@ -31,8 +31,8 @@ const DEADLINE: Duration = Duration::from_secs(30);
 const STRANGE_LIFE: u64 = 666;
 
 struct Sink {
-    own: Party,
-    reports: Sender<(Party, Noted<Chat>)>,
+    own: Member,
+    reports: Sender<(Member, Noted<Chat>)>,
 }
 
 impl EventSink<Chat> for Sink {
@@ -43,9 +43,9 @@ impl EventSink<Chat> for Sink {
 }
 
 fn start(
-    own: Party,
+    own: Member,
     peers: &[Peer],
-    reports: &Sender<(Party, Noted<Chat>)>,
+    reports: &Sender<(Member, Noted<Chat>)>,
 ) -> (Control, JoinHandle<()>) {
     let endpoints = endpoints(own, peers);
     let mut link = LinkKind::Udp.open(&endpoints).expect("a free port");
@@ -69,7 +69,7 @@ fn start(
     (control, thread)
 }
 
-fn sync(sender: Party) -> (Frame, Vec<u8>) {
+fn sync(sender: Member) -> (Frame, Vec<u8>) {
     let frame = Frame {
         header: Header {
             cluster: agreement().cluster,
@@ -88,7 +88,7 @@ fn sync(sender: Party) -> (Frame, Vec<u8>) {
     (frame, bytes)
 }
 
-fn sealed(sender: Party, key: FrameKey) -> Vec<u8> {
+fn sealed(sender: Member, key: FrameKey) -> Vec<u8> {
     let (frame, bytes) = sync(sender);
     let mut datagram = Vec::new();
     Seal::new(sender, key, u32::MAX, [])
@@ -105,8 +105,8 @@ fn a_stranger_is_named_and_not_believed() {
     let running: Vec<_> = [station(0), remote_io(0)]
         .map(|own| start(own, &all, &sender))
         .into();
-    let at = |party| {
-        let peer = all.iter().find(|peer| peer.party == party);
+    let at = |member| {
+        let peer = all.iter().find(|peer| peer.member == member);
         peer.expect("it is among them").address
     };
     let stranger = UdpSocket::bind(at(station(1))).expect("nobody else has it");
@@ -144,7 +144,7 @@ fn a_stranger_is_named_and_not_believed() {
         }
     });
 
-    let mut missing: BTreeSet<(RefusedAs, Option<Party>)> = [
+    let mut missing: BTreeSet<(RefusedAs, Option<Member>)> = [
         (RefusedAs::Replayed, Some(station(0))),
         (RefusedAs::Forged, Some(station(0))),
         (RefusedAs::Foreign, Some(station(9))),
@@ -163,7 +163,7 @@ fn a_stranger_is_named_and_not_believed() {
             }
         };
         match event {
-            Noted::Party(Chat::Heard { life, speaker }) => {
+            Noted::Member(Chat::Heard { life, speaker }) => {
                 assert_ne!(
                     life, STRANGE_LIFE,
                     "{listener:?} believes it of {speaker:?}"

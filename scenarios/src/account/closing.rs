@@ -14,9 +14,9 @@ impl Account {
         self.presences.close_cycle(at, cycle.heard);
         let stalled = self.stalls.explains(number);
         // A stall of the host hides for a moment who is there, and changes nothing about it.
-        let in_step = cycle.content == ProgramSet::first(self.services.len());
-        if !stalled || in_step {
-            self.protected = in_step;
+        let synchronised = cycle.content == ProgramSet::first(self.services.len());
+        if !stalled || synchronised {
+            self.protected = synchronised;
         }
         for (program, service) in self.services.iter_mut().enumerate() {
             let outcome = cycle.outcomes.get(&ProgramId(program as u8)).copied();
@@ -55,10 +55,10 @@ impl Account {
         let stations = self.terms.agreement.schedule.stations();
         let presences = std::mem::replace(&mut self.presences, Presences::new(stations, 1));
         let stalls = std::mem::take(&mut self.stalls);
-        let listed = stalls.listed.iter().filter_map(|(number, party, late)| {
+        let listed = stalls.listed.iter().filter_map(|(number, member, late)| {
             Some(Stall {
                 cycle: self.since_origin(*number)?,
-                name: self.terms.parties.name(*party).to_owned(),
+                name: self.terms.members.name(*member).to_owned(),
                 late_us: u64::try_from(late.as_micros()).unwrap_or(u64::MAX),
             })
         });

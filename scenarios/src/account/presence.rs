@@ -7,7 +7,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use understudy_simulator::Action;
-use understudy_wire::{Party, StationId, StationSet};
+use understudy_wire::{Member, StationId, StationSet};
 
 /// What a station was.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
@@ -89,8 +89,8 @@ impl Presences {
     }
 
     /// A step of the scenario, first felt in cycle `at`.
-    pub(crate) fn step(&mut self, at: u64, party: Party, action: Action) {
-        let Party::Station(station) = party else {
+    pub(crate) fn step(&mut self, at: u64, member: Member, action: Action) {
+        let Member::Station(station) = member else {
             return;
         };
         match action {
@@ -192,7 +192,7 @@ mod tests {
     fn check(turns: &str, steps: &[(u64, Action)], expected: &str) {
         let mut presences = Presences::new(1, 3);
         for &(at, action) in steps {
-            presences.step(at, Party::Station(STATION), action);
+            presences.step(at, Member::Station(STATION), action);
         }
         for (at, turn) in turns.chars().enumerate() {
             let heard = if turn == '1' {

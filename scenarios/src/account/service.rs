@@ -26,7 +26,7 @@ pub enum Service {
     /// By an output that was wrong.
     Wrong,
     /// By nobody: its remote I/O was not there.
-    Unserved,
+    Missed,
 }
 
 /// Deadlines of a remote I/O by what was applied.
@@ -45,7 +45,7 @@ pub struct Counts {
     /// The configured values, in cycles in which the host itself stood still.
     pub fail_safe_by_stall: u64,
     /// Cycles in which the remote I/O was not there.
-    pub unserved: u64,
+    pub missed: u64,
     /// Outputs of any source that were not what they had to be.
     pub wrong: u64,
 }
@@ -56,7 +56,7 @@ pub(crate) struct ServiceTrack {
     pub(crate) counts: Counts,
     pub(crate) intervals: Vec<Interval<Service>>,
     finished: Growing,
-    mishaps: Growing,
+    plant_faults: Growing,
 }
 
 /// A count that a restart of its plant sets back to 0.
@@ -79,15 +79,15 @@ impl ServiceTrack {
     /// What the plant has counted; it counts from the origin on.
     pub(crate) fn field(&mut self, field: &Field, after_origin: bool) {
         self.finished.follow(field.finished, after_origin);
-        self.mishaps.follow(field.mishaps, after_origin);
+        self.plant_faults.follow(field.plant_faults, after_origin);
     }
 
     pub(crate) fn finished(&self) -> u64 {
         self.finished.total
     }
 
-    pub(crate) fn mishaps(&self) -> u64 {
-        self.mishaps.total
+    pub(crate) fn plant_faults(&self) -> u64 {
+        self.plant_faults.total
     }
 
     /// Cycle `at` is over; cycles come in order.
@@ -103,12 +103,12 @@ impl ServiceTrack {
             (Some(Source::FailSafe), false) => &mut counts.fail_safe,
             (Some(Source::FailSafe), true) => &mut counts.fail_safe_by_stall,
             (None, true) => &mut counts.held_by_stall,
-            (None, false) => &mut counts.unserved,
+            (None, false) => &mut counts.missed,
         };
         *counter += 1;
         let service = match outcome {
             None if skipped => Service::Held,
-            None => Service::Unserved,
+            None => Service::Missed,
             Some(Outcome { wrong: true, .. }) => {
                 counts.wrong += 1;
                 Service::Wrong
@@ -127,7 +127,7 @@ impl ServiceTrack {
         let counts = &self.counts;
         counts.wrong == 0
             && counts.fail_safe + counts.fail_safe_by_stall == 0
-            && counts.unserved == 0
-            && self.mishaps() == 0
+            && counts.missed == 0
+            && self.plant_faults() == 0
     }
 }

@@ -1,7 +1,7 @@
 //! Cycles in which the host itself stood still, with the evidence.
 //!
-//! A held output is no failure of the cluster where the machine under it did not run. Evidence is a party
-//! that was woken later than it had asked for; what a scenario does to a party itself (stop, crash) is none.
+//! A held output is no failure of the cluster where the machine under it did not run. Evidence is a member
+//! that was woken later than it had asked for; what a scenario does to a member itself (stop, crash) is none.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -9,7 +9,7 @@ use std::time::Duration;
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_simulator::Action;
-use understudy_wire::Party;
+use understudy_wire::Member;
 
 /// One wake-up that came too late.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
@@ -28,27 +28,27 @@ const MAXIMUM_LISTED: usize = 200;
 /// Cycles before and after a stall that it may explain.
 const REACH_CYCLES: i64 = 1;
 
-/// Cycles after a step of the scenario for which a late wake-up of that party is the step's own doing.
+/// Cycles after a step of the scenario for which a late wake-up of that member is the step's own doing.
 const OWN_DOING_CYCLES: i64 = 5;
 
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Stalls {
     /// Numbers of cycles that are explained, the newest few thousand.
     explained: BTreeSet<i64>,
-    /// Parties that the scenario has stopped, crashed or slowed down, and when it let them go on.
-    disturbed: BTreeMap<Party, Option<i64>>,
-    pub(crate) listed: Vec<(i64, Party, Duration)>,
+    /// Members that the scenario has stopped, crashed or slowed down, and when it let them go on.
+    disturbed: BTreeMap<Member, Option<i64>>,
+    pub(crate) listed: Vec<(i64, Member, Duration)>,
     pub(crate) count: u64,
 }
 
 impl Stalls {
-    pub(crate) fn step(&mut self, number: i64, party: Party, action: Action) {
+    pub(crate) fn step(&mut self, number: i64, member: Member, action: Action) {
         match action {
             Action::Slow { by } if !by.is_zero() => {
-                self.disturbed.insert(party, None);
+                self.disturbed.insert(member, None);
             }
             Action::Crash | Action::Stop => {
-                self.disturbed.insert(party, None);
+                self.disturbed.insert(member, None);
             }
             Action::Restart
             | Action::RestartMisconfigured
@@ -56,22 +56,28 @@ impl Stalls {
             | Action::Continue
             | Action::Slow { .. } => {
                 self.disturbed
-                    .insert(party, Some(number + OWN_DOING_CYCLES));
+                    .insert(member, Some(number + OWN_DOING_CYCLES));
             }
             _ => {}
         }
     }
 
-    /// `party` was woken too late in the cycle with this number.
-    pub(crate) fn stalled(&mut self, number: i64, party: Party, late: Duration, period: Duration) {
-        match self.disturbed.get(&party) {
+    /// `member` was woken too late in the cycle with this number.
+    pub(crate) fn stalled(
+        &mut self,
+        number: i64,
+        member: Member,
+        late: Duration,
+        period: Duration,
+    ) {
+        match self.disturbed.get(&member) {
             Some(None) => return,
             Some(Some(until)) if number <= *until => return,
             _ => {}
         }
         self.count += 1;
         if self.listed.len() < MAXIMUM_LISTED {
-            self.listed.push((number, party, late));
+            self.listed.push((number, member, late));
         }
         let cycles = late.as_nanos() / period.as_nanos().max(1);
         let reach = REACH_CYCLES + i64::try_from(cycles).unwrap_or(1000).min(1000);

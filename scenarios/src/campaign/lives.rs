@@ -1,7 +1,7 @@
 //! Who lives: the stations of a replica as the model sees them, and what chance does to them next.
 //!
 //! A station is *up* from the moment at which it holds every state that it has to hold, and down from its failure on. Between them
-//! lie its detection (θ = 1 at any party), its repair, and its return: it starts, listens, and takes over the states. In the paper's
+//! lie its detection (θ = 1 at any member), its repair, and its return: it starts, listens, and takes over the states. In the paper's
 //! mode nobody counts on a station before it speaks, so there it is up once every copy has proved itself (or as many cycles before as the
 //! outputs are held). In the full mode the
 //! state is what the system needs, and a copy in shadow has it: if all others die, it proves itself and speaks.
@@ -15,7 +15,7 @@ use rand_distr::{Distribution, Exp1};
 use rand_pcg::Pcg64;
 use understudy_cluster::Cluster;
 use understudy_simulator::Action;
-use understudy_wire::{Mode, Party, ProgramId, ProgramSet, StationId, StationSet, Time};
+use understudy_wire::{Member, Mode, ProgramId, ProgramSet, StationId, StationSet, Time};
 
 use super::CampaignPlan;
 use super::seen::Seen;
@@ -68,7 +68,7 @@ impl Stage {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Life {
     /// It speaks.
-    InStep,
+    Synchronised,
     /// It is gone, and nobody has noticed.
     Undetected { since: Time },
     /// θ = 1.
@@ -110,7 +110,7 @@ pub(super) struct Lives<'a> {
     plan: &'a CampaignPlan,
     random: Pcg64,
     lives: Vec<Life>,
-    /// Whom some party takes for failed.
+    /// Whom some member takes for failed.
     flagged: StationSet,
     newest: Option<Newest>,
     /// The last stall of the host.
@@ -122,13 +122,13 @@ pub(super) struct Lives<'a> {
 }
 
 impl<'a> Lives<'a> {
-    /// All in step. `number` is that of the replica, which has a stream of chance of its own.
+    /// All synchronised. `number` is that of the replica, which has a stream of chance of its own.
     pub(super) fn new(cluster: &'a Cluster, plan: &'a CampaignPlan, number: u64) -> Self {
         Self {
             cluster,
             plan,
             random: Pcg64::new(u128::from(plan.seed), u128::from(number)),
-            lives: vec![Life::InStep; cluster.agreement().schedule.stations()],
+            lives: vec![Life::Synchronised; cluster.agreement().schedule.stations()],
             flagged: StationSet::EMPTY,
             newest: None,
             stalled: None,
@@ -143,7 +143,7 @@ impl<'a> Lives<'a> {
         self.random.random()
     }
 
-    /// Everybody is in step: from now on they fail.
+    /// Everybody is synchronised: from now on they fail.
     pub(super) fn begin(&mut self) {
         for rank in 0..self.lives.len() {
             self.order(StationId(rank as u8), Action::Crash);
@@ -219,7 +219,7 @@ impl<'a> Lives<'a> {
             }
             Seen::Cleared(station) => self.flagged.remove(station),
             Seen::Adopted(station, program) => self.adopted(now, station, program),
-            Seen::InStep(station, program) => self.proved(now, station, program),
+            Seen::Synchronised(station, program) => self.proved(now, station, program),
             Seen::Missed => self.deadline_missed(now),
             Seen::Stalled => {
                 self.stalled = Some(now);
@@ -282,7 +282,7 @@ impl<'a> Lives<'a> {
             before,
             counts_as_masked,
         });
-        // One that has not spoken since its return still counts as failed; nobody flags it once more.
+        // One that has not published since its return still counts as failed; nobody flags it once more.
         if self.flagged.contains(station) {
             self.detected(now, station);
         }
@@ -351,7 +351,7 @@ impl<'a> Lives<'a> {
             if self.mode() == Mode::Paper {
                 self.order(station, Action::Crash);
             }
-            Life::InStep
+            Life::Synchronised
         } else {
             Life::Shadow { since, unproved }
         };
@@ -363,7 +363,7 @@ impl<'a> Lives<'a> {
         self.run.cause = failed.then(|| self.cause());
         for life in &self.lives {
             let (stage, since) = match *life {
-                Life::InStep => continue,
+                Life::Synchronised => continue,
                 Life::Undetected { since } => (&mut self.run.detection, since),
                 Life::Repaired { since } => (&mut self.run.repair, since),
                 Life::TakingOver { since, .. } => (&mut self.run.taking_over, since),
@@ -380,7 +380,7 @@ impl<'a> Lives<'a> {
 
     fn is_up(&self, station: StationId) -> bool {
         match self.lives[station.index()] {
-            Life::InStep => true,
+            Life::Synchronised => true,
             Life::Shadow { .. } => self.mode() == Mode::Full,
             Life::Undetected { .. } | Life::Repaired { .. } | Life::TakingOver { .. } => false,
         }
@@ -406,11 +406,11 @@ impl<'a> Lives<'a> {
     /// Such as `robot after understudy`.
     fn cause(&self) -> String {
         let name = |station: &StationId| {
-            let name = self.cluster.party_name(Party::Station(*station));
+            let name = self.cluster.member_name(Member::Station(*station));
             name.unwrap_or_default().to_owned()
         };
         let Some(newest) = &self.newest else {
-            return "with all stations in step".to_owned();
+            return "with all stations synchronised".to_owned();
         };
         let before: Vec<String> = newest.before.iter().map(name).collect();
         if before.is_empty() {

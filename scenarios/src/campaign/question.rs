@@ -5,7 +5,7 @@ use understudy_reliability::{
     Hours, MAXIMUM_ACCELERATION, Options, ReliabilityError, Rule, System, UNDERSTUDIES,
     UnequalBoxes, acceleration_bias, grouped,
 };
-use understudy_wire::{Mode, Party};
+use understudy_wire::{Member, Mode};
 
 use super::CampaignPlan;
 
@@ -180,16 +180,16 @@ pub fn set_unequal(
             && !boxes.understudies
         {
             let controllers = cluster.controllers().len();
-            match cluster.party(&boxes.name) {
-                Some(Party::Station(rank)) if rank.index() < controllers && boxes.count == 1 => {}
-                Some(Party::Station(rank)) if rank.index() < controllers => {
+            match cluster.member(&boxes.name) {
+                Some(Member::Station(rank)) if rank.index() < controllers && boxes.count == 1 => {}
+                Some(Member::Station(rank)) if rank.index() < controllers => {
                     errors.push(wrong("there is one of that name".to_owned()));
                     continue;
                 }
-                Some(Party::Station(_)) if cluster.understudies().len() == 1 => {
+                Some(Member::Station(_)) if cluster.understudies().len() == 1 => {
                     boxes.understudies = true;
                 }
-                Some(Party::Station(_)) => {
+                Some(Member::Station(_)) => {
                     let why =
                         format!("understudies are alike: give the times of all as {UNDERSTUDIES}=");
                     errors.push(wrong(why));

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant, SystemTime};
 
 use understudy_cluster::Cluster;
 use understudy_simulator::{Action, Fault};
-use understudy_wire::{Party, Time};
+use understudy_wire::{Member, Time};
 
 use super::lives::{Lives, Order, Run};
 use super::seen::{Deadlines, Seen, of_station};
@@ -25,7 +25,7 @@ const ENDLESS_CYCLES: u64 = 1 << 40;
 /// Where a campaign on processes is kept, and how long it may take.
 #[derive(Debug, Clone)]
 pub struct RealCampaign {
-    /// How the parties are started.
+    /// How the members are started.
     pub laboratory: LaboratorySettings,
     /// Where runs are kept.
     pub out: PathBuf,
@@ -66,11 +66,11 @@ pub fn run_real_campaign(
         }
         let mut fates = Fates::new(cluster, plan, number, give_up);
         let inside = directory.inside(&format!("replica-{}", number + 1))?;
-        let mut in_step = false;
+        let mut synchronised = false;
         let mut on_progress = |progress| match progress {
             Progress::Step { .. } => watch(progress),
-            Progress::Cycle { cycle, .. } if !std::mem::replace(&mut in_step, true) => {
-                let what = format!("everybody is in step, replica {}", number + 1);
+            Progress::Cycle { cycle, .. } if !std::mem::replace(&mut synchronised, true) => {
+                let what = format!("everybody is synchronised, replica {}", number + 1);
                 watch(Progress::Step { cycle, what });
             }
             // The rest is told of the campaign as a whole.
@@ -154,7 +154,7 @@ struct Fates<'a> {
     lives: Lives<'a>,
     deadlines: Deadlines,
     period: Duration,
-    /// When everybody was in step, by the clock of the records.
+    /// When everybody was synchronised, by the clock of the records.
     origin: Option<Time>,
     newest: Time,
     /// The newest that was decided, counted from there.
@@ -191,16 +191,16 @@ impl<'a> Fates<'a> {
 
     fn look(&mut self, record: &Record) -> Option<Seen> {
         let now = Time(record.at_ns);
-        match (&record.event, record.party) {
-            (Happening::Station(event), Some(Party::Station(station))) => {
+        match (&record.event, record.member) {
+            (Happening::Station(event), Some(Member::Station(station))) => {
                 of_station(station, event)
             }
-            (Happening::RemoteIo(event), Some(Party::RemoteIo(program))) => {
+            (Happening::RemoteIo(event), Some(Member::RemoteIo(program))) => {
                 self.deadlines.look(now, program, event)
             }
-            (Happening::Run(RunEvent::Fault { action, party, .. }), _) => match (party, action) {
-                (Party::Station(station), Action::Crash) => Some(Seen::Crashed(*station)),
-                (Party::Station(station), Action::Restart) => Some(Seen::Restarted(*station)),
+            (Happening::Run(RunEvent::Fault { action, member, .. }), _) => match (member, action) {
+                (Member::Station(station), Action::Crash) => Some(Seen::Crashed(*station)),
+                (Member::Station(station), Action::Restart) => Some(Seen::Restarted(*station)),
                 _ => None,
             },
             _ => None,
@@ -222,14 +222,14 @@ impl<'a> Fates<'a> {
                     let fault = Fault {
                         at_cycle: 0,
                         phase: 0.0,
-                        party: Party::Station(station),
+                        member: Member::Station(station),
                         action,
                     };
                     self.due.extend(at.map(|at| (at, fault)));
                 }
                 Order::Forget(station) => {
-                    let party = Party::Station(station);
-                    self.due.retain(|(_, fault)| fault.party != party);
+                    let member = Member::Station(station);
+                    self.due.retain(|(_, fault)| fault.member != member);
                 }
             }
         }

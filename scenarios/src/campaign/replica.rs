@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use understudy_cluster::Cluster;
 use understudy_simulator::{Action, Fault, Network, NotReady, Record, Simulation};
-use understudy_wire::{Party, Time};
+use understudy_wire::{Member, Time};
 
 use super::CampaignPlan;
 use super::lives::{Lives, Order, Run};
@@ -28,8 +28,8 @@ pub(super) fn simulated(
     carry_out(&mut simulation, &mut lives);
     let mut deadlines = Deadlines::new(cluster.controllers().len());
     let seen = RefCell::new(Vec::new());
-    let mut observe = |now: Time, _: Option<u64>, party: Party, record: Record<'_>| {
-        let found = look(now, party, record, &mut deadlines);
+    let mut observe = |now: Time, _: Option<u64>, member: Member, record: Record<'_>| {
+        let found = look(now, member, record, &mut deadlines);
         seen.borrow_mut().extend(found.map(|found| (now, found)));
     };
     let mut over = || !seen.borrow().is_empty();
@@ -58,26 +58,26 @@ fn carry_out(simulation: &mut Simulation, lives: &mut Lives<'_>) {
                 simulation.schedule(Fault {
                     at_cycle: at as u64,
                     phase: at.fract(),
-                    party: Party::Station(station),
+                    member: Member::Station(station),
                     action,
                 });
             }
-            Order::Forget(station) => simulation.forget(Party::Station(station)),
+            Order::Forget(station) => simulation.forget(Member::Station(station)),
         }
     }
 }
 
 /// What of a record concerns the campaign.
-fn look(now: Time, party: Party, record: Record<'_>, deadlines: &mut Deadlines) -> Option<Seen> {
-    match (party, record) {
-        (Party::Station(station), Record::Fault(fault)) => match fault.action {
+fn look(now: Time, member: Member, record: Record<'_>, deadlines: &mut Deadlines) -> Option<Seen> {
+    match (member, record) {
+        (Member::Station(station), Record::Fault(fault)) => match fault.action {
             Action::Crash => Some(Seen::Crashed(station)),
             Action::Restart => Some(Seen::Restarted(station)),
             _ => None,
         },
         (_, Record::Violation(violation)) => Some(Seen::Violation(violation.to_string())),
-        (Party::Station(station), Record::Station(event)) => of_station(station, event),
-        (Party::RemoteIo(program), Record::RemoteIo(event)) => deadlines.look(now, program, event),
+        (Member::Station(station), Record::Station(event)) => of_station(station, event),
+        (Member::RemoteIo(program), Record::RemoteIo(event)) => deadlines.look(now, program, event),
         _ => None,
     }
 }

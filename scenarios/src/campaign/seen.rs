@@ -12,7 +12,7 @@ pub(super) enum Seen {
     Flagged(StationId),
     Cleared(StationId),
     Adopted(StationId, ProgramId),
-    InStep(StationId, ProgramId),
+    Synchronised(StationId, ProgramId),
     /// The first deadline of a remote I/O with nothing true to apply.
     Missed,
     /// A remote I/O is at its fail-safe; the first deadline with nothing true to apply.
@@ -67,7 +67,7 @@ pub(super) fn of_station(station: StationId, event: &StationEvent) -> Option<See
         StationEvent::Flagged { station, .. } => Some(Seen::Flagged(*station)),
         StationEvent::Cleared { station, .. } => Some(Seen::Cleared(*station)),
         StationEvent::Adopted { program, .. } => Some(Seen::Adopted(station, *program)),
-        StationEvent::InStep { program, .. } => Some(Seen::InStep(station, *program)),
+        StationEvent::Synchronised { program, .. } => Some(Seen::Synchronised(station, *program)),
         StationEvent::Stalled { .. } => Some(Seen::Stalled),
         _ => None,
     }

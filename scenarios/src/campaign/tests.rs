@@ -50,7 +50,7 @@ fn a_campaign_is_the_same_on_any_number_of_processors() {
 #[test]
 fn every_failure_of_the_system_has_the_cause_that_its_definition_names() {
     for (mode, second) in [(Mode::Full, "understudy"), (Mode::Paper, " after ")] {
-        let found = run_campaign(&cell(mode), &plan(30, 2), &mut |_| {}).expect("in step");
+        let found = run_campaign(&cell(mode), &plan(30, 2), &mut |_| {}).expect("synchronised");
         assert_eq!(found.campaign.failures.len(), 30);
         assert_eq!(found.violations, Vec::<String>::new());
         assert_eq!(found.unmasked, 0, "one failure at a time is masked");
@@ -70,7 +70,7 @@ fn a_replica_that_does_not_fail_is_censored() {
         maximum_cycles: 200,
         ..plan(2, 1)
     };
-    let found = run_campaign(&cell(Mode::Full), &lasting, &mut |_| {}).expect("in step");
+    let found = run_campaign(&cell(Mode::Full), &lasting, &mut |_| {}).expect("synchronised");
     assert_eq!(found.campaign.failures.len(), 0);
     assert_eq!(found.campaign.censored_hours.len(), 2);
 }
@@ -103,7 +103,7 @@ fn the_model_with_the_protocols_own_time_lies_in_the_interval() {
         let mut told = Vec::new();
         let measured = run_campaign(&cell, &planned.plan, &mut |done| told.push(done));
         assert_eq!(told, (1..=60).collect::<Vec<u64>>());
-        let found = hold_against_model(&cell, &planned, measured.expect("in step"));
+        let found = hold_against_model(&cell, &planned, measured.expect("synchronised"));
         let found = found.expect("an assessment");
         assert!(found.is_met(), "{mode:?}: {}", found.to_text());
         assert!(found.own_time_bias < 0.0);

@@ -10,7 +10,7 @@ use std::time::Duration;
 use rand::RngExt;
 use rand_pcg::Pcg64;
 use understudy_simulator::{Action, Disturbance, Fault, Network};
-use understudy_wire::{Party, ProgramId, Schedule, StationId};
+use understudy_wire::{Member, ProgramId, Schedule, StationId};
 
 use super::faultload::{Faultload, Injection};
 use super::kind::{Kind, Role};
@@ -45,17 +45,17 @@ pub(super) fn draw(
         faultload.injections.extend(drawn.injection(kind));
         return faultload;
     }
-    let (of_network, of_parties): (Vec<Kind>, Vec<Kind>) = kinds
+    let (of_network, of_members): (Vec<Kind>, Vec<Kind>) = kinds
         .iter()
         .partition(|kind| kind.roles() == [Role::Network]);
-    if !of_network.is_empty() && (of_parties.is_empty() || drawn.random.random_range(0..4) == 0) {
+    if !of_network.is_empty() && (of_members.is_empty() || drawn.random.random_range(0..4) == 0) {
         faultload.network = Some(drawn.network(&of_network));
     }
-    if of_parties.is_empty() {
+    if of_members.is_empty() {
         return faultload;
     }
     for _ in 0..drawn.random.random_range(1..=MAXIMUM_INJECTIONS) {
-        let kind = drawn.one_of(&of_parties);
+        let kind = drawn.one_of(&of_members);
         if let Some(injection) = drawn.injection(kind)
             && !faultload
                 .injections
@@ -92,16 +92,16 @@ impl Draw<'_> {
     fn injection(&mut self, kind: Kind) -> Option<Injection> {
         let schedule = self.schedule;
         let role = self.one_of(kind.roles());
-        let parties: Vec<Party> = role.parties(schedule).collect();
-        if parties.is_empty() {
+        let members: Vec<Member> = role.members(schedule).collect();
+        if members.is_empty() {
             return None;
         }
-        let party = self.one_of(&parties);
+        let member = self.one_of(&members);
         let (span, phase) = self.span();
         let step = |at_cycle: u64, action: Action| Fault {
             at_cycle,
             phase,
-            party,
+            member,
             action,
         };
         let (from, to) = (span.start, span.end);
@@ -142,24 +142,24 @@ impl Draw<'_> {
                 lasting(Action::Slow { by }, Action::Slow { by: Duration::ZERO })
             }
             Kind::OneWayCut => {
-                let to = self.other(party)?;
+                let to = self.other(member)?;
                 lasting(Action::Cut { to }, Action::Heal { to })
             }
             Kind::BrokenLink => {
-                let to = self.other(party)?;
-                self.broken_link(party, to, phase, from)
+                let to = self.other(member)?;
+                self.broken_link(member, to, phase, from)
             }
             Kind::Cut => {
-                let peer = self.other(party)?;
-                cuts(&[peer], party, phase, from, to)
+                let peer = self.other(member)?;
+                cuts(&[peer], member, phase, from, to)
             }
             Kind::LateLink => {
-                let to = self.other(party)?;
+                let to = self.other(member)?;
                 let by = schedule.period() / 20 * self.random.random_range(1..=40);
                 let end = Duration::ZERO;
                 lasting(Action::Delay { to, by }, Action::Delay { to, by: end })
             }
-            Kind::Isolation => cuts(&self.others(party), party, phase, from, to),
+            Kind::Isolation => cuts(&self.others(member), member, phase, from, to),
             Kind::CorruptFrames => {
                 let frames = self.random.random_range(1..=8);
                 vec![step(from, Action::Corrupt { frames })]
@@ -170,8 +170,8 @@ impl Draw<'_> {
             }
             Kind::Forgery => vec![step(from, Action::Forge)],
             Kind::FlippedState => {
-                let program = match (role, party) {
-                    (Role::Controller, Party::Station(station)) => ProgramId(station.0),
+                let program = match (role, member) {
+                    (Role::Controller, Member::Station(station)) => ProgramId(station.0),
                     _ => ProgramId(self.random.random_range(0..schedule.controllers()) as u8),
                 };
                 let bit = self.random.random_range(0..64);
@@ -190,26 +190,26 @@ impl Draw<'_> {
         Some(Injection { kind, role, steps })
     }
 
-    /// From `from` on `to` does not receive `party`, then a station crashes, and the link is whole again about that time: short
+    /// From `from` on `to` does not receive `member`, then a station crashes, and the link is whole again about that time: short
     /// outages are as likely as long ones.
-    fn broken_link(&mut self, party: Party, to: Party, phase: f64, from: u64) -> Vec<Fault> {
+    fn broken_link(&mut self, member: Member, to: Member, phase: f64, from: u64) -> Vec<Fault> {
         let last = self.cycles.end - 1;
         let length = LONGEST_OUTAGE.powf(self.random.random_range(0.0..1.0)) as u64;
         let crashes = (from + length).min(last);
         let heals = (from + (length + self.random.random_range(0..6)).saturating_sub(3)).min(last);
         let restarts = (crashes + self.random.random_range(1..40)).min(last);
         let stations = self.schedule.stations() as u8;
-        let station = Party::Station(StationId(self.random.random_range(0..stations)));
+        let station = Member::Station(StationId(self.random.random_range(0..stations)));
         let mut steps: Vec<Fault> = [
-            (from, party, Action::Cut { to }),
+            (from, member, Action::Cut { to }),
             (crashes, station, Action::Crash),
-            (heals, party, Action::Heal { to }),
+            (heals, member, Action::Heal { to }),
             (restarts, station, Action::Restart),
         ]
-        .map(|(at_cycle, party, action)| Fault {
+        .map(|(at_cycle, member, action)| Fault {
             at_cycle,
             phase,
-            party,
+            member,
             action,
         })
         .to_vec();
@@ -224,16 +224,16 @@ impl Draw<'_> {
         )
     }
 
-    fn others(&self, party: Party) -> Vec<Party> {
-        let parties = Role::ALL.into_iter();
-        parties
-            .flat_map(|role| role.parties(self.schedule))
-            .filter(|other| *other != party)
+    fn others(&self, member: Member) -> Vec<Member> {
+        let members = Role::ALL.into_iter();
+        members
+            .flat_map(|role| role.members(self.schedule))
+            .filter(|other| *other != member)
             .collect()
     }
 
-    fn other(&mut self, party: Party) -> Option<Party> {
-        let others = self.others(party);
+    fn other(&mut self, member: Member) -> Option<Member> {
+        let others = self.others(member);
         (!others.is_empty()).then(|| self.one_of(&others))
     }
 
@@ -267,14 +267,14 @@ impl Draw<'_> {
     }
 }
 
-/// Cuts `party` off from each peer, both ways.
-fn cuts(peers: &[Party], party: Party, phase: f64, from: u64, to: u64) -> Vec<Fault> {
-    let both = |at_cycle: u64, action: fn(Party) -> Action| {
+/// Cuts `member` off from each peer, both ways.
+fn cuts(peers: &[Member], member: Member, phase: f64, from: u64, to: u64) -> Vec<Fault> {
+    let both = |at_cycle: u64, action: fn(Member) -> Action| {
         peers.iter().flat_map(move |&peer| {
-            [(party, peer), (peer, party)].map(|(from, to)| Fault {
+            [(member, peer), (peer, member)].map(|(from, to)| Fault {
                 at_cycle,
                 phase,
-                party: from,
+                member: from,
                 action: action(to),
             })
         })

@@ -27,20 +27,20 @@ impl Injection {
         first..last + 1
     }
 
-    /// Whether two injections would both decide whether the process of one party runs.
+    /// Whether two injections would both decide whether the process of one member runs.
     pub(super) fn collides_with(&self, other: &Self) -> bool {
         let decides = |step: &&Fault| matches!(step.action, Action::Crash | Action::Stop);
         let mut decided = self.steps.iter().filter(decides);
-        let by_other = |party| {
+        let by_other = |member| {
             other
                 .steps
                 .iter()
                 .filter(decides)
-                .any(|it| it.party == party)
+                .any(|it| it.member == member)
         };
         let (own, others) = (self.cycles(), other.cycles());
         let meet = own.start < others.end && others.start < own.end;
-        meet && decided.any(|step| by_other(step.party))
+        meet && decided.any(|step| by_other(step.member))
     }
 }
 

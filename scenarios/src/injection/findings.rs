@@ -11,7 +11,7 @@ use super::coverage::CoverageRow;
 use super::kind::Phase;
 use super::minimise::Violating;
 use super::{Count, InjectionPlan};
-use crate::parties::Parties;
+use crate::members::Members;
 use crate::write::write;
 
 /// Version of `campaign.json`.
@@ -91,8 +91,8 @@ pub struct Failure {
     pub seed: u64,
     /// Where it shows first, in the small run.
     pub cycle: u64,
-    /// The party that it shows at; nothing where it is all of them.
-    pub party: Option<String>,
+    /// The member that it shows at; nothing where it is all of them.
+    pub member: Option<String>,
     /// What shows.
     pub what: String,
     /// The small run as the text of a scenario file.
@@ -107,7 +107,7 @@ impl Failure {
         faults_drawn: usize,
         small: &Violating,
     ) -> Self {
-        let parties = Parties::of(cluster);
+        let members = Members::of(cluster);
         let title = format!(
             "{} in run {run} of seed {}",
             plan.property.word(),
@@ -131,12 +131,12 @@ impl Failure {
             cycles: small.cycles,
             seed: small.seed,
             cycle: small.symptom.cycle,
-            party: small
+            member: small
                 .symptom
-                .party
-                .map(|party| parties.name(party).to_owned()),
+                .member
+                .map(|member| members.name(member).to_owned()),
             what: small.symptom.what.clone(),
-            scenario: write(&scenario, &parties, &remarks),
+            scenario: write(&scenario, &members, &remarks),
         }
     }
 
@@ -270,10 +270,10 @@ impl fmt::Display for Findings {
             self.runs_made
         )?;
         for failure in self.failures.iter().take(LISTED_FAILURES) {
-            let party = failure.party.as_deref().unwrap_or("all");
+            let member = failure.member.as_deref().unwrap_or("all");
             writeln!(
                 formatter,
-                "  run {}: {} of {} faults and {} cycles are enough; cycle {}, {party}: {}",
+                "  run {}: {} of {} faults and {} cycles are enough; cycle {}, {member}: {}",
                 failure.run,
                 failure.faults,
                 failure.faults_drawn,

@@ -4,13 +4,13 @@ use std::fmt;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
-use understudy_wire::{Party, Schedule, StationId};
+use understudy_wire::{Member, Schedule, StationId};
 
-/// What is injected. Every kind but the last four strikes one party.
+/// What is injected. Every kind but the last four strikes one member.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// A party is gone, and restarted later.
+    /// A member is gone, and restarted later.
     Crash,
     /// It crashes and restarts several times in a row.
     RestartStorm,
@@ -22,15 +22,15 @@ pub enum Kind {
     Slow,
     /// It is restarted with another configuration for a while.
     Misconfiguration,
-    /// One party does not hear another for a while.
+    /// One member does not hear another for a while.
     OneWayCut,
-    /// The link from one party to another is broken for long, then a station crashes.
+    /// The link from one member to another is broken for long, then a station crashes.
     BrokenLink,
-    /// Two parties do not hear each other for a while.
+    /// Two members do not hear each other for a while.
     Cut,
-    /// What one party sends comes late to another for a while.
+    /// What one member sends comes late to another for a while.
     LateLink,
-    /// A party hears nobody and is heard by nobody for a while.
+    /// A member hears nobody and is heard by nobody for a while.
     Isolation,
     /// Bits of some of its frames flip on their way.
     CorruptFrames,
@@ -174,8 +174,8 @@ impl Role {
         }
     }
 
-    /// Its parties, in order; none of the network.
-    pub(super) fn parties(self, schedule: &Schedule) -> impl Iterator<Item = Party> + use<> {
+    /// Its members, in order; none of the network.
+    pub(super) fn members(self, schedule: &Schedule) -> impl Iterator<Item = Member> + use<> {
         let controllers = schedule.controllers() as u8;
         let stations = schedule.stations() as u8;
         let (range, station) = match self {
@@ -186,9 +186,9 @@ impl Role {
         };
         range.map(move |index| {
             if station {
-                Party::Station(StationId(index))
+                Member::Station(StationId(index))
             } else {
-                Party::RemoteIo(understudy_wire::ProgramId(index))
+                Member::RemoteIo(understudy_wire::ProgramId(index))
             }
         })
     }
@@ -282,14 +282,14 @@ mod tests {
     }
 
     #[test]
-    fn every_party_has_one_role() {
+    fn every_member_has_one_role() {
         let schedule = Schedule::new(Duration::from_millis(10), 3, 2, 2).expect("within bounds");
-        let parties: Vec<Party> = Role::ALL
+        let members: Vec<Member> = Role::ALL
             .into_iter()
-            .flat_map(|role| role.parties(&schedule))
+            .flat_map(|role| role.members(&schedule))
             .collect();
-        assert_eq!(parties.len(), 3 + 2 + 3);
-        let distinct: std::collections::BTreeSet<_> = parties.iter().collect();
-        assert_eq!(distinct.len(), parties.len());
+        assert_eq!(members.len(), 3 + 2 + 3);
+        let distinct: std::collections::BTreeSet<_> = members.iter().collect();
+        assert_eq!(distinct.len(), members.len());
     }
 }

@@ -1,4 +1,4 @@
-//! Making a faultload that violates a property small: fewer faults, then fewer cycles, then simpler parties and numbers.
+//! Making a faultload that violates a property small: fewer faults, then fewer cycles, then simpler members and numbers.
 //!
 //! Delta debugging (A. Zeller and R. Hildebrandt, *Simplifying and Isolating Failure-Inducing Input*, IEEE Transactions on
 //! Software Engineering 28 (2), 2002) over the injections, and then one simplification after another for as long as one of them
@@ -9,7 +9,7 @@ use std::ops::Range;
 use std::time::Duration;
 
 use understudy_simulator::{Action, Disturbance, Fault};
-use understudy_wire::{Party, Schedule};
+use understudy_wire::{Member, Schedule};
 
 use super::faultload::{Faultload, Injection};
 use super::kind::Role;
@@ -184,7 +184,7 @@ fn candidates(faultload: &Faultload, schedule: &Schedule) -> Vec<Faultload> {
                 }),
         );
     }
-    list.extend(simpler_parties(faultload, schedule));
+    list.extend(simpler_members(faultload, schedule));
     list.retain(|candidate| candidate != faultload && is_possible(candidate));
     list
 }
@@ -318,27 +318,27 @@ fn simpler_networks(disturbance: &Disturbance) -> Vec<Disturbance> {
     list
 }
 
-/// The same with the first parties of each role in place of later ones.
-fn simpler_parties(faultload: &Faultload, schedule: &Schedule) -> Vec<Faultload> {
-    let mut used: BTreeMap<Party, Party> = BTreeMap::new();
+/// The same with the first members of each role in place of later ones.
+fn simpler_members(faultload: &Faultload, schedule: &Schedule) -> Vec<Faultload> {
+    let mut used: BTreeMap<Member, Member> = BTreeMap::new();
     for step in faultload.steps() {
-        used.entry(step.party).or_insert(step.party);
+        used.entry(step.member).or_insert(step.member);
         if let Action::Cut { to } | Action::Heal { to } | Action::Delay { to, .. } = step.action {
             used.entry(to).or_insert(to);
         }
     }
-    let roles = Role::ALL.into_iter().map(|role| role.parties(schedule));
-    let roles: Vec<Vec<Party>> = roles.map(Iterator::collect).collect();
+    let roles = Role::ALL.into_iter().map(|role| role.members(schedule));
+    let roles: Vec<Vec<Member>> = roles.map(Iterator::collect).collect();
     let mut list = Vec::new();
-    for &party in used.keys() {
+    for &member in used.keys() {
         let earlier = roles
             .iter()
-            .filter_map(|role| Some(&role[..role.iter().position(|other| *other == party)?]));
+            .filter_map(|role| Some(&role[..role.iter().position(|other| *other == member)?]));
         for &other in earlier.flatten() {
             // Two that are both used change places.
-            let swap = |which: Party| match which {
-                which if which == party => other,
-                which if which == other => party,
+            let swap = |which: Member| match which {
+                which if which == member => other,
+                which if which == other => member,
                 which => which,
             };
             let mut simpler = faultload.clone();
@@ -347,7 +347,7 @@ fn simpler_parties(faultload: &Faultload, schedule: &Schedule) -> Vec<Faultload>
                 .iter_mut()
                 .flat_map(|injection| &mut injection.steps)
             {
-                step.party = swap(step.party);
+                step.member = swap(step.member);
                 step.action = match step.action {
                     Action::Cut { to } => Action::Cut { to: swap(to) },
                     Action::Heal { to } => Action::Heal { to: swap(to) },
@@ -364,7 +364,7 @@ fn simpler_parties(faultload: &Faultload, schedule: &Schedule) -> Vec<Faultload>
 }
 
 /// Who is struck, in the order of the steps; less is simpler.
-fn rank(faultload: &Faultload) -> Vec<(Party, Option<Party>)> {
+fn rank(faultload: &Faultload) -> Vec<(Member, Option<Member>)> {
     let steps = faultload
         .injections
         .iter()
@@ -372,9 +372,9 @@ fn rank(faultload: &Faultload) -> Vec<(Party, Option<Party>)> {
     steps
         .map(|step| match step.action {
             Action::Cut { to } | Action::Heal { to } | Action::Delay { to, .. } => {
-                (step.party, Some(to))
+                (step.member, Some(to))
             }
-            _ => (step.party, None),
+            _ => (step.member, None),
         })
         .collect()
 }

@@ -23,7 +23,7 @@ pub enum Property {
     Held,
     /// A cycle with fail-safe outputs.
     FailSafe,
-    /// A station, a remote I/O or an understudy that is not in step again 100 cycles after the last fault.
+    /// A station, a remote I/O or an understudy that is not synchronised again 100 cycles after the last fault.
     Unprotected,
 }
 

@@ -2,11 +2,11 @@
 
 use understudy_cluster::press_cell;
 use understudy_simulator::{Action, Fault};
-use understudy_wire::{Party, Source, StationId};
+use understudy_wire::{Member, Source, StationId};
 
 use super::faultload::Injection;
 use super::*;
-use crate::parties::Parties;
+use crate::members::Members;
 use crate::read::read;
 use crate::{Circumstances, JournalState, Scenario, Summary, World, simulate, write};
 
@@ -36,7 +36,7 @@ fn run(plan: &InjectionPlan, threads: usize) -> Findings {
 }
 
 fn scenario(text: &str) -> Scenario {
-    let found = read("small.toml", text, Some(&Parties::of(&cell())));
+    let found = read("small.toml", text, Some(&Members::of(&cell())));
     assert_eq!(found.report.diagnostics, [], "{text}");
     found.scenario.expect("no diagnostics")
 }
@@ -165,7 +165,7 @@ fn a_station_that_stays_away_is_one_crash() {
     let crash = Fault {
         at_cycle: plan.window().end,
         phase: 0.5,
-        party: Party::Station(StationId(1)),
+        member: Member::Station(StationId(1)),
         action: Action::Crash,
     };
     faultload.injections.push(Injection {
@@ -197,14 +197,14 @@ fn a_station_that_stays_away_is_one_crash() {
 fn scenarios_are_written_as_they_are_read() {
     let cell = cell();
     let plan = plan(300, Property::Wrong, &Kind::ALL);
-    let parties = Parties::of(&cell);
+    let members = Members::of(&cell);
     for run in 0..plan.runs {
         let (faultload, seed) = plan.draw(&cell.agreement().schedule, run);
         let title = format!("Run \"{run}\" \\ of\tall");
         let expect = plan.property.expectation();
         let drawn = faultload.scenario(title, plan.cycles, seed, expect);
-        let text = write(&drawn, &parties, &["Of a campaign".to_owned()]);
-        let found = read("drawn.toml", &text, Some(&parties));
+        let text = write(&drawn, &members, &["Of a campaign".to_owned()]);
+        let found = read("drawn.toml", &text, Some(&members));
         assert_eq!(found.report.diagnostics, [], "{text}");
         assert_eq!(found.scenario, Some(drawn), "{text}");
     }

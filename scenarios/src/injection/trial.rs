@@ -1,13 +1,13 @@
-//! One run with one faultload, from a cluster that is already in step.
+//! One run with one faultload, from a cluster that is already synchronised.
 //!
-//! Coming into step on a quiet network draws no random number. So a copy of a cluster in step, given the run's seed, goes on
+//! Coming into step on a quiet network draws no random number. So a copy of a cluster synchronised, given the run's seed, goes on
 //! exactly as a run that started from nothing with that seed: a scenario file repeats what the campaign saw.
 
 use std::cell::RefCell;
 
 use understudy_cluster::Cluster;
 use understudy_simulator::{Network, NotReady, Simulation, Tally, parts};
-use understudy_wire::Party;
+use understudy_wire::Member;
 
 use super::faultload::Faultload;
 use super::property::Property;
@@ -18,10 +18,10 @@ const PATIENCE_CYCLES: u64 = 10_000;
 /// The first cycle in which a fault may strike, so that the frames that a replay repeats are of the run.
 pub(super) const FIRST_CYCLE: u64 = 20;
 
-/// A cluster in step, ready to be copied.
+/// A cluster synchronised, ready to be copied.
 #[derive(Clone)]
 pub(super) struct Bench {
-    in_step: Simulation,
+    synchronised: Simulation,
 }
 
 /// How a run violated its property.
@@ -29,8 +29,8 @@ pub(super) struct Bench {
 pub(super) struct Symptom {
     /// The first cycle in which it did.
     pub(super) cycle: u64,
-    /// At which party; none of all of them.
-    pub(super) party: Option<Party>,
+    /// At which member; none of all of them.
+    pub(super) member: Option<Member>,
     /// In words.
     pub(super) what: String,
 }
@@ -43,9 +43,9 @@ pub(super) struct Outcome {
 
 impl Bench {
     pub(super) fn new(cluster: &Cluster) -> Result<Self, NotReady> {
-        let mut in_step = Simulation::new(parts(cluster), Network::default(), 0);
-        in_step.run(0, PATIENCE_CYCLES, &mut |_, _, _, _| {})?;
-        Ok(Self { in_step })
+        let mut synchronised = Simulation::new(parts(cluster), Network::default(), 0);
+        synchronised.run(0, PATIENCE_CYCLES, &mut |_, _, _, _| {})?;
+        Ok(Self { synchronised })
     }
 
     /// `cycles` cycles under `faultload`, with all chance in the network from `seed`.
@@ -56,7 +56,7 @@ impl Bench {
         seed: u64,
         property: Property,
     ) -> Outcome {
-        let mut simulation = self.in_step.clone();
+        let mut simulation = self.synchronised.clone();
         simulation.reseed(seed);
         if let Some(disturbance) = &faultload.network {
             simulation.disturb(disturbance.clone());
@@ -69,14 +69,14 @@ impl Bench {
         let first: RefCell<Option<Symptom>> = RefCell::new(None);
         simulation.go_on(
             cycles,
-            &mut |_, cycle, party, record| {
+            &mut |_, cycle, member, record| {
                 let mut first = first.borrow_mut();
                 if first.is_none()
                     && let Some(what) = property.violated_by(&record)
                 {
                     *first = Some(Symptom {
                         cycle: cycle.unwrap_or(0),
-                        party: Some(party),
+                        member: Some(member),
                         what,
                     });
                 }
@@ -84,11 +84,11 @@ impl Bench {
             &mut || false,
         );
         let mut symptom = first.into_inner();
-        if property == Property::Unprotected && !simulation.in_step() {
+        if property == Property::Unprotected && !simulation.synchronised() {
             symptom = Some(Symptom {
                 cycle: cycles.saturating_sub(1),
-                party: None,
-                what: "not everybody is in step again".to_owned(),
+                member: None,
+                what: "not everybody is synchronised again".to_owned(),
             });
         }
         Outcome {

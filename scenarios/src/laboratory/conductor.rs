@@ -1,4 +1,4 @@
-//! Who says what is done to the parties of a laboratory, and when its run is over: the steps of a scenario, or chance.
+//! Who says what is done to the members of a laboratory, and when its run is over: the steps of a scenario, or chance.
 
 use std::time::Instant;
 
@@ -11,7 +11,7 @@ pub(crate) trait Conductor {
     /// A record, in the order in which they are read.
     fn hear(&mut self, record: &Record, now: Instant);
 
-    /// `cycle` is the newest that was decided, counted from the origin; none before everybody was in step.
+    /// `cycle` is the newest that was decided, counted from the origin; none before everybody was synchronised.
     fn follow(&mut self, cycle: Option<u64>, now: Instant);
 
     /// When the next thing is due.

@@ -13,7 +13,7 @@ pub enum LaboratoryError {
     /// A process could not be started.
     #[error("U0521: {name} cannot be started ({}): {source}", program.display())]
     Start {
-        /// Which party.
+        /// Which member.
         name: String,
         /// The program that was to run.
         program: PathBuf,
@@ -23,7 +23,7 @@ pub enum LaboratoryError {
     /// A member ended before it was ready, or in a measurement that its end would falsify.
     #[error("U0522: {name} ended unexpectedly ({how}){}", said(.lines))]
     Ended {
-        /// Which party.
+        /// Which member.
         name: String,
         /// Exit status or signal.
         how: String,
@@ -35,18 +35,18 @@ pub enum LaboratoryError {
     NotReady {
         /// How long it was waited for.
         seconds: u64,
-        /// The parties that were not.
+        /// The members that were not.
         names: Vec<String>,
     },
     /// The cluster never came into step.
     #[error(
-        "U0524: the cluster was not in step after {seconds} s; not yet in step: {}",
+        "U0524: the cluster was not synchronised after {seconds} s; not yet synchronised: {}",
         names.join(", ")
     )]
     NotInStep {
         /// How long it was waited for.
         seconds: u64,
-        /// The parties that were not.
+        /// The members that were not.
         names: Vec<String>,
     },
     /// The cycles of the cluster ceased.
@@ -70,7 +70,7 @@ pub enum LaboratoryError {
     /// A process says something that is no record.
     #[error("U0527: {name} says what is no record: {line}")]
     Record {
-        /// Which party.
+        /// Which member.
         name: String,
         /// The line, cut.
         line: String,
@@ -104,7 +104,7 @@ pub enum LaboratoryError {
 }
 
 impl LaboratoryError {
-    /// The stable code, such as `U0522`; a party's own code where it named one.
+    /// The stable code, such as `U0522`; a member's own code where it named one.
     pub fn code(&self) -> &str {
         match self {
             Self::Start { .. } => "U0521",
@@ -146,7 +146,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_code_of_a_party_that_named_one_is_passed_on() {
+    fn the_code_of_a_member_that_named_one_is_passed_on() {
         let check = |line: &str, expected| assert_eq!(code_in(line), expected, "{line}");
         check("error[U0501]: port 7 is in use", Some("U0501"));
         check("U0501: port", Some("U0501"));

@@ -26,8 +26,8 @@ impl RunKeys {
             return Ok(Self { authority: None });
         }
         let now = Date::of(SystemTime::now());
-        let parties = cluster.parties();
-        let names = parties.filter_map(|party| cluster.party_name(party));
+        let members = cluster.members();
+        let names = members.filter_map(|member| cluster.member_name(member));
         let names: Vec<String> = names.map(str::to_owned).collect();
         let made = Self {
             authority: Some(folder),
@@ -40,10 +40,10 @@ impl RunKeys {
         Ok(made)
     }
 
-    /// What the process of a party is told of its keys.
+    /// What the process of a member is told of its keys.
     pub(super) fn arguments(&self, name: &str) -> Vec<PathBuf> {
         let folder = self.authority.as_ref();
-        let folder = folder.map(|folder| folder.join("parties").join(name));
+        let folder = folder.map(|folder| folder.join("members").join(name));
         folder
             .map(|folder| vec![PathBuf::from("--keys"), folder])
             .unwrap_or_default()

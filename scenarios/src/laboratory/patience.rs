@@ -18,7 +18,7 @@ impl Laboratory<'_> {
             },
             None if self.ready.len() < self.processes.len() => Progress::Starting {
                 ready: self.ready.len(),
-                parties: self.processes.len(),
+                members: self.processes.len(),
             },
             None => Progress::ComingIntoStep {
                 names: self.names(self.account.awaited()),
@@ -39,8 +39,8 @@ impl Laboratory<'_> {
         // One that has ended is not waited for: what that means shows in the cycles.
         let living = self.processes.iter().filter(|(_, one)| !one.has_ended());
         let mut lacking = living
-            .map(|(party, _)| *party)
-            .filter(|party| !self.ready.contains(party))
+            .map(|(member, _)| *member)
+            .filter(|member| !self.ready.contains(member))
             .peekable();
         if lacking.peek().is_some() && self.account.cycle().is_none() {
             if over(waits.started, READY_PATIENCE) {

@@ -1,4 +1,4 @@
-//! One party as a process: exactly `understudy node`, `remote-io` or `plant`.
+//! One member as a process: exactly `understudy node`, `remote-io` or `plant`.
 //!
 //! Invariant: no orphan. A process ends when it is told to, when its standard input closes, when the laboratory's process ends
 //! however it ends (PR_SET_PDEATHSIG, which it sets for itself), and when this value is dropped.
@@ -13,7 +13,7 @@ use nix::unistd::Pid;
 use tokio::io::{AsyncBufReadExt, AsyncRead, AsyncWriteExt, BufReader};
 use tokio::process::{Child, ChildStdin, Command};
 use tokio::sync::mpsc::Sender;
-use understudy_wire::Party;
+use understudy_wire::Member;
 
 /// A line that a process says, at most; longer ones are cut by the reader's patience, not by memory.
 const ERROR_LINES: usize = 12;
@@ -21,7 +21,7 @@ const ERROR_LINES: usize = 12;
 /// What a process says.
 #[derive(Debug)]
 pub(super) struct Said {
-    pub(super) party: Party,
+    pub(super) member: Member,
     /// Which of its lives.
     pub(super) life: u32,
     pub(super) what: Saying,
@@ -38,7 +38,7 @@ pub(super) enum Saying {
 /// A running process.
 #[derive(Debug)]
 pub(super) struct Process {
-    party: Party,
+    member: Member,
     life: u32,
     child: Child,
     input: Option<ChildStdin>,
@@ -59,7 +59,7 @@ enum State {
 impl Process {
     /// Starts `command`; everything that it says goes to `said`.
     pub(super) fn start(
-        party: Party,
+        member: Member,
         life: u32,
         mut command: Command,
         said: Sender<Said>,
@@ -81,17 +81,17 @@ impl Process {
                 let mut lines = BufReader::new(output).lines();
                 while let Ok(Some(line)) = lines.next_line().await {
                     let what = Saying::Line(line);
-                    if said.send(Said { party, life, what }).await.is_err() {
+                    if said.send(Said { member, life, what }).await.is_err() {
                         return;
                     }
                 }
             }
             let what = Saying::End(errors.await.unwrap_or_default());
             // Nobody listens any more when the laboratory itself has ended.
-            let _ = said.send(Said { party, life, what }).await;
+            let _ = said.send(Said { member, life, what }).await;
         });
         Ok(Self {
-            party,
+            member,
             life,
             child,
             input,
@@ -103,8 +103,8 @@ impl Process {
         self.life
     }
 
-    pub(super) fn party(&self) -> Party {
-        self.party
+    pub(super) fn member(&self) -> Member {
+        self.member
     }
 
     /// Whether it has neither ended nor been asked to.

@@ -8,7 +8,7 @@ use tokio::process::Command;
 use tokio::sync::mpsc::Receiver;
 use understudy_bus::{Cuts, HostEvent, ZENOH_RUNTIME};
 use understudy_simulator::{Action, Fault};
-use understudy_wire::Party;
+use understudy_wire::Member;
 
 use super::error::LaboratoryError;
 use super::process::{Process, Said, Saying};
@@ -20,58 +20,58 @@ use crate::scenario::action_word;
 const END_PATIENCE: Duration = Duration::from_secs(3);
 
 impl Laboratory<'_> {
-    pub(super) async fn start(&mut self, party: Party) -> Result<(), LaboratoryError> {
-        let name = self.name(party);
+    pub(super) async fn start(&mut self, member: Member) -> Result<(), LaboratoryError> {
+        let name = self.name(member);
         let mut command = Command::new(&self.settings.program);
         command
-            .arg(match party {
-                Party::Station(_) => "node",
-                Party::RemoteIo(_) => "remote-io",
-                Party::Plant(_) => "plant",
+            .arg(match member {
+                Member::Station(_) => "node",
+                Member::RemoteIo(_) => "remote-io",
+                Member::Plant(_) => "plant",
             })
             .arg(&self.settings.cluster_file)
             .args(["--name", &name])
             .arg("--endpoints")
-            .args(self.site.endpoints(party))
+            .args(self.site.endpoints(member))
             .arg("--in-laboratory")
             .args(self.keys.arguments(&name))
             .args(&self.settings.arguments)
             .env(ZENOH_RUNTIME.0, ZENOH_RUNTIME.1);
         let life = self
             .lives
-            .entry(party)
+            .entry(member)
             .and_modify(|life| *life += 1)
             .or_insert(1);
-        let start = || Process::start(party, *life, command, self.sender.clone());
-        let process = self.site.at(party, start)?;
+        let start = || Process::start(member, *life, command, self.sender.clone());
+        let process = self.site.at(member, start)?;
         let mut process = process.map_err(|source| LaboratoryError::Start {
             name,
             program: self.settings.program.clone(),
             source,
         })?;
-        if let Some(cuts) = self.cuts.get(&party) {
+        if let Some(cuts) = self.cuts.get(&member) {
             cut(&mut process, cuts).await;
         }
-        self.processes.insert(party, process);
-        self.recovery.started(party);
-        self.note(RunEvent::Started { party });
+        self.processes.insert(member, process);
+        self.recovery.started(member);
+        self.note(RunEvent::Started { member });
         Ok(())
     }
 
-    pub(super) fn is_running(&self, party: Party) -> bool {
-        self.processes.get(&party).is_some_and(Process::is_running)
+    pub(super) fn is_running(&self, member: Member) -> bool {
+        self.processes.get(&member).is_some_and(Process::is_running)
     }
 
     /// Starts a member that has ended unexpectedly.
-    pub(super) async fn restart(&mut self, party: Party) {
+    pub(super) async fn restart(&mut self, member: Member) {
         let step = Fault {
             at_cycle: self.account.cycle().map_or(0, |cycle| cycle + 1),
             phase: 0.0,
-            party,
+            member,
             action: Action::Restart,
         };
         if let Err(error) = self.do_step(&step).await {
-            let after = self.recovery.ended(party, Instant::now());
+            let after = self.recovery.ended(member, Instant::now());
             self.show_step(format!("{error}; again in {after:?}"));
         }
     }
@@ -83,18 +83,18 @@ impl Laboratory<'_> {
     }
 
     pub(super) async fn hear(&mut self, said: Said) -> Result<(), LaboratoryError> {
-        let Said { party, life, what } = said;
+        let Said { member, life, what } = said;
         match what {
-            Saying::Line(line) => self.read(party, &line),
+            Saying::Line(line) => self.read(member, &line),
             Saying::End(lines) => {
-                let Some(process) = self.processes.get_mut(&party) else {
+                let Some(process) = self.processes.get_mut(&member) else {
                     return Ok(());
                 };
                 if process.life() != life || !process.is_running() {
                     return Ok(());
                 }
                 let status = process.end(END_PATIENCE).await;
-                self.died(party, life, status, lines)
+                self.died(member, life, status, lines)
             }
         }
     }
@@ -102,29 +102,29 @@ impl Laboratory<'_> {
     /// A member has ended unexpectedly.
     fn died(
         &mut self,
-        party: Party,
+        member: Member,
         life: u32,
         status: Option<ExitStatus>,
         lines: Vec<String>,
     ) -> Result<(), LaboratoryError> {
         let how = status.map_or("it closed its output".to_owned(), |it| it.to_string());
         self.note(RunEvent::Ended {
-            party,
+            member,
             how: how.clone(),
             said: lines.clone(),
         });
         self.show_journal();
         // A member that says itself why it cannot work keeps the run from beginning; what a signal does comes from outside.
         let refused = status.is_some_and(|status| status.code().is_some());
-        let never_worked = life == 1 && !self.ready.contains(&party) && refused;
+        let never_worked = life == 1 && !self.ready.contains(&member) && refused;
         if never_worked || self.settings.deaths == Deaths::EndTheRun {
-            let name = self.name(party);
+            let name = self.name(member);
             return Err(LaboratoryError::Ended { name, how, lines });
         }
-        let name = self.name(party);
+        let name = self.name(member);
         let back = match self.settings.deaths {
             Deaths::Restarted => {
-                let after = self.recovery.ended(party, Instant::now());
+                let after = self.recovery.ended(member, Instant::now());
                 format!("it is started again in {after:?}")
             }
             _ => format!(
@@ -136,15 +136,15 @@ impl Laboratory<'_> {
         Ok(())
     }
 
-    fn read(&mut self, party: Party, line: &str) -> Result<(), LaboratoryError> {
+    fn read(&mut self, member: Member, line: &str) -> Result<(), LaboratoryError> {
         let Ok(record) = serde_json::from_str::<Record>(line) else {
             return Err(LaboratoryError::Record {
-                name: self.name(party),
+                name: self.name(member),
                 line: line.chars().take(200).collect(),
             });
         };
         if let Happening::Host(HostEvent::Ready { rights, .. }) = &record.event {
-            self.ready.insert(party);
+            self.ready.insert(member);
             self.machine.extend(rights.lacking.iter().cloned());
         }
         self.take(&record);
@@ -152,8 +152,8 @@ impl Laboratory<'_> {
     }
 
     pub(super) async fn do_step(&mut self, step: &Fault) -> Result<(), LaboratoryError> {
-        let name = self.name(step.party);
-        let running = self.is_running(step.party);
+        let name = self.name(step.member);
+        let running = self.is_running(step.member);
         let cannot = match step.action {
             Action::Restart if running => Some("it runs already"),
             Action::Crash
@@ -172,13 +172,13 @@ impl Laboratory<'_> {
             self.show_step(format!("no {} of {name}: {why}", action_word(step.action)));
             return Ok(());
         }
-        let done = match (step.action, self.processes.get_mut(&step.party)) {
+        let done = match (step.action, self.processes.get_mut(&step.member)) {
             (Action::Restart, _) => {
-                self.start(step.party).await?;
+                self.start(step.member).await?;
                 Ok(())
             }
-            (Action::Cut { to }, _) => self.cut(step.party, to, true).await,
-            (Action::Heal { to }, _) => self.cut(step.party, to, false).await,
+            (Action::Cut { to }, _) => self.cut(step.member, to, true).await,
+            (Action::Heal { to }, _) => self.cut(step.member, to, false).await,
             (Action::Crash, Some(process)) => process.crash().await,
             (Action::Stop, Some(process)) => process.stop(),
             (Action::Continue, Some(process)) => process.go_on(),
@@ -197,7 +197,7 @@ impl Laboratory<'_> {
         })?;
         self.note(RunEvent::Fault {
             action: step.action,
-            party: step.party,
+            member: step.member,
             asked: step.at_cycle,
         });
         (self.watch)(Progress::Step {
@@ -208,7 +208,7 @@ impl Laboratory<'_> {
     }
 
     /// No frame of one member counts for another any more, or each does again.
-    async fn cut(&mut self, from: Party, to: Party, is_cut: bool) -> std::io::Result<()> {
+    async fn cut(&mut self, from: Member, to: Member, is_cut: bool) -> std::io::Result<()> {
         if self.site.cut(from, to, is_cut)? {
             return Ok(());
         }
@@ -226,11 +226,11 @@ impl Laboratory<'_> {
             process.ask_to_end().await;
         }
         let deadline = tokio::time::Instant::now() + END_PATIENCE;
-        let mut living: BTreeSet<(Party, u32)> = self
+        let mut living: BTreeSet<(Member, u32)> = self
             .processes
             .values()
             .filter(|process| !process.has_ended())
-            .map(|process| (process.party(), process.life()))
+            .map(|process| (process.member(), process.life()))
             .collect();
         // What they still say belongs to the journal, and they only end when somebody listens.
         while !living.is_empty() {
@@ -238,10 +238,10 @@ impl Laboratory<'_> {
                 Ok(Some(said)) => match said.what {
                     Saying::Line(line) => {
                         // The run is over; a last line that is cut is none of its failures.
-                        let _ = self.read(said.party, &line);
+                        let _ = self.read(said.member, &line);
                     }
                     Saying::End(_) => {
-                        living.remove(&(said.party, said.life));
+                        living.remove(&(said.member, said.life));
                     }
                 },
                 Ok(None) | Err(_) => break,

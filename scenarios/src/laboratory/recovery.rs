@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use understudy_wire::Party;
+use understudy_wire::Member;
 
 const FIRST: Duration = Duration::from_millis(500);
 /// Shorter than the laboratory waits for a cycle where no remote I/O is left.
@@ -15,8 +15,8 @@ const SETTLED: Duration = Duration::from_secs(30);
 
 #[derive(Debug, Default)]
 pub(super) struct Recovery {
-    due: BTreeMap<Party, Instant>,
-    lives: BTreeMap<Party, Life>,
+    due: BTreeMap<Member, Instant>,
+    lives: BTreeMap<Member, Life>,
 }
 
 /// The last restart of a member.
@@ -29,22 +29,22 @@ struct Life {
 
 impl Recovery {
     /// The member has ended; answers with the time after which it is started again.
-    pub(super) fn ended(&mut self, party: Party, now: Instant) -> Duration {
-        let after = match self.lives.get(&party) {
+    pub(super) fn ended(&mut self, member: Member, now: Instant) -> Duration {
+        let after = match self.lives.get(&member) {
             Some(life) if now.duration_since(life.started) < SETTLED => {
                 (life.after * 2).min(LONGEST)
             }
             _ => FIRST,
         };
         let started = now + after;
-        self.lives.insert(party, Life { started, after });
-        self.due.insert(party, started);
+        self.lives.insert(member, Life { started, after });
+        self.due.insert(member, started);
         after
     }
 
     /// The member was started by someone else: nothing is due any more.
-    pub(super) fn started(&mut self, party: Party) {
-        self.due.remove(&party);
+    pub(super) fn started(&mut self, member: Member) {
+        self.due.remove(&member);
     }
 
     /// Whether a member is still to be started.
@@ -56,11 +56,11 @@ impl Recovery {
         self.due.values().min().copied()
     }
 
-    pub(super) fn take_due(&mut self, now: Instant) -> Option<Party> {
+    pub(super) fn take_due(&mut self, now: Instant) -> Option<Member> {
         let due = self.due.iter().find(|(_, at)| **at <= now);
-        let party = due.map(|(party, _)| *party)?;
-        self.due.remove(&party);
-        Some(party)
+        let member = due.map(|(member, _)| *member)?;
+        self.due.remove(&member);
+        Some(member)
     }
 }
 
@@ -70,7 +70,7 @@ mod tests {
 
     use super::*;
 
-    const PARTY: Party = Party::Station(StationId(1));
+    const MEMBER: Member = Member::Station(StationId(1));
 
     /// Each time the member lives for so many seconds; the answers are the milliseconds that it was down before the next life.
     fn check(lives: &[u64], expected: &[u64]) {
@@ -78,11 +78,11 @@ mod tests {
         let mut now = Instant::now();
         let down = lives.iter().map(|&seconds| {
             now += Duration::from_secs(seconds);
-            let after = recovery.ended(PARTY, now);
+            let after = recovery.ended(MEMBER, now);
             assert_eq!(recovery.next_due(), Some(now + after));
             assert_eq!(recovery.take_due(now), None);
             now += after;
-            assert_eq!(recovery.take_due(now), Some(PARTY));
+            assert_eq!(recovery.take_due(now), Some(MEMBER));
             assert!(!recovery.is_pending());
             after.as_millis() as u64
         });
@@ -103,8 +103,8 @@ mod tests {
     fn a_member_that_was_started_by_hand_is_not_started_again() {
         let mut recovery = Recovery::default();
         let now = Instant::now();
-        recovery.ended(PARTY, now);
-        recovery.started(PARTY);
+        recovery.ended(MEMBER, now);
+        recovery.started(MEMBER);
         assert_eq!(recovery.take_due(now + LONGEST), None);
         assert_eq!(recovery.next_due(), None);
     }

@@ -1,4 +1,4 @@
-//! Where the parties of a laboratory run, and what lies between them.
+//! Where the members of a laboratory run, and what lies between them.
 //!
 //! | hosts | links | a cut is made by |
 //! |---|---|---|
@@ -19,16 +19,16 @@ use understudy_bus::{Endpoints, LinkKind, Peer};
 use understudy_cluster::Cluster;
 use understudy_network::{Hosts, Impairment, NetworkError, Proxy, Route, Share, Transport};
 use understudy_simulator::Network;
-use understudy_wire::{Party, ProgramId};
+use understudy_wire::{Member, ProgramId};
 
 use super::error::LaboratoryError;
 use crate::run_directory::RunDirectory;
 use crate::scenario::Scenario;
 
-/// The port of the first party of a host.
+/// The port of the first member of a host.
 const FIRST_PORT: u16 = 7450;
 
-/// On which hosts the parties run.
+/// On which hosts the members run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum HostKind {
     /// All on this machine, on its loopback interface.
@@ -38,7 +38,7 @@ pub enum HostKind {
     Namespaces,
 }
 
-/// What lies between the parties.
+/// What lies between the members.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct NetworkSettings {
     /// Where they run.
@@ -52,13 +52,13 @@ pub struct NetworkSettings {
 /// Where everybody is.
 #[derive(Debug)]
 pub(super) struct Site {
-    parties: Vec<Party>,
-    endpoints: BTreeMap<Party, PathBuf>,
+    members: Vec<Member>,
+    endpoints: BTreeMap<Member, PathBuf>,
     hosts: Option<Hosts>,
-    host_of: BTreeMap<Party, usize>,
+    host_of: BTreeMap<Member, usize>,
     proxy: Option<Proxy>,
     /// From whom to whom, and the place of the route in the proxy.
-    routes: BTreeMap<(Party, Party), usize>,
+    routes: BTreeMap<(Member, Member), usize>,
     /// The address of each route that a member is given for another member's.
     stand_ins: Vec<SocketAddr>,
     impairment: Impairment,
@@ -74,13 +74,13 @@ impl Site {
         directory: &RunDirectory,
     ) -> Result<Self, LaboratoryError> {
         let system = |what| move |source| LaboratoryError::System { what, source };
-        let parties: Vec<Party> = cluster.parties().collect();
+        let members: Vec<Member> = cluster.members().collect();
         let impairment = if settings.impairment.is_none() {
             scenario.network.map_or(settings.impairment, impairment_of)
         } else {
             settings.impairment
         };
-        let host_of = hosts_of(&parties);
+        let host_of = hosts_of(&members);
         let mut hosts = match settings.hosts {
             HostKind::Loopback => None,
             HostKind::Namespaces => Some(Hosts::build(&host_names(cluster, &host_of))?),
@@ -88,15 +88,15 @@ impl Site {
         let addresses = match &hosts {
             None => loopback_addresses(cluster)
                 .map_err(system("free ports of the loopback interface"))?,
-            Some(hosts) => namespace_addresses(&parties, &host_of, hosts),
+            Some(hosts) => namespace_addresses(&members, &host_of, hosts),
         };
-        let peers: Vec<Peer> = parties
+        let peers: Vec<Peer> = members
             .iter()
             .zip(addresses)
-            .filter_map(|(&party, address)| {
+            .filter_map(|(&member, address)| {
                 Some(Peer {
-                    party,
-                    name: cluster.party_name(party)?.to_owned(),
+                    member,
+                    name: cluster.member_name(member)?.to_owned(),
                     address,
                 })
             })
@@ -104,8 +104,11 @@ impl Site {
         let list = directory.file("endpoints.json");
         write_list(&list, &peers).map_err(system("to write endpoints.json"))?;
         let mut site = Self {
-            endpoints: parties.iter().map(|&party| (party, list.clone())).collect(),
-            parties,
+            endpoints: members
+                .iter()
+                .map(|&member| (member, list.clone()))
+                .collect(),
+            members,
             hosts: None,
             host_of,
             proxy: None,
@@ -128,29 +131,33 @@ impl Site {
                 let feeds = feeds(cluster);
                 site.route(cluster, &feeds, link, &peers, hosts.as_ref(), settings.seed)?;
                 site.write_views(&peers, directory)
-                    .map_err(system("to write the endpoints of each party"))?;
+                    .map_err(system("to write the endpoints of each member"))?;
             }
         }
         site.hosts = hosts;
         Ok(site)
     }
 
-    /// Starts something where the party runs.
-    pub(super) fn at<T>(&self, party: Party, work: impl FnOnce() -> T) -> Result<T, NetworkError> {
-        match (&self.hosts, self.host_of.get(&party)) {
+    /// Starts something where the member runs.
+    pub(super) fn at<T>(
+        &self,
+        member: Member,
+        work: impl FnOnce() -> T,
+    ) -> Result<T, NetworkError> {
+        match (&self.hosts, self.host_of.get(&member)) {
             (Some(hosts), Some(&host)) => hosts.within(host, work),
             _ => Ok(work()),
         }
     }
 
-    /// The file in which the party finds the others.
-    pub(super) fn endpoints(&self, party: Party) -> Option<&Path> {
-        self.endpoints.get(&party).map(PathBuf::as_path)
+    /// The file in which the member finds the others.
+    pub(super) fn endpoints(&self, member: Member) -> Option<&Path> {
+        self.endpoints.get(&member).map(PathBuf::as_path)
     }
 
     /// Lets no frame of one member through to another any more, or each again. False where nothing between them can do that, so that the
     /// receiver has to drop them.
-    pub(super) fn cut(&mut self, from: Party, to: Party, cut: bool) -> io::Result<bool> {
+    pub(super) fn cut(&mut self, from: Member, to: Member, cut: bool) -> io::Result<bool> {
         let places = (self.host_of.get(&from), self.host_of.get(&to));
         match (&mut self.hosts, &self.proxy, places) {
             (Some(hosts), None, (Some(&from), Some(&to))) if from != to => {
@@ -198,19 +205,19 @@ impl Site {
         for first in peers {
             let own = Endpoints::new(
                 cluster.agreement().cluster,
-                first.party,
+                first.member,
                 peers.to_vec(),
                 feeds.to_vec(),
             );
             let own = own.map_err(LaboratoryError::Endpoints)?;
             for second in peers {
                 // A session goes both ways, and is opened by the later of the two.
-                let opens = link == LinkKind::Udp || second.party < first.party;
-                if !opens || !own.talks_with(second.party) {
+                let opens = link == LinkKind::Udp || second.member < first.member;
+                if !opens || !own.talks_with(second.member) {
                     continue;
                 }
                 self.routes
-                    .insert((first.party, second.party), routes.len());
+                    .insert((first.member, second.member), routes.len());
                 routes.push(Route {
                     listen: SocketAddr::new(IpAddr::V4(host), 0),
                     to: link
@@ -246,7 +253,7 @@ impl Site {
         Ok(())
     }
 
-    /// What each party is told of the others.
+    /// What each member is told of the others.
     fn write_views(&mut self, peers: &[Peer], directory: &RunDirectory) -> io::Result<()> {
         let folder = directory.file("endpoints");
         std::fs::create_dir_all(&folder)?;
@@ -254,7 +261,7 @@ impl Site {
             let view: Vec<Peer> = peers
                 .iter()
                 .map(|peer| {
-                    let route = self.routes.get(&(own.party, peer.party));
+                    let route = self.routes.get(&(own.member, peer.member));
                     let stands_for = route.and_then(|&route| self.stand_ins.get(route));
                     Peer {
                         address: stands_for.copied().unwrap_or(peer.address),
@@ -264,16 +271,16 @@ impl Site {
                 .collect();
             let path = folder.join(format!("{}.json", own.name));
             write_list(&path, &view)?;
-            self.endpoints.insert(own.party, path);
+            self.endpoints.insert(own.member, path);
         }
         Ok(())
     }
 
     fn pairs_of_hosts(&self) -> Vec<(usize, usize)> {
         let count = self
-            .parties
+            .members
             .iter()
-            .filter_map(|party| self.host_of.get(party));
+            .filter_map(|member| self.host_of.get(member));
         let count = count.max().map_or(0, |last| last + 1);
         let pairs = (0..count).flat_map(|from| (0..count).map(move |to| (from, to)));
         pairs.filter(|(from, to)| from != to).collect()
@@ -294,25 +301,25 @@ fn impairment_of(network: Network) -> Impairment {
 }
 
 /// A station has a host of its own; a plant stands beside its remote I/O.
-fn hosts_of(parties: &[Party]) -> BTreeMap<Party, usize> {
+fn hosts_of(members: &[Member]) -> BTreeMap<Member, usize> {
     let mut host_of = BTreeMap::new();
-    for &party in parties {
-        let beside = match party {
-            Party::Plant(program) => host_of.get(&Party::RemoteIo(program)).copied(),
-            Party::Station(_) | Party::RemoteIo(_) => None,
+    for &member in members {
+        let beside = match member {
+            Member::Plant(program) => host_of.get(&Member::RemoteIo(program)).copied(),
+            Member::Station(_) | Member::RemoteIo(_) => None,
         };
         let next = host_of.values().max().map_or(0, |last: &usize| last + 1);
-        host_of.insert(party, beside.unwrap_or(next));
+        host_of.insert(member, beside.unwrap_or(next));
     }
     host_of
 }
 
-fn host_names(cluster: &Cluster, host_of: &BTreeMap<Party, usize>) -> Vec<String> {
+fn host_names(cluster: &Cluster, host_of: &BTreeMap<Member, usize>) -> Vec<String> {
     let count = host_of.values().max().map_or(0, |last| last + 1);
     let first = |host| host_of.iter().find(|(_, found)| **found == host);
     (0..count)
         .filter_map(first)
-        .filter_map(|(&party, _)| cluster.party_name(party))
+        .filter_map(|(&member, _)| cluster.member_name(member))
         .map(str::to_owned)
         .collect()
 }
@@ -320,8 +327,8 @@ fn host_names(cluster: &Cluster, host_of: &BTreeMap<Party, usize>) -> Vec<String
 /// From the cluster file, or free ones of the loopback interface.
 fn loopback_addresses(cluster: &Cluster) -> io::Result<Vec<SocketAddr>> {
     let known: Vec<Option<SocketAddr>> = cluster
-        .parties()
-        .map(|party| cluster.address(party))
+        .members()
+        .map(|member| cluster.address(member))
         .collect();
     let lacking = known.iter().filter(|address| address.is_none()).count();
     let mut free = understudy_bus::free_addresses(lacking)?.into_iter();
@@ -332,15 +339,15 @@ fn loopback_addresses(cluster: &Cluster) -> io::Result<Vec<SocketAddr>> {
 }
 
 fn namespace_addresses(
-    parties: &[Party],
-    host_of: &BTreeMap<Party, usize>,
+    members: &[Member],
+    host_of: &BTreeMap<Member, usize>,
     hosts: &Hosts,
 ) -> Vec<SocketAddr> {
     let mut used: BTreeMap<usize, u16> = BTreeMap::new();
-    parties
+    members
         .iter()
-        .filter_map(|party| {
-            let host = *host_of.get(party)?;
+        .filter_map(|member| {
+            let host = *host_of.get(member)?;
             let port = used.entry(host).or_insert(FIRST_PORT);
             *port += 1;
             let address = hosts.hosts().get(host)?.address();
@@ -369,15 +376,15 @@ mod tests {
 
     #[test]
     fn a_plant_stands_beside_its_remote_io() {
-        let parties = [
-            Party::Station(StationId(0)),
-            Party::Station(StationId(1)),
-            Party::RemoteIo(ProgramId(0)),
-            Party::RemoteIo(ProgramId(1)),
-            Party::Plant(ProgramId(1)),
+        let members = [
+            Member::Station(StationId(0)),
+            Member::Station(StationId(1)),
+            Member::RemoteIo(ProgramId(0)),
+            Member::RemoteIo(ProgramId(1)),
+            Member::Plant(ProgramId(1)),
         ];
-        let host_of = hosts_of(&parties);
-        let places: Vec<usize> = parties.iter().map(|party| host_of[party]).collect();
+        let host_of = hosts_of(&members);
+        let places: Vec<usize> = members.iter().map(|member| host_of[member]).collect();
         assert_eq!(places, [0, 1, 2, 3, 3]);
     }
 }

@@ -93,7 +93,7 @@ impl Conductor for Steps {
 #[cfg(test)]
 mod tests {
     use understudy_simulator::Action;
-    use understudy_wire::{Party, StationId};
+    use understudy_wire::{Member, StationId};
 
     use super::*;
 
@@ -108,7 +108,7 @@ mod tests {
                 .map(|&(at_cycle, phase)| Fault {
                     at_cycle,
                     phase,
-                    party: Party::Station(StationId(0)),
+                    member: Member::Station(StationId(0)),
                     action: Action::Crash,
                 })
                 .collect(),

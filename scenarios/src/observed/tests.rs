@@ -7,24 +7,24 @@ use crate::outlook::look_ahead;
 
 const MILLISECOND: u64 = 1_000_000;
 
-/// A record of a party, its time in milliseconds.
-fn of(ms: u64, party: Party, event: Happening) -> Record {
+/// A record of a member, its time in milliseconds.
+fn of(ms: u64, member: Member, event: Happening) -> Record {
     Record {
         at_ns: ms * MILLISECOND,
         name: String::new(),
-        party: Some(party),
+        member: Some(member),
         event,
     }
 }
 
-fn spoke(ms: u64, rank: u8) -> Record {
-    let event = StationEvent::Spoke {
+fn published(ms: u64, rank: u8) -> Record {
+    let event = StationEvent::Published {
         moment: Moment::default(),
         words: Default::default(),
     };
     of(
         ms,
-        Party::Station(StationId(rank)),
+        Member::Station(StationId(rank)),
         Happening::Station(event),
     )
 }
@@ -36,7 +36,7 @@ fn flagged(ms: u64, rank: u8) -> Record {
     };
     of(
         ms,
-        Party::RemoteIo(ProgramId(0)),
+        Member::RemoteIo(ProgramId(0)),
         Happening::RemoteIo(event),
     )
 }
@@ -48,7 +48,7 @@ fn stalled(ms: u64) -> Record {
     };
     of(
         ms,
-        Party::RemoteIo(ProgramId(1)),
+        Member::RemoteIo(ProgramId(1)),
         Happening::RemoteIo(event),
     )
 }
@@ -65,7 +65,7 @@ fn applied(ms: u64, program: u8, source: Source) -> Record {
     };
     of(
         ms,
-        Party::RemoteIo(ProgramId(program)),
+        Member::RemoteIo(ProgramId(program)),
         Happening::RemoteIo(event),
     )
 }
@@ -73,7 +73,7 @@ fn applied(ms: u64, program: u8, source: Source) -> Record {
 fn killed(ms: u64, rank: u8) -> Record {
     let event = RunEvent::Fault {
         action: Action::Crash,
-        party: Party::Station(StationId(rank)),
+        member: Member::Station(StationId(rank)),
         asked: 0,
     };
     Record::of_run(ms * MILLISECOND, event)
@@ -81,7 +81,7 @@ fn killed(ms: u64, rank: u8) -> Record {
 
 fn ended(ms: u64, rank: u8) -> Record {
     let event = RunEvent::Ended {
-        party: Party::Station(StationId(rank)),
+        member: Member::Station(StationId(rank)),
         how: "signal: 9 (SIGKILL)".to_owned(),
         said: Vec::new(),
     };
@@ -91,9 +91,9 @@ fn ended(ms: u64, rank: u8) -> Record {
 /// Two controllers and an understudy that speak until one second, and `more`.
 fn view(more: Vec<Record>) -> JournalView {
     let mut records = vec![
-        spoke(0, 0),
-        spoke(1, 1),
-        spoke(2, 2),
+        published(0, 0),
+        published(1, 1),
+        published(2, 2),
         applied(7, 0, Source::Direct),
         applied(7, 1, Source::Direct),
     ];
@@ -109,14 +109,22 @@ fn milliseconds(hours: f64) -> f64 {
 #[test]
 fn a_station_whose_process_ended_unexpectedly_failed_then() {
     let steps = |taken: fn(u64, u8) -> Record| {
-        view(vec![taken(2_002, 0), flagged(2_032, 0), spoke(2_532, 0)])
+        view(vec![
+            taken(2_002, 0),
+            flagged(2_032, 0),
+            published(2_532, 0),
+        ])
     };
     assert_eq!(steps(ended), steps(killed));
 }
 
 #[test]
 fn a_killed_station_failed_when_it_was_killed_and_is_repaired_when_it_speaks() {
-    let found = view(vec![killed(2_002, 0), flagged(2_032, 0), spoke(2_532, 0)]);
+    let found = view(vec![
+        killed(2_002, 0),
+        flagged(2_032, 0),
+        published(2_532, 0),
+    ]);
     let observed = &found.observed;
     assert_eq!((found.controllers, found.understudies), (2, 1));
     assert_eq!(milliseconds(observed.hours), 10_000.0);
@@ -132,8 +140,8 @@ fn a_killed_station_failed_when_it_was_killed_and_is_repaired_when_it_speaks() {
 }
 
 #[test]
-fn one_that_nobody_killed_failed_when_it_last_spoke() {
-    let found = view(vec![spoke(3_002, 1), flagged(3_042, 1)]);
+fn one_that_nobody_killed_failed_when_it_last_published() {
+    let found = view(vec![published(3_002, 1), flagged(3_042, 1)]);
     assert_eq!(milliseconds(found.observed.failures_at[0]), 3_000.0);
     assert_eq!(milliseconds(found.observed.detection_hours[0]), 40.0);
     assert_eq!(found.observed.repairs, 0);
@@ -142,7 +150,7 @@ fn one_that_nobody_killed_failed_when_it_last_spoke() {
 
 #[test]
 fn a_silence_beside_a_stall_is_no_failure() {
-    let found = view(vec![flagged(3_000, 1), stalled(3_050), spoke(3_060, 1)]);
+    let found = view(vec![flagged(3_000, 1), stalled(3_050), published(3_060, 1)]);
     assert_eq!((found.observed.failures_at.len(), found.stalls), (0, 1));
 }
 
@@ -179,7 +187,7 @@ fn a_journal_without_a_whole_cluster_or_with_a_broken_line_says_so() {
     };
     assert!(refused(Vec::new()).contains("all"));
     let silent = refused(vec![
-        spoke(1, 0),
+        published(1, 0),
         flagged(2, 2),
         applied(3, 0, Source::Direct),
     ]);
@@ -202,7 +210,11 @@ fn the_hours_to_come_take_a_repair_from_the_journal_or_from_the_user() {
     let given = look_ahead(undisturbed(), Mode::Full, hours("1s"), Some(hours("1s")));
     let given = given.expect("an outlook");
     assert!(given.outlook.reliability.estimate.is_some_and(|r| r > 0.8));
-    let seen = view(vec![killed(2_002, 0), flagged(2_032, 0), spoke(2_532, 0)]);
+    let seen = view(vec![
+        killed(2_002, 0),
+        flagged(2_032, 0),
+        published(2_532, 0),
+    ]);
     let found = look_ahead(seen, Mode::Full, hours("10s"), None).expect("an outlook");
     insta::assert_snapshot!(found.to_text());
 }

@@ -158,7 +158,7 @@ mod tests {
     use std::io::{BufRead, BufReader, Write};
     use std::os::unix::net::UnixStream as Stream;
 
-    use understudy_wire::{Party, StationId};
+    use understudy_wire::{Member, StationId};
 
     use super::super::{Acknowledgement, Command, commands};
     use super::*;
@@ -222,9 +222,9 @@ mod tests {
         }
         let there = Commander::of_run(run.clone());
         let asked = runtime.block_on(async {
-            let party = Party::Station(StationId(0));
+            let member = Member::Station(StationId(0));
             let by = ("anna".to_owned(), "to see it".to_owned());
-            let cut = there.give(party, Command::Isolate, by.0, by.1).await;
+            let cut = there.give(member, Command::Isolate, by.0, by.1).await;
             (there.acknowledge(seen()).await, cut)
         });
         let refused = Refusal::Said(Refusal::Down("robot".to_owned()).to_string());

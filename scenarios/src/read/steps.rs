@@ -8,7 +8,7 @@ use understudy_diagnostic::Diagnostic;
 use understudy_diagnostic::spelling::suggestion;
 use understudy_form::{Fields, Placed};
 use understudy_simulator::{Action, Fault};
-use understudy_wire::{Party, ProgramId, StateChoice};
+use understudy_wire::{Member, ProgramId, StateChoice};
 
 use super::{ANY, MAXIMUM_NUMBER, MAXIMUM_STEPS, Reader, SHARE};
 use crate::scenario::{ACTIONS, action_word};
@@ -25,10 +25,10 @@ const KEYS_OF_ACTIONS: [&str; 8] = [
     "epoch",
 ];
 
-/// How late a slow party is, at most.
+/// How late a slow member is, at most.
 const MAXIMUM_SLOWNESS: Duration = Duration::from_secs(1);
 
-/// A step with the name of its party. One step of a file may be several: a cut to many, or both ways.
+/// A step with the name of its member. One step of a file may be several: a cut to many, or both ways.
 type Step = Placed<(Vec<Fault>, String)>;
 
 impl Reader<'_> {
@@ -86,49 +86,49 @@ impl Reader<'_> {
             }
             known
         });
-        let party = station.as_ref().and_then(|name| self.party(name));
+        let member = station.as_ref().and_then(|name| self.member(name));
         let actions = match (word, &station) {
-            (Some(word), Some(name)) => self.actions(word, &mut fields, party, name),
+            (Some(word), Some(name)) => self.actions(word, &mut fields, member, name),
             _ => {
                 fields.ignore(&KEYS_OF_ACTIONS);
                 None
             }
         };
         fields.finish(&mut self.diagnostics);
-        let (party, at_cycle) = (party?, at?.value);
+        let (member, at_cycle) = (member?, at?.value);
         let phase = phase.map_or(0.0, |phase| phase.value);
         let faults = actions?.into_iter().map(|(by, action)| Fault {
             at_cycle,
             phase,
-            party: by.unwrap_or(party),
+            member: by.unwrap_or(member),
             action,
         });
         let value = (faults.collect(), station?.value.to_owned());
         Some(Placed { value, span })
     }
 
-    /// What an action is in full: each with the party that does it, where that is another one than the step names.
+    /// What an action is in full: each with the member that does it, where that is another one than the step names.
     fn actions(
         &mut self,
         word: &'static str,
         fields: &mut Fields<'_, '_>,
-        party: Option<Party>,
+        member: Option<Member>,
         station: &Placed<&str>,
-    ) -> Option<Vec<(Option<Party>, Action)>> {
+    ) -> Option<Vec<(Option<Member>, Action)>> {
         let one = |action| Some(vec![(None, action)]);
-        let any = |_: Party| true;
-        let in_cluster = |party: Party| !matches!(party, Party::Plant(_));
-        let of_remote_io = |party: Party| matches!(party, Party::RemoteIo(_));
-        let of_station = |party: Party| matches!(party, Party::Station(_));
-        let (fits, wanted): (fn(Party) -> bool, &str) = match word {
+        let any = |_: Member| true;
+        let in_cluster = |member: Member| !matches!(member, Member::Plant(_));
+        let of_remote_io = |member: Member| matches!(member, Member::RemoteIo(_));
+        let of_station = |member: Member| matches!(member, Member::Station(_));
+        let (fits, wanted): (fn(Member) -> bool, &str) = match word {
             "crash" | "restart" | "stop" | "continue" => (any, ""),
             "release" | "cold-start" | "accept-state" => (of_remote_io, "names a remote I/O"),
             "flip-state" | "flip-word" => (of_station, "names a controller or an understudy"),
             _ => (in_cluster, "names a station or a remote I/O, and no plant"),
         };
-        if let Some(party) = party.filter(|&party| !fits(party)) {
+        if let Some(member) = member.filter(|&member| !fits(member)) {
             let name = station.value;
-            let message = match (word, party) {
+            let message = match (word, member) {
                 ("release" | "cold-start" | "accept-state", _) => {
                     format!("`{name}` is not a remote I/O: `{word}` concerns its outputs")
                 }
@@ -162,11 +162,11 @@ impl Reader<'_> {
             "slow" => one(Action::Slow {
                 by: self.slowness(fields)?,
             }),
-            "cut" => self.cut(fields, party, |to| Action::Cut { to }),
-            "heal" => self.cut(fields, party, |to| Action::Heal { to }),
+            "cut" => self.cut(fields, member, |to| Action::Cut { to }),
+            "heal" => self.cut(fields, member, |to| Action::Heal { to }),
             "delay" => {
                 let by = self.slowness(fields);
-                let links = self.cut(fields, party, |to| Action::Delay {
+                let links = self.cut(fields, member, |to| Action::Delay {
                     to,
                     by: by.unwrap_or_default(),
                 });
@@ -180,7 +180,7 @@ impl Reader<'_> {
                 age: self.number(fields, "age", 1)?,
             }),
             "flip-state" => {
-                let program = self.program(fields, party);
+                let program = self.program(fields, member);
                 let bit = self.number(fields, "bit", 0)?;
                 one(Action::FlipState {
                     program: program?,
@@ -222,21 +222,21 @@ impl Reader<'_> {
         fields.time("by", bounds, &mut self.diagnostics)
     }
 
-    /// One action for each party that is named by `to`, or for all others where nobody is; with `both_ways`, one for each of
+    /// One action for each member that is named by `to`, or for all others where nobody is; with `both_ways`, one for each of
     /// them as well.
     fn cut(
         &mut self,
         fields: &mut Fields<'_, '_>,
-        party: Option<Party>,
-        action: impl Fn(Party) -> Action,
-    ) -> Option<Vec<(Option<Party>, Action)>> {
+        member: Option<Member>,
+        action: impl Fn(Member) -> Action,
+    ) -> Option<Vec<(Option<Member>, Action)>> {
         let names = fields.texts("to", &mut self.diagnostics);
         let both_ways = fields.flag("both_ways", &mut self.diagnostics);
         let both_ways = both_ways.unwrap_or(false);
         let mut peers = Vec::new();
         for name in &names {
-            match self.party(name) {
-                Some(peer @ (Party::Station(_) | Party::RemoteIo(_))) if Some(peer) != party => {
+            match self.member(name) {
+                Some(peer @ (Member::Station(_) | Member::RemoteIo(_))) if Some(peer) != member => {
                     peers.push(peer);
                 }
                 Some(_) => {
@@ -249,13 +249,13 @@ impl Reader<'_> {
                 None => {}
             }
         }
-        let party = party?;
+        let member = member?;
         if names.is_empty() {
-            let all = self.parties?.iter().map(|(peer, _)| peer);
-            peers.extend(all.filter(|&peer| peer != party && !matches!(peer, Party::Plant(_))));
+            let all = self.members?.iter().map(|(peer, _)| peer);
+            peers.extend(all.filter(|&peer| peer != member && !matches!(peer, Member::Plant(_))));
         }
         let there = peers.iter().map(|&peer| (None, action(peer)));
-        let back = peers.iter().map(|&peer| (Some(peer), action(party)));
+        let back = peers.iter().map(|&peer| (Some(peer), action(member)));
         let both = there
             .clone()
             .chain(back.take(if both_ways { peers.len() } else { 0 }));
@@ -263,23 +263,27 @@ impl Reader<'_> {
     }
 
     /// The program whose state it is: named by its controller; a controller's own where the step does not say.
-    fn program(&mut self, fields: &mut Fields<'_, '_>, party: Option<Party>) -> Option<ProgramId> {
+    fn program(
+        &mut self,
+        fields: &mut Fields<'_, '_>,
+        member: Option<Member>,
+    ) -> Option<ProgramId> {
         let named = fields.text("program", &mut self.diagnostics);
-        let programs = self.parties?.remote_ios().count();
-        let controller = |party: Option<Party>| match party {
-            Some(Party::Station(station)) if station.index() < programs => {
+        let programs = self.members?.remote_ios().count();
+        let controller = |member: Option<Member>| match member {
+            Some(Member::Station(station)) if station.index() < programs => {
                 Some(ProgramId(station.0))
             }
             _ => None,
         };
         let (asked, place) = match named {
-            Some(name) => (self.party(&name), name.span),
-            None => (party, fields.span()),
+            Some(name) => (self.member(&name), name.span),
+            None => (member, fields.span()),
         };
         let program = controller(asked);
         if program.is_none() && asked.is_some() {
             let message = "whose state is it? `program` names a controller".to_owned();
-            let names = self.parties?.stations().take(programs);
+            let names = self.members?.stations().take(programs);
             let help = suggestion("", names.map(|(_, name)| name));
             self.diagnostics
                 .push(Diagnostic::error("U0309", message, place).with_help(help));

@@ -70,7 +70,7 @@ pub(crate) struct Bench {
     /// What the program saw of each channel last.
     seen: Vec<bool>,
     /// What went wrong so far.
-    pub(crate) mishaps: Vec<String>,
+    pub(crate) plant_faults: Vec<String>,
     pub(crate) finished: u32,
     pub(crate) scans: u32,
 }
@@ -88,7 +88,7 @@ impl Bench {
             diagnosis: lower(outcome.diagnosis.as_ref().expect("it was asked for")),
             channels: channels.collect(),
             seen: vec![false; project.channels.len()],
-            mishaps: Vec::new(),
+            plant_faults: Vec::new(),
             finished: 0,
             scans: 0,
         }
@@ -149,8 +149,8 @@ impl Bench {
 
     /// What must not happen to a box.
     fn watch(&mut self) {
-        if self.plant.get("mishap") {
-            self.mishaps
+        if self.plant.get("plant_fault") {
+            self.plant_faults
                 .push(format!("scan {}: filled beside the box", self.scans));
         }
         self.finished += u32::from(self.plant.get("finished"));

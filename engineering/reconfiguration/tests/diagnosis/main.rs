@@ -25,7 +25,7 @@ fn nobody_is_accused_while_all_is_well() {
                 );
             }
         }
-        assert_eq!(bench.mishaps, Vec::<String>::new());
+        assert_eq!(bench.plant_faults, Vec::<String>::new());
         assert!(bench.finished > 20, "{} boxes", bench.finished);
     }
 }
@@ -45,7 +45,7 @@ struct Came {
     others_accused: bool,
     /// Boxes after the operator has looked and released.
     finished: u32,
-    mishaps: Vec<String>,
+    plant_faults: Vec<String>,
 }
 
 /// The operator looks and releases, and presses Ready.
@@ -60,7 +60,7 @@ fn suffer(bench: &Bench, channels: &[&str], fault: &Fault<'_>) -> Came {
         believed_again: None,
         others_accused: false,
         finished: 0,
-        mishaps: Vec::new(),
+        plant_faults: Vec::new(),
     };
     for scan in 0..ENDS {
         let sensor = |name: &str, shown: bool| {
@@ -85,7 +85,7 @@ fn suffer(bench: &Bench, channels: &[&str], fault: &Fault<'_>) -> Came {
         }
     }
     came.finished = bench.finished - came.finished;
-    came.mishaps = bench.mishaps;
+    came.plant_faults = bench.plant_faults;
     came
 }
 
@@ -138,7 +138,7 @@ fn a_stuck_channel_is_found_before_anything_goes_wrong() {
                     again.is_some_and(|scan| scan >= 300),
                     "{what}: believed in {again:?}"
                 );
-                assert_eq!(came.mishaps, Vec::<String>::new(), "{what}");
+                assert_eq!(came.plant_faults, Vec::<String>::new(), "{what}");
                 assert!(
                     came.finished >= 2,
                     "{what}: {} boxes after it",
@@ -172,7 +172,7 @@ fn a_channel_that_flickers_is_found_and_believed_again() {
             );
             assert!(!came.others_accused, "{what}");
             assert!(came.believed_again.is_some_and(|scan| scan > 30), "{what}");
-            assert_eq!(came.mishaps, Vec::<String>::new(), "{what}");
+            assert_eq!(came.plant_faults, Vec::<String>::new(), "{what}");
             assert!(
                 came.finished >= 2,
                 "{what}: {} boxes after it",
@@ -197,6 +197,6 @@ fn what_fails_too_often_waits_for_the_operator() {
         },
     );
     assert_eq!(came.believed_again, Some(LOOKS));
-    assert_eq!(came.mishaps, Vec::<String>::new());
+    assert_eq!(came.plant_faults, Vec::<String>::new());
     assert!(came.finished >= 2, "{} boxes", came.finished);
 }

@@ -2,7 +2,7 @@
 //!
 //! The conditions are those of Ramadge and Wonham (controllability, nonblocking), of Dietrich, Malik, Wonham and Brandin,
 //! "Implementation considerations in supervisory control" (confluence, bounded response, nonblocking under control), and of
-//! Fabian and Hellgren (avalanche, simultaneous events). All are decided on the closed loop: the automata in step.
+//! Fabian and Hellgren (avalanche, simultaneous events). All are decided on the closed loop: the automata synchronised.
 
 mod closed_loop;
 mod conditions;

@@ -2,7 +2,7 @@
 //! even where one link was broken until then.
 
 use understudy_simulator::Tally;
-use understudy_wire::Party;
+use understudy_wire::Member;
 
 use super::{Promise, Property};
 
@@ -12,7 +12,7 @@ pub(super) const PROPERTY: Property = Property {
     holds: |model, world| {
         let used = &world.used;
         let quiet = used.losses + used.delays + used.duplicates == 0;
-        let one_station = matches!(world.was_down.as_slice(), [] | [Party::Station(_)]);
+        let one_station = matches!(world.was_down.as_slice(), [] | [Member::Station(_)]);
         let untrue = |tally: &Tally| tally.held + tally.fail_safe > 0;
         let links = model.start.broken.len() <= 1;
         !(quiet && links && one_station && world.simulation.tallies().iter().any(untrue))

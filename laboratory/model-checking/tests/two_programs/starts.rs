@@ -1,37 +1,37 @@
-//! Runs that do not begin in step: everybody or some have just restarted, or stood still for a cycle, and something more happens.
+//! Runs that do not begin synchronised: everybody or some have just restarted, or stood still for a cycle, and something more happens.
 
 use understudy_model_checking::{Budget, Start};
-use understudy_wire::{Party, ProgramId, StationId};
+use understudy_wire::{Member, ProgramId, StationId};
 
 use crate::{NONE, ONE, check_from};
 
-const STATIONS: [Party; 3] = [station(0), station(1), station(2)];
-const REMOTE_IOS: [Party; 2] = [remote_io(0), remote_io(1)];
+const STATIONS: [Member; 3] = [station(0), station(1), station(2)];
+const REMOTE_IOS: [Member; 2] = [remote_io(0), remote_io(1)];
 
-const fn station(rank: u8) -> Party {
-    Party::Station(StationId(rank))
+const fn station(rank: u8) -> Member {
+    Member::Station(StationId(rank))
 }
 
-const fn remote_io(program: u8) -> Party {
-    Party::RemoteIo(ProgramId(program))
+const fn remote_io(program: u8) -> Member {
+    Member::RemoteIo(ProgramId(program))
 }
 
-fn restarted(parties: &[Party]) -> Start {
+fn restarted(members: &[Member]) -> Start {
     Start {
-        restarted: parties.to_vec(),
+        restarted: members.to_vec(),
         ..Start::default()
     }
 }
 
-fn behind(party: Party) -> Start {
+fn behind(member: Member) -> Start {
     Start {
-        behind: vec![party],
+        behind: vec![member],
         ..Start::default()
     }
 }
 
 /// Anything once, and a crash besides, after links were broken for longer than the history of a sample.
-fn check_broken(broken: &[(Party, Party)], states: usize) {
+fn check_broken(broken: &[(Member, Member)], states: usize) {
     let start = Start {
         broken: broken.to_vec(),
         ..Start::default()
@@ -89,7 +89,7 @@ fn a_remote_io_has_restarted() {
 }
 
 #[test]
-fn the_pacemaker_has_restarted() {
+fn the_cycle_master_has_restarted() {
     check_from(restarted(&[station(0)]), 1, one_in(3), 14_388);
 }
 

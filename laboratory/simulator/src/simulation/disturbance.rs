@@ -1,11 +1,11 @@
-//! What a fault does to a party. Links do their own part in [`crate::links`].
+//! What a fault does to a member. Links do their own part in [`crate::links`].
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
 use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
-use understudy_wire::{Agreement, ConfigurationHash, Epoch, Frame, Input, Machine, Party};
+use understudy_wire::{Agreement, ConfigurationHash, Epoch, Frame, Input, Machine, Member};
 
 use super::{Observe, Record, Simulation};
 use crate::fault::{Action, Fault};
@@ -13,54 +13,54 @@ use crate::slot::Slot;
 
 impl Simulation {
     pub(super) fn apply(&mut self, fault: &Fault, observe: &mut Observe<'_>) {
-        let &Fault { party, action, .. } = fault;
-        observe(self.now, self.pace.cycle(), party, Record::Fault(fault));
-        self.links.disturb(self.now, party, action);
-        let is_there = match party {
-            Party::Station(station) => station.index() < self.stations.len(),
-            Party::RemoteIo(program) | Party::Plant(program) => {
+        let &Fault { member, action, .. } = fault;
+        observe(self.now, self.pace.cycle(), member, Record::Fault(fault));
+        self.links.disturb(self.now, member, action);
+        let is_there = match member {
+            Member::Station(station) => station.index() < self.stations.len(),
+            Member::RemoteIo(program) | Member::Plant(program) => {
                 program.index() < self.remote_ios.len()
             }
         };
-        match (party, action) {
+        match (member, action) {
             _ if !is_there => {}
-            (Party::Plant(program), Action::Crash) => self.plants.crash(program),
-            (Party::Plant(_), Action::Restart) => self.restart(party, action),
-            (Party::Plant(_), _) => {}
+            (Member::Plant(program), Action::Crash) => self.plants.crash(program),
+            (Member::Plant(_), Action::Restart) => self.restart(member, action),
+            (Member::Plant(_), _) => {}
             (_, Action::Restart | Action::RestartMisconfigured | Action::RestartInEpoch { .. }) => {
-                self.restart(party, action)
+                self.restart(member, action)
             }
-            (Party::Station(station), Action::FlipState { program, bit }) => {
+            (Member::Station(station), Action::FlipState { program, bit }) => {
                 if let Some(machine) = self.stations[station.index()].machine() {
                     machine.flip_state(program, usize::from(bit));
                 }
             }
-            (Party::RemoteIo(program), Action::Release) => {
+            (Member::RemoteIo(program), Action::Release) => {
                 self.referees[program.index()].operator_chooses();
-                self.give(party, Input::Release, observe);
+                self.give(member, Input::Release, observe);
             }
-            (Party::RemoteIo(program), Action::Choose { choice }) => {
+            (Member::RemoteIo(program), Action::Choose { choice }) => {
                 self.referees[program.index()].operator_chooses();
-                self.give(party, Input::Choose(choice), observe);
+                self.give(member, Input::Choose(choice), observe);
             }
-            (Party::Station(station), _) => {
+            (Member::Station(station), _) => {
                 let waiting = disturb(&mut self.stations[station.index()], action);
-                self.catch_up(party, waiting, observe);
+                self.catch_up(member, waiting, observe);
             }
-            (Party::RemoteIo(program), _) => {
+            (Member::RemoteIo(program), _) => {
                 let waiting = disturb(&mut self.remote_ios[program.index()], action);
-                self.catch_up(party, waiting, observe);
+                self.catch_up(member, waiting, observe);
             }
         }
     }
 
-    fn restart(&mut self, party: Party, action: Action) {
+    fn restart(&mut self, member: Member, action: Action) {
         let agreed = |agreement: &Arc<Agreement>| match action {
             Action::RestartMisconfigured => Arc::new(misconfigured(agreement)),
             _ => Arc::clone(agreement),
         };
-        match party {
-            Party::Station(station) => {
+        match member {
+            Member::Station(station) => {
                 self.founded += 1;
                 let mut settings = self.parts.stations[station.index()].clone();
                 settings.epoch = match action {
@@ -70,20 +70,25 @@ impl Simulation {
                 settings.agreement = agreed(&settings.agreement);
                 self.stations[station.index()].restart(Station::new(self.now, settings));
             }
-            Party::RemoteIo(program) => {
+            Member::RemoteIo(program) => {
                 let mut settings = self.parts.remote_ios[program.index()].clone();
                 settings.agreement = agreed(&settings.agreement);
                 self.remote_ios[program.index()].restart(RemoteIo::new(self.now, settings));
                 self.show_field(program);
             }
-            Party::Plant(program) => self.plants.restart(program),
+            Member::Plant(program) => self.plants.restart(program),
         }
     }
 
-    /// Frames that have waited for a party that stood still.
-    fn catch_up(&mut self, party: Party, waiting: VecDeque<Arc<Frame>>, observe: &mut Observe<'_>) {
+    /// Frames that have waited for a member that stood still.
+    fn catch_up(
+        &mut self,
+        member: Member,
+        waiting: VecDeque<Arc<Frame>>,
+        observe: &mut Observe<'_>,
+    ) {
         for frame in waiting {
-            self.give(party, Input::Frame(&frame), observe);
+            self.give(member, Input::Frame(&frame), observe);
         }
     }
 }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use understudy_cluster::{press_cell, read};
 use understudy_gateway::BOUNDS;
-use understudy_scenarios::{Parties, read as read_scenario, simulate};
+use understudy_scenarios::{Members, read as read_scenario, simulate};
 use understudy_view::{Model, RunState};
 
 use super::*;
@@ -24,7 +24,7 @@ fn cell() -> Cluster {
 /// What was the case when `cycle` of a run with these faults was over.
 fn observed(cluster: &Cluster, faults: &str, cycle: i64) -> Observation {
     let text = format!("title = \"Faults\"\ncycles = 60\n{faults}");
-    let scenario = read_scenario("faults.toml", &text, Some(&Parties::of(cluster)));
+    let scenario = read_scenario("faults.toml", &text, Some(&Members::of(cluster)));
     assert_eq!(scenario.report.diagnostics, []);
     let scenario = scenario.scenario.expect("no diagnostics");
     let mut model = Model::new(Arc::new(cluster.clone()), BOUNDS);

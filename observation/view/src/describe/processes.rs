@@ -1,13 +1,13 @@
-//! What the processes of the parties say, and whoever runs them.
+//! What the processes of the members say, and whoever runs them.
 
 use understudy_bus::HostEvent;
-use understudy_scenarios::{Action, Parties, RunEvent};
-use understudy_wire::{Party, StateChoice};
+use understudy_scenarios::{Action, Members, RunEvent};
+use understudy_wire::{Member, StateChoice};
 
 use super::Words;
 use crate::event::Level;
 
-pub(super) fn host(event: &HostEvent, names: &Parties) -> Words {
+pub(super) fn host(event: &HostEvent, names: &Members) -> Words {
     use Level::{Alarm, Info, Notice, Warning};
     match event {
         HostEvent::Ready {
@@ -128,19 +128,19 @@ pub(super) fn host(event: &HostEvent, names: &Parties) -> Words {
     }
 }
 
-pub(super) fn run(event: &RunEvent, parties: &Parties) -> Words {
+pub(super) fn run(event: &RunEvent, members: &Members) -> Words {
     use Level::{Alarm, Info, Notice, Warning};
     match event {
-        RunEvent::Started { party } => (
+        RunEvent::Started { member } => (
             "started",
             Notice,
-            format!("{} is started", parties.name(*party)),
+            format!("{} is started", members.name(*member)),
         ),
-        RunEvent::Fault { action, party, .. } => {
-            ("fault", Notice, fault_text(*action, *party, parties))
+        RunEvent::Fault { action, member, .. } => {
+            ("fault", Notice, fault_text(*action, *member, members))
         }
         RunEvent::Commanded {
-            party,
+            member,
             command,
             owner,
             reason,
@@ -153,7 +153,7 @@ pub(super) fn run(event: &RunEvent, parties: &Parties) -> Words {
                 .map_or(String::new(), |why| format!("; not done: {why}"));
             let text = format!(
                 "{owner} commands {what} of {}: {reason}{refused}",
-                parties.name(*party)
+                members.name(*member)
             );
             ("commanded", Notice, text)
         }
@@ -165,27 +165,27 @@ pub(super) fn run(event: &RunEvent, parties: &Parties) -> Words {
                 seen.owner, seen.alarm, seen.name, seen.cycle
             ),
         ),
-        RunEvent::Attached { party } => (
+        RunEvent::Attached { member } => (
             "attached",
             Notice,
-            format!("{} tells its journal here", parties.name(*party)),
+            format!("{} tells its journal here", members.name(*member)),
         ),
-        RunEvent::Detached { party, reason } => (
+        RunEvent::Detached { member, reason } => (
             "detached",
             Warning,
-            format!("{} is not heard here: {reason}", parties.name(*party)),
+            format!("{} is not heard here: {reason}", members.name(*member)),
         ),
-        RunEvent::Ended { party, how, said } => {
+        RunEvent::Ended { member, how, said } => {
             let last = said
                 .last()
                 .map_or(String::new(), |line| format!("; {line:.200}"));
-            let text = format!("{} ended unexpectedly: {how}{last}", parties.name(*party));
+            let text = format!("{} ended unexpectedly: {how}{last}", members.name(*member));
             ("ended", Alarm, text)
         }
         RunEvent::Origin { .. } => (
             "origin",
             Info,
-            "everybody is in step: cycles are counted from here".to_owned(),
+            "everybody is synchronised: cycles are counted from here".to_owned(),
         ),
         RunEvent::ScenarioOver { verdict } => (
             "scenario-over",
@@ -201,17 +201,17 @@ pub(super) fn run(event: &RunEvent, parties: &Parties) -> Words {
     }
 }
 
-/// What was done to a party.
-pub(crate) fn fault_text(action: Action, party: Party, parties: &Parties) -> String {
-    let name = parties.name(party);
+/// What was done to a member.
+pub(crate) fn fault_text(action: Action, member: Member, members: &Members) -> String {
+    let name = members.name(member);
     match action {
         Action::Crash => format!("{name} is killed"),
         Action::Restart => format!("{name} is started again"),
         Action::Stop => format!("{name} is stopped"),
         Action::Continue => format!("{name} goes on"),
-        Action::Cut { to } => format!("{name} is cut off from {}", parties.name(to)),
-        Action::Heal { to } => format!("{name} is connected to {} again", parties.name(to)),
-        Action::Delay { to, by } => format!("{} hears {name} {by:?} later", parties.name(to)),
+        Action::Cut { to } => format!("{name} is cut off from {}", members.name(to)),
+        Action::Heal { to } => format!("{name} is connected to {} again", members.name(to)),
+        Action::Delay { to, by } => format!("{} hears {name} {by:?} later", members.name(to)),
         Action::Release => format!("{name} is released"),
         Action::Choose {
             choice: StateChoice::Cold,

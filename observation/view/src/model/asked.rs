@@ -5,10 +5,10 @@ use std::sync::Arc;
 use understudy_cluster::Cluster;
 use understudy_ladder::{Evaluation, Observer};
 use understudy_logic::Scratch;
-use understudy_scenarios::Parties;
+use understudy_scenarios::Members;
 use understudy_wire::{Moment, ProgramId, StationId};
 
-use super::{Model, ProgramTrack, Spoken};
+use super::{Model, ProgramTrack, SentTurn};
 use crate::alarm::Alarm;
 use crate::error::ViewError;
 use crate::event::Event;
@@ -25,8 +25,8 @@ impl Model {
     }
 
     /// Who is who.
-    pub fn parties(&self) -> &Parties {
-        &self.parties
+    pub fn members(&self) -> &Members {
+        &self.members
     }
 
     /// The newest cycle that was decided, from the origin of the run.
@@ -97,7 +97,7 @@ impl Model {
     }
 
     /// What the stations said in a cycle of the cluster.
-    pub fn spoken(&self, moment: Moment) -> &[Spoken] {
+    pub fn sent_turns(&self, moment: Moment) -> &[SentTurn] {
         self.turns.of(moment)
     }
 
@@ -191,6 +191,6 @@ impl Model {
     }
 
     pub(crate) fn program_name(&self, program: ProgramId) -> &str {
-        crate::describe::program_name(program, &self.parties)
+        crate::describe::program_name(program, &self.members)
     }
 }

@@ -4,7 +4,7 @@ use understudy_plant::Event as PlantEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_scenarios::{Record, moment, source_word};
 use understudy_wire::{
-    Field, Force, Image, Moment, Party, ProgramId, SignalPlace, Source, StationId, StationSet,
+    Field, Force, Image, Member, Moment, ProgramId, SignalPlace, Source, StationId, StationSet,
 };
 
 use super::Model;
@@ -172,7 +172,7 @@ impl Model {
                     silent.flagged_by_remote_io(program, flagged);
                 }
             }
-            RemoteIoEvent::Refused { party, .. } => self.refused(*party),
+            RemoteIoEvent::Refused { member, .. } => self.refused(*member),
             RemoteIoEvent::Forced { force, .. } => {
                 track.forced.retain(|other| other.signal != force.signal);
                 track.forced.push(force.clone());
@@ -187,7 +187,7 @@ impl Model {
             _ => {}
         }
         if let Some(alarm) = alarm {
-            let text = describe(record, &self.parties).text;
+            let text = describe(record, &self.members).text;
             self.alarms.raise(subject(alarm), cycle, text);
         }
     }
@@ -248,7 +248,7 @@ impl Model {
         if let Some(station) = track.word_of {
             text += &format!(
                 " from a word of {}",
-                self.parties.name(Party::Station(station))
+                self.members.name(Member::Station(station))
             );
         }
         if let Some(missing) = track.missing {
@@ -263,7 +263,7 @@ impl Model {
         let cause = match source {
             Source::Direct => None,
             _ if !track.heard[0].contains(own) => {
-                let name = self.parties.name(Party::Station(own));
+                let name = self.members.name(Member::Station(own));
                 let why = self.cause_of_silence(own);
                 Some(match why {
                     Some(why) => format!("{name} is silent: {why}"),
@@ -314,30 +314,30 @@ impl Model {
         match event {
             PlantEvent::Stepped { moment, field, .. } => {
                 self.histories[program.index()].saw(&field.sensors);
-                let before = track.plant.as_ref().map_or(0, |plant| plant.mishaps);
+                let before = track.plant.as_ref().map_or(0, |plant| plant.plant_faults);
                 track.plant = Some(field.clone());
-                if field.mishaps > before {
+                if field.plant_faults > before {
                     let cycle = self.cycles.of(Some(*moment));
                     let text = format!(
                         "something happened to it that must not: {} so far",
-                        field.mishaps
+                        field.plant_faults
                     );
                     self.alarms
-                        .raise((record.name.clone(), "mishap"), cycle, text.clone());
+                        .raise((record.name.clone(), "plant_fault"), cycle, text.clone());
                     self.events.push(Event {
                         number: 0,
                         cycle,
                         at_ns: record.at_ns,
                         name: record.name.clone(),
-                        event: "mishap",
+                        event: "plant_fault",
                         level: Level::Alarm,
                         text,
                         cause: None,
                     });
                 }
             }
-            PlantEvent::Refused { party, .. } => {
-                self.refused(*party);
+            PlantEvent::Refused { member, .. } => {
+                self.refused(*member);
                 let cycle = self.cycles.of(None);
                 self.happened(record, cycle, None);
             }

@@ -2,7 +2,7 @@
 
 use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason};
 use understudy_scenarios::Record;
-use understudy_wire::{Party, ProgramId};
+use understudy_wire::{Member, ProgramId};
 
 use super::Model;
 use crate::protection::{LackingStation, LostState, Protection};
@@ -27,7 +27,7 @@ impl Model {
         if let Some(track) = self.programs.get_mut(program.index()) {
             track.protection = None;
             track.lost = None;
-            let name = self.parties.name(Party::RemoteIo(program)).to_owned();
+            let name = self.members.name(Member::RemoteIo(program)).to_owned();
             self.alarms.over(&(name, STATE_LOST), self.cycles.of(None));
         }
     }
@@ -76,7 +76,7 @@ impl Model {
                 let lost = LostState {
                     since: cycle,
                     newest: newest.cycle.0,
-                    holder: self.parties.name(Party::Station(*holder)).to_owned(),
+                    holder: self.members.name(Member::Station(*holder)).to_owned(),
                     age_cycles: age.and_then(|age| u64::try_from(age).ok()),
                     asks: *asks,
                 };
@@ -107,8 +107,8 @@ impl Model {
     /// Why a station cannot stand in for a program: itself, or a link, as far as others say how it is.
     fn lacking(&self, program: ProgramId, lacking: &Lacking) -> LackingStation {
         let station = lacking.station;
-        let name = self.parties.name(Party::Station(station));
-        let remote_io = self.parties.name(Party::RemoteIo(program));
+        let name = self.members.name(Member::Station(station));
+        let remote_io = self.members.name(Member::RemoteIo(program));
         let mut link = None;
         let (reason, text) = match lacking.reason {
             LackingReason::NotReceived => {

@@ -3,14 +3,14 @@
 use std::collections::{BTreeSet, HashMap, VecDeque};
 
 use smallvec::SmallVec;
-use understudy_wire::{Image, Moment, Party, StationId, Word};
+use understudy_wire::{Image, Member, Moment, StationId, Word};
 
 use super::Model;
 use crate::event::{Event, Level};
 
 /// What a station said in a cycle.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Spoken {
+pub struct SentTurn {
     /// Who.
     pub station: StationId,
     /// Its words.
@@ -21,7 +21,7 @@ pub struct Spoken {
 /// The turns of the newest cycles.
 #[derive(Debug, Clone)]
 pub(super) struct Turns {
-    by_moment: HashMap<Moment, Vec<Spoken>>,
+    by_moment: HashMap<Moment, Vec<SentTurn>>,
     order: VecDeque<Moment>,
     most: usize,
     /// Stations that said something else than the samples lead to, and have not agreed since.
@@ -38,7 +38,7 @@ impl Turns {
         }
     }
 
-    pub(super) fn spoke(&mut self, moment: Moment, station: StationId, words: &[Word]) {
+    pub(super) fn published(&mut self, moment: Moment, station: StationId, words: &[Word]) {
         if !self.by_moment.contains_key(&moment) {
             if self.order.len() == self.most
                 && let Some(oldest) = self.order.pop_front()
@@ -49,7 +49,7 @@ impl Turns {
         }
         let turns = self.by_moment.entry(moment).or_default();
         if turns.iter().all(|turn| turn.station != station) {
-            turns.push(Spoken {
+            turns.push(SentTurn {
                 station,
                 words: words.iter().cloned().collect(),
                 checked: false,
@@ -57,7 +57,7 @@ impl Turns {
         }
     }
 
-    pub(super) fn of(&self, moment: Moment) -> &[Spoken] {
+    pub(super) fn of(&self, moment: Moment) -> &[SentTurn] {
         self.by_moment.get(&moment).map_or(&[], Vec::as_slice)
     }
 }
@@ -89,14 +89,14 @@ impl Model {
     /// Σ h(j)(x(j), u(j)) over the members of a word, where all of them are known.
     fn sum_of(&self, word: &Word, moment: Moment) -> Option<Image> {
         let mut sum = Image::default();
-        for program in word.members.iter() {
+        for program in word.mask.iter() {
             sum.add(self.history(program)?.truth_of(moment)?);
         }
         Some(sum)
     }
 
     fn compared(&mut self, station: StationId, moment: Moment, wrong: Option<String>) {
-        let name = self.parties.name(Party::Station(station)).to_owned();
+        let name = self.members.name(Member::Station(station)).to_owned();
         let cycle = self.cycles.of(Some(moment));
         let subject = (name.clone(), "word-differs");
         match wrong {

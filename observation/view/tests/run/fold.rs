@@ -2,7 +2,7 @@
 
 use understudy_scenarios::{Record, RunEvent, Scenario};
 use understudy_view::{Model, RunState, Snapshot, StationState};
-use understudy_wire::{Party, ProgramId, Source, StationId};
+use understudy_wire::{Member, ProgramId, Source, StationId};
 
 use crate::support::{KILL_EACH, cell, model, scenario};
 
@@ -144,11 +144,11 @@ fn an_unexpected_end_is_an_alarm_until_the_member_is_started_again() {
     let cell = cell();
     let text = "title = \"quiet\"\ncycles = 60\n";
     let mut model = model(&cell, &scenario(&cell, text), 1);
-    let robot = Party::Station(StationId(0));
-    let press_io = Party::RemoteIo(ProgramId(1));
-    for party in [robot, press_io] {
+    let robot = Member::Station(StationId(0));
+    let press_io = Member::RemoteIo(ProgramId(1));
+    for member in [robot, press_io] {
         let event = RunEvent::Ended {
-            party,
+            member,
             how: "signal: 9 (SIGKILL)".to_owned(),
             said: vec!["killed".to_owned()],
         };
@@ -166,8 +166,8 @@ fn an_unexpected_end_is_an_alarm_until_the_member_is_started_again() {
             "press-io ended unexpectedly: signal: 9 (SIGKILL)"
         ]
     );
-    for party in [robot, press_io] {
-        model.note(&Record::of_run(model.at_ns(), RunEvent::Started { party }));
+    for member in [robot, press_io] {
+        model.note(&Record::of_run(model.at_ns(), RunEvent::Started { member }));
     }
     assert_eq!(open(&model), [""; 0]);
     assert_ne!(model.station_state(StationId(0)), Some(StationState::Ended));

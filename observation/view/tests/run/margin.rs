@@ -3,7 +3,7 @@
 use understudy_scenarios::{Action, Fault, Network, Scenario};
 use understudy_simulator::{Simulation, parts};
 use understudy_view::{Margin, Outcome};
-use understudy_wire::{Mode, Party, StationId};
+use understudy_wire::{Member, Mode, StationId};
 
 use crate::support::{line, model};
 
@@ -16,7 +16,7 @@ fn crash(station: StationId, at_cycle: u64, phase: f64) -> Fault {
     Fault {
         at_cycle,
         phase,
-        party: Party::Station(station),
+        member: Member::Station(station),
         action: Action::Crash,
     }
 }
@@ -50,7 +50,7 @@ fn check(controllers: usize, understudies: usize, mode: Mode) {
             outcome
                 .failed
                 .iter()
-                .all(|party| matches!(party, Party::Station(_)))
+                .all(|member| matches!(member, Member::Station(_)))
         };
         for outcome in singles.iter().filter(of_stations).chain(&pairs) {
             for phase in [0.0, 0.3, 0.5] {
@@ -64,8 +64,8 @@ fn check(controllers: usize, understudies: usize, mode: Mode) {
 }
 
 fn happens(mut simulation: Simulation, outcome: &Outcome, phase: f64, context: &str) {
-    for party in &outcome.failed {
-        if let Party::Station(station) = party {
+    for member in &outcome.failed {
+        if let Member::Station(station) = member {
             simulation.schedule(crash(*station, FAILS_AT, phase));
         }
     }

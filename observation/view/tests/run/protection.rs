@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use understudy_scenarios::{Record, RunEvent};
 use understudy_view::{Bounds, LostState, Model, Protection};
-use understudy_wire::{Party, ProgramId, StationId};
+use understudy_wire::{Member, ProgramId, StationId};
 
 use crate::support::{cell, records, scenario};
 
@@ -59,18 +59,18 @@ fn of_a_dead_remote_io_nothing_is_known() {
             .protection(ProgramId(0))
             .is_some_and(|of| !of.protected)
     );
-    let ended = |party| RunEvent::Ended {
-        party,
+    let ended = |member| RunEvent::Ended {
+        member,
         how: "signal: 9 (SIGKILL)".to_owned(),
         said: Vec::new(),
     };
-    let note = |model: &mut Model, party| {
-        let record = Record::of_run(model.at_ns(), ended(party));
+    let note = |model: &mut Model, member| {
+        let record = Record::of_run(model.at_ns(), ended(member));
         model.note(&record);
     };
-    note(&mut model, Party::Station(StationId(2)));
+    note(&mut model, Member::Station(StationId(2)));
     assert!(model.lost_state(ProgramId(0)).is_some(), "another member");
-    note(&mut model, Party::RemoteIo(ProgramId(0)));
+    note(&mut model, Member::RemoteIo(ProgramId(0)));
     assert_eq!(model.lost_state(ProgramId(0)), None);
     assert_eq!(model.protection(ProgramId(0)), None);
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use understudy_cluster::{Cluster, Overrides, press_cell, read_with};
-use understudy_scenarios::{Parties, Record, Scenario, read, simulate};
+use understudy_scenarios::{Members, Record, Scenario, read, simulate};
 use understudy_view::{Bounds, Model};
 use understudy_wire::Mode;
 
@@ -57,7 +57,7 @@ pub(crate) fn cluster(text: &str, mode: Mode) -> Cluster {
 }
 
 pub(crate) fn scenario(cluster: &Cluster, text: &str) -> Scenario {
-    let found = read("scenario.toml", text, Some(&Parties::of(cluster)));
+    let found = read("scenario.toml", text, Some(&Members::of(cluster)));
     assert_eq!(found.report.diagnostics, []);
     found.scenario.expect("no diagnostics")
 }

@@ -1,4 +1,4 @@
-//! A command to a party of the laboratory.
+//! A command to a member of the laboratory.
 
 use std::sync::Arc;
 
@@ -20,8 +20,8 @@ use crate::login::Person;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Asked {
-    /// The party's name.
-    party: String,
+    /// The member's name.
+    member: String,
     command: AskedCommand,
     owner: String,
     reason: String,
@@ -62,9 +62,10 @@ pub(super) async fn command(
     }
     let owner = named(&person, asked.owner)?;
     let reason = readable(asked.reason, MAXIMUM_REASON_LENGTH, "the reason")?;
-    let party = app.model().party(&asked.party);
-    let party = party
-        .ok_or_else(|| Problem::unknown(format!("the cluster has no party {:.60}", asked.party)))?;
+    let member = app.model().member(&asked.member);
+    let member = member.ok_or_else(|| {
+        Problem::unknown(format!("the cluster has no member {:.60}", asked.member))
+    })?;
     let command = match asked.command {
         AskedCommand::Kill => Command::Kill,
         AskedCommand::Restart => Command::Restart,
@@ -88,7 +89,7 @@ pub(super) async fn command(
         }),
     };
     let commander = &app.commanding.commander;
-    let done = commander.give(party, command, owner, reason).await;
+    let done = commander.give(member, command, owner, reason).await;
     done.map_err(|refusal| Problem::refused(&refusal.to_string()))?;
     Ok(Json(json!({})))
 }

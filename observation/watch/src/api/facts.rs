@@ -12,7 +12,7 @@ use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use understudy_ladder::Signal;
 use understudy_view::Event;
-use understudy_wire::{Party, ProgramId};
+use understudy_wire::{Member, ProgramId};
 
 use super::Answered;
 use super::compare::others;
@@ -86,7 +86,7 @@ pub(super) async fn run(
     let microseconds = |time: std::time::Duration| u64::try_from(time.as_micros()).unwrap_or(0);
     let stations = known.stations().map(|station| StationFacts {
         rank: station.index(),
-        name: shown::name(known, Party::Station(station)),
+        name: shown::name(known, Member::Station(station)),
         role: if schedule.is_understudy(station) {
             "understudy"
         } else {
@@ -115,14 +115,14 @@ pub(super) async fn run(
 
 fn program_facts(known: &Known, program: ProgramId) -> ProgramFacts {
     let cluster = known.run.cluster();
-    let plant = Party::Plant(program);
+    let plant = Member::Plant(program);
     let ladder = cluster.controllers().get(program.index());
     let signals = |signals: &[Signal]| signals.iter().map(signal_facts).collect();
     ProgramFacts {
         index: program.index(),
         name: shown::program_name(known, program),
-        remote_io: shown::name(known, Party::RemoteIo(program)),
-        plant: cluster.party_name(plant).map(str::to_owned),
+        remote_io: shown::name(known, Member::RemoteIo(program)),
+        plant: cluster.member_name(plant).map(str::to_owned),
         inputs: ladder.map_or_else(Vec::new, |own| signals(&own.program.inputs)),
         outputs: ladder.map_or_else(Vec::new, |own| signals(&own.program.outputs)),
     }

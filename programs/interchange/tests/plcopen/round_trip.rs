@@ -68,7 +68,10 @@ fn the_examples_come_back() {
         "boiler/main",
         "filling-line/plant",
     ] {
-        let path = format!("{}/../../examples/{name}.ladder", env!("CARGO_MANIFEST_DIR"));
+        let path = format!(
+            "{}/../../examples/{name}.ladder",
+            env!("CARGO_MANIFEST_DIR")
+        );
         let text = std::fs::read_to_string(&path).expect("an example");
         let program = parse(&text).into_result().expect("an example is right").0;
         check(&program, 7);

@@ -4,14 +4,14 @@ use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use understudy_form::spoken;
+use understudy_form::written_time;
 use understudy_ladder::{Language, MAXIMUM_PRESET_VALUE, Namer, Signal};
 
 use super::{DraftProgram, note};
 use crate::read::MARK;
 
 /// Signals of a plant that mean something of their own.
-const SPECIAL: [&str; 4] = ["part_arrives", "handed_over", "finished", "mishap"];
+const SPECIAL: [&str; 4] = ["part_arrives", "handed_over", "finished", "plant_fault"];
 
 /// Cycles in which all inputs of a small program come and go once.
 const ROUND_CYCLES: usize = 100;
@@ -122,7 +122,7 @@ program {}
         } = self;
         let half = inputs.len().min(MAXIMUM_PRESET_VALUE as usize / 2);
         let cycles = (ROUND_CYCLES / (2 * half)).clamp(2, 10);
-        let time = spoken(period * cycles as u32);
+        let time = written_time(period * cycles as u32);
         let round = 2 * half;
         let _ = write!(
             text,

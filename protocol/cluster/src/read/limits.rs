@@ -105,7 +105,7 @@ pub(crate) fn too_wide(name: &str, circuit: &Circuit) -> Option<String> {
 mod tests {
     use understudy_wire::{
         Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
-        Lineage, MAXIMUM_HISTORY, Moment, Party, ProgramHash, ProgramId, ProgramSet, Recalled,
+        Lineage, MAXIMUM_HISTORY, Member, Moment, ProgramHash, ProgramId, ProgramSet, Recalled,
         Sample, StationId, StationSet, Transfer, Turn, Word, encode,
     };
 
@@ -121,7 +121,7 @@ mod tests {
     }
 
     /// The frame with the longest integers is not longer than was thought.
-    fn check_body(sender: Party, body: Body, bound: usize) {
+    fn check_body(sender: Member, body: Body, bound: usize) {
         let header = Header {
             cluster: ClusterHash(u64::MAX),
             configuration: ConfigurationHash(u64::MAX),
@@ -149,7 +149,7 @@ mod tests {
                     gone: StationSet::from_bits(u64::MAX),
                 };
                 let bound = sample_bytes(bits, history);
-                check_body(Party::RemoteIo(ProgramId(63)), Body::Sample(sample), bound);
+                check_body(Member::RemoteIo(ProgramId(63)), Body::Sample(sample), bound);
             }
             let transfer = Transfer {
                 to: StationId(63),
@@ -161,7 +161,7 @@ mod tests {
                 digest: Digest(u64::MAX),
                 state: ones(bits),
             };
-            let station = Party::Station(StationId(63));
+            let station = Member::Station(StationId(63));
             check_body(station, Body::Transfer(transfer), transfer_bytes(bits));
             for programs in [1, 2, 63] {
                 let holding = |program| Holding {
@@ -180,7 +180,7 @@ mod tests {
                     inputs: ones(bits),
                 };
                 let word = Word {
-                    members: ProgramSet::first(programs),
+                    mask: ProgramSet::first(programs),
                     sum: ones(bits),
                 };
                 let turn = Turn {

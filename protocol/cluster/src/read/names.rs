@@ -13,31 +13,31 @@ use crate::fields::Placed;
 /// All that were given so far, each with its place.
 #[derive(Default)]
 pub(crate) struct Names {
-    parties: BTreeMap<String, Range<usize>>,
+    members: BTreeMap<String, Range<usize>>,
     addresses: BTreeMap<SocketAddr, Range<usize>>,
 }
 
 impl Names {
-    /// Reports a name that another party has.
+    /// Reports a name that another member has.
     pub(crate) fn declare(
         &mut self,
         name: &str,
         span: Range<usize>,
         diagnostics: &mut Vec<Diagnostic>,
     ) {
-        if let Some(first) = self.parties.get(name) {
-            let message = format!("two parties are named `{name}`");
+        if let Some(first) = self.members.get(name) {
+            let message = format!("two members are named `{name}`");
             diagnostics.push(
                 Diagnostic::error("U0208", message, span)
                     .with_related(first.clone(), "the first is here")
                     .with_help("stations, remote I/Os and plants share one set of names"),
             );
         } else {
-            self.parties.insert(name.to_owned(), span);
+            self.members.insert(name.to_owned(), span);
         }
     }
 
-    /// Reports an address that another party has.
+    /// Reports an address that another member has.
     pub(crate) fn listen(
         &mut self,
         address: Option<&Placed<SocketAddr>>,
@@ -47,7 +47,7 @@ impl Names {
             return;
         };
         if let Some(first) = self.addresses.get(value) {
-            let message = format!("two parties have the address {value}");
+            let message = format!("two members have the address {value}");
             diagnostics.push(
                 Diagnostic::error("U0210", message, span.clone())
                     .with_related(first.clone(), "the first is here"),

@@ -54,7 +54,7 @@ pub(crate) fn findings(reports: &[Report]) -> String {
     lines.join("\n")
 }
 
-/// Closes the loop without a network, each plant feeding the next; answers with finished parts and mishaps of each plant.
+/// Closes the loop without a network, each plant feeding the next; answers with finished parts and plant faults of each plant.
 pub(crate) fn run(cluster: &Cluster, cycles: usize) -> Vec<(u64, u64)> {
     let count = cluster.controllers().len();
     let mut plants: Vec<Plant> = (0..count)
@@ -88,6 +88,6 @@ pub(crate) fn run(cluster: &Cluster, cycles: usize) -> Vec<(u64, u64)> {
             arrived = fields[index].handed_over - before;
         }
     }
-    let counts = |field: &understudy_wire::Field| (field.finished, field.mishaps);
+    let counts = |field: &understudy_wire::Field| (field.finished, field.plant_faults);
     fields.iter().map(counts).collect()
 }

@@ -183,7 +183,7 @@ fn the_command_line_replaces_what_the_file_says() {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, cases: 64, ..ProptestConfig::default() })]
 
-    /// Two files have equal hashes exactly when all their timings are equal, wherever their parties listen.
+    /// Two files have equal hashes exactly when all their timings are equal, wherever their members listen.
     #[test]
     fn hashes_are_equal_exactly_when_timings_are(
         left in (1..4_u32, 1..4_u32, 1..3_u32, 1..=u16::MAX),

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crate::common::{findings, load, run, split};
 use understudy_cluster::{Cluster, Link, press_cell};
-use understudy_wire::{Epoch, Image, Mode, Party, ProgramId, StationId};
+use understudy_wire::{Epoch, Image, Member, Mode, ProgramId, StationId};
 
 fn cell() -> Cluster {
     let (cluster, ladders) = split(press_cell());
@@ -15,14 +15,14 @@ fn cell() -> Cluster {
 }
 
 #[test]
-fn every_party_has_a_name_a_place_and_settings() {
+fn every_member_has_a_name_a_place_and_settings() {
     let cell = cell();
     let named: Vec<String> = cell
-        .parties()
-        .map(|party| {
-            let name = cell.party_name(party).expect("it has a name");
-            assert_eq!(cell.party(name), Some(party));
-            format!("{party:?} {name}")
+        .members()
+        .map(|member| {
+            let name = cell.member_name(member).expect("it has a name");
+            assert_eq!(cell.member(name), Some(member));
+            format!("{member:?} {name}")
         })
         .collect();
     insta::assert_snapshot!(named.join("\n"), @r"
@@ -40,8 +40,8 @@ fn every_party_has_a_name_a_place_and_settings() {
         assert_eq!((settings.epoch, settings.programs.len()), (Epoch(7), 2));
     }
     assert!(cell.station_settings(StationId(3), Epoch(7)).is_none());
-    assert_eq!(cell.party("nobody"), None);
-    assert_eq!(cell.party_name(Party::Plant(ProgramId(2))), None);
+    assert_eq!(cell.member("nobody"), None);
+    assert_eq!(cell.member_name(Member::Plant(ProgramId(2))), None);
     let robot = cell.remote_io_settings(ProgramId(0)).expect("it is there");
     assert_eq!(
         robot.fail_safe.to_string(),

@@ -25,12 +25,12 @@ pub struct Admitted {
     pub members: Vec<String>,
 }
 
-/// Where a party's keys begin.
+/// Where a member's keys begin.
 pub(crate) fn prefix(cluster: ClusterHash, name: &str) -> String {
     format!("understudy/{cluster}/{name}")
 }
 
-/// Where a party says the hash of its configuration to whoever does not know it.
+/// Where a member says the hash of its configuration to whoever does not know it.
 pub(crate) fn hash_key(name: &str) -> String {
     format!("understudy/cluster/{name}")
 }

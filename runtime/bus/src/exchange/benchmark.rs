@@ -1,6 +1,6 @@
 //! Seven processes and one number.
 //!
-//! The caller starts the processes: each is its own program again, told its part as one argument ([`ExchangeParty`] as JSON).
+//! The caller starts the processes: each is its own program again, told its part as one argument ([`ExchangeMember`] as JSON).
 
 use std::io::{self, BufRead, BufReader, Write};
 use std::net::{SocketAddr, UdpSocket};
@@ -13,10 +13,10 @@ use nix::sys::prctl::set_pdeathsig;
 use nix::sys::signal::Signal;
 use serde::{Deserialize, Serialize};
 use understudy_seal::{ClusterSecret, KEY_BYTES, Opener, Seal, Title};
-use understudy_wire::{ClusterHash, Machine, Party, ProgramId, StationId, Topic};
+use understudy_wire::{ClusterHash, Machine, Member, ProgramId, StationId, Topic};
 
 use super::meter::{Exchange, ExchangeMeter};
-use super::pattern::{PACEMAKER, PROGRAMS, Pattern, STATIONS};
+use super::pattern::{CYCLE_MASTER, PROGRAMS, Pattern, STATIONS};
 use super::raw::play;
 use crate::clock::Clock;
 use crate::control::Commands;
@@ -26,8 +26,8 @@ use crate::field::{FieldDriver, NoField};
 use crate::guard::Guard;
 use crate::journal::{EventSink, HostEvent, Journal, Noted, Record};
 use crate::link::LinkKind;
+use crate::member::{MemberSettings, run_member};
 use crate::observer::{NoObserver, Observer};
-use crate::party::{PartySettings, run_party};
 use crate::ports::free_addresses;
 use crate::rights::{CYCLE_PRIORITY, run_in_real_time, sleep_exactly};
 use crate::zenoh_link::ZENOH_RUNTIME;
@@ -62,33 +62,33 @@ pub struct ExchangeSettings {
 
 /// The part of one process, as it is handed to it.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct ExchangeParty {
-    own: Party,
-    parties: Vec<Peer>,
+pub struct ExchangeMember {
+    own: Member,
+    members: Vec<Peer>,
     carrier: Carrier,
     settings: ExchangeSettings,
 }
 
-/// Measures one carrier. `process` makes the command that runs [`run_exchange_party`] with the part it is given, writing to
+/// Measures one carrier. `process` makes the command that runs [`run_exchange_member`] with the part it is given, writing to
 /// its standard output.
 ///
 /// # Errors
-/// [`BusError::System`] where a process cannot be started, [`BusError::Benchmark`] where the pacemaker's says nothing in time.
+/// [`BusError::System`] where a process cannot be started, [`BusError::Benchmark`] where the cycle master's says nothing in time.
 pub fn measure(
     carrier: Carrier,
     settings: ExchangeSettings,
-    mut process: impl FnMut(&ExchangeParty) -> Command,
+    mut process: impl FnMut(&ExchangeMember) -> Command,
 ) -> Result<Exchange, BusError> {
-    let parties = parties().map_err(|source| BusError::System {
+    let members = members().map_err(|source| BusError::System {
         what: "seven free ports",
         source,
     })?;
     let mut running = Running(Vec::new());
-    // The pacemaker is the last to start.
-    for own in parties.iter().rev().map(|peer| peer.party) {
-        let part = ExchangeParty {
+    // The cycle master is the last to start.
+    for own in members.iter().rev().map(|peer| peer.member) {
+        let part = ExchangeMember {
             own,
-            parties: parties.clone(),
+            members: members.clone(),
             carrier,
             settings,
         };
@@ -107,11 +107,11 @@ pub fn measure(
         running.0.push(child);
     }
     let failed = |reason: &str| BusError::Benchmark {
-        party: PACEMAKER,
+        member: CYCLE_MASTER,
         reason: reason.into(),
     };
-    let pacemaker = running.0.last_mut().and_then(|child| child.stdout.take());
-    let output = pacemaker.ok_or_else(|| failed("has no output"))?;
+    let cycle_master = running.0.last_mut().and_then(|child| child.stdout.take());
+    let output = cycle_master.ok_or_else(|| failed("has no output"))?;
     let (found, result) = channel();
     let reader = std::thread::spawn(move || {
         let _ = found.send(read_exchange(output));
@@ -128,7 +128,7 @@ pub fn measure(
     exchange
 }
 
-/// Waits for what the pacemaker has measured.
+/// Waits for what the cycle master has measured.
 fn read_exchange(output: ChildStdout) -> Option<Exchange> {
     let lines = BufReader::new(output).lines().map_while(Result::ok);
     let mut records = lines.filter_map(|line| {
@@ -141,9 +141,9 @@ fn read_exchange(output: ChildStdout) -> Option<Exchange> {
     })
 }
 
-impl ExchangeParty {
+impl ExchangeMember {
     /// Whose part it is: a station below [`STATIONS`] or a remote I/O below [`PROGRAMS`].
-    pub fn own(&self) -> Party {
+    pub fn own(&self) -> Member {
         self.own
     }
 
@@ -156,9 +156,9 @@ impl ExchangeParty {
 /// What a process of the benchmark runs: the yardstick, or the pattern over a link.
 ///
 /// # Errors
-/// As [`run_party`] has.
-pub fn run_exchange_party(
-    part: ExchangeParty,
+/// As [`run_member`] has.
+pub fn run_exchange_member(
+    part: ExchangeMember,
     output: impl Write + Send + 'static,
 ) -> Result<(), BusError> {
     let pattern = Pattern::new(part.own, part.settings.period);
@@ -168,9 +168,9 @@ pub fn run_exchange_party(
 /// The same with a machine of the caller's own, such as a real station, in place of the pattern.
 ///
 /// # Errors
-/// As [`run_party`] has.
+/// As [`run_member`] has.
 pub fn run_exchange_machine<M>(
-    part: ExchangeParty,
+    part: ExchangeMember,
     machine: M,
     field: Box<dyn FieldDriver>,
     output: impl Write + Send + 'static,
@@ -179,18 +179,18 @@ where
     M: Machine + Send,
     M::Event: Serialize + Send + 'static,
 {
-    let ExchangeParty {
+    let ExchangeMember {
         own,
-        parties,
+        members,
         carrier,
         settings,
     } = part;
-    let endpoints = Endpoints::new(ClusterHash(u64::MAX), own, parties, Vec::new())?;
+    let endpoints = Endpoints::new(ClusterHash(u64::MAX), own, members, Vec::new())?;
     let meter = ExchangeMeter::new(usize::from(STATIONS), SKIPPED_CYCLES, settings.cycles);
     match carrier {
-        Carrier::Raw => run_raw_party(&endpoints, settings, meter, output),
+        Carrier::Raw => run_raw_member(&endpoints, settings, meter, output),
         Carrier::Link(link) => {
-            let observer: Box<dyn Observer> = if own == PACEMAKER {
+            let observer: Box<dyn Observer> = if own == CYCLE_MASTER {
                 Box::new(meter)
             } else {
                 Box::new(NoObserver)
@@ -200,7 +200,7 @@ where
             } else {
                 Guard::Off
             };
-            let party_settings = PartySettings {
+            let member_settings = MemberSettings {
                 endpoints,
                 link,
                 guard,
@@ -211,7 +211,7 @@ where
                 ends_with_parent: true,
                 real_time: settings.real_time,
             };
-            run_party(machine, party_settings, output).map(drop)
+            run_member(machine, member_settings, output).map(drop)
         }
     }
 }
@@ -222,19 +222,19 @@ fn guard(endpoints: &Endpoints) -> Guard {
     let key = |peer: &Peer| {
         secret.frame_key(Title {
             cluster: "exchange",
-            party: &peer.name,
+            member: &peer.name,
             generation: 1,
         })
     };
     let own = endpoints.own();
-    let senders = endpoints.heard().map(|(peer, _)| (peer.party, key(peer)));
+    let senders = endpoints.heard().map(|(peer, _)| (peer.member, key(peer)));
     Guard::with_keys(
-        Seal::new(own.party, key(own), 1, []),
-        Opener::new(own.party, senders, [], Arc::default()),
+        Seal::new(own.member, key(own), 1, []),
+        Opener::new(own.member, senders, [], Arc::default()),
     )
 }
 
-fn run_raw_party(
+fn run_raw_member(
     endpoints: &Endpoints,
     settings: ExchangeSettings,
     mut meter: ExchangeMeter,
@@ -247,7 +247,7 @@ fn run_raw_party(
     let socket =
         UdpSocket::bind(own.address).map_err(|source| BusError::listen(own.address, source))?;
     let clock = Clock::start();
-    let (mut sink, journal) = Journal::start::<()>(1, clock, own.party, own.name, output)?;
+    let (mut sink, journal) = Journal::start::<()>(1, clock, own.member, own.name, output)?;
     sleep_exactly();
     if settings.real_time
         && let Err(error) = run_in_real_time(CYCLE_PRIORITY)
@@ -257,9 +257,11 @@ fn run_raw_party(
     // The same datagrams as those of the links, one for each who is concerned.
     let audience = endpoints.audience(Topic::Cycle);
     let others: Vec<SocketAddr> = audience.map(|peer| peer.address).collect();
-    play(own.party, &socket, &others, settings, &mut meter).map_err(|source| BusError::System {
-        what: "to carry a datagram",
-        source,
+    play(own.member, &socket, &others, settings, &mut meter).map_err(|source| {
+        BusError::System {
+            what: "to carry a datagram",
+            source,
+        }
     })?;
     sink.record(
         clock.now(),
@@ -270,18 +272,18 @@ fn run_raw_party(
     Ok(())
 }
 
-/// All parties of the pattern on free ports.
-fn parties() -> io::Result<Vec<Peer>> {
-    let stations = (0..STATIONS).map(|rank| Party::Station(StationId(rank)));
-    let remote_ios = (0..PROGRAMS).map(|program| Party::RemoteIo(ProgramId(program)));
-    let parties: Vec<Party> = stations.chain(remote_ios).collect();
-    let addresses = free_addresses(parties.len())?;
-    let peer = |(party, address)| Peer {
-        party,
-        name: format!("{party:?}"),
+/// All members of the pattern on free ports.
+fn members() -> io::Result<Vec<Peer>> {
+    let stations = (0..STATIONS).map(|rank| Member::Station(StationId(rank)));
+    let remote_ios = (0..PROGRAMS).map(|program| Member::RemoteIo(ProgramId(program)));
+    let members: Vec<Member> = stations.chain(remote_ios).collect();
+    let addresses = free_addresses(members.len())?;
+    let peer = |(member, address)| Peer {
+        member,
+        name: format!("{member:?}"),
         address,
     };
-    Ok(parties.into_iter().zip(addresses).map(peer).collect())
+    Ok(members.into_iter().zip(addresses).map(peer).collect())
 }
 
 /// Processes that do not outlive their measurement.

@@ -2,7 +2,7 @@
 
 use hdrhistogram::Histogram;
 use serde::{Deserialize, Serialize};
-use understudy_wire::{Body, Frame, Moment, Party, StationSet, Time};
+use understudy_wire::{Body, Frame, Member, Moment, StationSet, Time};
 
 use crate::journal::HostEvent;
 use crate::observer::Observer;
@@ -33,7 +33,7 @@ pub struct ExchangeMeter {
     enough: u64,
     moment: Option<Moment>,
     first: Time,
-    spoken: StationSet,
+    published: StationSet,
     durations: Histogram<u64>,
     incomplete: u64,
 }
@@ -51,7 +51,7 @@ impl ExchangeMeter {
             enough,
             moment: None,
             first: Time::default(),
-            spoken: StationSet::EMPTY,
+            published: StationSet::EMPTY,
             durations: Histogram::new_with_bounds(1, LONGEST_NS, 3).expect("constant bounds"),
             incomplete: 0,
         }
@@ -75,13 +75,13 @@ impl ExchangeMeter {
     }
 
     fn begin(&mut self, now: Time, moment: Moment) {
-        let complete = self.spoken.len() == self.stations;
+        let complete = self.published.len() == self.stations;
         if self.moment.is_some() && !complete && self.skip == 0 {
             self.incomplete += 1;
         }
         self.moment = Some(moment);
         self.first = now;
-        self.spoken = StationSet::EMPTY;
+        self.published = StationSet::EMPTY;
     }
 
     fn complete(&mut self, now: Time) {
@@ -104,12 +104,12 @@ impl Observer for ExchangeMeter {
         if self.moment.is_none_or(|current| moment > current) {
             self.begin(now, moment);
         }
-        let (Body::Turn(_), Party::Station(station)) = (&frame.body, frame.header.sender) else {
+        let (Body::Turn(_), Member::Station(station)) = (&frame.body, frame.header.sender) else {
             return;
         };
-        if self.moment == Some(moment) && !self.spoken.contains(station) {
-            self.spoken.insert(station);
-            if self.spoken.len() == self.stations {
+        if self.moment == Some(moment) && !self.published.contains(station) {
+            self.published.insert(station);
+            if self.published.len() == self.stations {
                 self.complete(now);
             }
         }
@@ -146,7 +146,7 @@ mod tests {
                         epoch: Epoch(1),
                         cycle: Cycle(cycle),
                     },
-                    sender: Party::Station(StationId(turn.unwrap_or(0))),
+                    sender: Member::Station(StationId(turn.unwrap_or(0))),
                     alone: false,
                 },
                 body: turn.map_or(Body::Sync, |_| {

@@ -1,4 +1,4 @@
-//! How long a cycle's frames take: from the first frame of a cycle to the last turn heard, at the pacemaker.
+//! How long a cycle's frames take: from the first frame of a cycle to the last turn heard, at the cycle master.
 //!
 //! Three carriers are measured with one pattern of eight broadcasts among seven processes: plain sockets without anything of ours
 //! ([`Carrier::Raw`], the yardstick), and the two links with a machine that does nothing but follow the pattern. A real station
@@ -15,7 +15,7 @@ mod pattern;
 mod raw;
 
 pub use benchmark::{
-    Carrier, ExchangeParty, ExchangeSettings, measure, run_exchange_machine, run_exchange_party,
+    Carrier, ExchangeMember, ExchangeSettings, measure, run_exchange_machine, run_exchange_member,
 };
 pub use meter::{Exchange, ExchangeMeter};
 pub use pattern::{PROGRAMS, Pattern, STATIONS};

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
-    Input, Lineage, Machine, Moment, Output, Party, ProgramId, ProgramSet, Sample, StationId,
+    Input, Lineage, Machine, Member, Moment, Output, ProgramId, ProgramSet, Sample, StationId,
     StationSet, Time, Turn, Word,
 };
 
@@ -14,26 +14,26 @@ use understudy_wire::{
 pub const STATIONS: u8 = 4;
 /// Programs, and remote I/Os, in the pattern.
 pub const PROGRAMS: u8 = 3;
-/// Who paces, and measures.
-pub(super) const PACEMAKER: Party = Party::Station(StationId(0));
+/// Who is_cycle_master, and measures.
+pub(super) const CYCLE_MASTER: Member = Member::Station(StationId(0));
 /// Bits of each sample and of each output.
 const WIDTH: usize = 8;
 
-/// One party of the pattern. Station 0 paces: every period it says Sync, whether or not the last cycle was complete.
+/// One member of the pattern. Station 0 is_cycle_master: every period it says Sync, whether or not the last cycle was complete.
 #[derive(Debug)]
 pub struct Pattern {
-    own: Party,
+    own: Member,
     period: Duration,
     due: Time,
     moment: Moment,
     sampled: ProgramSet,
-    spoken: StationSet,
+    published: StationSet,
     said: VecDeque<Arc<Frame>>,
 }
 
 impl Pattern {
     /// The part of `own`, a station below [`STATIONS`] or a remote I/O below [`PROGRAMS`]; anybody else is silent.
-    pub fn new(own: Party, period: Duration) -> Self {
+    pub fn new(own: Member, period: Duration) -> Self {
         Self {
             own,
             period,
@@ -44,19 +44,19 @@ impl Pattern {
                 cycle: Cycle(0),
             },
             sampled: ProgramSet::EMPTY,
-            spoken: StationSet::EMPTY,
+            published: StationSet::EMPTY,
             said: VecDeque::new(),
         }
     }
 
-    fn paces(&self) -> bool {
-        self.own == PACEMAKER
+    fn is_cycle_master(&self) -> bool {
+        self.own == CYCLE_MASTER
     }
 
     fn begin(&mut self, moment: Moment) {
         self.moment = moment;
         self.sampled = ProgramSet::EMPTY;
-        self.spoken = StationSet::EMPTY;
+        self.published = StationSet::EMPTY;
     }
 
     fn say(&mut self, body: Body) {
@@ -66,15 +66,15 @@ impl Pattern {
 
     /// Takes the turn of this station where it has the token: station 0 after all samples, the others after their predecessor.
     fn take_turn(&mut self) {
-        let Party::Station(own) = self.own else {
+        let Member::Station(own) = self.own else {
             return;
         };
         let has_token = match own.0.checked_sub(1) {
             None => self.sampled.len() == usize::from(PROGRAMS),
-            Some(before) => self.spoken.contains(StationId(before)),
+            Some(before) => self.published.contains(StationId(before)),
         };
-        if has_token && own.0 < STATIONS && !self.spoken.contains(own) {
-            self.spoken.insert(own);
+        if has_token && own.0 < STATIONS && !self.published.contains(own) {
+            self.published.insert(own);
             self.say(turn(own));
         }
     }
@@ -85,7 +85,7 @@ impl Machine for Pattern {
 
     fn handle_input(&mut self, now: Time, input: Input<'_>) {
         match input {
-            Input::Wakeup if self.paces() && now >= self.due => {
+            Input::Wakeup if self.is_cycle_master() && now >= self.due => {
                 self.due = now + self.period;
                 self.begin(self.moment.plus(1));
                 self.say(Body::Sync);
@@ -94,19 +94,19 @@ impl Machine for Pattern {
                 match (&frame.body, frame.header.sender) {
                     (Body::Sync, _) if frame.header.moment > self.moment => {
                         self.begin(frame.header.moment);
-                        if matches!(self.own, Party::RemoteIo(program) if program.0 < PROGRAMS) {
+                        if matches!(self.own, Member::RemoteIo(program) if program.0 < PROGRAMS) {
                             self.say(sample());
                         }
                     }
-                    (Body::Sample(_), Party::RemoteIo(program))
+                    (Body::Sample(_), Member::RemoteIo(program))
                         if frame.header.moment == self.moment =>
                     {
                         self.sampled.insert(program);
                     }
-                    (Body::Turn(_), Party::Station(station))
+                    (Body::Turn(_), Member::Station(station))
                         if frame.header.moment == self.moment =>
                     {
-                        self.spoken.insert(station);
+                        self.published.insert(station);
                     }
                     _ => return,
                 }
@@ -121,7 +121,7 @@ impl Machine for Pattern {
     }
 
     fn wakeup(&self) -> Time {
-        if self.paces() {
+        if self.is_cycle_master() {
             self.due
         } else {
             Time(u64::MAX)
@@ -129,7 +129,7 @@ impl Machine for Pattern {
     }
 }
 
-fn frame(sender: Party, moment: Moment, body: Body) -> Frame {
+fn frame(sender: Member, moment: Moment, body: Body) -> Frame {
     Frame {
         header: Header {
             // As long as real hashes are on the wire.
@@ -159,7 +159,7 @@ fn sample() -> Body {
 
 /// A controller holds its own program, the understudy all.
 fn turn(own: StationId) -> Body {
-    let members: ProgramSet = if own.0 < PROGRAMS {
+    let mask: ProgramSet = if own.0 < PROGRAMS {
         ProgramSet::only(ProgramId(own.0))
     } else {
         ProgramSet::first(usize::from(PROGRAMS))
@@ -173,9 +173,9 @@ fn turn(own: StationId) -> Body {
     };
     Body::Turn(Turn {
         heard: StationSet::first(usize::from(own.0)),
-        holdings: members.iter().map(holding).collect(),
+        holdings: mask.iter().map(holding).collect(),
         words: [Word {
-            members,
+            mask,
             sum: Image::zero(WIDTH),
         }]
         .into_iter()
@@ -195,10 +195,10 @@ fn moment() -> Moment {
 
 /// The frames of one cycle in the order in which they are said, for the yardstick that carries as many bytes.
 pub(super) fn frames_of_a_cycle() -> Vec<Frame> {
-    let station = |rank| Party::Station(StationId(rank));
-    let samples = (0..PROGRAMS).map(|program| (Party::RemoteIo(ProgramId(program)), sample()));
+    let station = |rank| Member::Station(StationId(rank));
+    let samples = (0..PROGRAMS).map(|program| (Member::RemoteIo(ProgramId(program)), sample()));
     let turns = (0..STATIONS).map(|rank| (station(rank), turn(StationId(rank))));
-    std::iter::once((PACEMAKER, Body::Sync))
+    std::iter::once((CYCLE_MASTER, Body::Sync))
         .chain(samples)
         .chain(turns)
         .map(|(sender, body)| frame(sender, moment(), body))

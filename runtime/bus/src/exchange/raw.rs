@@ -4,15 +4,15 @@ use std::io;
 use std::net::{SocketAddr, UdpSocket};
 use std::time::Duration;
 
-use understudy_wire::{Frame, Party, Time, encode};
+use understudy_wire::{Frame, Member, Time, encode};
 
 use super::benchmark::ExchangeSettings;
 use super::meter::ExchangeMeter;
-use super::pattern::{PACEMAKER, PROGRAMS, STATIONS, frames_of_a_cycle};
+use super::pattern::{CYCLE_MASTER, PROGRAMS, STATIONS, frames_of_a_cycle};
 use crate::clock::Clock;
 use crate::observer::Observer;
 
-/// After so long without a datagram one was lost, and the pacemaker starts the next cycle.
+/// After so long without a datagram one was lost, and the cycle master starts the next cycle.
 const LOST_AFTER: Duration = Duration::from_millis(100);
 
 /// The eight datagrams of a cycle, in the order in which they are said. Byte 0 is the place in that order, bytes 1 to 8 are
@@ -37,39 +37,39 @@ impl Script {
         }
     }
 
-    fn place_of(&self, party: Party, which: usize) -> Option<usize> {
+    fn place_of(&self, member: Member, which: usize) -> Option<usize> {
         let said =
-            |(place, frame): (usize, &Frame)| (frame.header.sender == party).then_some(place);
+            |(place, frame): (usize, &Frame)| (frame.header.sender == member).then_some(place);
         self.frames.iter().enumerate().filter_map(said).nth(which)
     }
 }
 
-/// Plays the part of `own` until `cycles` were measured, where it is the pacemaker, and until the process is
+/// Plays the part of `own` until `cycles` were measured, where it is the cycle master, and until the process is
 /// killed, where it is not.
 pub(super) fn play(
-    own: Party,
+    own: Member,
     socket: &UdpSocket,
     others: &[SocketAddr],
     settings: ExchangeSettings,
     meter: &mut ExchangeMeter,
 ) -> io::Result<()> {
     let mut script = Script::new();
-    let paces = own == PACEMAKER;
-    // The pacemaker's first datagram is the Sync, and its second the turn.
+    let is_cycle_master = own == CYCLE_MASTER;
+    // The cycle master's first datagram is the Sync, and its second the turn.
     let mine = script
-        .place_of(own, usize::from(paces))
+        .place_of(own, usize::from(is_cycle_master))
         .unwrap_or(usize::MAX);
     let clock = Clock::start();
     let mut received = [0; 2048];
     let mut cycle = 0_u64;
-    if paces {
+    if is_cycle_master {
         socket.set_read_timeout(Some(LOST_AFTER))?;
     }
-    while !paces || !meter.satisfied() {
+    while !is_cycle_master || !meter.satisfied() {
         let mut heard = [false; 1 + PROGRAMS as usize + STATIONS as usize];
-        let mut spoken = false;
+        let mut published = false;
         let started = clock.now();
-        if paces {
+        if is_cycle_master {
             cycle += 1;
             heard[0] = true;
             note(meter, &script, 0, cycle, clock.now());
@@ -85,29 +85,29 @@ pub(super) fn play(
             if of > cycle {
                 cycle = of;
                 heard.fill(false);
-                spoken = false;
+                published = false;
             }
             if of == cycle {
                 heard[place] = true;
                 note(meter, &script, place, cycle, clock.now());
             }
             let token = match own {
-                PACEMAKER => heard[1..=usize::from(PROGRAMS)].iter().all(|&one| one),
-                Party::Station(_) => heard[mine - 1],
+                CYCLE_MASTER => heard[1..=usize::from(PROGRAMS)].iter().all(|&one| one),
+                Member::Station(_) => heard[mine - 1],
                 _ => heard[0],
             };
-            if token && !spoken {
-                spoken = true;
+            if token && !published {
+                published = true;
                 heard[mine] = true;
                 note(meter, &script, mine, cycle, clock.now());
                 broadcast(socket, others, &mut script.datagrams[mine], cycle)?;
             }
         }
-        if paces {
+        if is_cycle_master {
             let left = settings.period.saturating_sub(clock.now().since(started));
             #[allow(
                 clippy::disallowed_methods,
-                reason = "the pacemaker waits for the next period"
+                reason = "the cycle_master waits for the next period"
             )]
             std::thread::sleep(left);
         }

@@ -12,7 +12,7 @@ fn outage(rank: u8, at: u64, cycles: u64) -> Injection {
     let step = |at_cycle, action| Fault {
         at_cycle,
         phase: 0.375,
-        party: Party::Station(StationId(rank)),
+        member: Member::Station(StationId(rank)),
         action,
     };
     Injection {
@@ -30,7 +30,7 @@ fn schedule() -> Schedule {
 fn check(faultload: Faultload, cause: &dyn Fn(&Faultload) -> bool) -> (Violating, u32) {
     let symptom = Symptom {
         cycle: CYCLES - 1,
-        party: None,
+        member: None,
         what: String::new(),
     };
     let mut trials = 0;
@@ -53,16 +53,16 @@ fn check(faultload: Faultload, cause: &dyn Fn(&Faultload) -> bool) -> (Violating
 fn exactly_the_culprits_are_left() {
     let all: Vec<Injection> = (0..6).map(|rank| outage(rank, 60, 10)).collect();
     for culprits in 1..64_u32 {
-        let is_culprit = |step: &Fault| match step.party {
-            Party::Station(station) => culprits >> station.0 & 1 == 1,
+        let is_culprit = |step: &Fault| match step.member {
+            Member::Station(station) => culprits >> station.0 & 1 == 1,
             _ => false,
         };
         let crashed = |faultload: &Faultload| {
             let steps = faultload.steps();
             let crashes = steps.iter().filter(|step| step.action == Action::Crash);
-            let mut ranks: Vec<Party> = crashes
+            let mut ranks: Vec<Member> = crashes
                 .filter(|step| is_culprit(step))
-                .map(|step| step.party)
+                .map(|step| step.member)
                 .collect();
             ranks.dedup();
             ranks.len() == culprits.count_ones() as usize
@@ -115,7 +115,7 @@ fn numbers_become_small() {
     assert!(
         steps
             .iter()
-            .all(|step| step.party == Party::Station(StationId(0)))
+            .all(|step| step.member == Member::Station(StationId(0)))
     );
 }
 
@@ -153,25 +153,25 @@ fn a_network_becomes_simple() {
     assert_eq!(small.faultload.network, Some(expected));
 }
 
-/// Cuts between later parties become cuts between earlier ones of the same roles.
+/// Cuts between later members become cuts between earlier ones of the same roles.
 #[test]
-fn parties_become_simple() {
-    let cut = |from: Party, to: Party| Injection {
+fn members_become_simple() {
+    let cut = |from: Member, to: Member| Injection {
         kind: Kind::OneWayCut,
         role: Role::Controller,
         steps: vec![Fault {
             at_cycle: FIRST_CYCLE,
             phase: 0.0,
-            party: from,
+            member: from,
             action: Action::Cut { to },
         }],
     };
     let (late, first) = (StationId(5), StationId(0));
     let faultload = Faultload {
-        injections: vec![cut(Party::Station(late), Party::RemoteIo(ProgramId(4)))],
+        injections: vec![cut(Member::Station(late), Member::RemoteIo(ProgramId(4)))],
         network: None,
     };
     let (small, _) = check(faultload, &|faultload| !faultload.injections.is_empty());
-    let expected = cut(Party::Station(first), Party::RemoteIo(ProgramId(0)));
+    let expected = cut(Member::Station(first), Member::RemoteIo(ProgramId(0)));
     assert_eq!(small.faultload.injections, [expected]);
 }

@@ -1,4 +1,4 @@
-//! The automata in step, and the ways through them.
+//! The automata synchronised, and the ways through them.
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 
@@ -10,7 +10,7 @@ use crate::{Automaton, Label, State, Transition};
 /// The closed loop past which nothing is looked for.
 const MAXIMUM_CLOSED_LOOP: usize = 2_000_000;
 
-/// The automata in step.
+/// The automata synchronised.
 pub(super) struct ClosedLoop {
     pub(super) automaton: Automaton,
     /// Whence each state was first reached.

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use understudy_remote_io::Missing;
 use understudy_view::StationState;
-use understudy_wire::{Party, ProgramId, StationId};
+use understudy_wire::{Member, ProgramId, StationId};
 
 use super::{name, program_names};
 use crate::changes::{Process, Standing};
@@ -11,14 +11,14 @@ use crate::foreseen::began;
 use crate::model::Known;
 
 #[derive(Debug, Serialize)]
-pub(super) struct ShownParty {
+pub(super) struct ShownMember {
     pub(super) name: String,
     kind: &'static str,
     /// In one word.
     state: &'static str,
     /// It has no process.
     down: bool,
-    pub(super) paces: bool,
+    pub(super) is_cycle_master: bool,
     /// Nothing that it says arrives.
     cut: bool,
     note: String,
@@ -38,18 +38,18 @@ pub(super) fn station(
     standing: &Standing,
     station: StationId,
     cycle: i64,
-) -> ShownParty {
-    let party = Party::Station(station);
+) -> ShownMember {
+    let member = Member::Station(station);
     let schedule = &known.run.cluster().agreement().schedule;
     let understudy = schedule.is_understudy(station);
-    let process = standing.process(party);
+    let process = standing.process(member);
     let excluded = known
         .programs()
         .filter(|&program| standing.excluded(program).contains(station));
     let excluded = program_names(known, excluded.collect());
-    let cut = cut(known, standing, party);
-    ShownParty {
-        name: name(known, party),
+    let cut = cut(known, standing, member);
+    ShownMember {
+        name: name(known, member),
         kind: if understudy {
             "understudy"
         } else {
@@ -57,12 +57,12 @@ pub(super) fn station(
         },
         state: state_of(known, standing, station, cycle),
         down: matches!(process, Some(Process::Killed | Process::Ended)),
-        paces: pacemaker(known, standing, cycle) == Some(station),
+        is_cycle_master: cycle_master(known, standing, cycle) == Some(station),
         cut: matches!(cut, Some(Cut::FromAll)),
         note: note([
             (!excluded.is_empty()).then(|| format!("excluded for {}", excluded.join(", "))),
             cut.map(|cut| cut.words()),
-            not_told(standing, party),
+            not_told(standing, member),
         ]),
         program: (!understudy).then_some(station.0),
         words: words_of(known, station, cycle),
@@ -70,9 +70,9 @@ pub(super) fn station(
 }
 
 /// Who starts the cycles: the first by rank that has started some, and speaks.
-pub(super) fn pacemaker(known: &Known, standing: &Standing, cycle: i64) -> Option<StationId> {
-    standing.paced().find(|&station| {
-        let cut = cut(known, standing, Party::Station(station));
+pub(super) fn cycle_master(known: &Known, standing: &Standing, cycle: i64) -> Option<StationId> {
+    standing.cycle_masters().find(|&station| {
+        let cut = cut(known, standing, Member::Station(station));
         let speaks = state_of(known, standing, station, cycle) == "speaking";
         speaks && !matches!(cut, Some(Cut::FromAll))
     })
@@ -87,10 +87,10 @@ fn state_of(known: &Known, standing: &Standing, station: StationId, cycle: i64) 
     let state = recorded
         .or_else(|| run.station_state(station))
         .unwrap_or(StationState::NotStarted);
-    station_word(state, standing.process(Party::Station(station)))
+    station_word(state, standing.process(Member::Station(station)))
 }
 
-/// Whom a party does not reach any more.
+/// Whom a member does not reach any more.
 enum Cut {
     FromAll,
     From(Vec<String>),
@@ -105,15 +105,15 @@ impl Cut {
     }
 }
 
-fn cut(known: &Known, standing: &Standing, party: Party) -> Option<Cut> {
+fn cut(known: &Known, standing: &Standing, member: Member) -> Option<Cut> {
     let names: Vec<String> = standing
-        .cut_from(party)
+        .cut_from(member)
         .map(|other| name(known, other))
         .collect();
     let stations = known.stations().count();
     // Remote I/Os say nothing to each other.
-    let others = match party {
-        Party::Station(_) => stations - 1 + known.programs().count(),
+    let others = match member {
+        Member::Station(_) => stations - 1 + known.programs().count(),
         _ => stations,
     };
     match names.len() {
@@ -141,9 +141,9 @@ fn station_word(state: StationState, process: Option<Process>) -> &'static str {
     }
 }
 
-fn not_told(standing: &Standing, party: Party) -> Option<String> {
+fn not_told(standing: &Standing, member: Member) -> Option<String> {
     let told = "not heard here";
-    standing.is_detached(party).then(|| told.to_owned())
+    standing.is_detached(member).then(|| told.to_owned())
 }
 
 fn note<const N: usize>(parts: [Option<String>; N]) -> String {
@@ -159,13 +159,13 @@ pub(super) fn words_of(known: &Known, station: StationId, cycle: i64) -> Vec<Sho
     let Some(moment) = moments.next() else {
         return Vec::new();
     };
-    let turns = known.run.spoken(moment).iter();
+    let turns = known.run.sent_turns(moment).iter();
     let words = turns
         .filter(|turn| turn.station == station)
         .flat_map(|turn| turn.words.iter());
     words
         .map(|word| ShownWord {
-            members: program_names(known, word.members),
+            members: program_names(known, word.mask),
             sum: word.sum.to_string(),
         })
         .collect()
@@ -185,11 +185,11 @@ pub(super) fn remote_io(
     standing: &Standing,
     program: ProgramId,
     cycle: i64,
-) -> ShownParty {
-    let party = Party::RemoteIo(program);
+) -> ShownMember {
+    let member = Member::RemoteIo(program);
     let step = known.run.history(program).and_then(|steps| steps.at(cycle));
     let driven = step.and_then(|step| step.driven.as_ref());
-    let process = standing.process(party);
+    let process = standing.process(member);
     let missing = driven.and_then(|driven| driven.missing);
     let alive = match (driven, missing) {
         (None, _) | (_, Some(Missing::NoHistory)) => "listening",
@@ -198,36 +198,36 @@ pub(super) fn remote_io(
         _ => "serving",
     };
     let forced = standing.forced(program).count();
-    let cut = cut(known, standing, party);
-    ShownParty {
-        name: name(known, party),
+    let cut = cut(known, standing, member);
+    ShownMember {
+        name: name(known, member),
         kind: "remote-io",
         state: process_word(process).unwrap_or(alive),
         down: matches!(process, Some(Process::Killed | Process::Ended)),
-        paces: false,
+        is_cycle_master: false,
         cut: matches!(cut, Some(Cut::FromAll)),
         note: note([
             (forced > 0).then(|| format!("{forced} forced")),
             cut.map(|cut| cut.words()),
-            not_told(standing, party),
+            not_told(standing, member),
         ]),
         program: Some(program.0),
         words: Vec::new(),
     }
 }
 
-pub(super) fn plant(known: &Known, standing: &Standing, program: ProgramId) -> Option<ShownParty> {
-    let party = Party::Plant(program);
-    known.run.cluster().party_name(party)?;
-    let process = standing.process(party);
-    Some(ShownParty {
-        name: name(known, party),
+pub(super) fn plant(known: &Known, standing: &Standing, program: ProgramId) -> Option<ShownMember> {
+    let member = Member::Plant(program);
+    known.run.cluster().member_name(member)?;
+    let process = standing.process(member);
+    Some(ShownMember {
+        name: name(known, member),
         kind: "plant",
         state: process_word(process).unwrap_or("moving"),
         down: matches!(process, Some(Process::Killed | Process::Ended)),
-        paces: false,
+        is_cycle_master: false,
         cut: false,
-        note: note([not_told(standing, party)]),
+        note: note([not_told(standing, member)]),
         program: Some(program.0),
         words: Vec::new(),
     })

@@ -1,4 +1,4 @@
-//! A party that says who it is and reports whom it hears, and clusters of such parties.
+//! A member that says who it is and reports whom it hears, and clusters of such members.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -9,21 +9,21 @@ use understudy_bus::{Endpoints, Guard, Peer, free_addresses};
 use understudy_seal::{ClusterSecret, FrameKey, Opener, Seal, Title};
 use understudy_wire::{
     Agreement, Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Field, Frame, Header, Image,
-    Input, Lineage, Machine, Mode, Moment, Output, Party, ProgramId, Sample, Schedule, StationId,
+    Input, Lineage, Machine, Member, Mode, Moment, Output, ProgramId, Sample, Schedule, StationId,
     StationSet, Time, Topic,
 };
 
-/// How often each party says something.
+/// How often each member says something.
 const PERIOD: Duration = Duration::from_millis(10);
 
-/// What a party reports.
+/// What a member reports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "kebab-case")]
 pub(crate) enum Chat {
     /// It hears this life of another one for the first time.
-    Heard { speaker: Party, life: u64 },
+    Heard { speaker: Member, life: u64 },
     /// It hears another one say its 100th, 200th, … frame, or one of the 99 after that.
-    StillHears { speaker: Party, hundreds: u64 },
+    StillHears { speaker: Member, hundreds: u64 },
     /// Its sensors say something for the first time.
     Sensed,
     /// The operator has released its outputs.
@@ -32,7 +32,7 @@ pub(crate) enum Chat {
 
 /// Says one frame every period; a remote I/O drives its plant as well.
 pub(crate) struct Chatter {
-    own: Party,
+    own: Member,
     life: u64,
     cycle: u64,
     due: Time,
@@ -41,7 +41,7 @@ pub(crate) struct Chatter {
 }
 
 impl Chatter {
-    pub(crate) fn new(own: Party, life: u64) -> Self {
+    pub(crate) fn new(own: Member, life: u64) -> Self {
         Self {
             own,
             life,
@@ -68,9 +68,9 @@ impl Machine for Chatter {
                 self.due = now + PERIOD;
                 self.cycle += 1;
                 let body = match self.own {
-                    Party::Station(_) => Body::Sync,
-                    Party::RemoteIo(_) => Body::Sample(sample()),
-                    Party::Plant(_) => Body::Field(field()),
+                    Member::Station(_) => Body::Sync,
+                    Member::RemoteIo(_) => Body::Sample(sample()),
+                    Member::Plant(_) => Body::Field(field()),
                 };
                 let agreement = agreement();
                 self.said.push_back(Output::Send(Arc::new(Frame {
@@ -86,7 +86,7 @@ impl Machine for Chatter {
                     },
                     body,
                 })));
-                if matches!(self.own, Party::RemoteIo(_)) {
+                if matches!(self.own, Member::RemoteIo(_)) {
                     self.said.push_back(Output::Drive(Image::zero(3)));
                 }
             }
@@ -135,7 +135,7 @@ fn field() -> Field {
         sensors: Image::zero(3),
         handed_over: 0,
         finished: 0,
-        mishaps: 0,
+        plant_faults: 0,
         positions: [].into_iter().collect(),
     }
 }
@@ -153,58 +153,58 @@ pub(crate) fn agreement() -> Arc<Agreement> {
     })
 }
 
-pub(crate) fn station(rank: u8) -> Party {
-    Party::Station(StationId(rank))
+pub(crate) fn station(rank: u8) -> Member {
+    Member::Station(StationId(rank))
 }
 
-pub(crate) fn remote_io(program: u8) -> Party {
-    Party::RemoteIo(ProgramId(program))
+pub(crate) fn remote_io(program: u8) -> Member {
+    Member::RemoteIo(ProgramId(program))
 }
 
-pub(crate) fn plant(program: u8) -> Party {
-    Party::Plant(ProgramId(program))
+pub(crate) fn plant(program: u8) -> Member {
+    Member::Plant(ProgramId(program))
 }
 
-/// Gives each party a port that was free a moment ago.
-pub(crate) fn peers(parties: &[Party]) -> Vec<Peer> {
-    let addresses = free_addresses(parties.len()).expect("free ports");
-    let named = parties.iter().zip(addresses);
+/// Gives each member a port that was free a moment ago.
+pub(crate) fn peers(members: &[Member]) -> Vec<Peer> {
+    let addresses = free_addresses(members.len()).expect("free ports");
+    let named = members.iter().zip(addresses);
     named
-        .map(|(&party, address)| Peer {
-            party,
-            name: format!("{party:?}"),
+        .map(|(&member, address)| Peer {
+            member,
+            name: format!("{member:?}"),
             address,
         })
         .collect()
 }
 
-/// The key of a party, in a cluster whose secret everybody knows.
-pub(crate) fn key(party: Party) -> FrameKey {
+/// The key of a member, in a cluster whose secret everybody knows.
+pub(crate) fn key(member: Member) -> FrameKey {
     ClusterSecret::new([1; 32]).frame_key(Title {
         cluster: "cell",
-        party: &format!("{party:?}"),
+        member: &format!("{member:?}"),
         generation: 1,
     })
 }
 
-/// The keys of one party in one of its lives.
+/// The keys of one member in one of its lives.
 #[allow(dead_code, reason = "some tests have no keys")]
-pub(crate) fn guard(own: Party, life: u64, peers: &[Peer]) -> Guard {
+pub(crate) fn guard(own: Member, life: u64, peers: &[Peer]) -> Guard {
     let feeds = [(ProgramId(0), ProgramId(1))];
-    let heard = peers.iter().map(|peer| peer.party);
-    let heard = heard.filter(|&party| Topic::between(party, own, &feeds).is_some());
+    let heard = peers.iter().map(|peer| peer.member);
+    let heard = heard.filter(|&member| Topic::between(member, own, &feeds).is_some());
     Guard::with_keys(
         Seal::new(own, key(own), life as u32, []),
         Opener::new(
             own,
-            heard.map(|party| (party, key(party))),
+            heard.map(|member| (member, key(member))),
             [],
             Arc::default(),
         ),
     )
 }
 
-pub(crate) fn endpoints(own: Party, peers: &[Peer]) -> Endpoints {
+pub(crate) fn endpoints(own: Member, peers: &[Peer]) -> Endpoints {
     let feeds = vec![(ProgramId(0), ProgramId(1))];
     Endpoints::new(agreement().cluster, own, peers.to_vec(), feeds).expect("own is among them")
 }

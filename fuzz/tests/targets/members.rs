@@ -1,4 +1,4 @@
-//! What a party hears of others: frames, sealed and not, what is known of its peers, and what an operator forces.
+//! What a member hears of others: frames, sealed and not, what is known of its peers, and what an operator forces.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use understudy_bus::{Endpoints, Peer};
 use understudy_remote_io::RemoteIo;
 use understudy_seal::{ClusterSecret, Opener, Revocations, Seal, Title};
 use understudy_wire::{
-    ClusterHash, Force, Input, MAXIMUM_FRAME_BYTES, Machine, Party, ProgramId, SignalPlace,
+    ClusterHash, Force, Input, MAXIMUM_FRAME_BYTES, Machine, Member, ProgramId, SignalPlace,
     StationId, Time, decode, encode,
 };
 
@@ -40,12 +40,12 @@ fn frame() {
 #[test]
 fn sealed() {
     let secret = ClusterSecret::new([7; 32]);
-    let title = |party| Title {
+    let title = |member| Title {
         cluster: "cell",
-        party,
+        member,
         generation: 1,
     };
-    let (zero, one) = (Party::Station(StationId(0)), Party::Station(StationId(1)));
+    let (zero, one) = (Member::Station(StationId(0)), Member::Station(StationId(1)));
     attack("frame", &[], move |payload| {
         let key = || secret.frame_key(title("zero"));
         let transfer = || secret.transfer_key(title("zero"), title("one"));
@@ -87,7 +87,7 @@ fn endpoints() {
         let Ok(peers) = serde_json::from_slice::<Vec<Peer>>(bytes) else {
             return;
         };
-        if let Some(own) = peers.first().map(|peer| peer.party) {
+        if let Some(own) = peers.first().map(|peer| peer.member) {
             let _ = Endpoints::new(ClusterHash(1), own, peers, Vec::new());
         }
     });

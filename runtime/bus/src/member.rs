@@ -1,4 +1,4 @@
-//! One party as one process: what `understudy node`, `remote-io` and `plant` run.
+//! One member as one process: what `understudy node`, `remote-io` and `plant` run.
 
 use std::any::Any;
 use std::io::Write;
@@ -25,8 +25,8 @@ use crate::orders::{Order, orders};
 use crate::rights::{CYCLE_PRIORITY, Rights, run_in_real_time, sleep_exactly};
 use crate::watchdog::{Watchdog, Watched};
 
-/// What a process needs to know besides its party.
-pub struct PartySettings {
+/// What a process needs to know besides its member.
+pub struct MemberSettings {
     /// Who is where.
     pub endpoints: Endpoints,
     /// What carries the frames.
@@ -47,7 +47,7 @@ pub struct PartySettings {
     pub real_time: bool,
 }
 
-/// Runs a party until it is told to stop by a command, by SIGINT or SIGTERM, or by the end of standard input.
+/// Runs a member until it is told to stop by a command, by SIGINT or SIGTERM, or by the end of standard input.
 ///
 /// To be called from the main thread, before any other is started. Each report is one line of JSON on `output`
 /// ([`crate::Record`]); the first is [`HostEvent::Ready`], the last [`HostEvent::Stopped`].
@@ -56,9 +56,9 @@ pub struct PartySettings {
 /// [`BusError::PortInUse`], [`BusError::Listen`] or [`BusError::Zenoh`] where there is no link; [`BusError::System`] where the
 /// system refuses what every process needs; [`BusError::Panicked`] where the cycle panics. Rights that are lacking are no error;
 /// the ready record names them.
-pub fn run_party<M>(
+pub fn run_member<M>(
     mut machine: M,
-    settings: PartySettings,
+    settings: MemberSettings,
     output: impl Write + Send + 'static,
 ) -> Result<Summary, BusError>
 where
@@ -66,7 +66,7 @@ where
     M::Event: Serialize + Send + 'static,
 {
     let clock = Clock::start();
-    let PartySettings {
+    let MemberSettings {
         endpoints,
         link: kind,
         mut guard,
@@ -95,7 +95,7 @@ where
     };
     // The journal's thread starts before the rights are claimed, so that it inherits none.
     let (mut sink, journal) =
-        Journal::start::<M::Event>(JOURNAL_RECORDS, clock, own.party, own.name, output)?;
+        Journal::start::<M::Event>(JOURNAL_RECORDS, clock, own.member, own.name, output)?;
     let mut rights = if real_time {
         Rights::claim()
     } else {

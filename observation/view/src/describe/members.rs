@@ -2,42 +2,46 @@
 
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason};
-use understudy_scenarios::{Parties, source_word};
-use understudy_wire::{Party, SignalPlace, StationId};
+use understudy_scenarios::{Members, source_word};
+use understudy_wire::{Member, SignalPlace, StationId};
 
 use super::{Words, list, missing_text, program_name, programs, stations};
 use crate::event::Level;
 
-pub(super) fn station(event: &StationEvent, parties: &Parties) -> Words {
+pub(super) fn station(event: &StationEvent, members: &Members) -> Words {
     use Level::{Alarm, Info, Notice, Warning};
     match event {
-        StationEvent::Spoke { words, .. } => {
+        StationEvent::Published { words, .. } => {
             let words: Vec<String> = words
                 .iter()
-                .map(|word| format!("{} {}", programs(word.members, parties), word.sum))
+                .map(|word| format!("{} {}", programs(word.mask, members), word.sum))
                 .collect();
-            ("spoke", Info, format!("says {}", list(&words)))
+            ("published", Info, format!("says {}", list(&words)))
         }
         StationEvent::Holds {
             program, lineage, ..
         } => {
-            let whose = program_name(*program, parties);
+            let whose = program_name(*program, members);
             (
                 "holds",
                 Info,
                 format!("holds the state of {whose} at lineage {lineage}"),
             )
         }
-        StationEvent::Paces { .. } => ("paces", Notice, "starts the cycles from now on".to_owned()),
-        StationEvent::Flagged { station, .. } => flagged(*station, parties),
-        StationEvent::Cleared { station, .. } => cleared(*station, parties),
+        StationEvent::BecameCycleMaster { .. } => (
+            "became-cycle-master",
+            Notice,
+            "starts the cycles from now on".to_owned(),
+        ),
+        StationEvent::Flagged { station, .. } => flagged(*station, members),
+        StationEvent::Cleared { station, .. } => cleared(*station, members),
         StationEvent::Joins { wants, .. } => {
             let text = if wants.is_empty() {
                 "listens".to_owned()
             } else {
                 format!(
                     "listens, and asks for the state of {}",
-                    programs(*wants, parties)
+                    programs(*wants, members)
                 )
             };
             ("joins", Notice, text)
@@ -48,29 +52,29 @@ pub(super) fn station(event: &StationEvent, parties: &Parties) -> Words {
             lineage,
             ..
         } => {
-            let whose = program_name(*program, parties);
+            let whose = program_name(*program, members);
             let text = match from {
                 Some(from) => {
-                    let from = parties.name(Party::Station(*from));
+                    let from = members.name(Member::Station(*from));
                     format!("has the state of {whose} from {from}, at lineage {lineage}")
                 }
                 None => format!("starts {whose} from its initial state"),
             };
             ("adopted", Notice, text)
         }
-        StationEvent::InStep { program, .. } => {
-            let whose = program_name(*program, parties);
+        StationEvent::Synchronised { program, .. } => {
+            let whose = program_name(*program, members);
             (
-                "in-step",
+                "synchronised",
                 Notice,
-                format!("is in step with {whose}, and speaks for it"),
+                format!("is synchronised with {whose}, and speaks for it"),
             )
         }
         StationEvent::DigestDiffers {
             program, station, ..
         } => {
-            let other = parties.name(Party::Station(*station));
-            let whose = program_name(*program, parties);
+            let other = members.name(Member::Station(*station));
+            let whose = program_name(*program, members);
             (
                 "digest-differs",
                 Warning,
@@ -78,7 +82,7 @@ pub(super) fn station(event: &StationEvent, parties: &Parties) -> Words {
             )
         }
         StationEvent::Excluded { program, .. } => {
-            let whose = program_name(*program, parties);
+            let whose = program_name(*program, members);
             (
                 "excluded",
                 Alarm,
@@ -86,19 +90,19 @@ pub(super) fn station(event: &StationEvent, parties: &Parties) -> Words {
             )
         }
         StationEvent::Readmitted { program, .. } => {
-            let whose = program_name(*program, parties);
+            let whose = program_name(*program, members);
             ("readmitted", Notice, format!("begins again with {whose}"))
         }
         StationEvent::Refused {
-            party,
+            member,
             theirs,
             ours,
-        } => refused(*party, theirs.to_string(), ours.to_string(), parties),
+        } => refused(*member, theirs.to_string(), ours.to_string(), members),
         StationEvent::Stalled { late, .. } => stalled(*late),
     }
 }
 
-pub(super) fn remote_io(event: &RemoteIoEvent, parties: &Parties) -> Words {
+pub(super) fn remote_io(event: &RemoteIoEvent, members: &Members) -> Words {
     use Level::{Alarm, Info, Notice, Warning};
     match event {
         RemoteIoEvent::Sampled { inputs, .. } => ("sampled", Info, format!("samples {inputs}")),
@@ -111,7 +115,10 @@ pub(super) fn remote_io(event: &RemoteIoEvent, parties: &Parties) -> Words {
         } => {
             let mut text = format!("drives {outputs}, {}", source_word(*source));
             if let Some(station) = word_of {
-                text += &format!(" from a word of {}", parties.name(Party::Station(*station)));
+                text += &format!(
+                    " from a word of {}",
+                    members.name(Member::Station(*station))
+                );
             }
             if let Some(missing) = missing {
                 text += &format!(": {}", missing_text(*missing));
@@ -131,7 +138,7 @@ pub(super) fn remote_io(event: &RemoteIoEvent, parties: &Parties) -> Words {
             )
         }
         RemoteIoEvent::AdoptedLineage { lineage, from, .. } => {
-            let from = parties.name(Party::Station(*from));
+            let from = members.name(Member::Station(*from));
             (
                 "adopted-lineage",
                 Notice,
@@ -139,7 +146,7 @@ pub(super) fn remote_io(event: &RemoteIoEvent, parties: &Parties) -> Words {
             )
         }
         RemoteIoEvent::Disputed { stations: who, .. } => {
-            let who = stations(*who, parties);
+            let who = stations(*who, members);
             (
                 "disputed",
                 Alarm,
@@ -155,7 +162,7 @@ pub(super) fn remote_io(event: &RemoteIoEvent, parties: &Parties) -> Words {
             asks,
             ..
         } => {
-            let holder = parties.name(Party::Station(*holder));
+            let holder = members.name(Member::Station(*holder));
             let behind = applied.map_or_else(
                 || "it cannot know whether newer outputs were applied".to_owned(),
                 |applied| format!("outputs of cycle {} were applied", applied.cycle.0),
@@ -172,7 +179,7 @@ pub(super) fn remote_io(event: &RemoteIoEvent, parties: &Parties) -> Words {
             ("state-lost", Alarm, text)
         }
         RemoteIoEvent::StateRecovered { from, .. } => {
-            let from = parties.name(Party::Station(*from));
+            let from = members.name(Member::Station(*from));
             let text = format!("{from} has returned with the state of its program");
             ("state-recovered", Notice, text)
         }
@@ -196,7 +203,7 @@ pub(super) fn remote_io(event: &RemoteIoEvent, parties: &Parties) -> Words {
         RemoteIoEvent::Unprotected { lacking, .. } => {
             let reasons: Vec<String> = lacking
                 .iter()
-                .map(|one| lacking_text(one, parties))
+                .map(|one| lacking_text(one, members))
                 .collect();
             let text = format!("its program is not protected: {}", reasons.join(", "));
             ("unprotected", Alarm, text)
@@ -216,7 +223,7 @@ pub(super) fn remote_io(event: &RemoteIoEvent, parties: &Parties) -> Words {
             "an operator has released its outputs and whom it had accused".to_owned(),
         ),
         RemoteIoEvent::RecalledExclusion { stations: who, .. } => {
-            let who = stations(*who, parties);
+            let who = stations(*who, members);
             let text = format!(
                 "{who} stays excluded, as other stations recall, until an operator releases it"
             );
@@ -226,12 +233,12 @@ pub(super) fn remote_io(event: &RemoteIoEvent, parties: &Parties) -> Words {
             let text = format!("its diagnosis finds these channels failed: {failed}");
             ("diagnosed", Warning, text)
         }
-        RemoteIoEvent::Flagged { station, .. } => flagged(*station, parties),
-        RemoteIoEvent::Cleared { station, .. } => cleared(*station, parties),
+        RemoteIoEvent::Flagged { station, .. } => flagged(*station, members),
+        RemoteIoEvent::Cleared { station, .. } => cleared(*station, members),
         RemoteIoEvent::Syndrome {
             syndrome, accused, ..
         } => {
-            let who = stations(*accused, parties);
+            let who = stations(*accused, members);
             (
                 "syndrome",
                 Warning,
@@ -244,7 +251,7 @@ pub(super) fn remote_io(event: &RemoteIoEvent, parties: &Parties) -> Words {
             answer,
             ..
         } => {
-            let who = stations(*accused, parties);
+            let who = stations(*accused, members);
             let text = if *located {
                 format!("{who} is wrong by majority, and excluded until an operator releases it")
             } else {
@@ -255,8 +262,8 @@ pub(super) fn remote_io(event: &RemoteIoEvent, parties: &Parties) -> Words {
         RemoteIoEvent::DigestDiffers {
             program, accused, ..
         } => {
-            let who = stations(*accused, parties);
-            let whose = program_name(*program, parties);
+            let who = stations(*accused, members);
+            let whose = program_name(*program, members);
             (
                 "digest-differs",
                 Warning,
@@ -264,10 +271,10 @@ pub(super) fn remote_io(event: &RemoteIoEvent, parties: &Parties) -> Words {
             )
         }
         RemoteIoEvent::Refused {
-            party,
+            member,
             theirs,
             ours,
-        } => refused(*party, theirs.to_string(), ours.to_string(), parties),
+        } => refused(*member, theirs.to_string(), ours.to_string(), members),
         RemoteIoEvent::Stalled { late, .. } => stalled(*late),
         RemoteIoEvent::Forced { force, .. } => {
             let text = format!(
@@ -304,7 +311,7 @@ fn place(signal: SignalPlace) -> String {
     }
 }
 
-pub(super) fn plant(event: &understudy_plant::Event, parties: &Parties) -> Words {
+pub(super) fn plant(event: &understudy_plant::Event, members: &Members) -> Words {
     match event {
         understudy_plant::Event::Stepped { field, .. } => {
             let text = format!(
@@ -314,15 +321,15 @@ pub(super) fn plant(event: &understudy_plant::Event, parties: &Parties) -> Words
             ("stepped", Level::Info, text)
         }
         understudy_plant::Event::Refused {
-            party,
+            member,
             theirs,
             ours,
-        } => refused(*party, theirs.to_string(), ours.to_string(), parties),
+        } => refused(*member, theirs.to_string(), ours.to_string(), members),
     }
 }
 
-fn flagged(station: StationId, parties: &Parties) -> Words {
-    let name = parties.name(Party::Station(station));
+fn flagged(station: StationId, members: &Members) -> Words {
+    let name = members.name(Member::Station(station));
     (
         "flagged",
         Level::Warning,
@@ -330,13 +337,13 @@ fn flagged(station: StationId, parties: &Parties) -> Words {
     )
 }
 
-fn cleared(station: StationId, parties: &Parties) -> Words {
-    let name = parties.name(Party::Station(station));
+fn cleared(station: StationId, members: &Members) -> Words {
+    let name = members.name(Member::Station(station));
     ("cleared", Level::Notice, format!("{name} speaks again"))
 }
 
-fn refused(party: Party, theirs: String, ours: String, parties: &Parties) -> Words {
-    let name = parties.name(party);
+fn refused(member: Member, theirs: String, ours: String, members: &Members) -> Words {
+    let name = members.name(member);
     (
         "refused",
         Level::Warning,
@@ -353,8 +360,8 @@ fn stalled(late: std::time::Duration) -> Words {
 }
 
 /// Why a station cannot stand in for a program.
-fn lacking_text(lacking: &Lacking, parties: &Parties) -> String {
-    let name = parties.name(Party::Station(lacking.station));
+fn lacking_text(lacking: &Lacking, members: &Members) -> String {
+    let name = members.name(Member::Station(lacking.station));
     match lacking.reason {
         LackingReason::NotReceived => {
             format!("{name} is not received (it is down, or the link from it)")

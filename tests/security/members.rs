@@ -1,4 +1,4 @@
-//! A party that runs with keys: an operator's calls, a machine's examination.
+//! A member that runs with keys: an operator's calls, a machine's examination.
 
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -39,7 +39,7 @@ fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
         keys,
     ];
     assert_eq!(answer(&second).0, 0);
-    let of = |name: &str| format!("{keys}/parties/{name}");
+    let of = |name: &str| format!("{keys}/members/{name}");
     let common = ["--link", "udp", "--no-real-time"];
     let robot_io = of("robot-io");
     let start = [
@@ -81,7 +81,7 @@ fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
     assert!(lines.status.success());
     assert_eq!(String::from_utf8_lossy(&lines.stdout).lines().count(), 3);
 
-    // Keys of a party are no operator's, and keys of another cluster of the same name are nobody's.
+    // Keys of a member are no operator's, and keys of another cluster of the same name are nobody's.
     let refused = operate(&of("robot"), &["stop"]);
     assert_eq!((refused.0, codes(&refused.1)), (2, vec!["U0910"]));
     let theirs = folder.join("theirs");
@@ -89,11 +89,11 @@ fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
         answer(&["keys", "init", cluster, "--folder", text(&theirs)]).0,
         0
     );
-    let stranger = theirs.join("parties/operator");
+    let stranger = theirs.join("members/operator");
     let refused = operate(text(&stranger), &["stop"]);
     assert_eq!((refused.0, codes(&refused.1)), (1, vec!["U0509"]));
 
-    // A party that runs learns who is revoked; the revoked one does not.
+    // A member that runs learns who is revoked; the revoked one does not.
     let guest = of("guest");
     let kept = folder.join("kept");
     copy(Path::new(&guest), &kept);
@@ -108,7 +108,7 @@ fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
         assert!(started.elapsed() < DEADLINE, "still answered: {document:#}");
     }
     let started = Instant::now();
-    // Where the answer is lost, the party ends all the same.
+    // Where the answer is lost, the member ends all the same.
     while running.0.try_wait().expect("it is ours").is_none() {
         operate(&operator, &["stop"]);
         assert!(
@@ -120,19 +120,19 @@ fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
 
 /// It runs, because its own list is an old one; the others have the new one.
 #[test]
-fn a_party_whose_keys_were_revoked_is_named_and_not_heard() {
+fn a_member_whose_keys_were_revoked_is_named_and_not_heard() {
     let _one = one_at_a_time();
-    let folder = empty_folder("revoked_party");
+    let folder = empty_folder("revoked_member");
     let cluster = addressed_cell(&folder);
     let keys = folder.join("keys");
     let (cluster, keys) = (text(&cluster), text(&keys));
     assert_eq!(answer(&["keys", "init", cluster, "--folder", keys]).0, 0);
     let stolen = folder.join("stolen");
-    copy(Path::new(&format!("{keys}/parties/press")), &stolen);
+    copy(Path::new(&format!("{keys}/members/press")), &stolen);
     let common = ["--link", "udp", "--no-real-time"];
     let press = ["node", cluster, "--name", "press", "--keys", text(&stolen)];
     let _stolen = Running::start(&[&press[..], &common].concat());
-    let own = format!("{keys}/parties/robot");
+    let own = format!("{keys}/members/robot");
     let robot = ["node", cluster, "--name", "robot", "--keys", &own];
     let mut robot = understudy(&[&robot[..], &common].concat())
         .stdin(Stdio::null())
@@ -158,7 +158,7 @@ fn a_party_whose_keys_were_revoked_is_named_and_not_heard() {
     panic!("the robot has ended");
 }
 
-/// What systemd is told, of a party that runs and of one that stands still.
+/// What systemd is told, of a member that runs and of one that stands still.
 #[test]
 fn signs_of_life_come_from_a_cycle_that_runs() {
     let _one = one_at_a_time();
@@ -169,14 +169,14 @@ fn signs_of_life_come_from_a_cycle_that_runs() {
     socket
         .set_read_timeout(Some(DEADLINE))
         .expect("it is not zero");
-    let party = ["node", text(&cluster), "--name", "robot", "--link", "udp"];
-    let party = understudy(&[&party[..], &["--security", "off", "--no-real-time"]].concat())
+    let member = ["node", text(&cluster), "--name", "robot", "--link", "udp"];
+    let member = understudy(&[&member[..], &["--security", "off", "--no-real-time"]].concat())
         .env("NOTIFY_SOCKET", &path)
         .env("WATCHDOG_USEC", "400000")
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .spawn();
-    let party = Running(party.expect("the binary is built"));
+    let member = Running(member.expect("the binary is built"));
     let mut bytes = [0; 256];
     let mut next = || {
         let length = socket.recv(&mut bytes).expect("a sign in time");
@@ -186,7 +186,7 @@ fn signs_of_life_come_from_a_cycle_that_runs() {
     for _ in 0..3 {
         assert_eq!(next(), "WATCHDOG=1");
     }
-    drop(party);
+    drop(member);
     fs::remove_file(&path).expect("it is ours");
 }
 
@@ -243,7 +243,7 @@ fn doctor_names_what_is_wrong_with_its_remedy() {
         "--yes is of --fix"
     );
 
-    let of = |name: &str| format!("{keys}/parties/{name}");
+    let of = |name: &str| format!("{keys}/members/{name}");
     let robot = [
         "doctor", cluster, "--name", "robot", "--link", "udp", "--listen", "20",
     ];

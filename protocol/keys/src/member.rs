@@ -1,4 +1,4 @@
-//! What one party runs with.
+//! What one member runs with.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use understudy_cluster::Cluster;
 use understudy_seal::{FrameKey, KEY_BYTES, Opener, Revocations, Seal, TransferKey};
-use understudy_wire::{ClusterHash, ConfigurationHash, Party, StationId, Topic};
+use understudy_wire::{ClusterHash, ConfigurationHash, Member, StationId, Topic};
 
 use crate::certificate;
 use crate::date::Date;
@@ -30,7 +30,7 @@ pub(crate) struct KeysFile {
     pub(crate) expires: Date,
     /// Its frame key, hexadecimal; empty for an operator.
     pub(crate) own: String,
-    /// Common names of all parties.
+    /// Common names of all members.
     pub(crate) members: Vec<String>,
     /// Common names of all operators.
     pub(crate) operators: Vec<String>,
@@ -67,22 +67,22 @@ pub struct TlsFiles {
     pub certificate: PathBuf,
     /// Its own private key.
     pub private_key: PathBuf,
-    /// Common names of the parties whose certificates hold.
+    /// Common names of the members whose certificates hold.
     pub members: Vec<String>,
     /// Common names of the operators whose certificates hold.
     pub operators: Vec<String>,
 }
 
-/// The keys of a party, read and found good.
+/// The keys of a member, read and found good.
 #[derive(Debug)]
-pub struct PartyKeys {
+pub struct MemberKeys {
     folder: PathBuf,
-    own: Party,
+    own: Member,
     agreed: (ClusterHash, ConfigurationHash),
     expires: Date,
     key: FrameKey,
     heard: Vec<HeardSender>,
-    heard_keys: Vec<(Party, FrameKey)>,
+    heard_keys: Vec<(Member, FrameKey)>,
     to: Vec<(StationId, TransferKey)>,
     from: Vec<(StationId, TransferKey)>,
     revoked: Arc<Revocations>,
@@ -98,8 +98,8 @@ pub struct OperatorKeys {
     pub tls: TlsFiles,
 }
 
-impl PartyKeys {
-    /// Reads the folder of a party.
+impl MemberKeys {
+    /// Reads the folder of a member.
     ///
     /// # Errors
     /// All that is wrong with it: [`KeysError::Read`], [`KeysError::Permissions`], [`KeysError::Damaged`],
@@ -107,11 +107,11 @@ impl PartyKeys {
     pub fn load(
         folder: &Path,
         cluster: &Cluster,
-        own: Party,
+        own: Member,
         now: Date,
     ) -> Result<Self, Vec<KeysError>> {
-        let name = cluster.party_name(own).unwrap_or_default();
-        let (file, revoked) = read(folder, cluster, name, Role::Party, now)?;
+        let name = cluster.member_name(own).unwrap_or_default();
+        let (file, revoked) = read(folder, cluster, name, Role::Member, now)?;
         let mut errors = Vec::new();
         let neighbours = cluster.neighbours();
         let damaged = |whose: &str| KeysError::Damaged {
@@ -130,9 +130,9 @@ impl PartyKeys {
         let own_key = FrameKey::new(key(&file.own, &file.name, &mut errors));
         let (mut heard, mut heard_keys) = (Vec::new(), Vec::new());
         let (mut to, mut from) = (Vec::new(), Vec::new());
-        for party in cluster.parties() {
-            let other = cluster.party_name(party).unwrap_or_default();
-            if Topic::between(party, own, &neighbours).is_none() {
+        for member in cluster.members() {
+            let other = cluster.member_name(member).unwrap_or_default();
+            if Topic::between(member, own, &neighbours).is_none() {
                 continue;
             }
             let no_key = || KeysError::NoKey {
@@ -141,12 +141,12 @@ impl PartyKeys {
             };
             match file.heard.iter().find(|heard| heard.name == other) {
                 Some(found) => {
-                    heard_keys.push((party, FrameKey::new(key(&found.key, other, &mut errors))));
-                    heard.push((party, found.name.clone(), found.generation));
+                    heard_keys.push((member, FrameKey::new(key(&found.key, other, &mut errors))));
+                    heard.push((member, found.name.clone(), found.generation));
                 }
                 None => errors.push(no_key()),
             }
-            if let (Party::Station(_), Party::Station(rank)) = (own, party) {
+            if let (Member::Station(_), Member::Station(rank)) = (own, member) {
                 match file.shared.iter().find(|shared| shared.name == other) {
                     Some(found) => {
                         to.push((rank, TransferKey::new(key(&found.to, other, &mut errors))));
@@ -187,7 +187,7 @@ impl PartyKeys {
         &self.tls
     }
 
-    /// The common names of the operators and of the parties whose certificates hold now, by the list of revoked keys as it is now;
+    /// The common names of the operators and of the members whose certificates hold now, by the list of revoked keys as it is now;
     /// by the one of the start where that cannot be read.
     pub fn admitted(&self) -> (Vec<String>, Vec<String>) {
         let TlsFiles {
@@ -217,14 +217,14 @@ impl PartyKeys {
             let text = files::read(&path)?;
             text.trim().parse().map_err(|_| KeysError::Damaged {
                 path: path.clone(),
-                reason: "it is no whole number; issue this party new keys".to_owned(),
+                reason: "it is no whole number; issue this member new keys".to_owned(),
             })?
         } else {
             0
         };
         let exhausted = || KeysError::Damaged {
             path: path.clone(),
-            reason: "there is no further life; issue this party new keys".to_owned(),
+            reason: "there is no further life; issue this member new keys".to_owned(),
         };
         let next = last.checked_add(1).ok_or_else(exhausted)?;
         let life = next.max(u32::try_from(now.seconds()).unwrap_or(0));
@@ -247,7 +247,7 @@ impl OperatorKeys {
     /// Reads the folder of an operator.
     ///
     /// # Errors
-    /// As [`PartyKeys::load`].
+    /// As [`MemberKeys::load`].
     pub fn load(folder: &Path, cluster: &Cluster, now: Date) -> Result<Self, Vec<KeysError>> {
         let (file, revoked) = read(folder, cluster, "", Role::Operator, now)?;
         Ok(Self {
@@ -257,7 +257,7 @@ impl OperatorKeys {
     }
 }
 
-/// What holds for parties and operators alike; an operator may have any name.
+/// What holds for members and operators alike; an operator may have any name.
 fn read(
     folder: &Path,
     cluster: &Cluster,
@@ -267,7 +267,7 @@ fn read(
 ) -> Result<(KeysFile, RevokedFile), Vec<KeysError>> {
     // Without the folder nothing else needs to be said.
     if !folder.exists() {
-        let reason = "there is no such folder; `understudy keys` makes one for each party and each operator, parties/NAME";
+        let reason = "there is no such folder; `understudy keys` makes one for each member and each operator, members/NAME";
         return Err(vec![KeysError::Read {
             path: folder.to_owned(),
             source: io::Error::new(io::ErrorKind::NotFound, reason),
@@ -303,9 +303,9 @@ fn read(
             let found = format!("the cluster {}", file.cluster);
             errors.push(others(found, format!("the cluster {}", cluster.name())));
         }
-        if file.role != role || (role == Role::Party && file.name != name) {
+        if file.role != role || (role == Role::Member && file.name != name) {
             let wanted = match role {
-                Role::Party => name.to_owned(),
+                Role::Member => name.to_owned(),
                 Role::Operator => "an operator".to_owned(),
             };
             errors.push(others(file.name.clone(), wanted));

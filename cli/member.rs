@@ -1,4 +1,4 @@
-//! `understudy node`, `remote-io` and `plant`: one party as one process.
+//! `understudy node`, `remote-io` and `plant`: one member as one process.
 
 use std::io;
 use std::net::SocketAddr;
@@ -12,16 +12,16 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::json;
 use understudy_bus::{
-    Admitted, ChannelSettings, Commands, Endpoints, FieldDriver, Guard, LinkKind, NewLife, NoField,
-    NoObserver, PartySettings, Peer, Segments, SimulatedField, ZENOH_RUNTIME, hold_back_signals,
-    run_party,
+    Admitted, ChannelSettings, Commands, Endpoints, FieldDriver, Guard, LinkKind, MemberSettings,
+    NewLife, NoField, NoObserver, Peer, Segments, SimulatedField, ZENOH_RUNTIME, hold_back_signals,
+    run_member,
 };
 use understudy_cluster::{Cluster, Security, why_unreachable};
-use understudy_keys::{Date, PartyKeys, RevocationWatch};
+use understudy_keys::{Date, MemberKeys, RevocationWatch};
 use understudy_node::Station;
 use understudy_plant::PlantMachine;
 use understudy_remote_io::RemoteIo;
-use understudy_wire::{Epoch, Image, Machine, Party, ProgramId, Time};
+use understudy_wire::{Epoch, Image, Machine, Member, ProgramId, Time};
 
 use crate::answer::{Answer, Status};
 use crate::field::Equipment;
@@ -34,19 +34,19 @@ use crate::overrides::{OverrideArguments, link_kind, parse_size};
 Example:
   understudy node cluster.toml --name robot
 
-Reports are JSON lines on standard output (docs/run-directory.md). Every party needs an address in the cluster file, or in
+Reports are JSON lines on standard output (docs/run-directory.md). Every member needs an address in the cluster file, or in
 the file of --endpoints. SIGINT and SIGTERM end it in order; the lines `stop` and `release` on standard input are commands.")]
 pub(crate) struct Arguments {
     /// The cluster file
     #[arg(value_name = "CLUSTER.toml")]
     cluster: PathBuf,
-    /// Which party of the cluster, by its name
+    /// Which member of the cluster, by its name
     #[arg(long, value_name = "NAME")]
     name: String,
-    /// A JSON list of parties, names and addresses, in place of the addresses of the cluster file
+    /// A JSON list of members, names and addresses, in place of the addresses of the cluster file
     #[arg(long, value_name = "FILE")]
     endpoints: Option<PathBuf>,
-    /// The folder of this party's keys; needed unless the cluster file says `security = "off"`
+    /// The folder of this member's keys; needed unless the cluster file says `security = "off"`
     #[arg(long, value_name = "DIR")]
     keys: Option<PathBuf>,
     /// End with standard input and with the process that started this one
@@ -86,8 +86,8 @@ pub(crate) struct PlantArguments {
 }
 
 pub(crate) fn run_station(arguments: &Arguments) -> Answer {
-    with_cluster(arguments, |cluster, party| {
-        let Party::Station(station) = party else {
+    with_cluster(arguments, |cluster, member| {
+        let Member::Station(station) = member else {
             return Err(wrong_kind(arguments, "station", "understudy node"));
         };
         let settings = cluster.station_settings(station, epoch_of_the_clock());
@@ -96,7 +96,7 @@ pub(crate) fn run_station(arguments: &Arguments) -> Answer {
         play(
             arguments,
             cluster,
-            party,
+            member,
             Station::new(Time::default(), settings),
             Box::new(NoField),
         )
@@ -104,9 +104,9 @@ pub(crate) fn run_station(arguments: &Arguments) -> Answer {
 }
 
 pub(crate) fn run_remote_io(arguments: &Arguments) -> Answer {
-    with_cluster(arguments, |cluster, party| {
+    with_cluster(arguments, |cluster, member| {
         let wrong = || wrong_kind(arguments, "remote I/O", "understudy remote-io");
-        let Party::RemoteIo(program) = party else {
+        let Member::RemoteIo(program) = member else {
             return Err(wrong());
         };
         let settings = cluster.remote_io_settings(program).ok_or_else(wrong)?;
@@ -114,7 +114,7 @@ pub(crate) fn run_remote_io(arguments: &Arguments) -> Answer {
         play(
             arguments,
             cluster,
-            party,
+            member,
             RemoteIo::new(Time::default(), settings),
             field,
         )
@@ -145,16 +145,16 @@ fn field_of(
 }
 
 pub(crate) fn run_plant(arguments: &Arguments) -> Answer {
-    with_cluster(arguments, |cluster, party| {
+    with_cluster(arguments, |cluster, member| {
         let wrong = || wrong_kind(arguments, "plant", "understudy plant");
-        let Party::Plant(program) = party else {
+        let Member::Plant(program) = member else {
             return Err(wrong());
         };
         let settings = cluster.plant_settings(program).ok_or_else(wrong)?;
         play(
             arguments,
             cluster,
-            party,
+            member,
             PlantMachine::new(settings, Time::default()),
             Box::new(NoField),
         )
@@ -163,7 +163,7 @@ pub(crate) fn run_plant(arguments: &Arguments) -> Answer {
 
 fn with_cluster(
     arguments: &Arguments,
-    run: impl FnOnce(&Cluster, Party) -> Result<Answer, Answer>,
+    run: impl FnOnce(&Cluster, Member) -> Result<Answer, Answer>,
 ) -> Answer {
     let (cluster, _) = match files::cluster(&arguments.cluster, arguments.overrides.overrides()) {
         Ok(read) => read,
@@ -171,16 +171,16 @@ fn with_cluster(
     };
     // Before anything else is started, which would be lost.
     start_again_for_zenoh(link_kind(&cluster));
-    let answer = find(&cluster, &arguments.name).and_then(|party| run(&cluster, party));
+    let answer = find(&cluster, &arguments.name).and_then(|member| run(&cluster, member));
     answer.unwrap_or_else(|answer| answer)
 }
 
-/// The party of a name.
-pub(crate) fn find(cluster: &Cluster, name: &str) -> Result<Party, Answer> {
-    cluster.party(name).ok_or_else(|| {
+/// The member of a name.
+pub(crate) fn find(cluster: &Cluster, name: &str) -> Result<Member, Answer> {
+    cluster.member(name).ok_or_else(|| {
         let names: Vec<&str> = cluster
-            .parties()
-            .filter_map(|party| cluster.party_name(party))
+            .members()
+            .filter_map(|member| cluster.member_name(member))
             .collect();
         let message = format!("the cluster has no `{name}`; it has {}", names.join(", "));
         Answer::failed(Status::BadInput, "U0605", message)
@@ -199,7 +199,7 @@ fn wrong_kind(arguments: &Arguments, wanted: &str, command: &str) -> Answer {
 fn play<M>(
     arguments: &Arguments,
     cluster: &Cluster,
-    party: Party,
+    member: Member,
     machine: M,
     field: Box<dyn FieldDriver>,
 ) -> Result<Answer, Answer>
@@ -208,13 +208,13 @@ where
     M::Event: Serialize + Send + 'static,
 {
     let link = link_kind(cluster);
-    let parties = peers(cluster, arguments.endpoints.as_deref())?;
+    let members = peers(cluster, arguments.endpoints.as_deref())?;
     let neighbours = cluster.neighbours();
-    let endpoints = Endpoints::new(cluster.agreement().cluster, party, parties, neighbours);
+    let endpoints = Endpoints::new(cluster.agreement().cluster, member, members, neighbours);
     let endpoints = endpoints
         .map_err(|error| Answer::failed(Status::BadInput, error.code(), error.to_string()))?;
-    let keys = read_keys(arguments, cluster, party)?;
-    let settings = PartySettings {
+    let keys = read_keys(arguments, cluster, member)?;
+    let settings = MemberSettings {
         endpoints,
         link,
         guard: keys.guard,
@@ -238,7 +238,7 @@ where
             },
         )?),
     };
-    match run_party(machine, settings, output) {
+    match run_member(machine, settings, output) {
         // Its last record has said it already.
         Ok(_) => Ok(Answer::done("", json!(null))),
         Err(error) => Err(Answer::failed(
@@ -249,14 +249,14 @@ where
     }
 }
 
-/// What a party seals and opens with, and what follows its list of revoked keys.
+/// What a member seals and opens with, and what follows its list of revoked keys.
 struct Held {
     guard: Guard,
     channel: Option<ChannelSettings>,
     _watch: Option<RevocationWatch>,
 }
 
-fn read_keys(arguments: &Arguments, cluster: &Cluster, party: Party) -> Result<Held, Answer> {
+fn read_keys(arguments: &Arguments, cluster: &Cluster, member: Member) -> Result<Held, Answer> {
     let folder = match (&arguments.keys, cluster.security()) {
         (_, Security::Off) => {
             return Ok(Held {
@@ -266,7 +266,7 @@ fn read_keys(arguments: &Arguments, cluster: &Cluster, party: Party) -> Result<H
             });
         }
         (None, Security::Keys) => {
-            let message = "the cluster wants keys: name this party's folder with --keys (`understudy keys init` makes them), or write `security = \"off\"` in the cluster file";
+            let message = "the cluster wants keys: name this member's folder with --keys (`understudy keys init` makes them), or write `security = \"off\"` in the cluster file";
             return Err(Answer::failed(Status::BadInput, "U0620", message));
         }
         (Some(folder), Security::Keys) => folder,
@@ -275,7 +275,7 @@ fn read_keys(arguments: &Arguments, cluster: &Cluster, party: Party) -> Result<H
     // Whoever follows the list of revoked keys is a thread.
     hold_back_signals()
         .map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))?;
-    let keys = PartyKeys::load(folder, cluster, party, now);
+    let keys = MemberKeys::load(folder, cluster, member, now);
     let keys = keys.map_err(|errors| crate::keys::failed(&errors))?;
     let keys = Arc::new(keys);
     let seal = keys.begin_life(now);
@@ -292,7 +292,7 @@ fn read_keys(arguments: &Arguments, cluster: &Cluster, party: Party) -> Result<H
 }
 
 /// A life of now, noted where the lives before it are.
-fn new_life(keys: &Arc<PartyKeys>) -> NewLife {
+fn new_life(keys: &Arc<MemberKeys>) -> NewLife {
     let keys = Arc::clone(keys);
     Arc::new(move || {
         let life = keys.begin_life(Date::of(SystemTime::now()));
@@ -300,7 +300,7 @@ fn new_life(keys: &Arc<PartyKeys>) -> NewLife {
     })
 }
 
-fn channel(keys: Arc<PartyKeys>, cluster: &Cluster) -> ChannelSettings {
+fn channel(keys: Arc<MemberKeys>, cluster: &Cluster) -> ChannelSettings {
     let tls = keys.tls().clone();
     ChannelSettings {
         keys: crate::operate::tls_keys(&tls),
@@ -312,7 +312,7 @@ fn channel(keys: Arc<PartyKeys>, cluster: &Cluster) -> ChannelSettings {
     }
 }
 
-/// All parties and where they listen, from a list or from the cluster file.
+/// All members and where they listen, from a list or from the cluster file.
 pub(crate) fn peers(cluster: &Cluster, list: Option<&Path>) -> Result<Vec<Peer>, Answer> {
     match list {
         Some(path) => listed(path),
@@ -336,13 +336,13 @@ fn listed(path: &Path) -> Result<Vec<Peer>, Answer> {
 }
 
 fn addressed(cluster: &Cluster) -> Result<Vec<Peer>, Answer> {
-    let name = |party| cluster.party_name(party).unwrap_or_default().to_owned();
-    let known: Vec<(Party, Option<SocketAddr>)> = cluster
-        .parties()
-        .map(|party| (party, cluster.address(party)))
+    let name = |member| cluster.member_name(member).unwrap_or_default().to_owned();
+    let known: Vec<(Member, Option<SocketAddr>)> = cluster
+        .members()
+        .map(|member| (member, cluster.address(member)))
         .collect();
     let lacking = known.iter().filter(|(_, address)| address.is_none());
-    let lacking: Vec<String> = lacking.map(|(party, _)| name(*party)).collect();
+    let lacking: Vec<String> = lacking.map(|(member, _)| name(*member)).collect();
     if !lacking.is_empty() {
         let message = format!(
             "no address for {}; give each an `address = \"HOST:PORT\"` in the cluster file",
@@ -350,10 +350,10 @@ fn addressed(cluster: &Cluster) -> Result<Vec<Peer>, Answer> {
         );
         return Err(Answer::failed(Status::BadInput, "U0608", message));
     }
-    let peers = known.into_iter().filter_map(|(party, address)| {
+    let peers = known.into_iter().filter_map(|(member, address)| {
         Some(Peer {
-            party,
-            name: name(party),
+            member,
+            name: name(member),
             address: address?,
         })
     });

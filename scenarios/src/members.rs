@@ -1,0 +1,60 @@
+//! The members of a cluster by name.
+
+use understudy_wire::{Member, ProgramId, StationId};
+
+/// Every member of a cluster with its name: stations by rank, then remote I/Os, then plants.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Members(Vec<(Member, String)>);
+
+impl Members {
+    /// From all members; names are unique, which the reader of cluster files has checked.
+    pub fn new(members: impl IntoIterator<Item = (Member, String)>) -> Self {
+        let mut members: Vec<_> = members.into_iter().collect();
+        members.sort();
+        Self(members)
+    }
+
+    /// In order.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = (Member, &str)> {
+        self.0.iter().map(|(member, name)| (*member, name.as_str()))
+    }
+
+    /// Its name; for a member that is none of this cluster, its rank.
+    pub fn name(&self, member: Member) -> &str {
+        self.0
+            .iter()
+            .find(|(known, _)| *known == member)
+            .map_or("(unknown)", |(_, name)| name)
+    }
+
+    /// The member of a name.
+    pub fn find(&self, name: &str) -> Option<Member> {
+        self.iter()
+            .find(|(_, known)| *known == name)
+            .map(|(member, _)| member)
+    }
+
+    /// Stations in rank order.
+    pub fn stations(&self) -> impl Iterator<Item = (StationId, &str)> {
+        self.iter().filter_map(|(member, name)| match member {
+            Member::Station(station) => Some((station, name)),
+            _ => None,
+        })
+    }
+
+    /// Remote I/Os in the order of programs.
+    pub fn remote_ios(&self) -> impl Iterator<Item = (ProgramId, &str)> {
+        self.iter().filter_map(|(member, name)| match member {
+            Member::RemoteIo(program) => Some((program, name)),
+            _ => None,
+        })
+    }
+
+    /// Plants in the order of programs.
+    pub fn plants(&self) -> impl Iterator<Item = (ProgramId, &str)> {
+        self.iter().filter_map(|(member, name)| match member {
+            Member::Plant(program) => Some((program, name)),
+            _ => None,
+        })
+    }
+}
