@@ -124,7 +124,7 @@ pub struct Expectation {
     pub held: Option<u64>,
     /// Cycles with fail-safe outputs, at most.
     pub fail_safe: Option<u64>,
-    /// plant faults of all plants, at most.
+    /// Plant faults of all plants, at most.
     pub plant_faults: Option<u64>,
     /// Whether everybody must be synchronised at the end: each plant driven directly, and every station heard.
     pub protected: bool,

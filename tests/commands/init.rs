@@ -160,14 +160,14 @@ fn names_of_signals_that_mean_something_else_in_a_plant_are_kept_apart() {
     let folder = empty_folder("init_from_names");
     let text = "\
 program odd
-input  plant fault
+input  plant_fault
 input  tick
 input  level
 input  level.failed
 output part_arrives
 output finished
 rung
-    plant fault tick ( part_arrives )
+    plant_fault tick ( part_arrives )
 rung
     level /level.failed ( finished )
 ";

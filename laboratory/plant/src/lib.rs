@@ -9,7 +9,7 @@
 //! what another plant shows ([`Followed`]), such as the pilot flame that the main burner stands in.
 //!
 //! Counts ([`understudy_wire::Field`]) are all that a verdict needs: a plant is functional while `finished` grows, and nothing
-//! may ever be counted in `plant faults`.
+//! may ever be counted in `plant_faults`.
 
 mod binding;
 mod event;

@@ -6,7 +6,7 @@
 //!   pick place                          where it hands over
 //! ```
 //!
-//! Driving an axis against its end stop is harmless, as is driving it both ways at once. plant faults: moving sideways while not up, and
+//! Driving an axis against its end stop is harmless, as is driving it both ways at once. Plant faults: moving sideways while not up, and
 //! opening the gripper with a part anywhere but at the two places below. A step short of an end is near enough for both: an output
 //! that is held for a cycle moves an axis a little further, and breaks nothing.
 

@@ -450,7 +450,7 @@ impl Tree {
             count(|of| of.finished),
         );
         self.add(
-            "plant faults",
+            "PlantFaults",
             Kind::UInt64,
             "things that must not happen, where its plant is simulated",
             count(|of| of.plant_faults),
