@@ -31,15 +31,9 @@ pub fn of_understudy<'a>(
     published: ProgramSet,
     outputs_of: impl Fn(ProgramId) -> Option<&'a Image>,
 ) -> SmallVec<[Word; 2]> {
-    let sum = |mask: ProgramSet| {
-        let mut sum = Image::default();
-        for outputs in mask.iter().filter_map(&outputs_of) {
-            sum.add(outputs);
-        }
-        Word { mask, sum }
-    };
+    let sum = |mask: ProgramSet| understudy_parity::sum(mask, &outputs_of);
     match mode {
-        Mode::Paper if known == all => smallvec::smallvec![sum(all)],
+        Mode::Paper if known == all => sum(all).into_iter().collect(),
         Mode::Paper => SmallVec::new(),
         Mode::Full => {
             let together = known.and(published);
@@ -48,7 +42,7 @@ pub fn of_understudy<'a>(
             first
                 .into_iter()
                 .chain(silent.iter().map(ProgramSet::only))
-                .map(sum)
+                .filter_map(sum)
                 .collect()
         }
     }
