@@ -23,6 +23,9 @@ pub struct Settings {
     pub agreement: Arc<Agreement>,
     /// All programs of the cluster, in order; a controller runs its own, an understudy all of them.
     pub programs: Arc<[Program]>,
+    /// The generated parity controller, which an understudy evaluates in [`understudy_wire::Mode::Paper`]. It publishes no parity
+    /// word in that mode where this is absent.
+    pub generated: Option<Arc<Scan>>,
     /// The epoch that it starts when nobody is there: later than any that the cluster has had (the wall clock at start serves).
     pub epoch: Epoch,
 }

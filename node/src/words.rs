@@ -22,8 +22,10 @@ pub fn of_controller(program: ProgramId, outputs: &Image) -> SmallVec<[Word; 2]>
     }]
 }
 
-/// The words of an understudy that knows the outputs of `known` (those that `outputs_of` answers for), in a cluster of
-/// the programs `all`, where the controllers of `published` have said the same in this cycle.
+/// The parity words of an understudy that knows the outputs of `known` (those that `outputs_of` answers for), in a cluster of
+/// the programs `all`, where the controllers of `published` have published the same outputs in this cycle.
+///
+/// In the paper's mode an understudy publishes this sum as the output of the generated parity controller.
 pub fn of_understudy<'a>(
     mode: Mode,
     all: ProgramSet,

@@ -64,6 +64,7 @@ pub(crate) fn parts(understudies: usize) -> Parts {
         station: StationId(rank as u8),
         agreement: Arc::clone(&agreement),
         programs: Arc::clone(&programs),
+        generated: None,
         epoch: Epoch(0),
     });
     let remote_ios = programs.iter().zip(0..);

@@ -48,10 +48,16 @@ pub(crate) fn line(programs: usize, mode: Mode, understudies: usize) -> Parts {
             scan: Scan::new(circuit),
         })
         .collect();
+    let generated = (mode == Mode::Paper).then(|| {
+        let generated =
+            understudy_parity::generate(&circuits).expect("programs of different names");
+        Arc::new(Scan::new(generated.circuit()))
+    });
     let stations = (0..circuits.len() + understudies).map(|rank| understudy_node::Settings {
         station: StationId(rank as u8),
         agreement: Arc::clone(&agreement),
         programs: Arc::clone(&programs),
+        generated: generated.clone(),
         epoch: Epoch(0),
     });
     let remote_ios =
