@@ -12,7 +12,8 @@
 //! A program of which it does not know this cycle's output is in no word, instead of spoiling one.
 
 use smallvec::SmallVec;
-use understudy_wire::{Image, Mode, ProgramId, ProgramSet, Word};
+use understudy_cycle::Mode;
+use understudy_wire::{Image, ProgramId, ProgramSet, Word};
 
 /// The word of a controller.
 pub fn of_controller(program: ProgramId, outputs: &Image) -> SmallVec<[Word; 2]> {

@@ -14,9 +14,9 @@
 
 use std::sync::Arc;
 
+use understudy_cycle::Mode;
 use understudy_wire::{
-    Body, Frame, Holding, Image, Lineage, Mode, ProgramId, ProgramSet, StationId, StationSet, Turn,
-    Word,
+    Body, Frame, Holding, Image, Lineage, ProgramId, ProgramSet, StationId, StationSet, Turn, Word,
 };
 
 use crate::event::Missing;

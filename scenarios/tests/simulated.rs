@@ -1,11 +1,11 @@
 //! Every scenario file that comes with the project, in virtual time.
 
 use understudy_cluster::{Cluster, Overrides, press_cell};
+use understudy_cycle::Mode;
 use understudy_scenarios::{
     Account, Circumstances, Journal, JournalState, Members, OriginRule, Record, RunEvent, Scenario,
     Summary, Table, Terms, World, figure, read, records, report, simulate,
 };
-use understudy_wire::Mode;
 
 fn cluster(mode: Mode) -> Cluster {
     let files = press_cell();

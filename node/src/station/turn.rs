@@ -3,8 +3,9 @@
 use std::time::Duration;
 
 use smallvec::SmallVec;
+use understudy_cycle::{Mode, Output};
 use understudy_wire::{
-    Holding, Mode, Moment, Output, ProgramId, ProgramSet, StationId, StationSet, Time, Turn, Word,
+    Holding, Moment, ProgramId, ProgramSet, StationId, StationSet, Time, Turn, Word,
 };
 
 use super::{Said, Station};

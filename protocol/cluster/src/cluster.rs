@@ -6,13 +6,14 @@ use std::sync::Arc;
 
 use crate::device::FieldDevice;
 use serde::{Deserialize, Serialize};
+use understudy_cycle::{Agreement, Mode};
 use understudy_ladder::Program as LadderProgram;
 use understudy_logic::{Circuit, Scan};
 use understudy_node::Program;
 use understudy_parity::ParityController;
 use understudy_plant::{Followed, Plant};
 use understudy_remote_io::{Diagnosis, Release, StaleState, ValueFault};
-use understudy_wire::{Agreement, Epoch, Image, Member, Mode, ProgramHash, ProgramId, StationId};
+use understudy_wire::{Epoch, Image, Member, ProgramHash, ProgramId, StationId};
 
 /// What carries the frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]

@@ -4,13 +4,13 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use understudy_cycle::{Agreement, Mode, Schedule};
 use understudy_ladder::parse;
 use understudy_logic::{Circuit, Scan};
 use understudy_plant::{ModelKind, Plant, PressParameters, RobotParameters, Signals};
 use understudy_simulator::Parts;
 use understudy_wire::{
-    Agreement, ClusterHash, ConfigurationHash, Epoch, Image, Mode, ProgramHash, ProgramId,
-    Schedule, StationId,
+    ClusterHash, ConfigurationHash, Epoch, Image, ProgramHash, ProgramId, StationId,
 };
 
 pub(crate) const PERIOD: Duration = Duration::from_millis(10);
