@@ -17,12 +17,13 @@ use understudy_bus::{
     run_member,
 };
 use understudy_cluster::{Cluster, Security, why_unreachable};
-use understudy_journal::Segments;
+use understudy_cycle::{Machine};
+use understudy_journal::{Segments};
 use understudy_keys::{Date, MemberKeys, RevocationWatch};
 use understudy_node::Station;
 use understudy_plant::PlantMachine;
 use understudy_remote_io::RemoteIo;
-use understudy_wire::{Epoch, Image, Machine, Member, ProgramId, Time};
+use understudy_wire::{Epoch, Image, Member, ProgramId, Time};
 
 use crate::answer::{Answer, Status};
 use crate::field::Equipment;

@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use understudy_bus::LinkKind;
 use understudy_cluster::{Cluster, Link, Overrides, Security};
-use understudy_wire::Mode;
+use understudy_cycle::Mode;
 
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct OverrideArguments {

@@ -3,6 +3,7 @@
 //! [`Station`] is a controller or an understudy: they differ in which programs they run, and in the words that they say.
 
 mod event;
+mod generated;
 mod replica;
 mod settings;
 mod station;

@@ -37,9 +37,8 @@ pub(crate) struct Replica {
     copy: Option<Copied>,
     /// States before the last steps, oldest first; at most as many as a sample's history.
     past: VecDeque<State>,
-    /// y(i) of the last step, and the lineage after it: a state that was given has no outputs until it is stepped.
-    outputs: Image,
-    outputs_of: Option<Lineage>,
+    /// The last step: a state that was transferred has no outputs until it is stepped.
+    step: Step,
     /// The last sample that could not be followed, for replaying it onto a state that is given later.
     unfollowed: Option<Arc<Frame>>,
     /// What the newest sample said, and its cycle; of no cycle where another station told it.
@@ -54,6 +53,19 @@ struct State {
     stepped: Moment,
     /// Of the state before the last step.
     digest: Digest,
+}
+
+/// One step of a program: x(i)(t) and u(i)(t), from which y(i)(t) was computed.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) struct Step {
+    /// x(i)(t).
+    pub(crate) state: Image,
+    /// u(i)(t).
+    pub(crate) inputs: Image,
+    /// y(i)(t).
+    outputs: Image,
+    /// L(i)(t+1); `None` before the first step.
+    after: Option<Lineage>,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -82,8 +94,12 @@ impl Replica {
             standing: Standing::Lost,
             copy: None,
             past: VecDeque::with_capacity(history),
-            outputs: Image::zero(program.scan.output_count()),
-            outputs_of: None,
+            step: Step {
+                state: Image::zero(program.scan.register_count()),
+                inputs: Image::zero(program.scan.input_count()),
+                outputs: Image::zero(program.scan.output_count()),
+                after: None,
+            },
             unfollowed: None,
             recalled: None,
             history,
@@ -101,7 +117,7 @@ impl Replica {
     /// Whether it was stepped with the sample of `moment`, and so knows y(i) of that cycle.
     pub(crate) fn is_current(&self, moment: Moment) -> bool {
         let knows = |copy: &Copied| {
-            copy.state.stepped == moment && self.outputs_of == Some(copy.state.lineage)
+            copy.state.stepped == moment && self.step.after == Some(copy.state.lineage)
         };
         !matches!(self.standing, Standing::Lost | Standing::Excluded)
             && self.copy.as_ref().is_some_and(knows)
@@ -114,7 +130,12 @@ impl Replica {
 
     /// y(i) of the last step.
     pub(crate) fn outputs(&self) -> &Image {
-        &self.outputs
+        &self.step.outputs
+    }
+
+    /// The last step.
+    pub(crate) fn last_step(&self) -> &Step {
+        &self.step
     }
 
     /// Where it stands, and in which state.
@@ -441,15 +462,17 @@ impl Replica {
         before.clone_from(&copy.state);
         self.past.push_back(before);
         copy.state.digest = Digest::of(&copy.state.bits);
+        self.step.state.clone_from(&copy.state.bits);
+        self.step.inputs.clone_from(inputs);
         program.scan.step(
             scratch,
             copy.state.bits.words_mut(),
             inputs.words(),
-            self.outputs.words_mut(),
+            self.step.outputs.words_mut(),
         );
         copy.state.lineage = copy.state.lineage.after(inputs);
         copy.state.stepped = moment;
-        self.outputs_of = Some(copy.state.lineage);
+        self.step.after = Some(copy.state.lineage);
     }
 }
 

@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use understudy_cycle::Agreement;
 use understudy_logic::Scan;
-use understudy_wire::{Agreement, Epoch, ProgramHash, ProgramId, StationId};
+use understudy_wire::{Epoch, ProgramHash, ProgramId, StationId};
 
 /// One of the cluster's programs, compiled.
 #[derive(Debug, Clone)]
@@ -23,6 +24,9 @@ pub struct Settings {
     pub agreement: Arc<Agreement>,
     /// All programs of the cluster, in order; a controller runs its own, an understudy all of them.
     pub programs: Arc<[Program]>,
+    /// The generated parity controller, which an understudy evaluates in [`understudy_cycle::Mode::Paper`]. It publishes no parity
+    /// word in that mode where this is absent.
+    pub generated: Option<Arc<Scan>>,
     /// The epoch that it starts when nobody is there: later than any that the cluster has had (the wall clock at start serves).
     pub epoch: Epoch,
 }

@@ -21,11 +21,13 @@ use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
 use smallvec::SmallVec;
+use understudy_cycle::{
+    Admission, Arrival, Attendance, Copies, CycleClock, Input, Machine, Output, Reception, Waking,
+};
 use understudy_logic::Scratch;
 use understudy_wire::{
-    Admission, Arrival, Attendance, Body, ConfigurationHash, Copies, CycleClock, Digest, Frame,
-    Header, Holding, Image, Input, Lineage, Machine, Member, Moment, Output, ProgramId, ProgramSet,
-    Recalled, Reception, Sample, StationId, StationSet, Time, Waking,
+    Body, ConfigurationHash, Digest, Frame, Header, Holding, Image, Lineage, Member, Moment,
+    ProgramId, ProgramSet, Recalled, Sample, StationId, StationSet, Time,
 };
 
 use crate::event::Event;

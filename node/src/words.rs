@@ -12,7 +12,8 @@
 //! A program of which it does not know this cycle's output is in no word, instead of spoiling one.
 
 use smallvec::SmallVec;
-use understudy_wire::{Image, Mode, ProgramId, ProgramSet, Word};
+use understudy_cycle::Mode;
+use understudy_wire::{Image, ProgramId, ProgramSet, Word};
 
 /// The word of a controller.
 pub fn of_controller(program: ProgramId, outputs: &Image) -> SmallVec<[Word; 2]> {
@@ -22,8 +23,10 @@ pub fn of_controller(program: ProgramId, outputs: &Image) -> SmallVec<[Word; 2]>
     }]
 }
 
-/// The words of an understudy that knows the outputs of `known` (those that `outputs_of` answers for), in a cluster of
-/// the programs `all`, where the controllers of `published` have said the same in this cycle.
+/// The parity words of an understudy that knows the outputs of `known` (those that `outputs_of` answers for), in a cluster of
+/// the programs `all`, where the controllers of `published` have published the same outputs in this cycle.
+///
+/// In the paper's mode an understudy publishes this sum as the output of the generated parity controller.
 pub fn of_understudy<'a>(
     mode: Mode,
     all: ProgramSet,
@@ -31,15 +34,9 @@ pub fn of_understudy<'a>(
     published: ProgramSet,
     outputs_of: impl Fn(ProgramId) -> Option<&'a Image>,
 ) -> SmallVec<[Word; 2]> {
-    let sum = |mask: ProgramSet| {
-        let mut sum = Image::default();
-        for outputs in mask.iter().filter_map(&outputs_of) {
-            sum.add(outputs);
-        }
-        Word { mask, sum }
-    };
+    let sum = |mask: ProgramSet| understudy_parity::sum(mask, &outputs_of);
     match mode {
-        Mode::Paper if known == all => smallvec::smallvec![sum(all)],
+        Mode::Paper if known == all => sum(all).into_iter().collect(),
         Mode::Paper => SmallVec::new(),
         Mode::Full => {
             let together = known.and(published);
@@ -48,7 +45,7 @@ pub fn of_understudy<'a>(
             first
                 .into_iter()
                 .chain(silent.iter().map(ProgramSet::only))
-                .map(sum)
+                .filter_map(sum)
                 .collect()
         }
     }

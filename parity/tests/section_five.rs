@@ -7,7 +7,8 @@ use understudy_logic::bdd::Diagrams;
 use understudy_logic::{
     Circuit, Expression, Graph, NormalForm, Polynomial, Scan, Scratch, Variable,
 };
-use understudy_parity::{Equation, Equations, Style, generate, words};
+use understudy_parity::{Equation, Equations, Style, generate, reconstruct, syndrome};
+use understudy_wire::{Image, ProgramId, ProgramSet, Word};
 
 /// (30).
 const F1: [&str; 7] = [
@@ -215,15 +216,23 @@ fn theorems_hold_everywhere() {
         parity.step_lanes(&mut scratch, &mut state, &u, &mut output);
         outputs.push(output);
         assert_eq!(state, states, "(7)");
-        // A word is one output of 64 runs here, so a width of p outputs is one of 64 p bits.
-        let all: Vec<&[u64]> = outputs.iter().map(Vec::as_slice).collect();
-        assert_eq!(words::syndrome(all.iter().copied()), vec![0; 5], "(10)");
-        for wanted in 0..3 {
-            let mut heard: Vec<Option<&[u64]>> = all.iter().copied().map(Some).collect();
-            heard[wanted] = None;
-            let width = 64 * all[wanted].len();
-            let estimated = words::estimate(&heard, wanted, width);
-            assert_eq!(estimated.as_deref(), Ok(all[wanted]), "(12)");
+        // A packed word is one output of 64 runs here, so a width of p outputs is one of 64 p bits.
+        let mut images = outputs
+            .iter()
+            .map(|output| Image::from_words(64 * output.len(), output).expect("whole words"));
+        let own: Vec<Image> = images.by_ref().take(2).collect();
+        let word = Word {
+            mask: ProgramSet::first(2),
+            sum: images.next().expect("y(3)"),
+        };
+        let every = |program: ProgramId| own.get(program.index());
+        let zero = syndrome(&word, every).expect("both outputs are there");
+        assert!(zero.is_zero(), "(10)");
+        for wanted in word.mask.iter() {
+            let truth = &own[wanted.index()];
+            let others = |program| every(program).filter(|_| program != wanted);
+            let estimated = reconstruct(&word, wanted, truth.width(), others);
+            assert_eq!(estimated.as_ref(), Ok(truth), "(12)");
         }
     }
 }

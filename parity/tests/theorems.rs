@@ -6,8 +6,10 @@ mod common;
 use common::{Recipe, circuit, configuration, recipe};
 use proptest::prelude::*;
 use understudy_logic::{Circuit, Scan, Scratch};
-use understudy_parity::words::{self, ErasureError, ParityWord};
-use understudy_parity::{ParityController, ParityError, generate};
+use understudy_parity::{
+    ErasureError, ParityController, ParityError, generate, reconstruct, sum, syndrome,
+};
+use understudy_wire::{Image, ProgramId, ProgramSet, Word};
 
 /// One cycle of all stations: y(1)..y(N+1).
 struct Cluster {
@@ -31,7 +33,7 @@ impl Cluster {
     }
 
     /// All inputs come from the bits of `sample`, program by program.
-    fn step(&mut self, sample: u64) -> Vec<Vec<u64>> {
+    fn step(&mut self, sample: u64) -> Vec<Image> {
         let mut shift = 0;
         let mut outputs = Vec::new();
         for (scan, state) in &mut self.members {
@@ -46,9 +48,9 @@ impl Cluster {
     }
 }
 
-fn step(scan: &Scan, scratch: &mut Scratch, state: &mut [u64], inputs: u64) -> Vec<u64> {
-    let mut outputs = vec![0; scan.output_count().div_ceil(64)];
-    scan.step(scratch, state, &[inputs], &mut outputs);
+fn step(scan: &Scan, scratch: &mut Scratch, state: &mut [u64], inputs: u64) -> Image {
+    let mut outputs = Image::zero(scan.output_count());
+    scan.step(scratch, state, &[inputs], outputs.words_mut());
     outputs
 }
 
@@ -59,40 +61,40 @@ fn named(recipes: &[Recipe]) -> Vec<Circuit> {
         .collect()
 }
 
-/// Theorem 1, Theorem 2, and what is refused, for the outputs of one cycle.
-fn check(outputs: &[Vec<u64>], widths: &[usize]) {
-    let syndrome = words::syndrome(outputs.iter().map(Vec::as_slice));
-    assert!(syndrome.iter().all(|&word| word == 0), "Theorem 1");
+/// Theorem 1, Theorem 2, and what is refused, for the outputs y(1)..y(N), y(N+1) of one cycle.
+fn check(outputs: &[Image], widths: &[usize]) {
     let programs = widths.len();
-    for erased in 0..1_u32 << outputs.len() {
-        let present = |place: usize| erased >> place & 1 == 0;
-        let heard: Vec<Option<&[u64]>> = outputs
-            .iter()
-            .enumerate()
-            .map(|(place, output)| present(place).then_some(output.as_slice()))
-            .collect();
-        for (wanted, &width) in widths.iter().enumerate() {
-            let estimated = words::estimate(&heard, wanted, width);
-            if present(wanted) || erased.count_ones() == 1 {
-                assert_eq!(estimated.as_ref(), Ok(&outputs[wanted]), "Theorem 2");
-            } else {
-                assert!(matches!(estimated, Err(ErasureError::Two { .. })));
+    let (own, parity) = outputs.split_at(programs);
+    let all = ProgramSet::first(programs);
+    let paper = Word {
+        mask: all,
+        sum: parity[0].clone(),
+    };
+    let every = |program: ProgramId| own.get(program.index());
+    assert_eq!(sum(all, every), Some(paper.clone()), "(9)");
+    let zero = syndrome(&paper, every).expect("every output is there");
+    assert!(zero.is_zero(), "Theorem 1");
+    for erased in (0..1_u64 << programs).map(ProgramSet::from_bits) {
+        let received = |program: ProgramId| every(program).filter(|_| !erased.contains(program));
+        assert_eq!(sum(all, received).is_some(), erased.is_empty());
+        assert_eq!(syndrome(&paper, received).is_some(), erased.is_empty());
+        // The word over the programs that `erased` leaves reconstructs each of them, and no other.
+        let mask = all.without(erased);
+        let word = sum(mask, every).expect("every output is there");
+        for (wanted, &width) in all.iter().zip(widths) {
+            let truth = &own[wanted.index()];
+            let estimated = reconstruct(&paper, wanted, width, received);
+            let mut others = erased.without(ProgramSet::only(wanted)).iter();
+            match others.next() {
+                None => assert_eq!(estimated.as_ref(), Ok(truth), "Theorem 2"),
+                Some(other) => assert_eq!(estimated, Err(ErasureError::Two { wanted, other })),
             }
-        }
-        // A word over those that `erased` leaves brings back each of them, and nothing else.
-        let word = ParityWord::over(&heard[..programs]);
-        let all: Vec<Option<&[u64]>> = outputs[..programs]
-            .iter()
-            .map(|y| Some(y.as_slice()))
-            .collect();
-        for (wanted, &width) in widths.iter().enumerate() {
-            let mut others = all.clone();
-            others[wanted] = None;
-            let restored = word.reconstruct(&others, wanted, width);
-            if present(wanted) {
-                assert_eq!(restored.as_ref(), Ok(&outputs[wanted]));
+            let alone = |program| received(program).filter(|_| program != wanted);
+            let estimated = reconstruct(&word, wanted, width, alone);
+            if mask.contains(wanted) {
+                assert_eq!(estimated.as_ref(), Ok(truth));
             } else {
-                assert_eq!(restored, Err(ErasureError::NotMember { wanted }));
+                assert_eq!(estimated, Err(ErasureError::NotMember { wanted }));
             }
         }
     }
@@ -127,10 +129,23 @@ proptest! {
 /// Outputs of unequal width, wider than a word.
 #[test]
 fn wide_outputs_are_cut_to_their_own_width() {
-    let narrow = vec![0b101];
-    let wide = vec![u64::MAX, 0b11];
-    let parity = words::sum([narrow.as_slice(), wide.as_slice()]);
+    let image = |width, words: &[u64]| Image::from_words(width, words).expect("the bits fit");
+    let narrow = image(3, &[0b101]);
+    let wide = image(66, &[u64::MAX, 0b11]);
+    let parity = image(66, &[u64::MAX ^ 0b101, 0b11]);
     check(&[narrow, wide, parity], &[3, 66]);
+}
+
+/// A sum with a 1 past the width of the wanted output contains a faulty output: it is refused, not cut.
+#[test]
+fn a_sum_that_is_too_wide_is_refused() {
+    let wanted = ProgramId(0);
+    let word = Word {
+        mask: ProgramSet::only(wanted),
+        sum: Image::from_words(4, &[0b1001]).expect("the bits fit"),
+    };
+    let output = reconstruct(&word, wanted, 3, |_| None);
+    assert_eq!(output, Err(ErasureError::Width { wanted, width: 3 }));
 }
 
 #[test]

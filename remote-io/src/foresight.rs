@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use understudy_wire::{Frame, Image, Lineage, Mode, ProgramId, Source, StationSet};
+use understudy_cycle::Mode;
+use understudy_wire::{Frame, Image, Lineage, ProgramId, Source, StationSet};
 
 use crate::event::Missing;
 use crate::selection::{Heard, Selection};

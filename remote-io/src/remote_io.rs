@@ -28,10 +28,13 @@ use std::collections::VecDeque;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
+use understudy_cycle::{
+    Admission, Arrival, Attendance, Change, Copies, CycleClock, Input, Machine, Output, Reception,
+    Waking,
+};
 use understudy_wire::{
-    Admission, Arrival, Attendance, Body, Change, ConfigurationHash, Copies, CycleClock, Frame,
-    Header, Holding, Image, Input, Lineage, Machine, Member, Moment, Output, ProgramId, Recalled,
-    Reception, Source, StateChoice, StationId, StationSet, Time, Waking,
+    Body, ConfigurationHash, Frame, Header, Holding, Image, Lineage, Member, Moment, ProgramId,
+    Recalled, Source, StateChoice, StationId, StationSet, Time,
 };
 
 use crate::diagnosis::Diagnosing;

@@ -14,9 +14,9 @@
 
 use std::sync::Arc;
 
+use understudy_cycle::Mode;
 use understudy_wire::{
-    Body, Frame, Holding, Image, Lineage, Mode, ProgramId, ProgramSet, StationId, StationSet, Turn,
-    Word,
+    Body, Frame, Holding, Image, Lineage, ProgramId, ProgramSet, StationId, StationSet, Turn, Word,
 };
 
 use crate::event::Missing;
@@ -116,8 +116,8 @@ impl<'a> Heard<'a> {
                 continue;
             }
             for word in turn.words.iter().filter(|word| word.mask.contains(me)) {
-                let sum = self.reconstruct(me, turn, word);
-                let Some(outputs) = sum.and_then(|sum| sum.narrowed(width)) else {
+                let addend = |other| self.addend(other, turn);
+                let Ok(outputs) = understudy_parity::reconstruct(word, me, width, addend) else {
                     missing = Missing::TwoErasures;
                     continue;
                 };
@@ -133,36 +133,24 @@ impl<'a> Heard<'a> {
         (votes, missing)
     }
 
-    /// Equation (12) for one word: the sum of the word and of all its other members, or `None` where one of them is not
-    /// proved to be of the same history and of the same state as the word.
-    fn reconstruct(&self, me: ProgramId, turn: &Turn, word: &Word) -> Option<Image> {
-        let mut sum = word.sum.clone();
-        for other in word.mask.without(ProgramSet::only(me)).iter() {
-            let (outputs, theirs) = self.own_word(other)?;
-            let ours = holding_of(turn, other)?;
-            if ours.lineage != theirs.lineage || ours.digest != theirs.digest {
-                return None;
-            }
-            sum.add(&outputs.sum);
-        }
-        Some(sum)
+    /// Output of a program that may be added to a word of `turn`: its controller published it in this cycle, with the lineage
+    /// and the state digest that the understudy has for it.
+    fn addend(&self, program: ProgramId, turn: &Turn) -> Option<&'a Image> {
+        let (outputs, theirs) = self.own_word(program)?;
+        let ours = holding_of(turn, program)?;
+        let equal = ours.lineage == theirs.lineage && ours.digest == theirs.digest;
+        equal.then_some(&outputs.sum)
     }
 
-    /// Equation (10) for every word of which all members are heard: the words whose sum is not 0, with those who can be wrong.
+    /// Syndromes (10) that are not 0, of every word of which all outputs are received, with the stations that can be wrong.
     pub(crate) fn syndromes(self) -> impl Iterator<Item = (Image, StationSet)> {
         let words = self.understudies().filter_map(move |understudy| {
             let turn = self.turn_of(understudy)?;
             Some(turn.words.iter().map(move |word| (understudy, turn, word)))
         });
         words.flatten().filter_map(move |(understudy, turn, word)| {
-            let me = word.mask.iter().next()?;
-            let (outputs, theirs) = self.own_word(me)?;
-            let ours = holding_of(turn, me)?;
-            let mut syndrome = self.reconstruct(me, turn, word)?;
-            if ours.lineage != theirs.lineage || ours.digest != theirs.digest {
-                return None;
-            }
-            syndrome.add(&outputs.sum);
+            let addend = |program| self.addend(program, turn);
+            let syndrome = understudy_parity::syndrome(word, addend)?;
             let accused = word.mask.iter().map(|program| StationId(program.0));
             let accused = accused.chain([understudy]).collect();
             (!syndrome.is_zero()).then_some((syndrome, accused))

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use understudy_wire::{Agreement, Image, ProgramHash, ProgramId};
+use understudy_cycle::Agreement;
+use understudy_wire::{Image, ProgramHash, ProgramId};
 
 use crate::channel::Channel;
 use crate::diagnosis::Diagnosis;

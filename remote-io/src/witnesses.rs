@@ -2,7 +2,8 @@
 //!
 //! Living means heard in the last few cycles, speaking or asking to join.
 
-use understudy_wire::{Agreement, Holding, Image, ProgramId, Recalled, StationId, StationSet};
+use understudy_cycle::Agreement;
+use understudy_wire::{Holding, Image, ProgramId, Recalled, StationId, StationSet};
 
 /// One entry for each station that can hold the program's state.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]

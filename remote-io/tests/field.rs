@@ -3,11 +3,11 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use understudy_cycle::{Agreement, Input, Machine, Mode, Output, Schedule};
 use understudy_remote_io::{Event, Missing, Release, RemoteIo, Settings, StaleState, ValueFault};
 use understudy_wire::{
-    Agreement, Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Force, Frame, Header, Image,
-    Input, Join, Lineage, Machine, Member, Mode, Moment, Output, ProgramHash, ProgramId,
-    ProgramSet, Schedule, SignalPlace, Source, StationId, Time,
+    Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Force, Frame, Header, Image, Join, Lineage,
+    Member, Moment, ProgramHash, ProgramId, ProgramSet, SignalPlace, Source, StationId, Time,
 };
 
 const PERIOD: Duration = Duration::from_millis(10);

@@ -3,11 +3,12 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use understudy_cycle::{Agreement, Input, Machine, Mode, Output, Schedule};
 use understudy_remote_io::{Event, Release, RemoteIo, Settings, StaleState, ValueFault};
 use understudy_wire::{
-    Agreement, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding,
-    Image, Input, Join, Lineage, Machine, Member, Mode, Moment, Output, ProgramHash, ProgramId,
-    ProgramSet, Recalled, Schedule, Source, StationId, StationSet, Time,
+    Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
+    Join, Lineage, Member, Moment, ProgramHash, ProgramId, ProgramSet, Recalled, Source, StationId,
+    StationSet, Time,
 };
 
 const PERIOD: Duration = Duration::from_millis(10);

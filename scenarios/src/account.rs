@@ -16,13 +16,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_bus::HostEvent;
+use understudy_cycle::{Agreement};
 use understudy_journal::{Happening, Members, Numbering, Record, RunEvent, moment};
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_simulator::{Action, Referee, Violation};
-use understudy_wire::{
-    Agreement, Member, Moment, ProgramId, ProgramSet, Source, StationId, StationSet,
-};
+use understudy_wire::{Member, Moment, ProgramId, ProgramSet, Source, StationId, StationSet};
 
 use crate::figure::Signals;
 use crate::scenario::{During, Scenario};

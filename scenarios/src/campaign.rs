@@ -18,9 +18,9 @@ use std::sync::mpsc::channel;
 
 use serde::Serialize;
 use understudy_cluster::Cluster;
+use understudy_cycle::Mode;
 use understudy_reliability::{Campaign, SystemFailure};
 use understudy_simulator::NotReady;
-use understudy_wire::Mode;
 
 pub use found::{Found, hold_against_model};
 pub use question::{

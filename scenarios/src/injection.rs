@@ -24,8 +24,8 @@ use rand::RngExt;
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 use understudy_cluster::Cluster;
+use understudy_cycle::Schedule;
 use understudy_simulator::NotReady;
-use understudy_wire::Schedule;
 
 pub use coverage::CoverageRow;
 pub use findings::{Deadlines, Failure, Findings, FindingsError};

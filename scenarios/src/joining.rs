@@ -2,8 +2,9 @@
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use understudy_cycle::Schedule;
 use understudy_simulator::{Action, Fault};
-use understudy_wire::{Member, Schedule, StationId};
+use understudy_wire::{Member, StationId};
 
 use crate::account::Presence;
 use crate::scenario::Scenario;

@@ -5,10 +5,10 @@ use std::fmt::Write as _;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 use serde::Serialize;
+use understudy_cycle::Mode;
 use understudy_reliability::{
     Hours, Interval, Observed, Options, Outlook, ReliabilityError, Rule, grouped, outlook,
 };
-use understudy_wire::Mode;
 
 use crate::observed::JournalView;
 

@@ -4,8 +4,9 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use schemars::JsonSchema;
 use serde::Serialize;
+use understudy_cycle::Schedule;
 use understudy_simulator::{Action, Fault};
-use understudy_wire::{Member, ProgramId, Schedule, StationId};
+use understudy_wire::{Member, ProgramId, StationId};
 
 use crate::scenario::{Expectation, Scenario};
 use crate::summary::Summary;

@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use understudy_bus::{Endpoints, Peer};
+use understudy_cycle::{Input, Machine};
 use understudy_remote_io::RemoteIo;
 use understudy_seal::{ClusterSecret, Opener, Revocations, Seal, Title};
 use understudy_wire::{
-    ClusterHash, Force, Input, MAXIMUM_FRAME_BYTES, Machine, Member, ProgramId, SignalPlace,
-    StationId, Time, decode, encode,
+    ClusterHash, Force, MAXIMUM_FRAME_BYTES, Member, ProgramId, SignalPlace, StationId, Time,
+    decode, encode,
 };
 
 use crate::attack::attack;

@@ -7,8 +7,9 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 use understudy_cluster::Cluster;
+use understudy_cycle::{Agreement, Schedule, ScheduleError};
 use understudy_simulator::{Action, Fault, Network, NotReady, Parts, Simulation, parts};
-use understudy_wire::{Agreement, Member, Schedule, ScheduleError, StationId};
+use understudy_wire::{Member, StationId};
 
 use crate::pairs::{Account, Pairs};
 use crate::partner::Redundancy;

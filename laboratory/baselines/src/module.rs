@@ -4,9 +4,10 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use smallvec::smallvec;
+use understudy_cycle::{Agreement, Copies, Input, Machine, Output};
 use understudy_wire::{
-    Agreement, Body, Copies, Cycle, Epoch, Frame, Header, Image, Input, Lineage, Machine, Member,
-    Moment, Output, ProgramHash, ProgramId, Sample, StationSet, Time,
+    Body, Cycle, Epoch, Frame, Header, Image, Lineage, Member, Moment, ProgramHash, ProgramId,
+    Sample, StationSet, Time,
 };
 
 /// A deadline.

@@ -7,12 +7,11 @@ use std::sync::Arc;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use understudy_cluster::Cluster;
+use understudy_cycle::{Agreement, Input, Machine, Output};
 use understudy_logic::Scan;
 use understudy_plant::Plant;
 use understudy_simulator::Network;
-use understudy_wire::{
-    Agreement, Body, Field, Frame, Image, Input, Machine, Member, Output, ProgramId, Time, encode,
-};
+use understudy_wire::{Body, Field, Frame, Image, Member, ProgramId, Time, encode};
 
 use crate::module::Module;
 use crate::partner::{Event, Partner, Redundancy, Settings};

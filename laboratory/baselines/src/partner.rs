@@ -12,11 +12,11 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use smallvec::smallvec;
+use understudy_cycle::{Agreement, Copies, Input, Machine, Output};
 use understudy_logic::{Scan, Scratch};
 use understudy_wire::{
-    Agreement, Body, Copies, Cycle, Digest, Epoch, Frame, Header, Holding, Image, Input, Lineage,
-    Machine, Member, Moment, Output, ProgramHash, ProgramId, ProgramSet, StationId, StationSet,
-    Time, Transfer, Turn, Word,
+    Body, Cycle, Digest, Epoch, Frame, Header, Holding, Image, Lineage, Member, Moment,
+    ProgramHash, ProgramId, ProgramSet, StationId, StationSet, Time, Transfer, Turn, Word,
 };
 
 /// How two boxes share one program.

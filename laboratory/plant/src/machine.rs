@@ -22,10 +22,8 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_wire::{
-    Admission, Agreement, Body, Field, Frame, Header, Image, Input, Machine, Member, Moment,
-    Output, ProgramId, Reception, Time,
-};
+use understudy_cycle::{Admission, Agreement, Input, Machine, Output, Reception};
+use understudy_wire::{Body, Field, Frame, Header, Image, Member, Moment, ProgramId, Time};
 
 use crate::event::{Event, Pace};
 use crate::followed::{Followed, Hearing};

@@ -4,14 +4,15 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use proptest::prelude::*;
+use understudy_cycle::{Agreement, Input, Machine, Mode, Output, Schedule};
 use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_plant::{
     BindingProblem, Event, Followed, ModelKind, Plant, PlantMachine, Settings, Signals,
     WATCHDOG_CYCLES,
 };
 use understudy_wire::{
-    Actuation, Agreement, Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Field, Frame, Header,
-    Image, Input, Machine, Member, Mode, Moment, Output, ProgramId, Schedule, Time,
+    Actuation, Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Field, Frame, Header, Image,
+    Member, Moment, ProgramId, Time,
 };
 
 const PERIOD: Duration = Duration::from_millis(10);

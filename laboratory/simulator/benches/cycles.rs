@@ -3,8 +3,8 @@
 #[path = "../tests/press_cell/mod.rs"]
 mod press_cell;
 
+use understudy_cycle::Mode;
 use understudy_simulator::{Network, Simulation};
-use understudy_wire::Mode;
 
 const CYCLES: u64 = 20_000;
 

@@ -10,11 +10,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use serde::Serialize;
+use understudy_cycle::{Input, Machine, Output};
 use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
 use understudy_wire::{
-    Epoch, Field, Frame, Input, Lineage, Machine, Member, Output, ProgramId, ProgramSet, Source,
-    StateChoice, StationId, StationSet, Time,
+    Epoch, Field, Frame, Lineage, Member, ProgramId, ProgramSet, Source, StateChoice, StationId,
+    StationSet, Time,
 };
 
 use crate::fault::{Action, Fault};

@@ -4,7 +4,8 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_wire::{Frame, Input, Machine, Time};
+use understudy_cycle::{Input, Machine};
+use understudy_wire::{Frame, Time};
 
 /// Frames that wait for a stopped member, at most, as in a socket's buffer; later ones are lost.
 const WAITING_FRAMES: usize = 256;

@@ -6,9 +6,10 @@ mod press_cell;
 use std::time::Duration;
 
 use proptest::prelude::*;
+use understudy_cycle::Mode;
 use understudy_remote_io::Event;
 use understudy_simulator::{Action, Disturbance, Fault, Network, Record, Simulation};
-use understudy_wire::{Member, Mode, ProgramId, StationId};
+use understudy_wire::{Member, ProgramId, StationId};
 
 /// Something is done to a member, and undone later where it lasts.
 #[derive(Debug, Clone)]

@@ -4,9 +4,10 @@ mod press_cell;
 
 use std::time::Duration;
 
+use understudy_cycle::Mode;
 use understudy_node::Event;
 use understudy_simulator::{Action, Fault, Network, Record, Simulation, Tally};
-use understudy_wire::{ConfigurationHash, Member, Mode, ProgramId, StationId};
+use understudy_wire::{ConfigurationHash, Member, ProgramId, StationId};
 
 const ROBOT: Member = Member::Station(StationId(0));
 const UNDERSTUDY: Member = Member::Station(StationId(2));

@@ -2,8 +2,9 @@
 
 mod press_cell;
 
+use understudy_cycle::Mode;
 use understudy_simulator::{Action, Fault, Network, Simulation, Tally};
-use understudy_wire::{Member, Mode, ProgramId, StationId};
+use understudy_wire::{Member, ProgramId, StationId};
 
 fn fault(at_cycle: u64, phase: f64, rank: u8, action: Action) -> Fault {
     Fault {

@@ -5,9 +5,10 @@
 
 mod press_cell;
 
+use understudy_cycle::Mode;
 use understudy_remote_io::{Event, LackingReason, StaleState};
 use understudy_simulator::{Action, Fault, Network, Record, Simulation};
-use understudy_wire::{Member, Mode, ProgramId, Source, StateChoice, StationId};
+use understudy_wire::{Member, ProgramId, Source, StateChoice, StationId};
 
 const PROGRAMS: u8 = 2;
 const UNDERSTUDY: StationId = StationId(PROGRAMS);

@@ -6,9 +6,10 @@
 
 mod press_cell;
 
+use understudy_cycle::Mode;
 use understudy_remote_io::Event;
 use understudy_simulator::{Action, Fault, Network, Record, Simulation};
-use understudy_wire::{Member, Mode, ProgramId, StationId};
+use understudy_wire::{Member, ProgramId, StationId};
 
 const PROGRAMS: usize = 3;
 const STATIONS: usize = 4;

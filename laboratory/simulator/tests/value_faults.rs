@@ -5,9 +5,10 @@
 
 mod press_cell;
 
+use understudy_cycle::Mode;
 use understudy_remote_io::{Event, ValueFault};
 use understudy_simulator::{Action, Fault, Network, Record, Simulation, Tally, Violation};
-use understudy_wire::{Member, Mode, ProgramId, StationId, StationSet};
+use understudy_wire::{Member, ProgramId, StationId, StationSet};
 
 const AT: u64 = 20;
 const CYCLES: u64 = 60;

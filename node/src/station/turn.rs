@@ -3,14 +3,15 @@
 use std::time::Duration;
 
 use smallvec::SmallVec;
+use understudy_cycle::{Mode, Output};
 use understudy_wire::{
-    Holding, Moment, Output, ProgramId, ProgramSet, StationId, StationSet, Time, Turn,
+    Holding, Moment, ProgramId, ProgramSet, StationId, StationSet, Time, Turn, Word,
 };
 
 use super::{Said, Station};
 use crate::event::Event;
 use crate::replica::{Replica, Standing};
-use crate::words;
+use crate::{generated, words};
 
 /// How often a station says which states it holds.
 const STATES_EVERY: Duration = Duration::from_secs(2);
@@ -148,25 +149,7 @@ impl Station {
 
     pub(super) fn speak(&mut self, now: Time, moment: Moment) {
         self.cycle.published = true;
-        let may_speak = |replica: &&Replica| replica.may_speak(moment);
-        let words = if self.is_understudy() {
-            let known = self.replicas.iter().filter(may_speak);
-            words::of_understudy(
-                self.settings.agreement.mode,
-                ProgramSet::first(self.settings.agreement.schedule.controllers()),
-                known.map(Replica::id).collect(),
-                self.confirmed(),
-                |program| {
-                    let replica = self.replicas.iter().find(|replica| replica.id() == program);
-                    replica.map(Replica::outputs)
-                },
-            )
-        } else {
-            let known = self.replicas.iter().find(may_speak);
-            known.map_or_else(SmallVec::new, |replica| {
-                words::of_controller(replica.id(), replica.outputs())
-            })
-        };
+        let words = self.words(moment);
         self.report(Event::Published {
             moment,
             words: words.clone(),
@@ -182,6 +165,32 @@ impl Station {
         };
         let body = self.with_relayed(turn);
         self.send_cyclic(now, body);
+    }
+
+    fn words(&mut self, moment: Moment) -> SmallVec<[Word; 2]> {
+        let known = self.replicas.iter().filter(|it| it.may_speak(moment));
+        let agreement = &self.settings.agreement;
+        if !self.is_understudy() {
+            return known
+                .flat_map(|replica| words::of_controller(replica.id(), replica.outputs()))
+                .collect();
+        }
+        let all = ProgramSet::first(agreement.schedule.controllers());
+        let known = known.map(Replica::id).collect();
+        match (agreement.mode, &self.settings.generated) {
+            (Mode::Full, _) => {
+                words::of_understudy(Mode::Full, all, known, self.confirmed(), |program| {
+                    let replica = self.replicas.iter().find(|replica| replica.id() == program);
+                    replica.map(Replica::outputs)
+                })
+            }
+            (Mode::Paper, Some(scan)) if known == all => {
+                let steps = self.replicas.iter().map(Replica::last_step);
+                let sum = generated::outputs(scan, &mut self.scratch, steps);
+                sum.into_iter().map(|sum| Word { mask: all, sum }).collect()
+            }
+            (Mode::Paper, _) => SmallVec::new(),
+        }
     }
 
     pub(super) fn speaks_at(&self) -> Option<Time> {

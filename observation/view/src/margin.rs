@@ -6,11 +6,12 @@
 
 use std::sync::Arc;
 
+use understudy_cycle::Mode;
 use understudy_node::{words_of_controller, words_of_understudy};
 use understudy_remote_io::{Foreseen, Missing};
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Digest, Frame, Header, Holding, Image, Lineage, Member,
-    Mode, Moment, ProgramId, ProgramSet, StationId, StationSet, Turn, Word,
+    Moment, ProgramId, ProgramSet, StationId, StationSet, Turn, Word,
 };
 
 /// Who is alive, and holds what.

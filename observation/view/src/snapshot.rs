@@ -182,8 +182,8 @@ impl Model {
             cycle: self.cycle(),
             from_origin: self.has_origin(),
             mode: match agreement.mode {
-                understudy_wire::Mode::Full => "full",
-                understudy_wire::Mode::Paper => "paper",
+                understudy_cycle::Mode::Full => "full",
+                understudy_cycle::Mode::Paper => "paper",
             },
             period_us: u64::try_from(agreement.schedule.period().as_micros()).unwrap_or(u64::MAX),
             stations: (0..self.stations.len() as u8)

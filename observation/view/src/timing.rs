@@ -4,7 +4,8 @@ use std::collections::VecDeque;
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use understudy_wire::{Moment, Schedule};
+use understudy_cycle::Schedule;
+use understudy_wire::Moment;
 
 /// Cycles that are open, at most: lines of different members come a few cycles apart.
 const OPEN: usize = 8;

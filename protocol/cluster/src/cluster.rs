@@ -6,13 +6,14 @@ use std::sync::Arc;
 
 use crate::device::FieldDevice;
 use serde::{Deserialize, Serialize};
+use understudy_cycle::{Agreement, Mode};
 use understudy_ladder::Program as LadderProgram;
-use understudy_logic::Circuit;
+use understudy_logic::{Circuit, Scan};
 use understudy_node::Program;
 use understudy_parity::ParityController;
 use understudy_plant::{Followed, Plant};
 use understudy_remote_io::{Diagnosis, Release, StaleState, ValueFault};
-use understudy_wire::{Agreement, Epoch, Image, Member, ProgramHash, ProgramId, StationId};
+use understudy_wire::{Epoch, Image, Member, ProgramHash, ProgramId, StationId};
 
 /// What carries the frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -275,10 +276,13 @@ impl Cluster {
         epoch: Epoch,
     ) -> Option<understudy_node::Settings> {
         self.member_name(Member::Station(station))?;
+        let evaluates_generated =
+            self.agreement.mode == Mode::Paper && self.agreement.schedule.is_understudy(station);
         Some(understudy_node::Settings {
             station,
             agreement: Arc::clone(&self.agreement),
             programs: Arc::clone(&self.programs),
+            generated: evaluates_generated.then(|| Arc::new(Scan::new(self.parity.circuit()))),
             epoch,
         })
     }

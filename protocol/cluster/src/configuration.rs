@@ -4,8 +4,9 @@
 
 use std::fmt::Write;
 
+use understudy_cycle::Mode;
 use understudy_plant::{Followed, ModelKind, Signals};
-use understudy_wire::{Mode, ProgramId};
+use understudy_wire::ProgramId;
 
 use crate::canonical::circuit_text;
 use crate::cluster::Cluster;

@@ -2,7 +2,7 @@
 //!
 //! [`read`] takes the text of a `cluster.toml` and a function that gives the ladders that it names, and answers with a
 //! [`Cluster`] and with everything that is wrong in any of these files. From a cluster comes what each member is told when it
-//! starts. Two members that read equal files have equal [`configuration`](understudy_wire::Agreement::configuration) hashes,
+//! starts. Two members that read equal files have equal [`configuration`](understudy_cycle::Agreement::configuration) hashes,
 //! and only such members work together; the hash is of [`Cluster::canonical_text`].
 //!
 //! The format is described in `docs/cluster-file.md`.

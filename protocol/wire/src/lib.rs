@@ -1,33 +1,21 @@
 //! What travels between the members of a cluster: identifiers, images, lineages and frames.
 //!
-//! Everything that two members must agree on is here and nowhere else: who they are ([`Member`]), when who speaks
-//! ([`Schedule`]), which states are the same ([`Lineage`]), and the bytes of a [`Frame`] ([`encode`], [`decode`]).
+//! Everything that two members must agree on is here and nowhere else: who they are ([`Member`]), which states are the same
+//! ([`Lineage`]), and the bytes of a [`Frame`] ([`encode`], [`decode`]).
 
-mod agreement;
-mod attendance;
 mod audience;
 mod codec;
-mod copies;
-mod cycle_clock;
 mod force;
 mod frame;
 mod identifier;
 mod image;
 mod lineage;
-mod machine;
-mod reception;
-mod schedule;
 mod set;
 mod state_choice;
 mod time;
-mod waking;
 
-pub use agreement::{Agreement, Mode};
-pub use attendance::{Attendance, Change};
 pub use audience::Topic;
 pub use codec::{FrameError, MAXIMUM_FRAME_BYTES, decode, encode};
-pub use copies::Copies;
-pub use cycle_clock::{Arrival, CycleClock};
 pub use force::{
     Force, ForceError, MAXIMUM_FORCE_SECONDS, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH,
     SignalPlace,
@@ -42,10 +30,6 @@ pub use identifier::{
 };
 pub use image::{Image, ImageError, MAXIMUM_IMAGE_BITS};
 pub use lineage::{Digest, Lineage};
-pub use machine::{Input, Machine, Output};
-pub use reception::{Admission, Reception};
-pub use schedule::{Schedule, ScheduleError};
 pub use set::{Element, ProgramSet, Set, StationSet};
 pub use state_choice::StateChoice;
 pub use time::Time;
-pub use waking::Waking;

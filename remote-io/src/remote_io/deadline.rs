@@ -1,6 +1,7 @@
 //! The deadline: something is driven at every one, and only what is true, held, or fail-safe.
 
-use understudy_wire::{Image, Moment, Output, Source, Time};
+use understudy_cycle::Output;
+use understudy_wire::{Image, Moment, Source, Time};
 
 use super::{Applied, Floor, Phase, Question, RemoteIo};
 use crate::event::{Event, Missing};

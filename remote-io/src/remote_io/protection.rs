@@ -2,7 +2,8 @@
 //! program's output in this cycle. What is lost for `flag_after` cycles in a row is reported at once, with the reason.
 
 use smallvec::SmallVec;
-use understudy_wire::{Body, Lineage, Mode, Moment, StationId, StationSet, Turn};
+use understudy_cycle::Mode;
+use understudy_wire::{Body, Lineage, Moment, StationId, StationSet, Turn};
 
 use super::{Phase, RemoteIo};
 use crate::event::{Event, Lacking, LackingReason};

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use understudy_wire::{Body, Moment, Output, Sample, Source, Time};
+use understudy_cycle::Output;
+use understudy_wire::{Body, Moment, Sample, Source, Time};
 
 use super::{Floor, Phase, RemoteIo};
 use crate::channel;

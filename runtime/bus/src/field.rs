@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
-use understudy_wire::{
-    Actuation, Agreement, Body, Frame, Header, Image, Member, Moment, ProgramId,
-};
+use understudy_cycle::Agreement;
+use understudy_wire::{Actuation, Body, Frame, Header, Image, Member, Moment, ProgramId};
 
 /// Drives and senses the field of one member; never blocks.
 pub trait FieldDriver: Send {

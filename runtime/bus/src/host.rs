@@ -10,7 +10,8 @@ use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, ppoll};
 use nix::sys::time::TimeSpec;
 use serde::{Deserialize, Serialize};
-use understudy_wire::{Body, Frame, Input, Machine, Moment, Output, Time, encode};
+use understudy_cycle::{Input, Machine, Output};
+use understudy_wire::{Body, Frame, Moment, Time, encode};
 
 use crate::clock::Clock;
 use crate::error::BusError;

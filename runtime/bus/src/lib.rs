@@ -1,6 +1,6 @@
 //! Members on real clocks, threads and networks.
 //!
-//! A member (a station, a remote I/O, a plant) is a pure [`understudy_wire::Machine`]. This crate gives it a thread, a clock,
+//! A member (a station, a remote I/O, a plant) is a pure [`understudy_cycle::Machine`]. This crate gives it a thread, a clock,
 //! a link to its peers ([`LinkKind`]: Zenoh or plain UDP) and a journal, and runs it ([`Host`], or [`run_member`] for a process
 //! of its own). Nothing here decides anything about the cycle.
 

@@ -8,7 +8,7 @@ use nix::sys::eventfd::{EfdFlags, EventFd};
 use nix::sys::prctl::set_pdeathsig;
 use nix::sys::signal::Signal;
 use serde::Serialize;
-use understudy_wire::Machine;
+use understudy_cycle::Machine;
 
 use crate::channel::{Channel, ChannelSettings, followed};
 use crate::clock::Clock;

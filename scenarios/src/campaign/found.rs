@@ -8,11 +8,11 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 use understudy_cluster::Cluster;
+use understudy_cycle::Mode;
 use understudy_reliability::{
     AccelerationBias, Assessment, Hours, Interval, ReliabilityError, acceleration_bias, assess,
     grouped,
 };
-use understudy_wire::Mode;
 
 use super::question::Planned;
 use super::{CampaignPlan, Measured, OwnTime};

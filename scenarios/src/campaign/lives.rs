@@ -14,8 +14,9 @@ use rand::RngExt;
 use rand_distr::{Distribution, Exp1};
 use rand_pcg::Pcg64;
 use understudy_cluster::Cluster;
+use understudy_cycle::Mode;
 use understudy_simulator::Action;
-use understudy_wire::{Member, Mode, ProgramId, ProgramSet, StationId, StationSet, Time};
+use understudy_wire::{Member, ProgramId, ProgramSet, StationId, StationSet, Time};
 
 use super::CampaignPlan;
 use super::seen::Seen;

@@ -1,11 +1,12 @@
 //! What is asked of a campaign, and the plan that answers it.
 
 use understudy_cluster::Cluster;
+use understudy_cycle::Mode;
 use understudy_reliability::{
     Hours, MAXIMUM_ACCELERATION, Options, ReliabilityError, Rule, System, UNDERSTUDIES,
     UnequalBoxes, acceleration_bias, grouped,
 };
-use understudy_wire::{Member, Mode};
+use understudy_wire::Member;
 
 use super::CampaignPlan;
 

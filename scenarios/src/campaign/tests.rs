@@ -1,7 +1,8 @@
 use understudy_cluster::{Cluster, Overrides, press_cell, read_with};
+use understudy_cycle::Mode;
 use understudy_reliability::Hours;
 use understudy_simulator::Action;
-use understudy_wire::{Mode, ProgramId, StationId, Time};
+use understudy_wire::{ProgramId, StationId, Time};
 
 use super::lives::{Lives, Order};
 use super::seen::Seen;

@@ -1,7 +1,7 @@
 //! What was injected: kind of fault × role × phase of the cycle.
 
 use serde::{Deserialize, Serialize};
-use understudy_wire::Schedule;
+use understudy_cycle::Schedule;
 
 use super::faultload::Faultload;
 use super::kind::{Kind, Phase, Role};

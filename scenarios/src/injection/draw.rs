@@ -9,8 +9,9 @@ use std::time::Duration;
 
 use rand::RngExt;
 use rand_pcg::Pcg64;
+use understudy_cycle::Schedule;
 use understudy_simulator::{Action, Disturbance, Fault, Network};
-use understudy_wire::{Member, ProgramId, Schedule, StationId};
+use understudy_wire::{Member, ProgramId, StationId};
 
 use super::faultload::{Faultload, Injection};
 use super::kind::{Kind, Role};

@@ -4,9 +4,9 @@ use std::fmt::{self, Write as _};
 
 use serde::{Deserialize, Serialize};
 use understudy_cluster::Cluster;
-use understudy_journal::Members;
+use understudy_cycle::{Mode};
+use understudy_journal::{Members};
 use understudy_simulator::Tally;
-use understudy_wire::Mode;
 
 use super::coverage::CoverageRow;
 use super::kind::Phase;

@@ -4,7 +4,8 @@ use std::fmt;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
-use understudy_wire::{Member, Schedule, StationId};
+use understudy_cycle::Schedule;
+use understudy_wire::{Member, StationId};
 
 /// What is injected. Every kind but the last four strikes one member.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]

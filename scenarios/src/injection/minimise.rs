@@ -8,8 +8,9 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::time::Duration;
 
+use understudy_cycle::Schedule;
 use understudy_simulator::{Action, Disturbance, Fault};
-use understudy_wire::{Member, Schedule};
+use understudy_wire::Member;
 
 use super::faultload::{Faultload, Injection};
 use super::kind::Role;

@@ -1,6 +1,7 @@
+use understudy_cycle::Mode;
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
-use understudy_wire::{Image, Mode, Moment, StationSet};
+use understudy_wire::{Image, Moment, StationSet};
 
 use super::*;
 use crate::outlook::look_ahead;

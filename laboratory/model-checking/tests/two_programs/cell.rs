@@ -3,13 +3,13 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use understudy_cycle::{Agreement, Mode, Schedule};
 use understudy_logic::{Circuit, CircuitBuilder, Scan};
 use understudy_plant::{ModelKind, Plant, Signals};
 use understudy_remote_io::{Release, StaleState, ValueFault};
 use understudy_simulator::Parts;
 use understudy_wire::{
-    Agreement, ClusterHash, ConfigurationHash, Epoch, Image, Mode, ProgramHash, ProgramId,
-    Schedule, StationId,
+    ClusterHash, ConfigurationHash, Epoch, Image, ProgramHash, ProgramId, StationId,
 };
 
 const PERIOD: Duration = Duration::from_millis(10);
@@ -64,6 +64,7 @@ pub(crate) fn parts(understudies: usize) -> Parts {
         station: StationId(rank as u8),
         agreement: Arc::clone(&agreement),
         programs: Arc::clone(&programs),
+        generated: None,
         epoch: Epoch(0),
     });
     let remote_ios = programs.iter().zip(0..);

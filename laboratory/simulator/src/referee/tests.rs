@@ -1,10 +1,9 @@
 //! A referee that never blows its whistle proves nothing: every kind of violation is shown to it.
 
+use understudy_cycle::{Agreement, Mode, Schedule};
 use understudy_logic::CircuitBuilder;
 use understudy_remote_io::{Release, StaleState, ValueFault};
-use understudy_wire::{
-    Agreement, ClusterHash, ConfigurationHash, Cycle, Epoch, Mode, ProgramId, Schedule, StationSet,
-};
+use understudy_wire::{ClusterHash, ConfigurationHash, Cycle, Epoch, ProgramId, StationSet};
 
 use super::*;
 

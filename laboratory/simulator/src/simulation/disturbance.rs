@@ -3,9 +3,10 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use understudy_cycle::{Agreement, Input, Machine};
 use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
-use understudy_wire::{Agreement, ConfigurationHash, Epoch, Frame, Input, Machine, Member};
+use understudy_wire::{ConfigurationHash, Epoch, Frame, Member};
 
 use super::{Observe, Record, Simulation};
 use crate::fault::{Action, Fault};

@@ -4,13 +4,13 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use understudy_cycle::{Agreement, Mode, Schedule};
 use understudy_ladder::parse;
 use understudy_logic::{Circuit, Scan};
 use understudy_plant::{ModelKind, Plant, PressParameters, RobotParameters, Signals};
 use understudy_simulator::Parts;
 use understudy_wire::{
-    Agreement, ClusterHash, ConfigurationHash, Epoch, Image, Mode, ProgramHash, ProgramId,
-    Schedule, StationId,
+    ClusterHash, ConfigurationHash, Epoch, Image, ProgramHash, ProgramId, StationId,
 };
 
 pub(crate) const PERIOD: Duration = Duration::from_millis(10);
@@ -48,10 +48,16 @@ pub(crate) fn line(programs: usize, mode: Mode, understudies: usize) -> Parts {
             scan: Scan::new(circuit),
         })
         .collect();
+    let generated = (mode == Mode::Paper).then(|| {
+        let generated =
+            understudy_parity::generate(&circuits).expect("programs of different names");
+        Arc::new(Scan::new(generated.circuit()))
+    });
     let stations = (0..circuits.len() + understudies).map(|rank| understudy_node::Settings {
         station: StationId(rank as u8),
         agreement: Arc::clone(&agreement),
         programs: Arc::clone(&programs),
+        generated: generated.clone(),
         epoch: Epoch(0),
     });
     let remote_ios =

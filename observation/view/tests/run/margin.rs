@@ -1,9 +1,10 @@
 //! The margin of survival against the simulator: what is said to be masked is masked, what is said to be lost is lost.
 
+use understudy_cycle::Mode;
 use understudy_scenarios::{Action, Fault, Network, Scenario};
 use understudy_simulator::{Simulation, parts};
 use understudy_view::{Margin, Outcome};
-use understudy_wire::{Member, Mode, StationId};
+use understudy_wire::{Member, StationId};
 
 use crate::support::{line, model};
 

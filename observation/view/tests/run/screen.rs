@@ -81,7 +81,7 @@ fn a_journal_that_is_being_read_shows_no_values() {
 /// Any size, any key, nothing panics; also before the first record and with many stations.
 #[test]
 fn no_size_is_too_small() {
-    let large = line(12, 3, understudy_wire::Mode::Full);
+    let large = line(12, 3, understudy_cycle::Mode::Full);
     let quiet = understudy_scenarios::Scenario {
         title: "quiet".into(),
         cycles: 20,

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use understudy_cluster::{Cluster, Overrides, press_cell, read_with};
+use understudy_cycle::{Mode};
 use understudy_journal::{Members, Record};
 use understudy_scenarios::{Scenario, read, simulate};
 use understudy_view::{Bounds, Model};
-use understudy_wire::Mode;
 
 /// A robot, the press that it feeds, and so on in turn: so many controllers and understudies.
 pub(crate) fn line(controllers: usize, understudies: usize, mode: Mode) -> Cluster {

@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use crate::common::{findings, load, run, split};
 use understudy_cluster::{Cluster, Link, press_cell};
-use understudy_wire::{Epoch, Image, Member, Mode, ProgramId, StationId};
+use understudy_cycle::Mode;
+use understudy_wire::{Epoch, Image, Member, ProgramId, StationId};
 
 fn cell() -> Cluster {
     let (cluster, ladders) = split(press_cell());

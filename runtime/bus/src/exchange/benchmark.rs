@@ -12,8 +12,9 @@ use std::time::Duration;
 use nix::sys::prctl::set_pdeathsig;
 use nix::sys::signal::Signal;
 use serde::{Deserialize, Serialize};
+use understudy_cycle::Machine;
 use understudy_seal::{ClusterSecret, KEY_BYTES, Opener, Seal, Title};
-use understudy_wire::{ClusterHash, Machine, Member, ProgramId, StationId, Topic};
+use understudy_wire::{ClusterHash, Member, ProgramId, StationId, Topic};
 
 use super::meter::{Exchange, ExchangeMeter};
 use super::pattern::{CYCLE_MASTER, PROGRAMS, Pattern, STATIONS};

@@ -4,10 +4,11 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
+use understudy_cycle::{Input, Machine, Output};
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
-    Input, Lineage, Machine, Member, Moment, Output, ProgramId, ProgramSet, Sample, StationId,
-    StationSet, Time, Turn, Word,
+    Lineage, Member, Moment, ProgramId, ProgramSet, Sample, StationId, StationSet, Time, Turn,
+    Word,
 };
 
 /// Stations that speak in the pattern: three controllers and their understudy.

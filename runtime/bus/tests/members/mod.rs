@@ -6,11 +6,11 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use understudy_bus::{Endpoints, Guard, Peer, free_addresses};
+use understudy_cycle::{Agreement, Input, Machine, Mode, Output, Schedule};
 use understudy_seal::{ClusterSecret, FrameKey, Opener, Seal, Title};
 use understudy_wire::{
-    Agreement, Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Field, Frame, Header, Image,
-    Input, Lineage, Machine, Member, Mode, Moment, Output, ProgramId, Sample, Schedule, StationId,
-    StationSet, Time, Topic,
+    Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Field, Frame, Header, Image, Lineage,
+    Member, Moment, ProgramId, Sample, StationId, StationSet, Time, Topic,
 };
 
 /// How often each member says something.

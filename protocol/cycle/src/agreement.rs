@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::identifier::{ClusterHash, ConfigurationHash};
 use crate::schedule::Schedule;
+use understudy_wire::{ClusterHash, ConfigurationHash};
 
 /// Equal in every member; its hash is `configuration`, and a member with another hash is refused.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -16,7 +16,7 @@ pub struct Agreement {
     pub schedule: Schedule,
     /// How many failures are masked.
     pub mode: Mode,
-    /// Samples that a remote I/O keeps and sends, this cycle's included: 1 to [`crate::MAXIMUM_HISTORY`].
+    /// Samples that a remote I/O keeps and sends, this cycle's included: 1 to [`understudy_wire::MAXIMUM_HISTORY`].
     pub history: usize,
     /// Cycles of silence after which a station is flagged, θ = 1: at least 1.
     pub flag_after: u32,

@@ -7,9 +7,8 @@ use std::sync::Arc;
 
 use smallvec::SmallVec;
 
-use crate::frame::Frame;
 use crate::schedule::Schedule;
-use crate::time::Time;
+use understudy_wire::{Frame, Time};
 
 /// Frames of this cycle, each with the times at which it leaves again.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
@@ -68,7 +67,9 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::{Body, ClusterHash, ConfigurationHash, Header, Member, Moment, StationId};
+    use understudy_wire::{
+        Body, ClusterHash, ConfigurationHash, Header, Member, Moment, StationId,
+    };
 
     #[test]
     fn a_frame_leaves_as_often_as_configured() {

@@ -7,9 +7,7 @@
 
 use std::time::Duration;
 
-use crate::frame::{Body, Frame};
-use crate::identifier::{Epoch, Moment};
-use crate::time::Time;
+use understudy_wire::{Body, Epoch, Frame, Moment, Time};
 
 /// The current cycle of one member.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]

@@ -3,8 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::agreement::Agreement;
-use crate::frame::Header;
-use crate::identifier::{ClusterHash, ConfigurationHash, Member};
+use understudy_wire::{ClusterHash, ConfigurationHash, Header, Member};
 
 /// Decides on headers alone. Remembers whom it has refused, at most once for each member of the cluster.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]

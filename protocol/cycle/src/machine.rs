@@ -6,11 +6,7 @@
 
 use std::sync::Arc;
 
-use crate::force::{Force, SignalPlace};
-use crate::frame::Frame;
-use crate::image::Image;
-use crate::state_choice::StateChoice;
-use crate::time::Time;
+use understudy_wire::{Force, Frame, Image, SignalPlace, StateChoice, Time};
 
 /// What a member is told.
 #[derive(Debug, Clone, Copy)]

@@ -3,8 +3,7 @@
 //! Detection is by turns alone. Each member keeps its own view; nothing is decided on it but whose slot is closed, whom the
 //! cycle master's successor waits for, and which stations count as living.
 
-use crate::identifier::StationId;
-use crate::set::StationSet;
+use understudy_wire::{StationId, StationSet};
 
 /// One member's view of all stations.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]

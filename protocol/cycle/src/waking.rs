@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use crate::schedule::Schedule;
-use crate::time::Time;
+use understudy_wire::Time;
 
 /// The next wake-up of one member.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]

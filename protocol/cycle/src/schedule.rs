@@ -12,7 +12,7 @@
 
 use std::time::Duration;
 
-use crate::identifier::{MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, StationId};
+use understudy_wire::{MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, StationId};
 
 /// The timing of a cluster. All offsets are from the start of a cycle.
 #[derive(Debug, Clone, PartialEq, Eq)]
