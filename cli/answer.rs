@@ -6,9 +6,7 @@ use std::ffi::OsStr;
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Map, Value};
-use understudy_diagnostic::{
-    Diagnostic, Lines, MAXIMUM_MESSAGE, Position, Report, Severity, shortened,
-};
+use understudy_text::{Diagnostic, Lines, MAXIMUM_MESSAGE, Position, Report, Severity, shortened};
 
 /// The most findings of all files together that an answer shows.
 const MAXIMUM_SHOWN: usize = 500;

@@ -10,13 +10,13 @@ use std::time::Duration;
 use clap::Args;
 use serde::Serialize;
 use understudy_cluster::{Cluster, Overrides};
-use understudy_diagnostic::{Diagnostic, Report, Severity, has_errors};
 use understudy_interchange::{parse_program, unknown_form};
 use understudy_ladder::parse_time;
 use understudy_scenarios::{Members, read};
 use understudy_supervisor::ladder::read_map;
 use understudy_supervisor::petri::read_net;
 use understudy_supervisor::read_ads;
+use understudy_text::{Diagnostic, Report, Severity, has_errors};
 
 use crate::answer::{Answer, Failure, Status};
 use crate::automata;

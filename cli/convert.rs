@@ -6,12 +6,12 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
-use understudy_diagnostic::{Lines, MAXIMUM_SHOWN, Report, shortened};
 use understudy_interchange::plcopen::Fidelity;
 use understudy_interchange::{
     Compared, Format, Reading, WriteError, Written, read, unknown_form, write,
 };
 use understudy_ladder::parse_time;
+use understudy_text::{Lines, MAXIMUM_SHOWN, Report, shortened};
 
 use crate::answer::{Answer, Status};
 use crate::files;

@@ -5,9 +5,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use understudy_cluster::{Cluster, Loaded, Overrides, TemplateFile};
-use understudy_diagnostic::spelling::nearest;
-use understudy_diagnostic::{Report, decode};
 use understudy_scenarios::{Members, Scenario, named_file, read as read_scenario};
+use understudy_text::spelling::nearest;
+use understudy_text::{Report, decode};
 
 use crate::answer::{Answer, Status};
 use crate::kind::{self, Kind};

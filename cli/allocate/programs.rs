@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use understudy_cluster::{Cluster, Overrides};
-use understudy_diagnostic::Report;
 use understudy_interchange::parse_program;
 use understudy_ladder::{Program, parse_time};
 use understudy_logic::Circuit;
 use understudy_parity::{ParityController, generate};
+use understudy_text::Report;
 
 use crate::answer::{Answer, Status};
 use crate::files;

@@ -30,7 +30,7 @@ mod value;
 use std::collections::HashMap;
 use std::ops::Range;
 
-use understudy_diagnostic::{Diagnostic, Report};
+use understudy_text::{Diagnostic, Report};
 
 use crate::chain::{Chain, ChainBuilder};
 use crate::error::ReliabilityError;
@@ -341,7 +341,7 @@ impl Reader {
                 builder.transition(from, to, line.per_hour);
             }
         }
-        if understudy_diagnostic::has_errors(&self.findings) {
+        if understudy_text::has_errors(&self.findings) {
             return None;
         }
         match builder.build() {

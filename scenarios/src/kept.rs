@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use understudy_cluster::{Cluster, Link, Overrides, Security, read_with};
-use understudy_diagnostic::{Report, decode};
+use understudy_text::{Report, decode};
 use understudy_wire::Mode;
 
 use crate::named_files::{named_bytes, named_file};

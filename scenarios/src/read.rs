@@ -19,10 +19,10 @@ use std::ops::{Range, RangeInclusive};
 use std::time::Duration;
 
 use toml::de::DeTable;
-use understudy_diagnostic::spelling::suggestion;
-use understudy_diagnostic::{Diagnostic, Report, has_errors};
-use understudy_form::{Codes, Fields, Placed, parse};
 use understudy_simulator::{Disturbance, Network};
+use understudy_text::spelling::suggestion;
+use understudy_text::tables::{Codes, Fields, Placed, parse};
+use understudy_text::{Diagnostic, Report, has_errors};
 use understudy_wire::{Member, ProgramId, Source};
 
 use crate::members::Members;

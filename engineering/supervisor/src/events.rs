@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Name;
+use understudy_text::Diagnostic;
 
 use crate::ads::MAXIMUM_LABEL;
 use crate::alphabet::{Alphabet, Event, Label};

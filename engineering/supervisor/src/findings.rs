@@ -1,7 +1,7 @@
 //! What synthesis found, in words: each finding with the shortest sequence of events that shows it.
 
-use understudy_diagnostic::Severity;
-use understudy_diagnostic::spelling::nearest;
+use understudy_text::Severity;
+use understudy_text::spelling::nearest;
 
 use crate::alphabet::Label;
 use crate::model::Model;

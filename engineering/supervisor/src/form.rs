@@ -6,10 +6,10 @@ use std::time::Duration;
 
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::nearest;
-use understudy_form::Codes;
 use understudy_ladder::{Name, parse_time};
+use understudy_text::Diagnostic;
+use understudy_text::spelling::nearest;
+use understudy_text::tables::Codes;
 
 /// A place in the text, in bytes.
 pub(crate) type Place = Range<usize>;
@@ -45,7 +45,7 @@ pub(crate) fn read<'t, T>(
         codes,
         diagnostics: Vec::new(),
     };
-    let root = understudy_form::parse(text, codes, &mut form.diagnostics);
+    let root = understudy_text::tables::parse(text, codes, &mut form.diagnostics);
     let result = root.map(|root| read(&mut form, root.get_ref()));
     form.diagnostics
         .sort_by_key(|diagnostic| diagnostic.span.start);

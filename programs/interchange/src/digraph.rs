@@ -21,8 +21,8 @@ mod network;
 mod read;
 mod write;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Program;
+use understudy_text::Diagnostic;
 
 pub use self::draw::draw_svg;
 pub use self::graph::{Digraph, Edge, Label, Vertex, digraphs};

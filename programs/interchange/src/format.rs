@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, has_errors};
 use understudy_ladder::{Parsed, Program, parse};
+use understudy_text::{Diagnostic, has_errors};
 
 use crate::plcopen::Fidelity;
 use crate::{digraph, ldmicro, plcopen, structured_text};

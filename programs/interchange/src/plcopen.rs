@@ -23,8 +23,8 @@ use std::collections::HashSet;
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, has_errors};
 use understudy_ladder::{Program, check};
+use understudy_text::{Diagnostic, has_errors};
 
 pub use fidelity::{Count, Fidelity, Note};
 pub use write::write;

@@ -33,8 +33,8 @@ use std::ops::Range;
 use std::rc::Rc;
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, Severity, has_errors};
 use understudy_ladder::{Name, Program};
+use understudy_text::{Diagnostic, Severity, has_errors};
 
 pub(crate) use self::parser::is_keyword;
 pub use self::syntax::Class;

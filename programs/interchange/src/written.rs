@@ -8,11 +8,11 @@ mod behaviour;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, Severity};
 use understudy_ladder::{
     Block, LowerError, PERIODS, Program, Signal, StandardNames, print, structured_text, time_text,
 };
 use understudy_logic::Circuit;
+use understudy_text::{Diagnostic, Severity};
 
 use self::behaviour::Pair;
 use crate::format::{Format, Reading, read};

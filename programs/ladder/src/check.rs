@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
+use understudy_text::Diagnostic;
 
 use crate::lexer::{MAXIMUM_NAME_LENGTH, MAXIMUM_PRESET_TIME, is_name_part, is_name_start};
 use crate::parser::{KEYWORDS, MAXIMUM_NESTING, MAXIMUM_PRESET_VALUE};

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::str::CharIndices;
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS};
+use understudy_text::{Diagnostic, MAXIMUM_FINDINGS};
 
 use crate::program::{Address, Area};
 

@@ -17,8 +17,8 @@ use std::collections::{HashMap, HashSet};
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, has_errors};
 use understudy_logic::{Circuit, CircuitBuilder, Expression, Graph, RegisterId, Variable};
+use understudy_text::{Diagnostic, has_errors};
 
 use self::number::Number;
 pub use self::observer::Observer;
@@ -63,7 +63,7 @@ pub(crate) fn validate(program: &Program, period: Duration) -> Result<(), LowerE
     }
     let mut diagnostics = check(program);
     if has_errors(&diagnostics) {
-        diagnostics.retain(|found| found.severity == understudy_diagnostic::Severity::Error);
+        diagnostics.retain(|found| found.severity == understudy_text::Severity::Error);
         return Err(LowerError::Invalid {
             program: program.name.to_string(),
             diagnostics,

@@ -9,8 +9,8 @@ pub use rung::MAXIMUM_PRESET_VALUE;
 
 use std::ops::Range;
 
-use understudy_diagnostic::spelling::nearest;
-use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS, has_errors};
+use understudy_text::spelling::nearest;
+use understudy_text::{Diagnostic, MAXIMUM_FINDINGS, has_errors};
 
 use crate::check::check;
 use crate::lexer::{Lexeme, Placed, lex};

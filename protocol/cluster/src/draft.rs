@@ -7,8 +7,8 @@ mod stub;
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use understudy_form::written_time;
 use understudy_ladder::{Program, Signal};
+use understudy_text::duration::written_time;
 
 use crate::fields::MAXIMUM_NAME_LENGTH;
 use crate::format::{LONGEST_PERIOD, SHORTEST_PERIOD};

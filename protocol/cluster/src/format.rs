@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use understudy_form::written_time;
+use understudy_text::duration::written_time;
 use understudy_wire::MAXIMUM_HISTORY;
 
 /// The bounds of a cluster's period.

@@ -41,12 +41,12 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_diagnostic::spelling::suggestion;
-use understudy_diagnostic::{Diagnostic, Report};
 use understudy_ladder::Program as LadderProgram;
 use understudy_logic::{Circuit, Scan};
 use understudy_node::Program;
 use understudy_remote_io::{Release, StaleState, ValueFault};
+use understudy_text::spelling::suggestion;
+use understudy_text::{Diagnostic, Report};
 use understudy_wire::{
     Agreement, ClusterHash, ConfigurationHash, Image, MAXIMUM_PROGRAMS, Mode, Schedule,
 };

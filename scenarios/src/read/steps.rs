@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::suggestion;
-use understudy_form::{Fields, Placed};
 use understudy_simulator::{Action, Fault};
+use understudy_text::Diagnostic;
+use understudy_text::spelling::suggestion;
+use understudy_text::tables::{Fields, Placed};
 use understudy_wire::{Member, ProgramId, StateChoice};
 
 use super::{ANY, MAXIMUM_NUMBER, MAXIMUM_STEPS, Reader, SHARE};

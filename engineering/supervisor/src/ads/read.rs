@@ -1,7 +1,7 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS, shortened};
+use understudy_text::{Diagnostic, MAXIMUM_FINDINGS, shortened};
 
 use super::{MAXIMUM_LABEL, MAXIMUM_STATES, Vocal};
 use crate::alphabet::Label;
@@ -271,7 +271,7 @@ impl Reader {
         let transitions = self.take_transitions(text);
         self.diagnostics
             .sort_by_key(|diagnostic| diagnostic.span.start);
-        let automaton = if understudy_diagnostic::has_errors(&self.diagnostics) {
+        let automaton = if understudy_text::has_errors(&self.diagnostics) {
             None
         } else {
             let name = self.name.take().unwrap_or_default();

@@ -1,9 +1,9 @@
 //! Where signals are in the PLC: the table `[addresses]` of maps, models and nets.
 
 use toml::de::DeTable;
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::nearest;
 use understudy_ladder::{Address, Area, Name, Program, parse_address};
+use understudy_text::Diagnostic;
+use understudy_text::spelling::nearest;
 
 use super::names::{ILLEGAL_NAME, is_legal};
 use crate::form::Form;

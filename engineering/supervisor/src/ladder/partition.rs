@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::nearest;
 use understudy_ladder::Name;
+use understudy_text::Diagnostic;
+use understudy_text::spelling::nearest;
 
 use super::map::InputOutputMap;
 use super::names::{ILLEGAL_NAME, is_legal};

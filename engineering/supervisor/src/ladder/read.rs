@@ -33,8 +33,8 @@
 //! ```
 
 use toml::de::DeTable;
-use understudy_diagnostic::{Diagnostic, has_errors};
 use understudy_ladder::Name;
+use understudy_text::{Diagnostic, has_errors};
 
 use super::addresses::read_addresses;
 use super::map::{

@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::nearest;
+use understudy_text::Diagnostic;
+use understudy_text::spelling::nearest;
 
 use super::read::Loader;
 use crate::alphabet::{Alphabet, Event, Label};

@@ -2,8 +2,8 @@ use std::collections::HashMap;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
-use understudy_diagnostic::{Diagnostic, Report, has_errors};
-use understudy_form::Codes;
+use understudy_text::tables::Codes;
+use understudy_text::{Diagnostic, Report, has_errors};
 
 use super::Model;
 use super::component::read_component;

@@ -33,8 +33,8 @@
 use std::collections::HashMap;
 
 use toml::de::DeTable;
-use understudy_diagnostic::{Diagnostic, has_errors};
 use understudy_ladder::{MAXIMUM_PRESET_VALUE, Name};
+use understudy_text::{Diagnostic, has_errors};
 
 use super::condition::parse_condition;
 use super::net::{Action, Arc, Net, NetError, NetTransition, Place};

@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
 use understudy_bus::closed_segments;
-use understudy_diagnostic::shortened;
 use understudy_scenarios::Record;
+use understudy_text::shortened;
 
 use super::Trouble;
 use super::progress::Progress;

@@ -2,10 +2,10 @@
 
 use std::collections::{HashMap, HashSet};
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{
     Address, Area, KEYWORDS, MAXIMUM_NAME_LENGTH, Name, Program, Signal, parse_address,
 };
+use understudy_text::Diagnostic;
 
 /// An edge's symbol and what it is used for.
 pub(super) struct Use {

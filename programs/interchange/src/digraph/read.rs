@@ -6,10 +6,10 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use roxmltree::Node;
-use understudy_diagnostic::{Diagnostic, has_errors};
 use understudy_ladder::{
     Element, Feed, MAXIMUM_RUNGS, Name, Program, Rung, Series, Signal, check, visit,
 };
+use understudy_text::{Diagnostic, has_errors};
 
 use super::Reading;
 use super::infer::{Names, Use, contradictions, signals};
@@ -30,7 +30,7 @@ pub(super) fn read(text: &str) -> Reading {
     };
     if !has_errors(&reader.diagnostics) {
         let found = check(&program).into_iter();
-        let errors = found.filter(|found| found.severity == understudy_diagnostic::Severity::Error);
+        let errors = found.filter(|found| found.severity == understudy_text::Severity::Error);
         reader.diagnostics.extend(errors);
     }
     let mut diagnostics = reader.diagnostics;

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS, shortened};
+use understudy_text::{Diagnostic, MAXIMUM_FINDINGS, shortened};
 
 /// The largest file.
 const MAXIMUM_BYTES: usize = 16 << 20;

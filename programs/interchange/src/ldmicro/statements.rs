@@ -10,7 +10,7 @@ use std::fmt::Write;
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
+use understudy_text::Diagnostic;
 
 use super::limits::limits;
 use super::parse::{Coil, Element, File, Kind};

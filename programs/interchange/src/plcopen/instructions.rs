@@ -14,7 +14,7 @@
 use std::collections::HashSet;
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
+use understudy_text::Diagnostic;
 
 use super::plan::MAXIMUM_JUMPS;
 use super::statements::{OPERATORS, Statements};

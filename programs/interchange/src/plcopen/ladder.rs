@@ -11,10 +11,10 @@ use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{
     Coil, CoilKind, Contact, ContactKind, Element, Name, Program, Rung, Series, Signal,
 };
+use understudy_text::Diagnostic;
 
 use self::calls::Pending;
 use self::scope::{Binding, Scope};

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use std::sync::LazyLock;
 
 use roxmltree::Node;
-use understudy_diagnostic::{Diagnostic, shortened};
+use understudy_text::{Diagnostic, shortened};
 
 use self::rules::{Particle, Rules, Type};
 use super::xml::{attribute, elements, start_tag};

@@ -8,8 +8,8 @@ mod structure;
 
 use std::collections::HashMap;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Name;
+use understudy_text::Diagnostic;
 
 pub(super) use self::structure::wired;
 use self::structure::{Structure, structure};

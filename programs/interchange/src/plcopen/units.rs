@@ -3,8 +3,8 @@
 
 use std::collections::HashMap;
 
-use understudy_diagnostic::{Diagnostic, Severity, has_errors};
 use understudy_ladder::{Name, Program};
+use understudy_text::{Diagnostic, Severity, has_errors};
 
 use super::document::{
     Body, Graph, Ignored, Language, Pou, PouKind, Project, Section, Variable, VariableType,

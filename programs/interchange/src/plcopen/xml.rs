@@ -5,8 +5,8 @@ mod passage;
 use std::ops::Range;
 
 use roxmltree::{Document, Node, ParsingOptions};
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Name;
+use understudy_text::Diagnostic;
 
 pub(crate) use passage::Passage;
 

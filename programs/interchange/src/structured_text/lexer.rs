@@ -3,8 +3,8 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS};
 use understudy_ladder::MAXIMUM_NAME_LENGTH;
+use understudy_text::{Diagnostic, MAXIMUM_FINDINGS};
 
 /// What one lexeme is.
 #[derive(Debug, Clone, PartialEq, Eq)]

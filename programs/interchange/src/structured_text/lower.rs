@@ -9,9 +9,9 @@ mod rungs;
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{Name, Program, Relation};
 use understudy_logic::{Expression, Graph, Operation, Variable};
+use understudy_text::Diagnostic;
 
 use self::rungs::Rungs;
 use super::bounds::Interval;

@@ -8,8 +8,8 @@ mod statement;
 use std::collections::HashSet;
 use std::ops::Range;
 
-use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS};
 use understudy_ladder::Name;
+use understudy_text::{Diagnostic, MAXIMUM_FINDINGS};
 
 use super::lexer::{Lexeme, Placed, lex};
 use super::syntax::{File, Statement, Unit};

@@ -17,8 +17,8 @@ use std::ops::Range;
 use std::rc::Rc;
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS};
 use understudy_ladder::{KEYWORDS, MAXIMUM_NAME_LENGTH, Name};
+use understudy_text::{Diagnostic, MAXIMUM_FINDINGS};
 
 use self::leave::Left;
 use self::types::Types;
@@ -266,6 +266,6 @@ impl Resolver {
             .declarations
             .iter()
             .map(|declaration| declaration.name.as_str());
-        understudy_diagnostic::spelling::nearest(name, known)
+        understudy_text::spelling::nearest(name, known)
     }
 }

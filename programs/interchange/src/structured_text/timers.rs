@@ -24,8 +24,8 @@ use std::collections::{BTreeMap, BTreeSet, HashSet, VecDeque};
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::BlockKind;
+use understudy_text::Diagnostic;
 
 use super::bounds::Interval;
 use super::program::{Action, Cell, Kind, Resolved, Role, Step, Timer, Truth, walk};

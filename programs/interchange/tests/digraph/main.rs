@@ -15,7 +15,7 @@ use understudy_logic::Running;
 fn program(xml: &str) -> Program {
     let reading = read(xml);
     assert!(
-        !understudy_diagnostic::has_errors(&reading.diagnostics),
+        !understudy_text::has_errors(&reading.diagnostics),
         "{:#?}\n{xml}",
         reading.diagnostics
     );

@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use roxmltree::{Document, Node};
-use understudy_diagnostic::Severity;
 use understudy_interchange::Format;
 use understudy_interchange::plcopen::{read, write};
+use understudy_text::Severity;
 
 use crate::random::random_program;
 use crate::reading::reading;

@@ -2,23 +2,23 @@
 
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_interchange::structured_text::read;
 use understudy_ladder::{Program, check};
+use understudy_text::Diagnostic;
 
 pub(crate) const PERIOD: Duration = Duration::from_millis(100);
 
 /// The one program of a text without errors.
 pub(crate) fn program(text: &str) -> Program {
     let reading = read(text);
-    let errors = understudy_diagnostic::has_errors(&reading.diagnostics);
+    let errors = understudy_text::has_errors(&reading.diagnostics);
     assert!(!errors, "{:#?}\n{text}", reading.diagnostics);
     let [program] = reading.programs.as_slice() else {
         panic!("one program is expected:\n{text}");
     };
     let found = check(program);
     assert!(
-        !understudy_diagnostic::has_errors(&found),
+        !understudy_text::has_errors(&found),
         "{found:#?}\n{}\n{text}",
         understudy_ladder::print(program)
     );
@@ -27,7 +27,7 @@ pub(crate) fn program(text: &str) -> Program {
 
 /// What is found in a text, each with its line and column.
 pub(crate) fn findings(text: &str, diagnostics: Vec<Diagnostic>) -> String {
-    let report = understudy_diagnostic::Report {
+    let report = understudy_text::Report {
         name: "text".into(),
         text: text.into(),
         diagnostics,

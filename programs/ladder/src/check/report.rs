@@ -1,7 +1,7 @@
 //! What becomes of the reads, writes and undefined names that the check has met.
 
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::nearest;
+use understudy_text::Diagnostic;
+use understudy_text::spelling::nearest;
 
 use super::{Checker, Role, Symbol};
 

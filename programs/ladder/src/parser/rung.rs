@@ -3,8 +3,8 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::nearest;
+use understudy_text::Diagnostic;
+use understudy_text::spelling::nearest;
 
 use super::{MAXIMUM_NESTING, Parser};
 use crate::lexer::Lexeme;

@@ -48,7 +48,7 @@ fn check(circuit: &Circuit, seed: u64) {
     let text = print(&ladder);
     let parsed = parse(&text);
     assert!(
-        !understudy_diagnostic::has_errors(&parsed.diagnostics),
+        !understudy_text::has_errors(&parsed.diagnostics),
         "{:#?}\n{text}",
         parsed.diagnostics
     );

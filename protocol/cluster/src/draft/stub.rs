@@ -4,8 +4,8 @@ use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use understudy_form::written_time;
 use understudy_ladder::{Language, MAXIMUM_PRESET_VALUE, Namer, Signal};
+use understudy_text::duration::written_time;
 
 use super::{DraftProgram, note};
 use crate::read::MARK;

@@ -1,11 +1,11 @@
 //! Edges: their ends, and the elements that they are.
 
 use roxmltree::Node;
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{
     Block, BlockKind, Coil, Comparison, Contact, Element, MAXIMUM_PRESET_VALUE, Name, Relation,
     parse_time,
 };
+use understudy_text::Diagnostic;
 
 use super::super::graph::{coil_kind, contact_kind, edge_types};
 use super::super::infer::Use;

@@ -1,6 +1,6 @@
 //! Elements that do more than to pass power: one-shots, timers, counters, calculations.
 
-use understudy_diagnostic::Diagnostic;
+use understudy_text::Diagnostic;
 
 use super::super::parse::{Counter, Edge, Element, Kind, Timer};
 use super::{Use, Writer};

@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 
 use roxmltree::Node;
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Name;
+use understudy_text::Diagnostic;
 
 use super::read::Reader;
 use super::rungs::rung;

@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use std::time::Duration;
 
 use roxmltree::Node;
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{Name, PERIODS};
+use understudy_text::Diagnostic;
 
 use super::objects::graph;
 use super::{

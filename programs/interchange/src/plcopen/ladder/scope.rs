@@ -4,10 +4,10 @@ use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{
     Address, Area, KEYWORDS, MAXIMUM_NAME_LENGTH, Name, Signal, parse_address,
 };
+use understudy_text::Diagnostic;
 
 use crate::plcopen::document::{Ignored, Pou, Section, Variable, VariableType};
 use crate::plcopen::literal::{boolean, integer, time};

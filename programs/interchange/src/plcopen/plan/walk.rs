@@ -4,8 +4,8 @@ mod finish;
 
 use std::collections::{HashMap, HashSet};
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Name;
+use understudy_text::Diagnostic;
 
 use super::Plan;
 use super::links::{Links, Source};

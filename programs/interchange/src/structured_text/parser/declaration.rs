@@ -6,8 +6,8 @@ use super::super::syntax::{
     UnitKind,
 };
 use super::Parser;
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{Name, PERIODS};
+use understudy_text::Diagnostic;
 
 impl Parser {
     /// The unit that begins here, and the word that ends it.

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::BlockKind;
+use understudy_text::Diagnostic;
 
 use super::super::program::{Action, Truth};
 use super::super::syntax::{Argument, Class, Expression, Path};

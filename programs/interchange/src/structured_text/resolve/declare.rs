@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{Address, Area, Name, parse_address};
+use understudy_text::Diagnostic;
 
 use super::super::program::{Cell, Kind, Number, Role, Timer, Truth};
 use super::super::syntax::{Class, Declaration, Expression, UnitKind};

@@ -3,8 +3,8 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{Name, Relation};
+use understudy_text::Diagnostic;
 
 use super::super::program::{Action, Cell, Kind, Number, Role, Truth};
 use super::super::syntax::{Expression, ExpressionKind, Operator, Path};

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{Name, Relation};
+use understudy_text::Diagnostic;
 
 use super::super::program::{Action, Number, Role, Truth};
 use super::super::syntax::{Argument, UnitKind};

@@ -7,8 +7,8 @@ use super::super::syntax::{Expression, Label, Loop, Path, Statement, StatementKi
 use super::expression::Value;
 use super::leave::{Leaves, leaves, leaves_of};
 use super::{Entity, MAXIMUM_STEPS, Resolver};
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Relation;
+use understudy_text::Diagnostic;
 
 impl Resolver {
     /// The steps of one execution of an instance.

@@ -6,13 +6,12 @@ use std::borrow::Cow;
 use std::ops::{Range, RangeInclusive};
 use std::time::Duration;
 
+use super::Codes;
+use super::value::{Placed, Value};
+use crate::Diagnostic;
+use crate::spelling::suggestion;
 use toml::Spanned;
 use toml::de::DeTable;
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::suggestion;
-
-use crate::Codes;
-use crate::value::{Placed, Value};
 
 /// One table, `what`, and the keys that it was asked for.
 pub struct Fields<'a, 't> {

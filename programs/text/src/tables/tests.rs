@@ -1,9 +1,7 @@
 use std::time::Duration;
 
-use toml::de::DeTable;
-use understudy_diagnostic::Diagnostic;
-
 use super::*;
+use toml::de::DeTable;
 
 const CODES: Codes = Codes {
     no_toml: "toml",

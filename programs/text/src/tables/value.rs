@@ -3,13 +3,12 @@
 use std::ops::{Range, RangeInclusive};
 use std::time::Duration;
 
+use super::Codes;
+use crate::Diagnostic;
+use crate::duration::{parse_time, written_time};
+use crate::spelling::suggestion;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::suggestion;
-
-use crate::Codes;
-use crate::time::{parse_time, written_time};
 
 /// The largest whole number that TOML knows.
 const LARGEST: u64 = i64::MAX as u64;

@@ -4,16 +4,14 @@
 //! is reported, and the reader goes on without it to check the rest. What the values mean is the reader's own affair.
 
 mod fields;
-mod time;
 mod value;
 
 pub use fields::{Fields, unknown_key};
-pub use time::{parse_time, written_time};
 pub use value::{Placed, Value};
 
+use crate::{Diagnostic, MAXIMUM_FINDINGS};
 use toml::Spanned;
 use toml::de::DeTable;
-use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS};
 
 /// The largest file; readers of one kind may have a smaller bound.
 pub const MAXIMUM_TEXT_BYTES: usize = 16 << 20;
