@@ -11,7 +11,7 @@ use understudy_logic::{Circuit, Running};
 use understudy_testing::skip;
 use understudy_text::{Report, Severity};
 
-use crate::random::Dice;
+use understudy_testing::random::Dice;
 
 pub(crate) const PERIOD: Duration = Duration::from_millis(100);
 

@@ -46,29 +46,3 @@ pub(crate) fn findings(text: &str, diagnostics: Vec<Diagnostic>) -> String {
     });
     lines.collect()
 }
-
-/// Random numbers, the same for the same seed.
-pub(crate) struct Dice(u64);
-
-impl Dice {
-    pub(crate) fn new(seed: u64) -> Self {
-        Self(seed ^ 0x9e37_79b9_7f4a_7c15)
-    }
-
-    pub(crate) fn next(&mut self) -> u64 {
-        // SplitMix64.
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut value = self.0;
-        value = (value ^ value >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        value = (value ^ value >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        value ^ value >> 31
-    }
-
-    pub(crate) fn below(&mut self, bound: usize) -> usize {
-        usize::try_from(self.next() % bound as u64).expect("a small bound")
-    }
-
-    pub(crate) fn bits(&mut self, count: usize) -> Vec<bool> {
-        (0..count).map(|_| self.below(2) == 1).collect()
-    }
-}

@@ -3,8 +3,8 @@
 use proptest::prelude::*;
 use understudy_ladder::{draw_svg, draw_text, parse, print};
 
-use crate::random::random_program;
 use crate::support::program;
+use understudy_testing::random::random_program;
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
