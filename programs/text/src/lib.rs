@@ -8,7 +8,9 @@
 pub mod duration;
 mod encoding;
 mod lines;
+pub mod markup;
 pub mod pages;
+pub mod shell;
 mod shown;
 pub mod spelling;
 pub mod tables;

@@ -4,6 +4,7 @@
 //! is reported, and the reader goes on without it to check the rest. What the values mean is the reader's own affair.
 
 mod fields;
+pub mod format;
 mod value;
 
 pub use fields::{Fields, unknown_key};
@@ -19,7 +20,7 @@ pub const MAXIMUM_TEXT_BYTES: usize = 16 << 20;
 /// The stable codes of one kind of file for what can be wrong with its form.
 #[derive(Debug)]
 pub struct Codes {
-    /// The text is no TOML.
+    /// The text is not TOML.
     pub no_toml: &'static str,
     /// A key that its table does not have.
     pub unknown_key: &'static str,
@@ -29,11 +30,11 @@ pub struct Codes {
     pub wrong_type: &'static str,
     /// A number or a time out of its bounds.
     pub out_of_bounds: &'static str,
-    /// A word that is none of those possible.
+    /// A word that is not one of the possible ones.
     pub unknown_word: &'static str,
 }
 
-/// The tables of `text`; nothing where it is no TOML, because what the recovery makes of a broken text would only bring
+/// The tables of `text`; nothing where it is not TOML, because what the recovery makes of a broken text would only bring
 /// errors that follow from the first ones.
 pub fn parse<'t>(
     text: &'t str,
@@ -51,7 +52,7 @@ pub fn parse<'t>(
     let (table, errors) = DeTable::parse_recoverable(text);
     for error in errors.iter().take(MAXIMUM_FINDINGS) {
         let span = error.span().unwrap_or(text.len()..text.len());
-        let message = format!("this is no TOML: {}", error.message().trim_end());
+        let message = format!("invalid TOML: {}", error.message().trim_end());
         diagnostics.push(Diagnostic::error(codes.no_toml, message, span));
     }
     errors.is_empty().then_some(table)
