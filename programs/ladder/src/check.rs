@@ -328,7 +328,7 @@ impl<'a> Checker<'a> {
             None if self.places.contains_key(counter.as_str()) => {
                 self.diagnostics.push(Diagnostic::error(
                     "U0111",
-                    format!("`{counter}` is no counter and has no CV"),
+                    format!("`{counter}` is not a counter and has no CV"),
                     counter.span(),
                 ));
             }

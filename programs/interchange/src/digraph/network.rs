@@ -110,7 +110,7 @@ impl Shape {
         for edge in edges {
             if behind_outputs.contains(&edge.from) {
                 let message = format!(
-                    "vertex {} stands behind an output, and power goes no further",
+                    "vertex {} follows an output, where the power ends",
                     edge.from
                 );
                 found.push(Diagnostic::error("U1063", message, edge.span.clone()));

@@ -54,7 +54,7 @@ impl Reader {
             .push(Diagnostic::error(code, message, span));
     }
 
-    /// Says which children and attributes of `node` nobody reads.
+    /// Reports the children and attributes of `node` that are not read.
     fn only(&mut self, node: Node<'_, '_>, elements: &[&str], attributes: &[&str]) {
         let mut found = Vec::new();
         for child in xml::elements(node) {
@@ -84,7 +84,7 @@ impl Reader {
     fn diagram(&mut self, root: Node<'_, '_>) -> Program {
         if root.tag_name().name() != "LadderDiagram" {
             let message = format!(
-                "a LadderDiagram is expected, and `{}` stands here",
+                "expected a LadderDiagram, found `{}`",
                 root.tag_name().name()
             );
             self.error("U1060", message, xml::start_tag(root));
@@ -159,7 +159,7 @@ impl Reader {
             other => {
                 self.error(
                     "U1061",
-                    format!("`{other}` is no initial value; 0 and 1 are"),
+                    format!("invalid initial value `{other}`: expected 0 or 1"),
                     initial.span(),
                 );
                 None

@@ -217,7 +217,7 @@ impl Drawing<'_> {
                     self.error("U1004", message, target.span());
                 }
                 Some(Binding::Other(_) | Binding::Time(_) | Binding::Number(_)) => {
-                    self.general(format!("`{target}` is no BOOL"), target.span());
+                    self.general(format!("`{target}` is not a BOOL"), target.span());
                 }
                 None => self.undefined(target),
             }

@@ -95,7 +95,7 @@ impl Reader {
                 "function" => PouKind::Function,
                 other => {
                     let message = format!(
-                        "a unit is a program, functionBlock or function, and `{other}` is none"
+                        "invalid type of unit `{other}`: expected program, functionBlock or function"
                     );
                     self.error("U1002", message, pou);
                     continue;
