@@ -5,7 +5,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use understudy_cluster::{Cluster, Loaded, Overrides, TemplateFile};
-use understudy_scenarios::{Members, Scenario, named_file, read as read_scenario};
+use understudy_journal::{Members, named_file};
+use understudy_scenarios::{Scenario, read as read_scenario};
 use understudy_text::spelling::nearest;
 use understudy_text::{Report, decode};
 

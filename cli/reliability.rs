@@ -7,12 +7,13 @@ use std::time::SystemTime;
 use clap::{Args, ValueEnum};
 use serde_json::{Map, Value, json};
 use understudy_cluster::{Cluster, Overrides};
+use understudy_journal::time_name;
 use understudy_reliability::{
     Answer as Calculated, Assessment, CommonCauseConvention, Hours, Options, Provenance,
     ReliabilityError, SharedPart, UnequalBoxes, answer_chain, calculate, read_chain, report,
     report_data,
 };
-use understudy_scenarios::{options_of, set_unequal, time_name};
+use understudy_scenarios::{options_of, set_unequal};
 use understudy_text::Report;
 
 use crate::answer::{Answer, Status};

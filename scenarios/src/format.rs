@@ -2,9 +2,10 @@
 
 use std::time::Duration;
 
+use understudy_journal::{SOURCES, source_word};
 use understudy_text::tables::format::{Kind, Table, key, required};
 
-use crate::scenario::{ACTIONS, SOURCES, source_word};
+use crate::scenario::ACTIONS;
 
 /// Cycles of one scenario, at most.
 pub const MAXIMUM_CYCLES: u64 = 100_000_000;

@@ -18,6 +18,7 @@ mod steps;
 use std::ops::Range;
 
 use toml::de::DeTable;
+use understudy_journal::{Members, SOURCES, source_word};
 use understudy_simulator::{Disturbance, Network};
 use understudy_text::spelling::suggestion;
 use understudy_text::tables::{Codes, Fields, Placed, parse};
@@ -26,8 +27,7 @@ use understudy_wire::{Member, ProgramId, Source};
 
 pub use crate::format::MAXIMUM_CYCLES;
 use crate::format::SCENARIO;
-use crate::members::Members;
-use crate::scenario::{During, Expectation, SOURCES, Scenario, source_word};
+use crate::scenario::{During, Expectation, Scenario};
 
 /// Steps of one scenario, at most.
 pub const MAXIMUM_STEPS: usize = 10_000;

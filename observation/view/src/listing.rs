@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_cluster::Cluster;
+use understudy_journal::{Happening, Members, Record, RunEvent, moment};
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
-use understudy_scenarios::{Happening, Members, Record, RunEvent, moment};
 use understudy_text::spelling::suggestion;
 use understudy_wire::{Member, Moment, ProgramId, Source};
 

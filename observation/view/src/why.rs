@@ -7,7 +7,7 @@ mod text;
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use understudy_scenarios::source_word;
+use understudy_journal::source_word;
 use understudy_text::spelling::suggestion;
 use understudy_wire::{Member, ProgramId, Source, StationId};
 

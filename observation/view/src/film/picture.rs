@@ -4,7 +4,7 @@ mod signs;
 
 use std::fmt::Write as _;
 
-use understudy_scenarios::source_word;
+use understudy_journal::source_word;
 use understudy_text::markup::escaped;
 use understudy_wire::Source;
 

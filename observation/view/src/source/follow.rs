@@ -13,8 +13,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
-use understudy_bus::closed_segments;
-use understudy_scenarios::Record;
+use understudy_journal::{Record, closed_segments};
 use understudy_text::shortened;
 
 use super::Trouble;
