@@ -13,13 +13,14 @@ use understudy_allocation::{
     Requirement, Stock, Terms, allocate, csv, html, text,
 };
 use understudy_journal::time_name;
+use understudy_text::duration::parse_positive;
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::run::command_line;
 use crate::verify::patience::Patience;
 use crate::{catalogue, files};
-use programs::{Programs, period};
+use programs::Programs;
 
 /// Choose controllers for programs, their understudy and their remote I/O
 #[derive(Debug, Args)]
@@ -46,7 +47,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "NUMBER", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=8))]
     understudies: u8,
     /// From one scan to the next, where no cluster says it
-    #[arg(long, value_name = "TIME", default_value = "10ms", value_parser = period)]
+    #[arg(long, value_name = "TIME", default_value = "10ms", value_parser = parse_positive)]
     period: Duration,
     /// Such as inputs>=24, languages~ladder, vendor=Siemens, remote-io:ethernet; may be given more than once
     #[arg(long, value_name = "WHAT")]
@@ -73,7 +74,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "PROGRAM=FILE", value_parser = properties)]
     properties: Vec<(String, PathBuf)>,
     /// For proving; a program of which not everything was decided by then is not placed
-    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = period)]
+    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = parse_positive)]
     budget: Duration,
     /// Place programs that have not passed verification
     #[arg(long)]

@@ -6,8 +6,8 @@ use std::ffi::OsStr;
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Map, Value};
-use understudy_diagnostic::{
-    Diagnostic, Lines, MAXIMUM_MESSAGE, Position, Report, Severity, shortened,
+use understudy_text::{
+    Diagnostic, Lines, MAXIMUM_MESSAGE, Position, Report, Severity, shell, shortened,
 };
 
 /// The most findings of all files together that an answer shows.
@@ -163,19 +163,9 @@ impl Answer {
     }
 }
 
-/// A call of this program, as a shell takes it.
+/// A call of this program as a line of a shell.
 pub(crate) fn shell_line<'a>(arguments: impl IntoIterator<Item = &'a str>) -> String {
-    let plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./=:,".contains(letter);
-    let mut line = "understudy".to_owned();
-    for argument in arguments {
-        line.push(' ');
-        if !argument.is_empty() && argument.chars().all(plain) {
-            line.push_str(argument);
-        } else {
-            line.push_str(&format!("'{}'", argument.replace('\'', r"'\''")));
-        }
-    }
-    line
+    shell::line(std::iter::once("understudy").chain(arguments))
 }
 
 /// The findings of each file that an answer shows.

@@ -56,7 +56,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "KIND,...", value_delimiter = ',', value_parser = parse_kinds)]
     faults: Vec<Vec<Kind>>,
     /// No run is begun after this time, such as 10min; the findings say how many were made
-    #[arg(long, value_name = "TIME", value_parser = parse_budget)]
+    #[arg(long, value_name = "TIME", value_parser = understudy_text::duration::parse)]
     budget: Option<Duration>,
     /// Processors to use, by default all
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -259,27 +259,4 @@ fn parse_kinds(text: &str) -> Result<Vec<Kind>, String> {
             known.join(", ")
         )
     })
-}
-
-/// `90s`, `10min`, `2h`.
-fn parse_budget(text: &str) -> Result<Duration, String> {
-    let expected = || format!("{text:?} is no time with its unit, such as 90s, 10min or 2h");
-    let unit = text
-        .find(|letter: char| letter.is_ascii_alphabetic())
-        .ok_or_else(expected)?;
-    let (number, unit) = text.split_at(unit);
-    let seconds = match unit {
-        "ms" => 1e-3,
-        "s" => 1.0,
-        "min" => 60.0,
-        "h" => 3600.0,
-        _ => return Err(expected()),
-    };
-    let number: f64 = number.trim().parse().map_err(|_| expected())?;
-    let time = number * seconds;
-    if (0.0..1e7).contains(&time) {
-        Ok(Duration::from_secs_f64(time))
-    } else {
-        Err(expected())
-    }
 }

@@ -11,7 +11,7 @@ use understudy_allocation::{
     Added, AdditionError, Catalogue, Controller, Family, Figure, Kind, Mode, Quantity, Statement,
     file,
 };
-use understudy_diagnostic::Report;
+use understudy_text::Report;
 
 use crate::allocate::message;
 use crate::answer::{Answer, Status};

@@ -10,14 +10,14 @@ use std::time::Duration;
 use clap::Args;
 use serde::Serialize;
 use understudy_cluster::{Cluster, Overrides};
-use understudy_diagnostic::{Diagnostic, Report, Severity, has_errors};
 use understudy_interchange::{parse_program, unknown_form};
 use understudy_journal::Members;
-use understudy_ladder::parse_time;
 use understudy_scenarios::read;
 use understudy_supervisor::ladder::read_map;
 use understudy_supervisor::petri::read_net;
 use understudy_supervisor::read_ads;
+use understudy_text::duration;
+use understudy_text::{Diagnostic, Report, Severity, has_errors};
 
 use crate::answer::{Answer, Failure, Status};
 use crate::automata;
@@ -41,13 +41,9 @@ pub(crate) struct Arguments {
     /// Ladder programs (.ladder), automata of TCT (.ADS), and clusters, scenarios, models, nets and maps of signals (.toml)
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
-    /// For what nobody asked about large ladders; small ones take none of it
-    #[arg(long, value_name = "TIME", default_value = "1s", value_parser = time)]
+    /// Time limit for the optional checks of large programs
+    #[arg(long, value_name = "TIME", default_value = "1s", value_parser = duration::parse)]
     budget: Duration,
-}
-
-fn time(text: &str) -> std::result::Result<Duration, String> {
-    parse_time(text).ok_or_else(|| format!("{text:?} is no time such as 1s"))
 }
 
 /// Timers of a ladder by itself last so many scans, as they do for `verify`.

@@ -6,12 +6,12 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
-use understudy_diagnostic::{Lines, MAXIMUM_SHOWN, Report, shortened};
 use understudy_interchange::plcopen::Fidelity;
 use understudy_interchange::{
     Compared, Format, Reading, WriteError, Written, read, unknown_form, write,
 };
-use understudy_ladder::parse_time;
+use understudy_text::duration::parse_positive;
+use understudy_text::{Lines, MAXIMUM_SHOWN, Report, shortened};
 
 use crate::answer::{Answer, Status};
 use crate::files;
@@ -44,7 +44,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "NAME")]
     unit: Option<String>,
     /// From one scan to the next; as IN says, or 10ms
-    #[arg(long, value_name = "TIME", value_parser = time)]
+    #[arg(long, value_name = "TIME", value_parser = parse_positive)]
     period: Option<Duration>,
     /// Say what was kept and what was not
     #[arg(long)]
@@ -75,11 +75,6 @@ impl Form {
             Self::Ldmicro => Format::LdMicro,
         }
     }
-}
-
-fn time(text: &str) -> Result<Duration, String> {
-    let time = parse_time(text).filter(|time| !time.is_zero());
-    time.ok_or_else(|| format!("{text:?} is no time such as 10ms"))
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Answer {

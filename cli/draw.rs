@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use understudy_diagnostic::Report;
 use understudy_interchange::{digraph, parse_program};
 use understudy_ladder::{draw_svg, draw_text};
+use understudy_text::Report;
 
 use crate::answer::Answer;
 use crate::files;

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use codespan_reporting::diagnostic::Label;
 use codespan_reporting::files::{Error, Files};
-use understudy_diagnostic::{Diagnostic, Lines};
+use understudy_text::{Diagnostic, Lines};
 
 /// The most characters of a line that are shown, the marks for what is cut off not counted.
 const MAXIMUM_COLUMNS: usize = 120;

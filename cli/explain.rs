@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use clap::Args;
 use serde_json::json;
-use understudy_diagnostic::pages::{page, pages};
+use understudy_text::pages::{page, pages};
 
 use crate::answer::{Answer, Status};
 

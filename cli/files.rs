@@ -5,10 +5,10 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use understudy_cluster::{Cluster, Loaded, Overrides, TemplateFile};
-use understudy_diagnostic::spelling::nearest;
-use understudy_diagnostic::{Report, decode};
 use understudy_journal::{Members, named_file};
 use understudy_scenarios::{Scenario, read as read_scenario};
+use understudy_text::spelling::nearest;
+use understudy_text::{Report, decode};
 
 use crate::answer::{Answer, Status};
 use crate::kind::{self, Kind};

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use clap::Args;
 use serde_json::json;
-use understudy_diagnostic::MAXIMUM_SHOWN;
+use understudy_text::MAXIMUM_SHOWN;
 use understudy_view::{Filter, JournalLine, Listing, Run, Trouble};
 
 use crate::answer::{Answer, Status};

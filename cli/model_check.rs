@@ -184,7 +184,7 @@ fn start(arguments: &Arguments, cluster: &Cluster) -> Result<Start, Answer> {
         .collect();
     let mut answer = Answer::bad_files(Vec::new());
     for name in unknown {
-        let known = understudy_diagnostic::spelling::suggestion(&name, known.iter().copied());
+        let known = understudy_text::spelling::suggestion(&name, known.iter().copied());
         let message = format!("the cluster has no station or remote I/O `{name}`; {known}");
         answer = answer.and_failure(Status::BadInput, "U0605", message);
     }

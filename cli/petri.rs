@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
 use serde_json::{Value, json};
-use understudy_diagnostic::Report;
 use understudy_ladder::print;
 use understudy_supervisor::ladder::locate;
 use understudy_supervisor::petri::{
@@ -14,6 +13,7 @@ use understudy_supervisor::proof::{
     Finding, HybridProof, HybridVerdict, ProofSettings, hybrid_findings, prove_hybrid,
 };
 use understudy_supervisor::{Automaton, Model, write_model};
+use understudy_text::Report;
 
 use crate::answer::{Answer, Status};
 use crate::automata::{self, Sources, description, summary};

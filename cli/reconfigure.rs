@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::Value;
-use understudy_diagnostic::{Diagnostic, Report};
 use understudy_journal::named_file;
 use understudy_ladder::print;
 use understudy_reconfiguration::project::{self, Loaded, Project};
 use understudy_reconfiguration::{Failure, Outcome, analyse};
 use understudy_supervisor::{draw_automaton_svg, draw_dot};
+use understudy_text::{Diagnostic, Report};
 
 use crate::answer::{Answer, Status};
 use crate::files;

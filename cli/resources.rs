@@ -8,8 +8,9 @@ use clap::Args;
 use serde_json::{Value, json};
 use understudy_allocation::{Resources, instructions};
 use understudy_ladder::{Program, from_circuit};
+use understudy_text::duration::parse_positive;
 
-use crate::allocate::programs::{Programs, period};
+use crate::allocate::programs::Programs;
 use crate::answer::Answer;
 
 /// Count what programs need of a controller
@@ -28,7 +29,7 @@ pub(crate) struct Arguments {
     #[arg(long)]
     instructions: bool,
     /// From one scan to the next, where no cluster says it
-    #[arg(long, value_name = "TIME", default_value = "10ms", value_parser = period)]
+    #[arg(long, value_name = "TIME", default_value = "10ms", value_parser = parse_positive)]
     period: Duration,
 }
 

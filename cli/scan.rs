@@ -81,7 +81,7 @@ fn program(arguments: &Arguments) -> Result<(usize, Circuit), Answer> {
     let source = files::text_of(Kind::Ladder, path)?;
     let name = path.display().to_string();
     let parsed = parse_program(&name, &source);
-    let report = understudy_diagnostic::Report {
+    let report = understudy_text::Report {
         name,
         text: source,
         diagnostics: parsed.diagnostics,

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
-use understudy_diagnostic::{Diagnostic, Report};
 use understudy_ladder::print;
 use understudy_supervisor::ladder::{
     Conversion, InputOutputMap, Located, Mode, Modules, convert, read_map, table,
@@ -13,6 +12,7 @@ use understudy_supervisor::proof::{
     Finding, FindingSeverity, ProofSettings, Verdict, findings, prove,
 };
 use understudy_supervisor::{Automaton, Label, Model, Signal};
+use understudy_text::{Diagnostic, Report};
 
 use crate::answer::{Answer, Status};
 use crate::automata::{self, Sources};

@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
-use understudy_diagnostic::Severity;
 use understudy_supervisor::operations::{minstate, sync};
 use understudy_supervisor::{
     Automaton, Bounds, Finding, Model, SymbolicBounds, Together, empty_finding, model_findings,
     modular_findings, specification_findings, synthesis_findings, synthesise, synthesise_modularly,
     synthesise_symbolically, write_model,
 };
+use understudy_text::Severity;
 
 use crate::answer::{Answer, Failure, Status};
 use crate::automata::{self, Sources, description, summary};

@@ -9,10 +9,11 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use understudy_cluster::{Cluster, Overrides};
-use understudy_diagnostic::{Report, has_errors};
 use understudy_interchange::parse_program;
-use understudy_ladder::{Program, parse_time};
+use understudy_ladder::Program;
 use understudy_logic::Circuit;
+use understudy_text::duration::parse_positive;
+use understudy_text::{Report, has_errors};
 use understudy_verification::program::{Bounds, Remarks, Subject};
 use understudy_verification::property::{Properties, Property, not_of_one_scan, read, read_one};
 use understudy_verification::symbolic::Resolved;
@@ -56,13 +57,13 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "TEXT")]
     fair: Vec<String>,
     /// From one scan to the next; timers are so many scans long
-    #[arg(long, value_name = "TIME", default_value = "10ms", value_parser = time)]
+    #[arg(long, value_name = "TIME", default_value = "10ms", value_parser = parse_positive)]
     period: Duration,
     /// Nodes of decision diagrams alive at once
     #[arg(long, value_name = "NUMBER", default_value_t = 4_000_000)]
     nodes: usize,
     /// Time after which what is not decided stays undecided; without it, as long as the bounds let it take
-    #[arg(long, value_name = "TIME", value_parser = time)]
+    #[arg(long, value_name = "TIME", value_parser = parse_positive)]
     budget: Option<Duration>,
     /// For what stays undecided: induction over at most so many scans
     #[arg(long, value_name = "SCANS", default_value_t = 20)]
@@ -84,11 +85,6 @@ enum Smv {
     Scan,
     /// One module a rung, as in the paper on the deployment of controllers
     Rungs,
-}
-
-fn time(text: &str) -> Result<Duration, String> {
-    let time = parse_time(text).filter(|time| !time.is_zero());
-    time.ok_or_else(|| format!("{text:?} is no time such as 10ms"))
 }
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {

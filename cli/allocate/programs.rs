@@ -4,21 +4,15 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use understudy_cluster::{Cluster, Overrides};
-use understudy_diagnostic::Report;
 use understudy_interchange::parse_program;
-use understudy_ladder::{Program, parse_time};
+use understudy_ladder::Program;
 use understudy_logic::Circuit;
 use understudy_parity::{ParityController, generate};
+use understudy_text::Report;
 
 use crate::answer::{Answer, Status};
 use crate::files;
 use crate::kind::Kind;
-
-/// A period that is longer than nothing.
-pub(crate) fn period(text: &str) -> Result<Duration, String> {
-    let time = parse_time(text).filter(|time| !time.is_zero());
-    time.ok_or_else(|| format!("{text:?} is no time such as 10ms"))
-}
 
 /// All that was read.
 pub(crate) struct Programs {

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use understudy_allocation::{Group as Wanted, Member, Resources, Verification};
-use understudy_diagnostic::{Report, has_errors};
 use understudy_ladder::from_circuit;
 use understudy_logic::Circuit;
 use understudy_logic::bdd::Diagrams;
 use understudy_parity::generate;
+use understudy_text::{Report, has_errors};
 use understudy_verification::program::{Answer as Proof, Bounds, Lamp, OutputFinding, Subject};
 use understudy_verification::property::{Properties, not_of_one_scan, read};
 use understudy_verification::prove_parity_while;

@@ -4,9 +4,9 @@
 use std::time::{Duration, Instant};
 
 use understudy_cluster::Cluster;
-use understudy_diagnostic::{Diagnostic, Report};
 use understudy_ladder::Program;
 use understudy_logic::Circuit;
+use understudy_text::{Diagnostic, Report};
 use understudy_verification::program::{Bounds, Subject};
 use understudy_verification::{Refutation, Work, prove_parity_while};
 

@@ -10,10 +10,10 @@ use std::time::Duration;
 use understudy_cluster::{
     Draft, DraftProgram, MAXIMUM_PROGRAM_NAME, is_name, read as read_cluster,
 };
-use understudy_diagnostic::{Report, Severity, decode};
 use understudy_interchange::{
     Format, Reading, USUAL_PERIOD, read_all, unknown_form, write as write_program,
 };
+use understudy_text::{Report, Severity, decode};
 use understudy_wire::MAXIMUM_STATIONS;
 
 use super::written;

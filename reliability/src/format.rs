@@ -29,8 +29,9 @@ mod value;
 
 use std::collections::HashMap;
 use std::ops::Range;
+use understudy_text::spelling::suggestion;
 
-use understudy_diagnostic::{Diagnostic, Report};
+use understudy_text::{Diagnostic, Report};
 
 use crate::chain::{Chain, ChainBuilder};
 use crate::error::ReliabilityError;
@@ -212,9 +213,8 @@ impl Reader {
                         format!("{word} says nothing about a state"),
                         span,
                     );
-                    self.findings.push(
-                        finding.with_help(suggestion(word, ["start", "failure"].into_iter())),
-                    );
+                    self.findings
+                        .push(finding.with_help(suggestion(word, ["start", "failure"])));
                 }
             }
         }
@@ -341,7 +341,7 @@ impl Reader {
                 builder.transition(from, to, line.per_hour);
             }
         }
-        if understudy_diagnostic::has_errors(&self.findings) {
+        if understudy_text::has_errors(&self.findings) {
             return None;
         }
         match builder.build() {
@@ -425,21 +425,4 @@ fn span_of(line: &str, part: &str, offset: usize) -> Range<usize> {
             .saturating_sub(line.as_ptr() as usize)
             .min(line.len());
     start..start + part.len()
-}
-
-/// The known name that is nearest to a misspelt one, or all of them.
-fn suggestion<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
-    let mut known: Vec<&str> = known.collect();
-    known.sort_unstable();
-    let near = known
-        .iter()
-        .map(|other| (strsim::jaro_winkler(name, other), other))
-        .filter(|(likeness, _)| *likeness > 0.75)
-        .max_by(|a, b| a.0.total_cmp(&b.0));
-    match near {
-        Some((_, other)) => format!("did you mean {other}?"),
-        None if known.is_empty() => "none is declared yet".into(),
-        None if known.len() > 8 => format!("there are {} and others", known[..8].join(", ")),
-        None => format!("there are {}", known.join(", ")),
-    }
 }

@@ -4,6 +4,7 @@
 //! failure; a state further left says its rate of failing below itself, so that no arrow runs behind others.
 
 use std::fmt::Write;
+use understudy_text::markup::escaped;
 
 use crate::chain::Chain;
 
@@ -233,10 +234,4 @@ fn lines(name: &str) -> Vec<String> {
         Some((first, second)) => vec![format!("{first},"), second.into()],
         None => vec![name.into()],
     }
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
 }

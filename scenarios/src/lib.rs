@@ -3,6 +3,7 @@
 mod account;
 mod campaign;
 mod figure;
+mod format;
 mod injection;
 mod joining;
 mod laboratory;

@@ -15,21 +15,19 @@
 
 mod steps;
 
-use std::ops::{Range, RangeInclusive};
-use std::time::Duration;
+use std::ops::Range;
 
 use toml::de::DeTable;
-use understudy_diagnostic::spelling::suggestion;
-use understudy_diagnostic::{Diagnostic, Report, has_errors};
-use understudy_form::{Codes, Fields, Placed, parse};
 use understudy_journal::{Members, SOURCES, source_word};
 use understudy_simulator::{Disturbance, Network};
+use understudy_text::spelling::suggestion;
+use understudy_text::tables::{Codes, Fields, Placed, parse};
+use understudy_text::{Diagnostic, Report, has_errors};
 use understudy_wire::{Member, ProgramId, Source};
 
+pub use crate::format::MAXIMUM_CYCLES;
+use crate::format::SCENARIO;
 use crate::scenario::{During, Expectation, Scenario};
-
-/// Cycles of one scenario, at most.
-pub const MAXIMUM_CYCLES: u64 = 100_000_000;
 
 /// Steps of one scenario, at most.
 pub const MAXIMUM_STEPS: usize = 10_000;
@@ -42,14 +40,6 @@ const CODES: Codes = Codes {
     out_of_bounds: "U0305",
     unknown_word: "U0306",
 };
-
-/// Any whole number that is not negative.
-const ANY: RangeInclusive<u64> = 0..=u64::MAX;
-
-const SHARE: RangeInclusive<f64> = 0.0..=1.0;
-
-/// How long a frame is on its way, at most.
-const MAXIMUM_LATENCY: Duration = Duration::from_secs(3600);
 
 /// A scenario file that was read.
 #[derive(Debug, Clone)]
@@ -74,7 +64,7 @@ pub fn read(name: &str, text: &str, members: Option<&Members>) -> ReadScenario {
             value: root.get_ref(),
             span: 0..0,
         };
-        reader.scenario(Fields::new("a scenario", table, &CODES))
+        reader.scenario(Fields::of(&SCENARIO, table, &CODES))
     });
     let mut diagnostics = reader.diagnostics;
     diagnostics.sort_by_key(|diagnostic| (diagnostic.span.start, diagnostic.span.end));
@@ -96,9 +86,6 @@ pub fn looks_like_a_scenario(text: &str) -> bool {
         .any(|key| table.get_ref().contains_key(*key))
 }
 
-/// Frames, bits and ages of a step, at most.
-pub(crate) const MAXIMUM_NUMBER: u16 = 1000;
-
 struct Reader<'p> {
     members: Option<&'p Members>,
     diagnostics: Vec<Diagnostic>,
@@ -107,16 +94,16 @@ struct Reader<'p> {
 impl Reader<'_> {
     fn scenario(&mut self, mut fields: Fields<'_, '_>) -> Option<Scenario> {
         let found = &mut self.diagnostics;
-        fields.require(&["title", "cycles"], found);
+        fields.require_all(found);
         let title = fields.text("title", found);
-        let cycles = fields.count("cycles", 1..=MAXIMUM_CYCLES, found);
+        let cycles = fields.format_count("cycles", found);
         let cycles = cycles.map(|cycles| cycles.value);
         // Later checks need some end; an unknown one must not bring further errors.
         let end = cycles.unwrap_or(MAXIMUM_CYCLES);
-        let seed = fields.count("seed", ANY, found);
-        let steps = fields.tables("step", "a step", found);
-        let network = fields.table("network", "the network", found);
-        let expect = fields.table("expect", "the expectation", found);
+        let seed = fields.format_count("seed", found);
+        let steps = fields.format_tables("step", found);
+        let network = fields.format_table("network", found);
+        let expect = fields.format_table("expect", found);
         fields.finish(found);
         let steps = self.steps(steps, end);
         let disturbance = network.map(|network| self.network(network, end));
@@ -136,10 +123,10 @@ impl Reader<'_> {
     fn network(&mut self, mut fields: Fields<'_, '_>, end: u64) -> Disturbance {
         let found = &mut self.diagnostics;
         let usual = Network::default();
-        let latency = fields.time("latency", Duration::ZERO..=MAXIMUM_LATENCY, found);
-        let jitter = fields.time("jitter", Duration::ZERO..=MAXIMUM_LATENCY, found);
+        let latency = fields.format_time("latency", found);
+        let jitter = fields.format_time("jitter", found);
         let mut share = |key| {
-            let share = fields.number(key, SHARE, found);
+            let share = fields.format_number(key, found);
             share.map_or(0.0, |share| share.value)
         };
         let network = Network {
@@ -149,8 +136,8 @@ impl Reader<'_> {
             latency: latency.unwrap_or(usual.latency),
             jitter: jitter.unwrap_or(usual.jitter),
         };
-        let from = fields.count("from", ANY, found);
-        let to = fields.count("to", ANY, found);
+        let from = fields.format_count("from", found);
+        let to = fields.format_count("to", found);
         let place = fields.span();
         fields.finish(found);
         let cycles = (from.is_some() || to.is_some()).then(|| {
@@ -183,7 +170,7 @@ impl Reader<'_> {
 
     fn expectation(&mut self, mut fields: Fields<'_, '_>, end: u64) -> Expectation {
         let found = &mut self.diagnostics;
-        let mut count = |key| Some(fields.count(key, ANY, found)?.value);
+        let mut count = |key| Some(fields.format_count(key, found)?.value);
         let wrong = count("wrong").unwrap_or(0);
         let held = count("held");
         let fail_safe = count("fail_safe");
@@ -196,9 +183,9 @@ impl Reader<'_> {
         });
         let finished: Vec<_> = finished
             .into_iter()
-            .filter_map(|(name, parts)| Some((name, parts.count(ANY, found)?.value)))
+            .filter_map(|(name, parts)| Some((name, parts.count(0..=u64::MAX, found)?.value)))
             .collect();
-        let during = fields.tables("during", "a range", found);
+        let during = fields.format_tables("during", found);
         fields.finish(found);
         Expectation {
             wrong,
@@ -223,9 +210,9 @@ impl Reader<'_> {
 
     fn during(&mut self, mut fields: Fields<'_, '_>, end: u64) -> Option<During> {
         let found = &mut self.diagnostics;
-        fields.require(&["from", "to", "remote_io", "source"], found);
-        let from = fields.count("from", ANY, found);
-        let to = fields.count("to", ANY, found);
+        fields.require_all(found);
+        let from = fields.format_count("from", found);
+        let to = fields.format_count("to", found);
         let remote_io = fields.text("remote_io", found);
         let words = fields.texts("source", found);
         fields.finish(found);

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 use std::time::Duration;
+use understudy_text::duration;
 
 use understudy_journal::{Members, source_word};
 use understudy_simulator::{Action, Disturbance, Fault, Network};
@@ -140,18 +141,6 @@ fn quoted(text: &str) -> String {
     quoted
 }
 
-/// In the largest unit that leaves a whole number.
 fn time(duration: Duration) -> String {
-    let nanoseconds = duration.as_nanos();
-    let units = [
-        ("s", 1_000_000_000),
-        ("ms", 1_000_000),
-        ("us", 1_000),
-        ("ns", 1),
-    ];
-    let unit = units
-        .iter()
-        .find(|(_, scale)| nanoseconds.is_multiple_of(*scale));
-    let (unit, scale) = unit.unwrap_or(&("ns", 1));
-    format!("\"{}{unit}\"", nanoseconds / scale)
+    quoted(&duration::text(duration))
 }

@@ -8,7 +8,7 @@ use std::process::Command;
 use std::sync::Mutex;
 use std::thread;
 
-use understudy_diagnostic::pages::{Page, pages};
+use understudy_text::pages::{Page, pages};
 
 use crate::{empty_folder, understudy};
 

@@ -9,6 +9,7 @@ mod campaign;
 mod check;
 mod convert;
 mod des;
+mod durations;
 mod examples;
 mod explain;
 mod gateway;

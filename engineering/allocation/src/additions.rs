@@ -1,6 +1,6 @@
 //! The catalogue that comes with the program, and what is added to one: all of it, or nothing.
 
-use understudy_diagnostic::Report;
+use understudy_text::Report;
 
 use crate::controller::Catalogue;
 use crate::file;

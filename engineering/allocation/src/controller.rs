@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use understudy_text::spelling;
 
 use serde::Serialize;
 
@@ -176,21 +177,16 @@ impl Catalogue {
     /// Models whose names are like `name`, the most alike first.
     pub fn like(&self, name: &str) -> Vec<String> {
         let wanted = name.to_lowercase();
-        let mut found: Vec<(usize, String)> = self
-            .controllers()
-            .map(|controller| {
-                let model = controller.model.to_lowercase();
-                let distance = if model.contains(&wanted) {
-                    0
-                } else {
-                    strsim::damerau_levenshtein(&model, &wanted)
-                };
-                (distance, controller.model.clone())
-            })
-            .filter(|(distance, _)| *distance <= wanted.chars().count() / 3 + 1)
-            .collect();
-        found.sort();
-        found.into_iter().take(5).map(|(_, model)| model).collect()
+        let part = |model: &str| model.to_lowercase().contains(&wanted);
+        let models = || {
+            self.controllers()
+                .map(|controller| controller.model.as_str())
+        };
+        let mut found: Vec<&str> = models().filter(|model| part(model)).collect();
+        found.sort_unstable();
+        let others = spelling::alike(name, models().filter(|model| !part(model)));
+        let found = found.into_iter().chain(others).take(5);
+        found.map(str::to_owned).collect()
     }
 
     /// Adds a controller, or new figures for one that is there; answers with the names of figures that it had and that changed.

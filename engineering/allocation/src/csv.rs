@@ -4,7 +4,7 @@
 
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
+use understudy_text::Diagnostic;
 
 /// A field and where it stood.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -10,8 +10,8 @@ mod wide;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use understudy_diagnostic::spelling::suggestion;
-use understudy_diagnostic::{Diagnostic, Report, has_errors};
+use understudy_text::spelling::suggestion;
+use understudy_text::{Diagnostic, Report, has_errors};
 
 use crate::controller::{Catalogue, Controller, Kind};
 use crate::csv::{Field, line, records};

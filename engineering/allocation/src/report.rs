@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
+use understudy_text::markup::escaped;
 
 use minijinja::value::Serde;
 use minijinja::{Environment, Value, context};
@@ -127,21 +128,6 @@ fn links(source: String) -> Value {
         }
     }
     Value::from_safe_string(html)
-}
-
-fn escaped(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            '\'' => escaped.push_str("&#39;"),
-            _ => escaped.push(character),
-        }
-    }
-    escaped
 }
 
 /// Counts of each program by name, in the order of the items; nothing for remote I/Os.

@@ -4,7 +4,7 @@ use std::fmt;
 use std::time::Duration;
 
 use serde::Serialize;
-use understudy_ladder::parse_time;
+use understudy_text::duration;
 
 use crate::controller::Kind;
 use crate::figures::{Quantity, Statement};
@@ -170,9 +170,9 @@ fn asked(text: &str) -> Result<Asked, String> {
             Some(kind) => only("=", Asked::Kind(kind)),
             None => Err(format!("`{value}` is no kind; kinds are plc and embedded")),
         },
-        "scan_time" => match parse_time(value).filter(|time| !time.is_zero()) {
-            Some(time) => only("<=", Asked::ScanTime(time)),
-            None => Err(format!("`{value}` is no time such as 10ms")),
+        "scan_time" => match duration::parse_positive(value) {
+            Ok(time) => only("<=", Asked::ScanTime(time)),
+            Err(error) => Err(error.to_string()),
         },
         _ => Err(format!("there is no `{name}`; {}", known_names())),
     }

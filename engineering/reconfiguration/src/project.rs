@@ -19,11 +19,11 @@ use std::ops::{Range, RangeInclusive};
 use std::time::Duration;
 
 use toml::de::DeTable;
-use understudy_diagnostic::spelling::suggestion;
-use understudy_diagnostic::{Diagnostic, Report, has_errors};
-use understudy_form::{Codes, Fields, Placed, Value};
 use understudy_interchange::parse_program;
 use understudy_ladder::Program;
+use understudy_text::spelling::suggestion;
+use understudy_text::tables::{Codes, Fields, Placed, Value};
+use understudy_text::{Diagnostic, Report, has_errors};
 
 use self::patience::patience;
 pub use self::relations::{Pattern, RelationEntry};
@@ -175,7 +175,7 @@ impl Reader<'_> {
                 .push(Diagnostic::error("U1207", message, 0..0));
             return None;
         }
-        let root = understudy_form::parse(text, &CODES, &mut self.diagnostics)?;
+        let root = understudy_text::tables::parse(text, &CODES, &mut self.diagnostics)?;
         let table = Placed {
             value: root.get_ref(),
             span: root.span(),

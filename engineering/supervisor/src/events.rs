@@ -1,11 +1,12 @@
 //! The events that a file declares: their names, their numbers, and by which signals of the PLC they are seen and made.
 
 use std::collections::HashMap;
+use understudy_text::tables::format::Table;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Name;
+use understudy_text::Diagnostic;
 
 use crate::ads::MAXIMUM_LABEL;
 use crate::alphabet::{Alphabet, Event, Label};
@@ -32,12 +33,12 @@ struct Declared {
 }
 
 impl Events {
-    /// Those of the table `events`, each of which may have `keys`. Where no label is given it is the lowest free one that fits,
+    /// Those of the table `events`, each in the form of `format`. Where no label is given it is the lowest free one that fits,
     /// in the order of the file; `others` are events that are known already, by the same names or by other ones.
     pub(crate) fn read(
         form: &mut Form<'_>,
         table: &DeTable,
-        keys: &[&str],
+        format: &Table,
         others: &Alphabet,
     ) -> Self {
         let mut entries: Vec<_> = match table.get("events") {
@@ -48,7 +49,7 @@ impl Events {
         let mut taken: HashMap<u32, Place> = HashMap::new();
         let mut declared = Vec::new();
         for (key, value) in entries {
-            declared.extend(Declared::read(form, key, value, keys, &mut taken));
+            declared.extend(Declared::read(form, key, value, format, &mut taken));
         }
         let mut events = Self {
             alphabet: Alphabet::default(),
@@ -119,7 +120,7 @@ impl Declared {
         form: &mut Form<'_>,
         key: &Spanned<std::borrow::Cow<'_, str>>,
         value: &Spanned<DeValue>,
-        keys: &[&str],
+        format: &Table,
         taken: &mut HashMap<u32, Place>,
     ) -> Option<Self> {
         let name = key.get_ref().to_string();
@@ -127,7 +128,7 @@ impl Declared {
             form.error("U0825", "the name of an event is one word", key.span());
         }
         let entry = form.table(value)?;
-        form.check_keys(entry, keys, "an event");
+        form.check_keys(entry, format);
         let label = form.number(entry, "label", 0..=MAXIMUM_LABEL);
         let controllable = match entry.get("controllable") {
             Some(value) => form.boolean(value)?,

@@ -1,7 +1,7 @@
 //! What synthesis found, in words: each finding with the shortest sequence of events that shows it.
 
-use understudy_diagnostic::Severity;
-use understudy_diagnostic::spelling::nearest;
+use understudy_text::Severity;
+use understudy_text::spelling;
 
 use crate::alphabet::Label;
 use crate::model::Model;
@@ -49,10 +49,8 @@ pub fn model_findings(model: &Model) -> Vec<Finding> {
             .iter()
             .flat_map(|plant| plant.alphabet().labels());
         let known: Vec<String> = known.map(|label| model.alphabet.name(label)).collect();
-        let help = match nearest(&event, known.iter().map(String::as_str)) {
-            Some(near) => format!("; perhaps {near} is meant"),
-            None => String::new(),
-        };
+        let help = spelling::question(&event, known.iter().map(String::as_str));
+        let help = help.map_or_else(String::new, |help| format!("; {help}"));
         let message =
             format!("specification {specification} names event {event}, and no plant has it{help}");
         Finding::error("U0843", message)

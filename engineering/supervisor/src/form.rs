@@ -6,10 +6,11 @@ use std::time::Duration;
 
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::nearest;
-use understudy_form::Codes;
-use understudy_ladder::{Name, parse_time};
+use understudy_ladder::Name;
+use understudy_text::spelling;
+use understudy_text::tables::Codes;
+use understudy_text::tables::format::Table;
+use understudy_text::{Diagnostic, duration};
 
 /// A place in the text, in bytes.
 pub(crate) type Place = Range<usize>;
@@ -45,7 +46,7 @@ pub(crate) fn read<'t, T>(
         codes,
         diagnostics: Vec::new(),
     };
-    let root = understudy_form::parse(text, codes, &mut form.diagnostics);
+    let root = understudy_text::tables::parse(text, codes, &mut form.diagnostics);
     let result = root.map(|root| read(&mut form, root.get_ref()));
     form.diagnostics
         .sort_by_key(|diagnostic| diagnostic.span.start);
@@ -67,14 +68,15 @@ impl<'t> Form<'t> {
         known: impl IntoIterator<Item = &'n str>,
         else_help: Option<String>,
     ) {
-        let help = nearest(name, known).map(|near| format!("perhaps \"{near}\" is meant"));
+        let help = spelling::question(name, known);
         let mut diagnostic = Diagnostic::error(code, message, place);
         diagnostic.help = help.or(else_help);
         self.diagnostics.push(diagnostic);
     }
 
-    /// Reports the keys of a table, `what`, that it does not have.
-    pub(crate) fn check_keys(&mut self, table: &DeTable, known: &[&str], what: &str) {
+    /// Reports the keys of a table that its format does not have.
+    pub(crate) fn check_keys(&mut self, table: &DeTable, format: &Table) {
+        let (what, known) = (format.what, format.names());
         for key in table.keys() {
             let name = key.get_ref().as_ref();
             if !known.contains(&name) {
@@ -213,16 +215,13 @@ impl<'t> Form<'t> {
 
     /// The time that `text` says.
     pub(crate) fn time(&mut self, text: &Name) -> Option<Duration> {
-        let time = parse_time(text).filter(|_| !text.is_empty());
-        if time.is_none() {
-            let message = format!("{:?} is no time", text.as_str());
-            self.diagnostics.push(
-                Diagnostic::error(self.codes.unknown_word, message, text.span())
-                    .with_label("expected a number and its unit, at most 100 days")
-                    .with_help("such as \"15s\", \"1500ms\" or \"2m\""),
-            );
+        let time = duration::parse(text);
+        if let Err(error) = &time {
+            let error = Diagnostic::error(self.codes.unknown_word, error.to_string(), text.span());
+            self.diagnostics
+                .push(error.with_help("such as \"15s\", \"1.5s\" or \"2m\""));
         }
-        time
+        time.ok()
     }
 
     /// What `read` makes of each table of the list under `key`.

@@ -13,6 +13,7 @@ mod events;
 mod explicit;
 mod findings;
 mod form;
+mod format;
 mod kind;
 pub mod ladder;
 pub mod model;

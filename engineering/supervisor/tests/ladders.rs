@@ -90,7 +90,7 @@ fn proved(modules: &Modules, mode: Mode) -> Proof {
     let map = InputOutputMap::direct("reference", &modules.alphabet());
     let conversion = convert(modules, &map, mode).expect("a direct map fits");
     let errors = check(&conversion.program);
-    assert!(!understudy_diagnostic::has_errors(&errors), "{errors:?}");
+    assert!(!understudy_text::has_errors(&errors), "{errors:?}");
     let settings = ProofSettings {
         mode,
         ..ProofSettings::default()

@@ -1,8 +1,8 @@
 //! What is wrong with a map of signals, all of it in one run.
 
-use understudy_diagnostic::{Diagnostic, Report};
 use understudy_supervisor::ladder::{InputOutputMap, Mode, Modules, Partition, convert, read_map};
 use understudy_supervisor::{Automaton, read_ads, read_model};
+use understudy_text::{Diagnostic, Report};
 
 fn shown(text: &str, diagnostics: Vec<Diagnostic>) -> String {
     let report = Report {

@@ -1,8 +1,8 @@
 //! The format of nets: what is accepted, and everything that is wrong in one run.
 
-use understudy_diagnostic::{Diagnostic, Report};
 use understudy_supervisor::Label;
 use understudy_supervisor::petri::{ReadNet, draw_net_dot, draw_net_svg, read_net, write_net};
+use understudy_text::{Diagnostic, Report};
 
 fn shown(text: &str, diagnostics: Vec<Diagnostic>) -> String {
     let report = Report {

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::time::Duration;
+use understudy_text::markup::escaped;
 
 use understudy_ladder::{
     Element, Evaluation, Interpreter, LowerError, Program, Rung, draw_svg_rungs, visit,
@@ -150,10 +151,4 @@ fn names_of(rung: &Rung) -> (Vec<String>, Vec<String>) {
         Element::Branches(_) => {}
     });
     (reads, writes)
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
 }

@@ -10,11 +10,11 @@ mod unasked;
 use std::cell::OnceCell;
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::suggestion;
 use understudy_ladder::{LowerError, Program};
 use understudy_logic::Circuit;
 use understudy_logic::bdd::Diagrams;
+use understudy_text::Diagnostic;
+use understudy_text::spelling::suggestion;
 
 use crate::effort::{ALWAYS, GoOn};
 use crate::explicit::Explicit;

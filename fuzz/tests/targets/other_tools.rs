@@ -13,7 +13,7 @@ fn text(bytes: &[u8]) -> String {
 
 /// What is taken is a ladder without errors, which becomes a circuit.
 fn is_sound(program: &Program) {
-    assert!(!understudy_diagnostic::has_errors(&check(program)));
+    assert!(!understudy_text::has_errors(&check(program)));
     let _ = program.lower(Duration::from_millis(10));
 }
 

@@ -46,7 +46,7 @@ fn words() {
     attack("words", &[], |bytes| {
         for word in text(bytes).split_whitespace() {
             let _ = understudy_ladder::parse_address(word);
-            let _ = understudy_ladder::parse_time(word);
+            let _ = understudy_text::duration::parse(word);
             let _ = Requirement::parse(word);
             let _ = understudy_network::Impairment::parse_delay(word);
             let _ = serde_json::from_str::<understudy_network::Impairment>(word);

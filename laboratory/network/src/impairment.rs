@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 use std::time::Duration;
+use understudy_text::duration::{self, InvalidDuration};
 
 use serde::{Deserialize, Serialize};
 
@@ -89,20 +90,9 @@ impl Impairment {
     /// A time of an impairment as people write it, such as `1ms`.
     ///
     /// # Errors
-    /// Where it is no time, or longer than a minute.
-    pub fn parse_delay(text: &str) -> Result<Duration, WrittenImpairment> {
-        let wrong = || wrong(text, "time up to 60s", "1ms, 500us or 0.2s");
-        let units = [("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("s", 1.0)];
-        let (number, unit) = units
-            .iter()
-            .find_map(|(unit, seconds)| Some((text.strip_suffix(unit)?, seconds)))
-            .ok_or_else(wrong)?;
-        let seconds = plain_number(number).ok_or_else(wrong)? * unit;
-        let time = Duration::try_from_secs_f64(seconds).map_err(|_| wrong())?;
-        if time > MAXIMUM_DELAY {
-            return Err(wrong());
-        }
-        Ok(time)
+    /// Where it is not a duration, or longer than a minute.
+    pub fn parse_delay(text: &str) -> Result<Duration, InvalidDuration> {
+        duration::parse_up_to(text, MAXIMUM_DELAY)
     }
 }
 

@@ -8,7 +8,7 @@ use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf, absolute};
 
-use understudy_diagnostic::decode;
+use understudy_text::decode;
 
 /// Environment variable with more folders that named files may lie in, separated as in `PATH`.
 pub const ALLOWED_FOLDERS: &str = "UNDERSTUDY_ALLOW_FILES";

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_cluster::Cluster;
-use understudy_diagnostic::spelling::suggestion;
 use understudy_journal::{Happening, Members, Record, RunEvent, moment};
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
+use understudy_text::spelling::suggestion;
 use understudy_wire::{Member, Moment, ProgramId, Source};
 
 use crate::cycles::Cycles;

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! The paper's XML has normally open and normally closed contacts and outputs. The other elements of a ladder have edges of further
-//! types here, and what the paper leaves out (declarations, titles, comments) stands in elements and attributes that its readers
+//! types here, and what the paper leaves out (declarations, titles, comments) is in elements and attributes that its readers
 //! pass over; `docs/digraph-xml.md` lists all of it. Any acyclic digraph is read: one that is series and parallel becomes one network,
 //! and in any other each vertex becomes a memory bit.
 
@@ -21,8 +21,8 @@ mod network;
 mod read;
 mod write;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Program;
+use understudy_text::Diagnostic;
 
 pub use self::draw::draw_svg;
 pub use self::graph::{Digraph, Edge, Label, Vertex, digraphs};

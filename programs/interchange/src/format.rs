@@ -1,9 +1,9 @@
-//! The forms that programs come in: told apart by what stands in a file, and read by one function.
+//! The forms that programs come in: recognised by their content, and read by one function.
 
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, has_errors};
 use understudy_ladder::{Parsed, Program, parse};
+use understudy_text::{Diagnostic, has_errors};
 
 use crate::plcopen::Fidelity;
 use crate::{digraph, ldmicro, plcopen, structured_text};
@@ -70,7 +70,7 @@ impl Format {
         }
     }
 
-    /// The form that the ending of a name stands for.
+    /// The form that the extension of a file name means.
     pub fn of_ending(name: &str) -> Option<Self> {
         let (_, ending) = name.rsplit_once('.')?;
         let mut endings = ENDINGS.into_iter();

@@ -25,8 +25,8 @@ mod statements;
 
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, has_errors};
 use understudy_ladder::{Name, Program};
+use understudy_text::{Diagnostic, has_errors};
 
 use crate::structured_text;
 

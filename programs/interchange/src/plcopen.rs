@@ -1,17 +1,16 @@
 //! PLCopen TC6 XML 2.01 and 2.0: ladders of OpenPLC Editor, Beremiz, CODESYS and others.
 //!
-//! [`read`] takes a file apart in stages, each of which reports everything that it finds: well-formed and bounded (`xml`), by the
-//! schema (`schema`), what stands in it (`document`), who is connected to whom and who acts when (`plan`), and then rungs
-//! (`ladder`). [`write()`] makes a file that the schema takes and that reads back as the same circuit.
+//! [`read`] works in stages, each of which reports everything that it finds: a well-formed and bounded file (`xml`), its content
+//! (`document`), connections and execution order (`plan`), and rungs (`ladder`). [`write()`] makes a file that is valid under
+//! the schema and reads back as the same circuit.
 
 mod document;
 mod fidelity;
 mod instructions;
 mod ladder;
-mod literal;
+pub(crate) mod literal;
 mod plan;
 mod power;
-mod schema;
 mod sequence;
 mod standard;
 mod statements;
@@ -23,8 +22,8 @@ use std::collections::HashSet;
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, has_errors};
 use understudy_ladder::{Program, check};
+use understudy_text::{Diagnostic, has_errors};
 
 pub use fidelity::{Count, Fidelity, Note};
 pub use write::write;
@@ -66,7 +65,7 @@ pub fn read(text: &str, unit: Option<&str>) -> Reading {
     let namespace = root.tag_name().namespace().unwrap_or_default();
     if root.tag_name().name() != "project" || !NAMESPACES.contains(&namespace) {
         let message = format!(
-            "this is no PLCopen XML 2.01 or 2.0: its root is `{}` in the namespace {namespace:?}",
+            "not a PLCopen XML file of version 2.01 or 2.0: its root is `{}` in the namespace {namespace:?}",
             root.tag_name().name()
         );
         let error = Diagnostic::error("U1001", message, xml::start_tag(root));
@@ -77,9 +76,8 @@ pub fn read(text: &str, unit: Option<&str>) -> Reading {
         reading.diagnostics.push(error.with_help(help));
         return reading;
     }
-    reading.diagnostics = schema::validate(root);
     let (project, found) = document::read(root);
-    reading.diagnostics.extend(found);
+    reading.diagnostics = found;
     if let Some(pou) = chosen(&project, unit, &mut reading.diagnostics) {
         translate(&project, pou, &mut reading);
     }
@@ -186,7 +184,7 @@ fn chosen<'a>(
     }
 }
 
-/// Says which programs the tasks run beside the one that is read.
+/// Reports the programs that the tasks run in addition to the one that is read.
 fn others(project: &Project, read: &Instance, diagnostics: &mut Vec<Diagnostic>) {
     for other in &project.instances {
         if !std::ptr::eq(other, read) {
@@ -255,7 +253,7 @@ fn translate(project: &Project, pou: &Pou, reading: &mut Reading) {
         let is_wrong = has_errors(&found) || has_errors(&drawn.diagnostics);
         if drawn.general.is_empty() || is_wrong {
             for general in drawn.general {
-                let message = format!("{} is not taken with these errors", general.what);
+                let message = format!("{} is not read because of these errors", general.what);
                 found.push(Diagnostic::warning("U1022", message, general.span));
             }
             reading.diagnostics.extend(found);

@@ -16,7 +16,7 @@
 //!
 //! A scan of the ladder does what one execution of the text does. Standard blocks become blocks of the ladder where they can
 //! stand in a rung; other blocks and functions are put in place of their calls; numbers become as many bits as their
-//! values need. What is taken, and what is not, is described in `docs/structured-text.md`.
+//! values need. `docs/structured-text.md` describes what is supported.
 
 mod bounds;
 mod lexer;
@@ -33,8 +33,8 @@ use std::ops::Range;
 use std::rc::Rc;
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, Severity, has_errors};
 use understudy_ladder::{Name, Program};
+use understudy_text::{Diagnostic, Severity, has_errors};
 
 pub(crate) use self::parser::is_keyword;
 pub use self::syntax::Class;
@@ -58,7 +58,7 @@ pub struct Reading {
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Reads a whole text. Nothing is lost in silence: what is not taken is an error or a warning, with its place.
+/// Reads a whole text. Nothing is lost in silence: whatever is unsupported is an error or a warning, with its place.
 pub fn read(text: &str) -> Reading {
     let (file, mut diagnostics) = parser::parse(text);
     let mut programs = Vec::new();
@@ -101,7 +101,7 @@ pub fn read(text: &str) -> Reading {
     if programs.is_empty() && !has_errors(&diagnostics) {
         let help = "a text needs a PROGRAM … END_PROGRAM";
         diagnostics
-            .push(Diagnostic::error("U1051", "there is no program here", 0..0).with_help(help));
+            .push(Diagnostic::error("U1051", "the text has no program", 0..0).with_help(help));
     }
     let mut seen = HashSet::new();
     diagnostics.retain(|found| seen.insert((found.code, found.span.clone())));
@@ -113,7 +113,7 @@ pub fn read(text: &str) -> Reading {
     }
 }
 
-/// What is declared beside the programs and named nowhere else in the text.
+/// What is declared outside of the programs and not used elsewhere in the text.
 fn unused(text: &str, file: &File) -> Option<Diagnostic> {
     let belongs = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
     let mut places: HashMap<String, Vec<usize>> = HashMap::new();

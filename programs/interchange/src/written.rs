@@ -8,11 +8,11 @@ mod behaviour;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, Severity};
 use understudy_ladder::{
-    Block, LowerError, PERIODS, Program, Signal, StandardNames, print, structured_text, time_text,
+    Block, LowerError, PERIODS, Program, Signal, StandardNames, print, structured_text,
 };
 use understudy_logic::Circuit;
+use understudy_text::{Diagnostic, Severity};
 
 use self::behaviour::Pair;
 use crate::format::{Format, Reading, read};
@@ -121,7 +121,7 @@ fn refusal(reading: &Reading) -> String {
     )
 }
 
-/// A program beside what was read of its text.
+/// A program with what was read of its text.
 struct Comparison<'a> {
     format: Format,
     program: &'a Program,
@@ -179,7 +179,7 @@ impl<'a> Comparison<'a> {
             && read != Some(period)
         {
             let help = "write it into the cluster file, or give it with --period";
-            let period = time_text(period);
+            let period = understudy_text::duration::text(period);
             self.lost("does not keep the interval of the task", &[period], help);
         }
     }
@@ -405,7 +405,7 @@ fn head_lines(program: &Program) -> impl Iterator<Item = &str> {
     head(program).flat_map(str::lines).filter(|line| says(line))
 }
 
-/// Titles and comments of rungs, and what stands below them, line by line.
+/// Titles and comments of rungs, and the text below them, line by line.
 fn lines(program: &Program) -> impl Iterator<Item = &str> {
     let rungs = program.rungs.iter();
     let rungs = rungs.flat_map(|rung| rung.title.iter().chain(&rung.comments));
@@ -419,7 +419,7 @@ fn says(line: &str) -> bool {
     !letters(line).is_empty()
 }
 
-/// A text without what stands between its letters: forms break and join lines.
+/// A text without the blanks between its letters: forms break and join lines.
 fn letters(text: &str) -> String {
     let is_letter = |letter: &char| !letter.is_whitespace() && !letter.is_control();
     text.chars().filter(is_letter).collect()

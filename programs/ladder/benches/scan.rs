@@ -1,6 +1,6 @@
 //! A program of 1,000 rungs and 4,900 contacts: reading, lowering, scanning, and generating from it.
 //!
-//! The scan is given for each contact (the bar is 3 ns), beside the plain evaluation of the same graph.
+//! The scan is given for each contact (the bar is 3 ns), compared with the plain evaluation of the same graph.
 
 use std::fmt::Write;
 use std::hint::black_box;

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
+use understudy_text::Diagnostic;
 
 use crate::lexer::{MAXIMUM_NAME_LENGTH, MAXIMUM_PRESET_TIME, is_name_part, is_name_start};
 use crate::parser::{KEYWORDS, MAXIMUM_NESTING, MAXIMUM_PRESET_VALUE};
@@ -328,7 +328,7 @@ impl<'a> Checker<'a> {
             None if self.places.contains_key(counter.as_str()) => {
                 self.diagnostics.push(Diagnostic::error(
                     "U0111",
-                    format!("`{counter}` is no counter and has no CV"),
+                    format!("`{counter}` is not a counter and has no CV"),
                     counter.span(),
                 ));
             }

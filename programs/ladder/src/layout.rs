@@ -1,7 +1,7 @@
 //! Where the parts of a rung stand, in cells of one character; both drawings paint it.
 //!
 //! A [`Piece`] enters at cell 0 of its wire row and leaves into the cell behind its last one, so that pieces join by standing
-//! side by side. Row 0 is the wire; what stands above it has negative rows. Wires run from cell centre to cell centre.
+//! side by side. Row 0 is the wire; rows above it are negative. Wires run from cell centre to cell centre.
 //!
 //! Where a scan is drawn too, wires with power are `live`, and names have their values behind them.
 
@@ -275,7 +275,7 @@ fn coil_sign(kind: CoilKind) -> &'static str {
     }
 }
 
-/// The elements side by side, and the power behind the last one; nothing where there is none, or no scan.
+/// The elements side by side, and the power behind the last one; nothing without elements or without a scan.
 fn series(series: &Series, flows: &mut Flows<'_>) -> (Piece, Option<bool>) {
     let mut whole = Piece::default();
     let mut power = None;

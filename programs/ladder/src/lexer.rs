@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::str::CharIndices;
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS};
+use understudy_text::{Diagnostic, MAXIMUM_FINDINGS, duration};
 
 use crate::program::{Address, Area};
 
@@ -13,7 +13,7 @@ use crate::program::{Address, Area};
 pub const MAXIMUM_NAME_LENGTH: usize = 120;
 
 /// The longest preset time.
-pub const MAXIMUM_PRESET_TIME: Duration = Duration::from_secs(100 * 24 * 3600);
+pub const MAXIMUM_PRESET_TIME: Duration = duration::MAXIMUM;
 
 /// What one lexeme is.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -169,7 +169,7 @@ impl<'a> Lexer<'a> {
         if word.ends_with('.') || word.contains("..") {
             self.diagnostics.push(Diagnostic::error(
                 "U0101",
-                format!("`{word}` is not a name: a dot stands between two parts"),
+                format!("invalid name `{word}`: a dot separates two parts"),
                 start..start + word.len(),
             ));
             return Lexeme::Faulty;
@@ -230,14 +230,14 @@ impl<'a> Lexer<'a> {
         {
             return Lexeme::Number(number);
         }
-        match parse_time(word) {
-            Some(time) => Lexeme::Time(time),
-            None => {
-                let message = format!("`{word}` is neither a number nor a time");
+        match duration::parse(word) {
+            Ok(time) => Lexeme::Time(time),
+            Err(_) => {
+                let message = format!("`{word}` is neither a number nor a duration");
                 self.diagnostics.push(
                     Diagnostic::error("U0110", message, start..start + word.len()).with_help(
-                        "times look like 300ms, 2s or 1m30s (units d, h, m, s, ms, us, the larger \
-                         first) and are at most 100 days; names begin with a letter or _",
+                        "write a duration such as 300ms, 1.5s or 1m30s (units d, h, m, s, ms, us and \
+                         ns, the larger first), at most 100 days; names begin with a letter or _",
                     ),
                 );
                 Lexeme::Faulty
@@ -256,7 +256,7 @@ pub(crate) fn is_name_part(character: char) -> bool {
     character.is_alphanumeric() || character == '_'
 }
 
-/// The address of a bit, without its `%`; `None` where it is none.
+/// The address of a bit, without its `%`; `None` where the text is not an address.
 pub fn parse_address(text: &str) -> Option<Address> {
     let mut characters = text.chars();
     let area = match characters.next()? {
@@ -276,41 +276,4 @@ pub fn parse_address(text: &str) -> Option<Address> {
         })
         .collect::<Option<Vec<u32>>>()?;
     Some(Address { area, path })
-}
-
-/// The units of times, in microseconds, the largest first.
-pub(crate) const UNITS_MICROSECONDS: [(&str, u64); 6] = [
-    ("d", 86_400_000_000),
-    ("h", 3_600_000_000),
-    ("m", 60_000_000),
-    ("s", 1_000_000),
-    ("ms", 1_000),
-    ("us", 1),
-];
-
-/// A time such as `300ms` or `1m30s`, the larger units first; `None` where it is none, or longer than [`MAXIMUM_PRESET_TIME`].
-pub fn parse_time(text: &str) -> Option<Duration> {
-    let mut rest = text;
-    let mut next_unit = 0;
-    let mut total_microseconds: u64 = 0;
-    while !rest.is_empty() {
-        let digits = rest.find(|character: char| !character.is_ascii_digit())?;
-        let number: u64 = rest[..digits].parse().ok()?;
-        rest = &rest[digits..];
-        let letters = rest
-            .find(|character: char| !character.is_ascii_alphabetic())
-            .unwrap_or(rest.len());
-        let unit = UNITS_MICROSECONDS
-            .iter()
-            .position(|(unit, _)| *unit == &rest[..letters])?;
-        if unit < next_unit {
-            return None;
-        }
-        next_unit = unit + 1;
-        total_microseconds =
-            total_microseconds.checked_add(number.checked_mul(UNITS_MICROSECONDS[unit].1)?)?;
-        rest = &rest[letters..];
-    }
-    let time = Duration::from_micros(total_microseconds);
-    (time <= MAXIMUM_PRESET_TIME).then_some(time)
 }

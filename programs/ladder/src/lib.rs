@@ -32,18 +32,18 @@ mod program;
 mod structured_text;
 
 pub use check::check;
-pub use draw::{draw_svg, draw_svg_rungs, draw_svg_with_flow, draw_text, draw_text_rungs, escaped};
+pub use draw::{draw_svg, draw_svg_rungs, draw_svg_with_flow, draw_text, draw_text_rungs};
 pub use flow::{ElementFlow, Evaluation, Reading, RungFlow};
 pub use from_circuit::from_circuit;
 pub use interpreter::Interpreter;
-pub use lexer::{MAXIMUM_NAME_LENGTH, MAXIMUM_PRESET_TIME, parse_address, parse_time};
+pub use lexer::{MAXIMUM_NAME_LENGTH, MAXIMUM_PRESET_TIME, parse_address};
 pub use lower::{LowerError, Observer, PERIODS, Write};
-pub use names::{Language, Namer, StandardNames};
+pub use names::{Language, Namer, StandardNames, legal_name};
 pub use parser::{
     KEYWORDS, MAXIMUM_NESTING, MAXIMUM_PRESET_VALUE, MAXIMUM_RUNGS, MAXIMUM_TEXT_BYTES, Parsed,
     parse,
 };
-pub use print::{print, time_text};
+pub use print::print;
 pub use program::{
     Address, Area, Block, BlockKind, Coil, CoilKind, Comparison, Contact, ContactKind, Element,
     Feed, Name, Program, Relation, Rung, Series, Signal, visit,

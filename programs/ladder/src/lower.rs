@@ -17,8 +17,8 @@ use std::collections::{HashMap, HashSet};
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, has_errors};
 use understudy_logic::{Circuit, CircuitBuilder, Expression, Graph, RegisterId, Variable};
+use understudy_text::{Diagnostic, has_errors};
 
 use self::number::Number;
 pub use self::observer::Observer;
@@ -63,7 +63,7 @@ pub(crate) fn validate(program: &Program, period: Duration) -> Result<(), LowerE
     }
     let mut diagnostics = check(program);
     if has_errors(&diagnostics) {
-        diagnostics.retain(|found| found.severity == understudy_diagnostic::Severity::Error);
+        diagnostics.retain(|found| found.severity == understudy_text::Severity::Error);
         return Err(LowerError::Invalid {
             program: program.name.to_string(),
             diagnostics,
@@ -84,7 +84,7 @@ impl Program {
     /// Inputs and outputs are in the order of their declaration; y(t) is what the outputs are after the scan.
     ///
     /// # Errors
-    /// A period out of [`PERIODS`], or a program with errors. A preset that is no multiple of the period is rounded up; see
+    /// A period out of [`PERIODS`], or a program with errors. A preset that is not a multiple of the period is rounded up; see
     /// [`Program::preset_warnings`].
     pub fn lower(&self, period: Duration) -> Result<Circuit, LowerError> {
         let outputs = self.outputs.iter().map(|signal| signal.name.to_string());
@@ -125,7 +125,7 @@ impl Program {
         Ok(lowering.finish(self, shown))
     }
 
-    /// A warning for each timer whose preset is no multiple of `period`.
+    /// A warning for each timer whose preset is not a multiple of `period`.
     pub fn preset_warnings(&self, period: Duration) -> Vec<Diagnostic> {
         if !PERIODS.contains(&period) {
             return Vec::new();
@@ -139,7 +139,7 @@ impl Program {
             let scans = preset_scans(preset, period);
             let rounded = period.saturating_mul(u32::try_from(scans).unwrap_or(u32::MAX));
             let message = format!(
-                "the preset {preset:?} of `{}` is no multiple of the period {period:?}; it lasts {scans} scans, {rounded:?}",
+                "the preset {preset:?} of `{}` is not a multiple of the period {period:?}; it lasts {scans} scans, {rounded:?}",
                 block.name
             );
             let warning = Diagnostic::warning("U0155", message, block.name.span());
@@ -211,7 +211,7 @@ impl<'a> Lowering<'a> {
         lowering
     }
 
-    /// Makes a bit that something writes; a name that is taken gets a number.
+    /// Makes a bit that something writes; a name that is in use gets a number.
     fn slot(&mut self, name: String, initial: bool) -> usize {
         let mut unique = name.clone();
         let mut count = 2;

@@ -17,7 +17,7 @@ const MAXIMUM_WANTED_LENGTH: usize = MAXIMUM_NAME_LENGTH - 12;
 pub enum Language {
     /// That of this crate.
     Ladder,
-    /// IEC 61131-3: ASCII, no dots, no two underscores beside each other or one at the end, case does not matter.
+    /// IEC 61131-3: ASCII, no dots, no two underscores in a row and none at the end, case does not matter.
     StructuredText,
 }
 
@@ -41,7 +41,7 @@ impl Namer {
     /// A legal name that is like `wanted`; another one each time.
     pub fn name(&mut self, wanted: &str) -> String {
         let legal = match self.language {
-            Language::Ladder => ladder_name(wanted),
+            Language::Ladder => legal_name(wanted),
             Language::StructuredText => structured_text_name(wanted),
         };
         let mut name = legal.clone();
@@ -64,7 +64,8 @@ impl Namer {
     }
 }
 
-fn ladder_name(wanted: &str) -> String {
+/// A name of a ladder that is like `wanted`, with room for a number behind it; it may be a keyword.
+pub fn legal_name(wanted: &str) -> String {
     let parts: Vec<String> = wanted
         .split('.')
         .filter(|part| !part.is_empty())

@@ -1,7 +1,7 @@
 //! Lexemes to a [`Program`], with recovery: what is wrong is reported and passed over, so that one run finds everything.
 //!
 //! Recursive descent; every loop consumes a lexeme or ends, and brackets nest at most [`MAXIMUM_NESTING`] deep, so any text
-//! is read in linear time and bounded stack. The grammar stands in `docs/ladder-format.md`; each function names its rule.
+//! is read in linear time and bounded stack. The grammar is in `docs/ladder-format.md`; each function names its rule.
 
 mod rung;
 
@@ -9,8 +9,8 @@ pub use rung::MAXIMUM_PRESET_VALUE;
 
 use std::ops::Range;
 
-use understudy_diagnostic::spelling::nearest;
-use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS, has_errors};
+use understudy_text::spelling::nearest;
+use understudy_text::{Diagnostic, MAXIMUM_FINDINGS, has_errors};
 
 use crate::check::check;
 use crate::lexer::{Lexeme, Placed, lex};
@@ -25,7 +25,7 @@ pub const MAXIMUM_RUNGS: usize = 100_000;
 /// How deep brackets and braces may nest.
 pub const MAXIMUM_NESTING: usize = 64;
 
-/// Reserved words; each begins a part of the program, `at` stands before an address.
+/// Reserved words; each begins a part of the program, `at` comes before an address.
 pub const KEYWORDS: [&str; 6] = ["program", "input", "output", "memory", "rung", "at"];
 
 /// What a text says.
@@ -143,7 +143,7 @@ impl Parser {
         program
     }
 
-    /// Reports what stands where a part of the program should begin, and passes to the next part.
+    /// Reports a lexeme where a part of the program should begin, and passes to the next part.
     fn pass_to_keyword(&mut self) {
         let span = self.span();
         if *self.lexeme() != Lexeme::Faulty {
@@ -336,7 +336,7 @@ impl Parser {
         }
     }
 
-    /// A name that is not reserved; reports what stands there otherwise and leaves it.
+    /// A name that is not reserved; reports any other lexeme and leaves it.
     fn name(&mut self, expected: &str) -> Option<Name> {
         match self.lexeme().clone() {
             Lexeme::Word(word) if !KEYWORDS.contains(&word.as_str()) => {

@@ -1,7 +1,7 @@
 //! A circuit as assignments one after the other, as a ladder and Structured Text need it.
 //!
 //! Invariant: every expression is read from the old state x(t). What is shared comes first, then the outputs, then the
-//! registers; a register is written at once where nobody else reads its old value any more, and otherwise its new value is
+//! registers; a register is written at once where its old value is not read again, and otherwise its new value is
 //! held until all have been computed. So the sequence of assignments equals the synchronous equations (1)-(2).
 
 mod named;

@@ -1,9 +1,9 @@
 //! A program back to text; [`crate::parse`] reads the same program from it.
 
 use std::fmt::Write;
-use std::time::Duration;
 
-use crate::lexer::UNITS_MICROSECONDS;
+use understudy_text::duration;
+
 use crate::program::{Block, Coil, CoilKind, Element, Program, Rung, Series, Signal};
 
 /// Characters of a line past which a series is broken between its elements.
@@ -12,7 +12,7 @@ const LINE_WIDTH: usize = 100;
 /// The text of a program in the ladder format.
 ///
 /// Reading it gives the same program again, if this one could have been read: names are names, comments and titles stand on
-/// one line each, presets are whole microseconds, and branches are two or more.
+/// one line each, and branches are two or more.
 pub fn print(program: &Program) -> String {
     let mut text = String::new();
     comments(&mut text, &program.comments);
@@ -132,7 +132,7 @@ fn words_of_series(series: &Series, words: &mut Vec<String>) {
 fn words_of_block(block: &Block, words: &mut Vec<String>) {
     let mut head = format!("{{{} {}", block.kind.word(), block.name);
     if let Some(time) = block.kind.preset_time() {
-        let _ = write!(head, " {}", time_text(time));
+        let _ = write!(head, " {}", duration::text(time));
     }
     if let Some(value) = block.kind.preset_value() {
         let _ = write!(head, " {value}");
@@ -159,7 +159,7 @@ pub(crate) fn series_text(series: &Series) -> String {
     words.join(" ")
 }
 
-/// What stands over a contact: its operand or comparison, with the sign before it.
+/// The text above a contact: its operand or comparison, with the sign before it.
 fn element_text(element: &Element) -> String {
     match element {
         Element::Contact(contact) => format!("{}{}", contact.kind.sign(), contact.operand),
@@ -178,17 +178,4 @@ fn coil_text(coil: &Coil) -> String {
         CoilKind::Set | CoilKind::Reset => format!("({} {})", coil.kind.sign(), coil.target),
         _ => format!("({}{})", coil.kind.sign(), coil.target),
     }
-}
-
-/// A time as the text format writes it, in whole microseconds.
-pub fn time_text(time: Duration) -> String {
-    let mut rest = u64::try_from(time.as_micros()).unwrap_or(u64::MAX);
-    let mut text = String::new();
-    for (unit, microseconds) in UNITS_MICROSECONDS {
-        if rest >= microseconds {
-            let _ = write!(text, "{}{unit}", rest / microseconds);
-            rest %= microseconds;
-        }
-    }
-    if text.is_empty() { "0ms".into() } else { text }
 }

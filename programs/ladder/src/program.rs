@@ -103,7 +103,7 @@ pub struct Rung {
     pub title: Option<String>,
     /// Its comment lines.
     pub comments: Vec<String>,
-    /// What stands between the left rail and the coils; empty is a wire.
+    /// The network between the left rail and the coils; empty is a wire.
     pub network: Series,
     /// The coils, all fed by the same power, written from left to right.
     pub coils: Vec<Coil>,
@@ -112,7 +112,7 @@ pub struct Rung {
 /// Elements one behind the other; power passes when all of them pass it.
 pub type Series = Vec<Element>;
 
-/// What stands in a rung before its coils.
+/// An element of a rung before its coils.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Element {
     /// A contact.

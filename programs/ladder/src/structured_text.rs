@@ -10,8 +10,9 @@ mod program;
 use std::fmt::Write;
 use std::time::Duration;
 
+use understudy_text::duration;
+
 use crate::names::Namer;
-use crate::print::time_text;
 
 pub use self::circuit::circuit_as_structured_text;
 pub use self::program::structured_text;
@@ -21,15 +22,15 @@ const LINE_WIDTH: usize = 96;
 
 /// A time literal of the standard, such as `T#1m30s`. The standard's smallest unit is the millisecond, with a fraction.
 pub fn standard_time(time: Duration) -> String {
-    let microseconds = time.as_micros() % 1_000_000;
-    if microseconds.is_multiple_of(1_000) {
-        return format!("T#{}", time_text(time));
+    let nanoseconds = time.subsec_nanos();
+    if nanoseconds.is_multiple_of(1_000_000) {
+        return format!("T#{}", duration::text(time));
     }
     let seconds = match time.as_secs() {
         0 => String::new(),
-        seconds => time_text(Duration::from_secs(seconds)),
+        seconds => duration::text(Duration::from_secs(seconds)),
     };
-    let milliseconds = format!("{}.{:03}", microseconds / 1_000, microseconds % 1_000);
+    let milliseconds = format!("{}.{:06}", nanoseconds / 1_000_000, nanoseconds % 1_000_000);
     format!("T#{seconds}{}ms", milliseconds.trim_end_matches('0'))
 }
 

@@ -25,7 +25,7 @@ const SHALLOW: usize = 500;
 /// Why a diagram could not be made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum BddError {
-    /// Its nodes and those of the diagrams beside it pass the bound.
+    /// Its nodes and those of the other diagrams pass the bound.
     #[error(
         "U0412: the decision diagram needs more than {limit} nodes; split the function or raise the bound"
     )]

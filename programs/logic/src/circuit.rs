@@ -99,7 +99,7 @@ pub enum CircuitError {
         circuit: String,
         /// "input", "register" or "output".
         kind: &'static str,
-        /// The name that stands twice.
+        /// The name that occurs twice.
         name: String,
     },
     /// A register has no next-state function.

@@ -59,7 +59,7 @@ impl Operation {
 
 /// The owner of expressions.
 ///
-/// The constructors simplify what is free to simplify: constants, double negation, an operand that stands twice or beside
+/// The constructors simplify what is free to simplify: constants, double negation, an operand that occurs twice or next to
 /// its own negation. They keep the order of operands, because a person reads the result.
 #[derive(Debug, Clone, Default)]
 pub struct Graph {

@@ -7,13 +7,13 @@ use std::collections::HashMap;
 
 use crate::expression::{Expression, Graph, Operation, Variable};
 
-/// A formula that nobody would read.
+/// A formula that is too long to be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
     "U0411: the formula has more than {leaves} variables or is nested deeper than {depth}; it is too large to print"
 )]
 pub struct FormulaTooLarge {
-    /// Variables in one formula, at most, each counted as often as it stands.
+    /// Variables in one formula, at most, each counted as often as it occurs.
     pub leaves: usize,
     /// Nesting, at most.
     pub depth: usize,

@@ -7,8 +7,8 @@ mod stub;
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use understudy_form::written_time;
 use understudy_ladder::{Program, Signal};
+use understudy_text::duration;
 
 use crate::fields::MAXIMUM_NAME_LENGTH;
 use crate::format::{LONGEST_PERIOD, SHORTEST_PERIOD};
@@ -92,7 +92,7 @@ impl Draft {
     }
 
     fn cluster_file(&self, stubs: &[Stub<'_>]) -> String {
-        let period = written_time(self.period);
+        let period = duration::text(self.period);
         let mut text = format!(
             "\
 # Drafted by `understudy init --from`. It runs as it is, with stand-ins for the plants.

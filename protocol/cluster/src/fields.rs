@@ -9,9 +9,9 @@ use std::ops::Range;
 use std::time::Duration;
 
 use toml::de::DeTable;
-use understudy_diagnostic::Diagnostic;
-pub(crate) use understudy_form::Placed;
-use understudy_form::{Codes, Value, unknown_key};
+use understudy_text::Diagnostic;
+pub(crate) use understudy_text::tables::Placed;
+use understudy_text::tables::{Codes, Value, unknown_key};
 
 use crate::format::{Key, Kind, Section};
 

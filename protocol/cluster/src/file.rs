@@ -6,9 +6,9 @@ use std::ops::Range;
 use std::time::Duration;
 
 use toml::de::DeTable;
-use understudy_diagnostic::Diagnostic;
-use understudy_form::{Value, unknown_key};
 use understudy_plant::{PressParameters, RobotParameters};
+use understudy_text::Diagnostic;
+use understudy_text::tables::{Value, unknown_key};
 
 use crate::fields::{CODES, Fields, Placed};
 use crate::format::{
@@ -113,7 +113,7 @@ pub(crate) enum ModelSection {
 
 /// Reads all sections; where the text is no TOML, says so and nothing else.
 pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<ClusterFile> {
-    let root = understudy_form::parse(text, &CODES, diagnostics)?;
+    let root = understudy_text::tables::parse(text, &CODES, diagnostics)?;
     let root = root.get_ref();
     let known = SECTIONS.map(|section| section.name);
     for key in root.keys() {

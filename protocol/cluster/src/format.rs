@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use understudy_form::written_time;
+use understudy_text::duration;
 use understudy_wire::MAXIMUM_HISTORY;
 
 /// The bounds of a cluster's period.
@@ -446,8 +446,8 @@ impl Kind {
             Self::Count { least, most, .. } => format!("a whole number from {least} to {most}"),
             Self::Time { least, most, .. } => format!(
                 "a time with its unit in quotes, from \"{}\" to \"{}\"",
-                written_time(*least),
-                written_time(*most)
+                duration::text(*least),
+                duration::text(*most)
             ),
             Self::Word { words, .. } => {
                 let quoted: Vec<String> = words.iter().map(|word| format!("\"{word}\"")).collect();
@@ -468,7 +468,7 @@ impl Kind {
     pub(crate) fn default(&self) -> Option<String> {
         match self {
             Self::Count { default, .. } => Some(default.to_string()),
-            Self::Time { default, .. } => Some(format!("\"{}\"", written_time(*default))),
+            Self::Time { default, .. } => Some(format!("\"{}\"", duration::text(*default))),
             Self::Word {
                 words,
                 default: true,

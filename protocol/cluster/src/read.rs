@@ -42,12 +42,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_cycle::{Agreement, Mode, Schedule};
-use understudy_diagnostic::spelling::suggestion;
-use understudy_diagnostic::{Diagnostic, Report};
 use understudy_ladder::Program as LadderProgram;
 use understudy_logic::{Circuit, Scan};
 use understudy_node::Program;
 use understudy_remote_io::{Release, StaleState, ValueFault};
+use understudy_text::{Diagnostic, Report};
+use understudy_text::spelling::{suggestion};
 use understudy_wire::{ClusterHash, ConfigurationHash, Image, MAXIMUM_PROGRAMS};
 
 use self::ladders::Ladders;

@@ -2,6 +2,7 @@
 
 use schemars::Schema;
 use serde_json::{Map, Value, json};
+use understudy_text::duration;
 
 use crate::fields::MAXIMUM_NAME_LENGTH;
 use crate::format::{
@@ -69,7 +70,7 @@ fn property(key: &Key) -> Value {
             json!({ "type": "integer", "minimum": least, "maximum": most, "default": default })
         }
         Kind::Time { .. } => {
-            json!({ "type": "string", "pattern": "^\\s*[0-9]+(\\.[0-9]*)?\\s*(s|ms|us|ns)\\s*$" })
+            json!({ "type": "string", "pattern": duration::pattern() })
         }
         Kind::Word { words, .. } => json!({ "enum": words }),
         Kind::Bits => json!({ "type": "object", "additionalProperties": { "type": "boolean" } }),

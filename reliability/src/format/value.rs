@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
+use understudy_text::Diagnostic;
 
 use crate::quantity::unit_length;
 

@@ -4,29 +4,15 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::suggestion;
-use understudy_form::{Fields, Placed};
 use understudy_simulator::{Action, Fault};
+use understudy_text::Diagnostic;
+use understudy_text::spelling::suggestion;
+use understudy_text::tables::{Fields, Placed};
 use understudy_wire::{Member, ProgramId, StateChoice};
 
-use super::{ANY, MAXIMUM_NUMBER, MAXIMUM_STEPS, Reader, SHARE};
+use super::{MAXIMUM_STEPS, Reader};
+use crate::format::{STEP, action_keys};
 use crate::scenario::{ACTIONS, action_word};
-
-/// Keys that only some actions have.
-const KEYS_OF_ACTIONS: [&str; 8] = [
-    "to",
-    "both_ways",
-    "by",
-    "frames",
-    "age",
-    "program",
-    "bit",
-    "epoch",
-];
-
-/// How late a slow member is, at most.
-const MAXIMUM_SLOWNESS: Duration = Duration::from_secs(1);
 
 /// A step with the name of its member. One step of a file may be several: a cut to many, or both ways.
 type Step = Placed<(Vec<Fault>, String)>;
@@ -59,9 +45,9 @@ impl Reader<'_> {
     fn step(&mut self, mut fields: Fields<'_, '_>, end: u64) -> Option<Step> {
         let found = &mut self.diagnostics;
         let span = fields.span();
-        fields.require(&["at", "action", "station"], found);
-        let at = fields.count("at", ANY, found);
-        let phase = fields.number("phase", SHARE, found);
+        fields.require_all(found);
+        let at = fields.format_count("at", found);
+        let phase = fields.format_number("phase", found);
         let action = fields.text("action", found);
         let station = fields.text("station", found);
         if let Some(Placed { value: at, span }) = &at
@@ -90,7 +76,7 @@ impl Reader<'_> {
         let actions = match (word, &station) {
             (Some(word), Some(name)) => self.actions(word, &mut fields, member, name),
             _ => {
-                fields.ignore(&KEYS_OF_ACTIONS);
+                fields.ignore(&action_keys());
                 None
             }
         };
@@ -132,13 +118,13 @@ impl Reader<'_> {
                 ("release" | "cold-start" | "accept-state", _) => {
                     format!("`{name}` is not a remote I/O: `{word}` concerns its outputs")
                 }
-                _ => format!("`{name}` is nobody to whom `{word}` can be done"),
+                _ => format!("`{name}` cannot be the target of `{word}`"),
             };
             self.diagnostics.push(
                 Diagnostic::error("U0309", message, station.span.clone())
                     .with_help(format!("{word} {wanted}")),
             );
-            fields.ignore(&KEYS_OF_ACTIONS);
+            fields.ignore(&action_keys());
             return None;
         }
         match word {
@@ -147,7 +133,7 @@ impl Reader<'_> {
             "restart-misconfigured" => one(Action::RestartMisconfigured),
             "restart-in-epoch" => {
                 fields.require(&["epoch"], &mut self.diagnostics);
-                let epoch = fields.count("epoch", ANY, &mut self.diagnostics)?;
+                let epoch = fields.format_count("epoch", &mut self.diagnostics)?;
                 one(Action::RestartInEpoch { epoch: epoch.value })
             }
             "stop" => one(Action::Stop),
@@ -174,22 +160,22 @@ impl Reader<'_> {
             }
             "forge" => one(Action::Forge),
             "corrupt" => one(Action::Corrupt {
-                frames: self.number(fields, "frames", 1)?,
+                frames: self.number(fields, "frames")?,
             }),
             "replay" => one(Action::Replay {
-                age: self.number(fields, "age", 1)?,
+                age: self.number(fields, "age")?,
             }),
             "flip-state" => {
                 let program = self.program(fields, member);
-                let bit = self.number(fields, "bit", 0)?;
+                let bit = self.number(fields, "bit")?;
                 one(Action::FlipState {
                     program: program?,
                     bit,
                 })
             }
             _ => {
-                let bit = self.number(fields, "bit", 0);
-                let frames = self.number(fields, "frames", 1);
+                let bit = self.number(fields, "bit");
+                let frames = self.number(fields, "frames");
                 let (bit, frames) = (bit?, frames?);
                 one(match word {
                     "flip-sample" => Action::FlipSample { bit, frames },
@@ -200,26 +186,19 @@ impl Reader<'_> {
     }
 
     /// A small number; its least value where the step does not say.
-    fn number(
-        &mut self,
-        fields: &mut Fields<'_, '_>,
-        key: &'static str,
-        least: u16,
-    ) -> Option<u16> {
-        let bounds = u64::from(least)..=u64::from(MAXIMUM_NUMBER);
-        match fields.get(key) {
-            Some(number) => {
-                let number = number.count(bounds, &mut self.diagnostics)?;
-                u16::try_from(number.value).ok()
-            }
-            None => Some(least),
-        }
+    fn number(&mut self, fields: &mut Fields<'_, '_>, key: &'static str) -> Option<u16> {
+        let number = if fields.has(key) {
+            fields.format_count(key, &mut self.diagnostics)?.value
+        } else {
+            fields.ignore(&[key]);
+            *STEP.kind(key).counts().start()
+        };
+        u16::try_from(number).ok()
     }
 
     fn slowness(&mut self, fields: &mut Fields<'_, '_>) -> Option<Duration> {
         fields.require(&["by"], &mut self.diagnostics);
-        let bounds = Duration::ZERO..=MAXIMUM_SLOWNESS;
-        fields.time("by", bounds, &mut self.diagnostics)
+        fields.format_time("by", &mut self.diagnostics)
     }
 
     /// One action for each member that is named by `to`, or for all others where nobody is; with `both_ways`, one for each of
@@ -240,7 +219,7 @@ impl Reader<'_> {
                     peers.push(peer);
                 }
                 Some(_) => {
-                    let message = format!("`{}` is nobody who could hear it", name.value);
+                    let message = format!("`{}` cannot receive from it", name.value);
                     self.diagnostics.push(
                         Diagnostic::error("U0309", message, name.span.clone())
                             .with_help("another station or a remote I/O"),
@@ -317,7 +296,7 @@ impl Reader<'_> {
             if !possible {
                 let why = match before {
                     Some((Action::Crash, _)) => "has crashed by then; restart it first",
-                    Some((Action::Stop, _)) => "stands still by then; continue it first",
+                    Some((Action::Stop, _)) => "is suspended by then; continue it first",
                     _ => "runs by then",
                 };
                 let message = format!(

@@ -1,4 +1,6 @@
-//! What the tests of several crates share.
+//! What the tests of several crates share: skipped tests, random numbers and random programs.
+
+pub mod random;
 
 use std::fmt::Display;
 use std::fs::OpenOptions;

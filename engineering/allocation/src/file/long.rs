@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::suggestion;
+use understudy_text::Diagnostic;
+use understudy_text::spelling::suggestion;
 
 use super::{Row, line, number, price_has_currency};
 use crate::controller::{Catalogue, Family};

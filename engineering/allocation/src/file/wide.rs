@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
+use understudy_text::Diagnostic;
 
 use super::{Row, number, price_has_currency};
 use crate::controller::Catalogue;

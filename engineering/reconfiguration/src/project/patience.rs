@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
-use understudy_form::Fields;
+use understudy_text::Diagnostic;
+use understudy_text::tables::Fields;
 
 use super::TIMES;
 use crate::diagnosis::Patience;

@@ -3,8 +3,8 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use understudy_diagnostic::Diagnostic;
-use understudy_form::Fields;
+use understudy_text::Diagnostic;
+use understudy_text::tables::Fields;
 
 use super::unknown;
 use crate::controller::Controller;

@@ -1,7 +1,8 @@
 use std::collections::HashMap;
 use std::ops::Range;
+use understudy_text::spelling::nearest;
 
-use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS, shortened};
+use understudy_text::{Diagnostic, MAXIMUM_FINDINGS, shortened};
 
 use super::{MAXIMUM_LABEL, MAXIMUM_STATES, Vocal};
 use crate::alphabet::Label;
@@ -71,15 +72,8 @@ impl Section {
 
     fn nearest(line: &str) -> Option<Self> {
         let line = line.trim_end_matches(':').to_lowercase();
-        let distance = |section: &Self| {
-            let words = section.words().iter();
-            words
-                .map(|word| strsim::damerau_levenshtein(word, &line))
-                .min()
-        };
-        let nearest = Self::ALL.into_iter().min_by_key(distance)?;
-        distance(&nearest).filter(|&distance| distance <= 4)?;
-        Some(nearest)
+        let words = Self::ALL.iter().flat_map(|section| section.words());
+        nearest(&line, words.copied()).and_then(Self::of)
     }
 }
 
@@ -210,7 +204,7 @@ impl Reader {
         let mut diagnostic =
             Diagnostic::error("U0812", message, word).with_label(format!("expected {expected}"));
         if let Some(near) = Section::nearest(&line) {
-            diagnostic = diagnostic.with_help(format!("perhaps \"{}\" is meant", near.heading()));
+            diagnostic = diagnostic.with_help(format!("did you mean \"{}\"?", near.heading()));
             // So that what follows is not taken for what it is not.
             self.section = Some(near);
         }
@@ -271,7 +265,7 @@ impl Reader {
         let transitions = self.take_transitions(text);
         self.diagnostics
             .sort_by_key(|diagnostic| diagnostic.span.start);
-        let automaton = if understudy_diagnostic::has_errors(&self.diagnostics) {
+        let automaton = if understudy_text::has_errors(&self.diagnostics) {
             None
         } else {
             let name = self.name.take().unwrap_or_default();

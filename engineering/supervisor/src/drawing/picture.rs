@@ -1,6 +1,7 @@
 //! Shapes, arrows and texts as SVG.
 
 use std::fmt::Write as _;
+use understudy_text::markup::escaped;
 
 use super::labels::{Area, Label, free_place};
 use super::layout::Point;
@@ -225,10 +226,4 @@ pub(crate) fn middle(one: Point, other: Point) -> Point {
 
 fn point((x, y): Point) -> String {
     format!("{x:.1} {y:.1}")
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
 }

@@ -1,9 +1,9 @@
 //! Where signals are in the PLC: the table `[addresses]` of maps, models and nets.
 
 use toml::de::DeTable;
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::nearest;
 use understudy_ladder::{Address, Area, Name, Program, parse_address};
+use understudy_text::Diagnostic;
+use understudy_text::spelling;
 
 use super::names::{ILLEGAL_NAME, is_legal};
 use crate::form::Form;
@@ -108,9 +108,9 @@ pub fn locate(program: &mut Program, addresses: &[Located]) -> Result<(), Vec<Di
 fn unknown(program: &Program, signal: &Name) -> Diagnostic {
     let message = format!("the ladder has no signal `{signal}`");
     let known = program.inputs.iter().chain(&program.outputs);
-    let near = nearest(signal, known.map(|known| known.name.as_str()));
+    let near = spelling::question(signal, known.map(|known| known.name.as_str()));
     let mut diagnostic = Diagnostic::error("U0866", message, signal.span());
-    diagnostic.help = near.map(|near| format!("perhaps \"{near}\" is meant"));
+    diagnostic.help = near;
     diagnostic
 }
 

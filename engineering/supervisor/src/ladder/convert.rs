@@ -5,8 +5,8 @@ mod single;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{Block, BlockKind, Coil, Element, Name, Program, Signal};
+use understudy_text::Diagnostic;
 
 use super::addresses::locate;
 use super::map::{Agent, InputOutputMap, Mode, When};

@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::nearest;
 use understudy_ladder::Name;
+use understudy_text::Diagnostic;
+use understudy_text::spelling;
 
 use super::map::InputOutputMap;
 use super::names::{ILLEGAL_NAME, is_legal};
@@ -209,10 +209,9 @@ impl Resolver<'_> {
                 .any(|signal| signal == timer.runs_while.as_str())
             {
                 let message = format!("no switch has the signal `{}`", timer.runs_while);
-                let help = match nearest(&timer.runs_while, signals) {
-                    Some(near) => format!("perhaps \"{near}\" is meant"),
-                    None => "a timer runs while the signal of a switch's position is on".into(),
-                };
+                let help = spelling::question(&timer.runs_while, signals).unwrap_or_else(|| {
+                    "a timer runs while the signal of a switch's position is on".into()
+                });
                 self.diagnostics.push(
                     Diagnostic::error("U0857", message, timer.runs_while.span()).with_help(help),
                 );
@@ -325,9 +324,9 @@ impl Resolver<'_> {
         if found.is_none() {
             let message = format!("there is no event `{event}`");
             let known = self.alphabet.events().iter();
-            let near = nearest(event, known.map(|event| event.name.as_str()));
+            let near = spelling::question(event, known.map(|event| event.name.as_str()));
             let mut diagnostic = Diagnostic::error("U0851", message, event.span());
-            diagnostic.help = near.map(|near| format!("perhaps \"{near}\" is meant"));
+            diagnostic.help = near;
             self.diagnostics.push(diagnostic);
         }
         found

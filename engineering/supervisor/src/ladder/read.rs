@@ -33,8 +33,8 @@
 //! ```
 
 use toml::de::DeTable;
-use understudy_diagnostic::{Diagnostic, has_errors};
 use understudy_ladder::Name;
+use understudy_text::{Diagnostic, has_errors};
 
 use super::addresses::read_addresses;
 use super::map::{
@@ -42,6 +42,7 @@ use super::map::{
 };
 use crate::Label;
 use crate::form::{self, CODES, Form};
+use crate::format;
 
 /// What a text says, and what is wrong with it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -64,25 +65,14 @@ pub fn read_map(text: &str) -> ReadMap {
 }
 
 fn map(form: &mut Form<'_>, table: &DeTable) -> InputOutputMap {
-    let keys = [
-        "program",
-        "start",
-        "events",
-        "input",
-        "switch",
-        "pulse",
-        "timer",
-        "request",
-        "addresses",
-    ];
-    form.check_keys(table, &keys, "a map");
+    form.check_keys(table, &format::MAP);
     let end = form.text.trim_end().len();
     InputOutputMap {
         program: form.name(table, "program", "a map", &(end..end)),
         start: form.optional(table, "start"),
         events: event_names(form, table),
         inputs: form.list(table, "input", |form, entry, place| {
-            form.check_keys(entry, &["event", "signal", "when", "by"], "an input");
+            form.check_keys(entry, &format::INPUT);
             InputEvent {
                 event: form.name(entry, "event", "an input", place),
                 signal: form.name(entry, "signal", "an input", place),
@@ -91,14 +81,14 @@ fn map(form: &mut Form<'_>, table: &DeTable) -> InputOutputMap {
             }
         }),
         switches: form.list(table, "switch", |form, entry, place| {
-            form.check_keys(entry, &["off", "positions", "memory"], "a switch");
+            form.check_keys(entry, &format::SWITCH);
             if !entry.contains_key("positions") {
                 form.missing("positions", "a switch", place.clone());
             }
             Switch {
                 off: form.optional(entry, "off"),
                 positions: form.list(entry, "positions", |form, entry, place| {
-                    form.check_keys(entry, &["event", "signal"], "a position");
+                    form.check_keys(entry, &format::POSITION);
                     Position {
                         event: form.name(entry, "event", "a position", place),
                         signal: form.name(entry, "signal", "a position", place),
@@ -108,7 +98,7 @@ fn map(form: &mut Form<'_>, table: &DeTable) -> InputOutputMap {
             }
         }),
         pulses: form.list(table, "pulse", |form, entry, place| {
-            form.check_keys(entry, &["event", "signal", "memory"], "a pulse");
+            form.check_keys(entry, &format::PULSE);
             Pulse {
                 event: form.name(entry, "event", "a pulse", place),
                 signal: form.name(entry, "signal", "a pulse", place),
@@ -116,7 +106,7 @@ fn map(form: &mut Form<'_>, table: &DeTable) -> InputOutputMap {
             }
         }),
         timers: form.list(table, "timer", |form, entry, place| {
-            form.check_keys(entry, &["event", "name", "runs_while", "preset"], "a timer");
+            form.check_keys(entry, &format::TIMER);
             let preset = form.name(entry, "preset", "a timer", place);
             Timer {
                 event: form.name(entry, "event", "a timer", place),
@@ -130,7 +120,7 @@ fn map(form: &mut Form<'_>, table: &DeTable) -> InputOutputMap {
             }
         }),
         requests: form.list(table, "request", |form, entry, place| {
-            form.check_keys(entry, &["event", "signal"], "a request");
+            form.check_keys(entry, &format::REQUEST);
             Request {
                 event: form.name(entry, "event", "a request", place),
                 signal: form.name(entry, "signal", "a request", place),

@@ -4,24 +4,15 @@ use std::collections::HashMap;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::nearest;
+use understudy_text::Diagnostic;
+use understudy_text::spelling;
 
 use super::read::Loader;
 use crate::alphabet::{Alphabet, Event, Label};
 use crate::automaton::{Automaton, State, Transition};
 use crate::events::Events;
 use crate::form::{Form, Place, Word, trimmed};
-
-const KEYS: [&str; 7] = [
-    "name",
-    "file",
-    "events",
-    "initial",
-    "marked",
-    "states",
-    "transitions",
-];
+use crate::format;
 
 pub(super) fn read_component(
     form: &mut Form<'_>,
@@ -30,7 +21,7 @@ pub(super) fn read_component(
     events: &Events,
     loader: &mut Loader<'_>,
 ) -> Option<Automaton> {
-    form.check_keys(table, &KEYS, "an automaton");
+    form.check_keys(table, &format::AUTOMATON);
     let name = form.optional(table, "name").map(|name| name.to_string());
     if let Some(file) = table.get("file") {
         return loader.automaton(form, file, name);
@@ -152,8 +143,8 @@ fn warn_of_unreached(form: &mut Form<'_>, automaton: &Automaton, names: &[Word<'
         let message = format!("no event leads to state {name} of {}", automaton.name());
         let mut diagnostic = Diagnostic::warning("U0828", message, place.clone());
         let others = names.iter().map(|(other, _)| *other);
-        if let Some(near) = nearest(name, others.filter(|other| other != name)) {
-            diagnostic = diagnostic.with_help(format!("perhaps \"{near}\" is meant"));
+        if let Some(help) = spelling::question(name, others.filter(|other| other != name)) {
+            diagnostic = diagnostic.with_help(help);
         }
         form.diagnostics.push(diagnostic);
     }

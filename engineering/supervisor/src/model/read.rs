@@ -2,8 +2,8 @@ use std::collections::HashMap;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
-use understudy_diagnostic::{Diagnostic, Report, has_errors};
-use understudy_form::Codes;
+use understudy_text::tables::Codes;
+use understudy_text::{Diagnostic, Report, has_errors};
 
 use super::Model;
 use super::component::read_component;
@@ -12,6 +12,7 @@ use crate::alphabet::Alphabet;
 use crate::automaton::Automaton;
 use crate::events::Events;
 use crate::form::{self, Form, Place};
+use crate::format;
 use crate::ladder::{check_signals, read_addresses};
 use crate::petri::{Net, NetFile, buffers, read_net, reduce};
 
@@ -114,28 +115,18 @@ impl Loader<'_> {
 }
 
 fn model(form: &mut Form<'_>, table: &DeTable, loader: &mut Loader<'_>) -> Model {
-    let [plant, specification, supervisor] = ROLES;
-    let known = [
-        "name",
-        "events",
-        "addresses",
-        plant,
-        specification,
-        supervisor,
-    ];
-    form.check_keys(table, &known, "a model");
+    form.check_keys(table, &format::MODEL);
     let name = form.optional(table, "name").unwrap_or_default();
-    let keys = ["controllable", "label", "signal", "when"];
     let nets = nets(form, table, loader);
     let others = Alphabet::default().union(nets.values().map(|net| &net.events));
-    let events = Events::read(form, table, &keys, &others);
+    let events = Events::read(form, table, &format::SIGNAL_EVENT, &others);
     check_signals(form, &events.signals);
     let addresses = read_addresses(form, table);
     let [plants, specifications, supervisors] = ROLES.map(|role| {
         let read = form.list(table, role, |form, component, place| {
-            match component.get("net").filter(|_| role == plant) {
+            match component.get("net").filter(|_| role == ROLES[0]) {
                 Some(value) => {
-                    form.check_keys(component, &["net"], "a plant that is a net");
+                    form.check_keys(component, &format::NET_PLANT);
                     let net = nets.get(&value.span().start);
                     net.map_or_else(Vec::new, |net| plants_of(form, net, value.span()))
                 }

@@ -14,7 +14,7 @@ use understudy_ladder::Name;
 use super::net::Condition;
 use crate::form::{Form, Word};
 use crate::ladder::{ILLEGAL_NAME, When, is_legal};
-use understudy_diagnostic::Diagnostic;
+use understudy_text::Diagnostic;
 
 /// Brackets nest no deeper.
 const MAXIMUM_NESTING: usize = 64;

@@ -208,7 +208,7 @@ fn describe_transition(transition: &NetTransition) -> Vec<String> {
         lines.push(condition);
     }
     if let Some(delay) = transition.delay {
-        lines.push(format!("after {}", understudy_ladder::time_text(delay)));
+        lines.push(format!("after {}", understudy_text::duration::text(delay)));
     }
     lines
 }

@@ -33,14 +33,15 @@
 use std::collections::HashMap;
 
 use toml::de::DeTable;
-use understudy_diagnostic::{Diagnostic, has_errors};
 use understudy_ladder::{MAXIMUM_PRESET_VALUE, Name};
+use understudy_text::{Diagnostic, has_errors};
 
 use super::condition::parse_condition;
 use super::net::{Action, Arc, Net, NetError, NetTransition, Place};
 use crate::Alphabet;
 use crate::events::Events;
 use crate::form::{self, CODES, Form, Word, split, trimmed};
+use crate::format;
 use crate::ladder::{ILLEGAL_NAME, Located, is_legal, read_addresses};
 
 /// The most tokens that a file gives a place, and the heaviest arc.
@@ -78,16 +79,10 @@ pub fn read_net(text: &str) -> ReadNet {
 }
 
 fn read_file(form: &mut Form<'_>, table: &DeTable) -> Option<NetFile> {
-    let keys = ["name", "events", "place", "transition", "addresses"];
-    form.check_keys(table, &keys, "a net");
+    form.check_keys(table, &format::NET_FILE);
     let end = form.text.trim_end().len();
     let name = form.name(table, "name", "a net", &(end..end));
-    let events = Events::read(
-        form,
-        table,
-        &["controllable", "label"],
-        &Alphabet::default(),
-    );
+    let events = Events::read(form, table, &format::EVENT, &Alphabet::default());
     let addresses = read_addresses(form, table);
     let mut names = Vec::new();
     let places = form.list(table, "place", |form, entry, span| {
@@ -131,17 +126,7 @@ impl Numbers {
         name: &Name,
         events: &Events,
     ) -> NetTransition {
-        let keys = [
-            "name",
-            "event",
-            "takes",
-            "gives",
-            "inhibited_by",
-            "enabled_by",
-            "when",
-            "after",
-        ];
-        form.check_keys(entry, &keys, "a transition");
+        form.check_keys(entry, &format::TRANSITION);
         let label = match form.optional(entry, "event") {
             Some(event) => events.find(form, &(event.as_str(), event.span())),
             None => events.get(name),
@@ -253,8 +238,7 @@ fn report(form: &mut Form<'_>, error: &NetError, names: &[Name]) {
 }
 
 fn place(form: &mut Form<'_>, entry: &DeTable, span: &form::Place) -> Place {
-    let keys = ["name", "tokens", "capacity", "level", "impulse"];
-    form.check_keys(entry, &keys, "a place");
+    form.check_keys(entry, &format::PLACE);
     let name = form.optional(entry, "name").unwrap_or_default();
     let mut actions = signals(form, entry, "level", Action::Level);
     actions.extend(signals(form, entry, "impulse", Action::Impulse));

@@ -13,8 +13,8 @@ mod rungs;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use understudy_diagnostic::{Diagnostic, has_errors};
 use understudy_ladder::{Name, Program};
+use understudy_text::{Diagnostic, has_errors};
 
 use super::explore::ExplorationError;
 use super::net::Net;
@@ -108,7 +108,7 @@ pub fn to_ladder(
     let ladder = Maker::new(net, supervisors, &bounds).make();
     let mut found = understudy_ladder::check(&ladder.program);
     if has_errors(&found) {
-        found.retain(|found| found.severity == understudy_diagnostic::Severity::Error);
+        found.retain(|found| found.severity == understudy_text::Severity::Error);
         return Err(HybridError::Invalid(found));
     }
     Ok(ladder)

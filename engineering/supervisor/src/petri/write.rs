@@ -1,6 +1,6 @@
 use std::fmt::Write as _;
 
-use understudy_ladder::time_text;
+use understudy_text::duration;
 
 use super::net::{Action, Arc, Net, NetTransition};
 use super::read::NetFile;
@@ -81,7 +81,7 @@ fn write_transition(text: &mut String, file: &NetFile, net: &Net, transition: &N
         let _ = writeln!(text, "when = {}", quoted(&condition));
     }
     if let Some(delay) = transition.delay {
-        let _ = writeln!(text, "after = {}", quoted(&time_text(delay)));
+        let _ = writeln!(text, "after = {}", quoted(&duration::text(delay)));
     }
 }
 

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::LowerError;
+use understudy_text::Diagnostic;
 
 use crate::Label;
 

@@ -1,11 +1,11 @@
 //! The two formats: what is accepted, and everything that is wrong in one run.
 
 use insta::assert_snapshot;
-use understudy_diagnostic::{Diagnostic, Report};
 use understudy_supervisor::ads::Vocal;
 use understudy_supervisor::{
     Alphabet, Automaton, Event, Label, Model, State, read_ads, read_model, write_ads, write_model,
 };
+use understudy_text::{Diagnostic, Report};
 
 use crate::models::{MODELS, Model as Reference};
 

@@ -12,9 +12,9 @@
 
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{Coil, CoilKind, Element, LowerError, Program, Write, visit};
 use understudy_logic::Circuit;
+use understudy_text::Diagnostic;
 
 use super::questions::{Questions, Target};
 use super::search::{Found, Search};

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
+use understudy_text::Diagnostic;
 
 /// What a [`Token`] is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -10,7 +10,7 @@
 //!
 //! A line that cannot be read is reported and left out; the lines behind it are read all the same.
 
-use understudy_diagnostic::Diagnostic;
+use understudy_text::Diagnostic;
 
 use super::lexer::{Sign, Token, tokens};
 use super::{Formula, MAXIMUM_NESTING, MAXIMUM_SCANS, Named, Path, Property};

@@ -10,10 +10,6 @@ use understudy_verification::program::{Bounds, Remarks, Subject};
 use understudy_verification::symbolic::replays;
 use understudy_verification::{Shown, draw_runs};
 
-#[path = "../../../../programs/ladder/tests/ladder/random.rs"]
-#[allow(dead_code, reason = "made for the tests of another crate")]
-pub(crate) mod random;
-
 const PERIOD: Duration = Duration::from_millis(100);
 
 fn remarks(program: &Program) -> (Subject, Remarks) {
@@ -244,7 +240,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(60))]
     #[test]
     fn remarks_are_right(seed: u64) {
-        let mut program = random::random_program(seed, 3);
+        let mut program = understudy_testing::random::random_program(seed, 3);
         // Edge coils and blocks only make the states more.
         for coil in program.rungs.iter_mut().flat_map(|rung| &mut rung.coils) {
             coil.kind = match coil.kind {

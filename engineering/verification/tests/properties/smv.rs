@@ -10,7 +10,7 @@ use understudy_verification::property::read_one;
 use understudy_verification::smv;
 use understudy_verification::symbolic::resolve;
 
-use crate::remarks::random::random_program;
+use understudy_testing::random::random_program;
 
 /// Words that no signal may have, of those that a ladder's names could be.
 const RESERVED: [&str; 24] = [

@@ -5,7 +5,7 @@ mod signs;
 use std::fmt::Write as _;
 
 use understudy_journal::source_word;
-use understudy_ladder::escaped;
+use understudy_text::markup::escaped;
 use understudy_wire::Source;
 
 use super::{Applied, Film};

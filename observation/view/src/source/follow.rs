@@ -13,8 +13,8 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
-use understudy_diagnostic::shortened;
 use understudy_journal::{Record, closed_segments};
+use understudy_text::shortened;
 
 use super::Trouble;
 use super::progress::Progress;

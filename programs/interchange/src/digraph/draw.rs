@@ -3,10 +3,11 @@
 use std::collections::HashMap;
 use std::fmt::Write;
 
-use understudy_ladder::{ContactKind, Program, time_text};
+use understudy_ladder::{ContactKind, Program};
+use understudy_text::duration;
+use understudy_text::markup::escaped;
 
 use super::graph::{Digraph, Edge, LEFT, Label, STEP_X, Vertex, digraphs};
-use super::write::escaped;
 
 const RADIUS: f64 = 13.0;
 const MARGIN: f64 = 60.0;
@@ -181,7 +182,7 @@ fn draw_edge(body: &mut String, edge: &Edge, from: Vertex, to: Vertex, below: f6
     }
 }
 
-/// What stands at an edge, and whether a bar stands over it, as the paper has it for normally closed contacts.
+/// The text at an edge, and whether it has a bar above, which marks a normally closed contact in the paper.
 fn words(label: &Label) -> (String, bool) {
     match label {
         Label::Contact(ContactKind::NormallyClosed, name) => (name.to_string(), true),
@@ -191,7 +192,7 @@ fn words(label: &Label) -> (String, bool) {
             (format!("{counter}.CV {sign} {}", comparison.value), false)
         }
         Label::Block(name, kind) => {
-            let time = kind.preset_time().map(time_text);
+            let time = kind.preset_time().map(duration::text);
             let preset = time.or(kind.preset_value().map(|value| value.to_string()));
             let preset = preset
                 .map(|preset| format!(" {preset}"))

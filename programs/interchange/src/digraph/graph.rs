@@ -152,7 +152,7 @@ impl Drawing {
         self.finish(graph, height(&rung.network).max(rung.coils.len()));
     }
 
-    /// The elements of `series` from the vertex `from`, which stands at `place` (column, row); the last one leads to `to`, or to a vertex
+    /// The elements of `series` from the vertex `from` at `place` (column, row); the last one leads to `to`, or to a vertex
     /// of its own. Answers with the last vertex and its column.
     fn series(
         &mut self,

@@ -2,10 +2,10 @@
 
 use std::collections::{HashMap, HashSet};
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{
-    Address, Area, KEYWORDS, MAXIMUM_NAME_LENGTH, Name, Program, Signal, parse_address,
+    Address, Area, KEYWORDS, Name, Program, Signal, legal_name, parse_address,
 };
+use understudy_text::Diagnostic;
 
 /// An edge's symbol and what it is used for.
 pub(super) struct Use {
@@ -48,25 +48,11 @@ impl Names {
 }
 
 fn legal(name: &str) -> String {
-    let parts = name.split('.').filter(|part| !part.is_empty()).map(|part| {
-        let change = |character: char| {
-            if character.is_alphanumeric() {
-                character
-            } else {
-                '_'
-            }
-        };
-        part.chars().map(change).collect::<String>()
-    });
-    let mut legal = parts.collect::<Vec<_>>().join(".");
-    if !legal.starts_with(|first: char| first.is_alphabetic() || first == '_') {
-        legal.insert(0, '_');
-    }
+    let mut legal = legal_name(name);
     if KEYWORDS.contains(&legal.as_str()) {
         legal.push('_');
     }
-    let short: String = legal.chars().take(MAXIMUM_NAME_LENGTH - 8).collect();
-    short.trim_end_matches('.').to_owned()
+    legal
 }
 
 /// Declares what is used: what an output writes is an output, what is only read is an input.

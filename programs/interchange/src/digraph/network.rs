@@ -6,10 +6,10 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{
     Coil, CoilKind, Contact, ContactKind, Element, MAXIMUM_NESTING, Name, Rung, Series,
 };
+use understudy_text::Diagnostic;
 
 /// Branches in branches past which vertices become memory bits.
 const MAXIMUM_DEPTH: usize = MAXIMUM_NESTING - 2;
@@ -110,7 +110,7 @@ impl Shape {
         for edge in edges {
             if behind_outputs.contains(&edge.from) {
                 let message = format!(
-                    "vertex {} stands behind an output, and power goes no further",
+                    "vertex {} follows an output, where the power ends",
                     edge.from
                 );
                 found.push(Diagnostic::error("U1063", message, edge.span.clone()));

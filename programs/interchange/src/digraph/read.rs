@@ -6,10 +6,10 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use roxmltree::Node;
-use understudy_diagnostic::{Diagnostic, has_errors};
 use understudy_ladder::{
     Element, Feed, MAXIMUM_RUNGS, Name, Program, Rung, Series, Signal, check, visit,
 };
+use understudy_text::{Diagnostic, has_errors};
 
 use super::Reading;
 use super::infer::{Names, Use, contradictions, signals};
@@ -30,7 +30,7 @@ pub(super) fn read(text: &str) -> Reading {
     };
     if !has_errors(&reader.diagnostics) {
         let found = check(&program).into_iter();
-        let errors = found.filter(|found| found.severity == understudy_diagnostic::Severity::Error);
+        let errors = found.filter(|found| found.severity == understudy_text::Severity::Error);
         reader.diagnostics.extend(errors);
     }
     let mut diagnostics = reader.diagnostics;
@@ -54,7 +54,7 @@ impl Reader {
             .push(Diagnostic::error(code, message, span));
     }
 
-    /// Says which children and attributes of `node` nobody reads.
+    /// Reports the children and attributes of `node` that are not read.
     fn only(&mut self, node: Node<'_, '_>, elements: &[&str], attributes: &[&str]) {
         let mut found = Vec::new();
         for child in xml::elements(node) {
@@ -84,7 +84,7 @@ impl Reader {
     fn diagram(&mut self, root: Node<'_, '_>) -> Program {
         if root.tag_name().name() != "LadderDiagram" {
             let message = format!(
-                "a LadderDiagram is expected, and `{}` stands here",
+                "expected a LadderDiagram, found `{}`",
                 root.tag_name().name()
             );
             self.error("U1060", message, xml::start_tag(root));
@@ -159,7 +159,7 @@ impl Reader {
             other => {
                 self.error(
                     "U1061",
-                    format!("`{other}` is no initial value; 0 and 1 are"),
+                    format!("invalid initial value `{other}`: expected 0 or 1"),
                     initial.span(),
                 );
                 None

@@ -2,8 +2,10 @@
 
 use std::collections::HashMap;
 use std::fmt::Write;
+use understudy_text::markup::escaped;
 
-use understudy_ladder::{Address, Program, Signal, time_text};
+use understudy_ladder::{Address, Program, Signal};
+use understudy_text::duration;
 
 use super::graph::{Digraph, Edge, Label, digraphs, type_of};
 
@@ -123,7 +125,10 @@ fn write_edge(text: &mut String, edge: &Edge, addresses: &HashMap<&str, String>)
         }
         Label::Block(name, kind) => {
             let mut more = vec![("block", kind.word().to_owned())];
-            more.extend(kind.preset_time().map(|time| ("preset", time_text(time))));
+            more.extend(
+                kind.preset_time()
+                    .map(|time| ("preset", duration::text(time))),
+            );
             more.extend(
                 kind.preset_value()
                     .map(|value| ("preset", value.to_string())),
@@ -146,22 +151,4 @@ fn write_edge(text: &mut String, edge: &Edge, addresses: &HashMap<&str, String>)
         element(name, &content);
     }
     text.push_str("      </Edge>\n");
-}
-
-/// XML has no way to write control characters.
-pub(super) fn escaped(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            _ if character.is_control() || matches!(character, '\u{fffe}' | '\u{ffff}') => {
-                escaped.push('\u{fffd}')
-            }
-            _ => escaped.push(character),
-        }
-    }
-    escaped
 }

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS, shortened};
+use understudy_text::{Diagnostic, MAXIMUM_FINDINGS, shortened};
 
 /// The largest file.
 const MAXIMUM_BYTES: usize = 16 << 20;
@@ -223,10 +223,7 @@ impl<'a> Parser<'a> {
             } else {
                 self.error(
                     "U1071",
-                    format!(
-                        "a RUNG is expected, and `{}` stands here",
-                        shortened(line, 60)
-                    ),
+                    format!("expected a RUNG, found `{}`", shortened(line, 60)),
                     span,
                 );
             }
@@ -245,7 +242,10 @@ impl<'a> Parser<'a> {
         if period.is_none() {
             self.error(
                 "U1072",
-                format!("`{}` is no cycle time in microseconds", shortened(text, 60)),
+                format!(
+                    "invalid cycle time `{}`: expected microseconds",
+                    shortened(text, 60)
+                ),
                 span,
             );
         }
@@ -269,7 +269,10 @@ impl<'a> Parser<'a> {
                 }
                 None => self.error(
                     "U1071",
-                    format!("`{}` is no name with its pin", shortened(line, 60)),
+                    format!(
+                        "invalid pin `{}`: expected a name and its pin",
+                        shortened(line, 60)
+                    ),
                     span,
                 ),
             }
@@ -418,9 +421,9 @@ impl<'a> Parser<'a> {
                 } else {
                     let is_known = REFUSED.contains(&word);
                     let message = if is_known {
-                        format!("{word} is not taken")
+                        format!("{word} is not supported")
                     } else {
-                        format!("`{}` is no element that is known here", shortened(word, 60))
+                        format!("unknown element `{}`", shortened(word, 60))
                     };
                     self.error("U1073", message, span.clone());
                     return None;

@@ -10,7 +10,7 @@ use std::fmt::Write;
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
+use understudy_text::Diagnostic;
 
 use super::limits::limits;
 use super::parse::{Coil, Element, File, Kind};
@@ -30,7 +30,7 @@ impl Written {
     }
 }
 
-/// What a name of the file stands for.
+/// The meaning of a name of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Use {
     Bit,
@@ -149,7 +149,7 @@ impl Writer {
         unique
     }
 
-    /// The name in the text of a name in the file, which always stands for the same kind of thing.
+    /// The name in the text of a name in the file, which always has the same kind.
     fn name(&mut self, name: &str, wanted: Use, span: &Range<usize>) -> String {
         let known = match self.names.get(name) {
             Some(known) => known.clone(),
@@ -186,7 +186,7 @@ impl Writer {
         name
     }
 
-    /// A variable or a number that stands for itself.
+    /// A variable or a literal number.
     fn operand(&mut self, text: &str, span: &Range<usize>) -> String {
         match text.parse::<i64>() {
             Ok(value) if (-0x8000..0x8000).contains(&value) => value.to_string(),
@@ -209,7 +209,7 @@ impl Writer {
         name
     }
 
-    /// The power behind the elements; nobody needs it where they are `last` on their rung.
+    /// The power behind the elements; not needed where they are `last` on their rung.
     fn series(&mut self, series: &[Element], mut power: String, last: bool) -> String {
         let acting = series.iter().rposition(acts).map_or(0, |place| place + 1);
         let behind = series[acting..].iter();

@@ -1,4 +1,4 @@
-//! What stands in a PLCopen file, with its places, before anybody asks what it means.
+//! The content of a PLCopen file with its places, before its meaning is checked.
 
 mod objects;
 mod read;
@@ -22,7 +22,7 @@ pub(crate) struct Project {
     pub(crate) globals: Vec<Variable>,
     /// What runs: the tasks in the order of the file.
     pub(crate) instances: Vec<Instance>,
-    /// What the file has and nobody here asks for.
+    /// Content of the file that is not used.
     pub(crate) ignored: Vec<Ignored>,
     /// Written by a tool that declares no instances of blocks; it puts units where the schema has none.
     pub(crate) lacks_instances: bool,
@@ -156,7 +156,7 @@ pub(crate) struct Object {
     pub(crate) span: Range<usize>,
     /// Top left corner in thousandths of the file's unit; x, then y.
     pub(crate) position: (i64, i64),
-    /// `executionOrderId`; 0 is none.
+    /// `executionOrderId`; 0 where it is absent.
     pub(crate) order: u64,
     pub(crate) kind: Kind,
     /// What comes in, in the order of the file.

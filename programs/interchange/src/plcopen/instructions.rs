@@ -14,7 +14,7 @@
 use std::collections::HashSet;
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
+use understudy_text::Diagnostic;
 
 use super::plan::MAXIMUM_JUMPS;
 use super::statements::{OPERATORS, Statements};
@@ -175,7 +175,7 @@ impl List<'_, '_> {
     fn taken(&mut self, span: &Range<usize>) -> Option<Value> {
         self.is_used = true;
         if self.result.is_none() {
-            let message = "there is no result here: an LD is missing before it";
+            let message = "no result yet: an LD is missing before this instruction";
             self.error("U1017", message.into(), span.clone());
         }
         self.result.clone()

@@ -11,10 +11,10 @@ use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{
     Coil, CoilKind, Contact, ContactKind, Element, Name, Program, Rung, Series, Signal,
 };
+use understudy_text::Diagnostic;
 
 use self::calls::Pending;
 use self::scope::{Binding, Scope};
@@ -217,7 +217,7 @@ impl Drawing<'_> {
                     self.error("U1004", message, target.span());
                 }
                 Some(Binding::Other(_) | Binding::Time(_) | Binding::Number(_)) => {
-                    self.general(format!("`{target}` is no BOOL"), target.span());
+                    self.general(format!("`{target}` is not a BOOL"), target.span());
                 }
                 None => self.undefined(target),
             }

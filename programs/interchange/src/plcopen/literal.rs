@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use understudy_ladder::MAXIMUM_PRESET_TIME;
+use understudy_text::duration;
 
 /// `TRUE`, `FALSE`, `1`, `0`, `BOOL#1`, in any case.
 pub(crate) fn boolean(text: &str) -> Option<bool> {
@@ -42,58 +42,16 @@ pub(crate) fn integer(text: &str) -> Option<i64> {
 
 /// `T#1m30s`, `TIME#1.5s`, `t#250ms`: at most the longest preset.
 pub(crate) fn time(text: &str) -> Option<Duration> {
-    const UNITS: [(&str, u64); 7] = [
-        ("d", 86_400_000_000_000),
-        ("h", 3_600_000_000_000),
-        ("m", 60_000_000_000),
-        ("s", 1_000_000_000),
-        ("ms", 1_000_000),
-        ("us", 1_000),
-        ("ns", 1),
-    ];
     let text = text.trim();
     let rest = strip_prefix(strip_prefix(strip_prefix(text, "TIME#"), "T#"), "LTIME#");
-    if rest.len() == text.len() || rest.is_empty() {
-        return None;
-    }
-    let mut rest = rest.replace('_', "").to_ascii_lowercase();
-    let mut nanoseconds: u64 = 0;
-    let mut last = None;
-    while !rest.is_empty() {
-        let end = rest.find(|letter: char| letter.is_ascii_alphabetic())?;
-        let (number, behind) = rest.split_at(end);
-        let stop = behind
-            .find(|letter: char| !letter.is_ascii_alphabetic())
-            .unwrap_or(behind.len());
-        let place = UNITS
-            .iter()
-            .position(|(unit, _)| *unit == &behind[..stop])?;
-        if last.is_some_and(|last| last >= place) {
-            return None;
-        }
-        last = Some(place);
-        nanoseconds = nanoseconds.checked_add(scaled(number, UNITS[place].1)?)?;
-        rest = behind[stop..].to_owned();
-    }
-    let time = Duration::from_nanos(nanoseconds);
-    (time <= MAXIMUM_PRESET_TIME).then_some(time)
+    (rest.len() < text.len()).then(|| duration(rest))?
 }
 
-/// A decimal number of units in nanoseconds, exactly.
-fn scaled(number: &str, unit: u64) -> Option<u64> {
-    let (whole, part) = number.split_once('.').unwrap_or((number, ""));
-    let digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
-    if whole.is_empty() || part.len() > 9 || !digits(whole) || !digits(part) {
-        return None;
-    }
-    let whole = whole.parse::<u64>().ok()?.checked_mul(unit)?;
-    let scale = 10_u64.pow(u32::try_from(part.len()).ok()?);
-    let part = if part.is_empty() {
-        0
-    } else {
-        part.parse::<u64>().ok()?
-    };
-    whole.checked_add(u64::try_from(u128::from(part) * u128::from(unit) / u128::from(scale)).ok()?)
+/// The value of a literal of time behind its `T#`: as every other duration, in any case, with `_` between its parts.
+pub(crate) fn duration(value: &str) -> Option<Duration> {
+    let plain = value.replace('_', "").to_ascii_lowercase();
+    let is_standard = !plain.contains(' ') && !plain.contains("min");
+    is_standard.then(|| duration::parse(&plain).ok())?
 }
 
 fn strip_prefix<'a>(text: &'a str, prefix: &str) -> &'a str {
@@ -122,6 +80,14 @@ mod tests {
             ("T#1s1h", None),
             ("T#99999999999d", None),
             ("T#-1s", None),
+            ("T#1m_2.25s", Some(62_250_000)),
+            ("T#1M30S", Some(90_000_000)),
+            ("T#0ms", Some(0)),
+            ("T#1.s", None),
+            ("T#1.5", None),
+            ("T#101d", None),
+            ("T#1min", None),
+            ("T#1 s", None),
         ];
         for (text, microseconds) in times {
             assert_eq!(

@@ -12,8 +12,8 @@ mod walk;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Name;
+use understudy_text::Diagnostic;
 
 pub(crate) use self::jumps::MAXIMUM_JUMPS;
 use self::links::{Links, Source};

@@ -4,7 +4,7 @@ use understudy_ladder::Name;
 
 use super::document::Edge;
 
-/// What stands at an output of an object.
+/// The state of an output of an object.
 #[derive(Debug, Clone)]
 pub(crate) enum Power {
     Constant(bool),
@@ -130,7 +130,7 @@ impl Power {
     }
 }
 
-/// Branches that are not empty and differ. What some begin with alike stands before them once.
+/// Branches that are not empty and differ. A common beginning is before them once.
 fn join(series: Vec<Vec<Power>>) -> Power {
     let mut groups: Vec<(Power, Vec<Vec<Power>>)> = Vec::new();
     for mut parts in series {

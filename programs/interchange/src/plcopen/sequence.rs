@@ -8,8 +8,8 @@ mod structure;
 
 use std::collections::HashMap;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Name;
+use understudy_text::Diagnostic;
 
 pub(super) use self::structure::wired;
 use self::structure::{Structure, structure};
@@ -324,7 +324,7 @@ impl Chart<'_, '_, '_> {
                 });
             }
             _ => {
-                let message = format!("an action with the qualifier {qualifier} is not taken");
+                let message = format!("an action with the qualifier {qualifier} is not supported");
                 let span = action.qualifier.span();
                 let error = Diagnostic::error("U1010", message, span);
                 self.lowered.diagnostics.push(error);
@@ -383,7 +383,7 @@ impl Chart<'_, '_, '_> {
     }
 
     fn foreign(&mut self, what: &str, span: std::ops::Range<usize>) {
-        let message = format!("{what} is not taken");
+        let message = format!("{what} is not supported");
         let error = Diagnostic::error("U1010", message, span);
         self.lowered.diagnostics.push(error);
     }
@@ -406,7 +406,7 @@ impl Chart<'_, '_, '_> {
 }
 
 impl Statements<'_> {
-    /// A text of the file as it stands, but for the names of steps.
+    /// A text of the file as it is, except for the names of steps.
     fn verbatim(&mut self, text: &Passage) {
         let is_word = |letter: char| letter.is_alphanumeric() || matches!(letter, '_' | '.');
         let whole = text.as_str();

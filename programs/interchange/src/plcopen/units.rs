@@ -3,8 +3,8 @@
 
 use std::collections::HashMap;
 
-use understudy_diagnostic::{Diagnostic, Severity, has_errors};
 use understudy_ladder::{Name, Program};
+use understudy_text::{Diagnostic, Severity, has_errors};
 
 use super::document::{
     Body, Graph, Ignored, Language, Pou, PouKind, Project, Section, Variable, VariableType,
@@ -234,7 +234,7 @@ pub(crate) fn is_block(project: &Project, name: &str) -> bool {
 pub(crate) fn undeclared(project: &Project, instance: &Name, kind: &str) -> Diagnostic {
     let message = format!("the block `{instance}` is not declared");
     let (found, help) = if project.lacks_instances {
-        let message = format!("{message}; it is taken as a {kind} of its own");
+        let message = format!("{message}; it is read as a separate {kind}");
         (Diagnostic::warning("U1012", message, instance.span()), "")
     } else {
         (

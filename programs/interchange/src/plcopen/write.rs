@@ -1,6 +1,6 @@
 //! A program as PLCopen XML 2.01 that editors open and that compiles there to the same scan.
 //!
-//! Each rung stands below the one before it, between rails of its own, and its coils below each other, so that the order by y is
+//! Each rung is below the one before it, between rails of its own, and its coils below each other, so that the order by y is
 //! the order of the scan in every tool. Tools that write Structured Text ask a rung's contacts again for each coil, and call a block
 //! that nothing asks for after everything else; so a rung whose coils change what it reads gets a bit that keeps its power,
 //! and a block at the end of a rung gets a coil.

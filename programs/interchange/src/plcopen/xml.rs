@@ -5,8 +5,8 @@ mod passage;
 use std::ops::Range;
 
 use roxmltree::{Document, Node, ParsingOptions};
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Name;
+use understudy_text::Diagnostic;
 
 pub(crate) use passage::Passage;
 
@@ -19,7 +19,7 @@ pub const MAXIMUM_NODES: u32 = 1_000_000;
 /// The most elements within each other.
 pub const MAXIMUM_DEPTH: usize = 64;
 
-/// A tree within the bounds, or why there is none.
+/// A tree within the bounds, or the reason why the text is refused.
 #[expect(clippy::result_large_err, reason = "once for a file")]
 pub(crate) fn parse(text: &str) -> Result<Document<'_>, Diagnostic> {
     if text.len() > MAXIMUM_BYTES {
@@ -86,7 +86,7 @@ fn too_deep(root: Node<'_, '_>) -> Option<Range<usize>> {
     }
 }
 
-/// Where the start tag of an element stands: a whole element may be long.
+/// The place of the start tag of an element: a whole element may be long.
 pub(crate) fn start_tag(node: Node<'_, '_>) -> Range<usize> {
     let range = node.range();
     let text = &node.document().input_text()[range.clone()];
@@ -131,7 +131,7 @@ pub(crate) fn text(node: Node<'_, '_>) -> Passage {
     Passage::of(node)
 }
 
-/// The text of an element without white space around it; where there is none, at the element.
+/// The text of an element without white space around it; an empty text is placed at the element.
 pub(crate) fn word(node: Node<'_, '_>) -> Name {
     let whole = text(node);
     let trimmed = whole.as_str().trim();

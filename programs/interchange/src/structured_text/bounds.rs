@@ -9,8 +9,8 @@ use std::collections::BTreeSet;
 use std::ops::{Index, IndexMut};
 use std::rc::Rc;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Relation;
+use understudy_text::Diagnostic;
 
 use super::program::{Action, Kind, Number, Resolved, Role, Step, Truth, walk};
 

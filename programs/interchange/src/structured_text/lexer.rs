@@ -3,8 +3,10 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS};
 use understudy_ladder::MAXIMUM_NAME_LENGTH;
+use understudy_text::{Diagnostic, MAXIMUM_FINDINGS};
+
+use crate::plcopen::literal::duration;
 
 /// What one lexeme is.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -236,7 +238,7 @@ impl<'a> Lexer<'a> {
                     None => self.error(
                         "U1032",
                         format!(
-                            "`{text}` is no time, or one that is negative or longer than 100 days"
+                            "invalid duration `{text}`: expected a number with a unit, from 0 to 100 days"
                         ),
                         start,
                     ),
@@ -276,11 +278,7 @@ impl<'a> Lexer<'a> {
                     // A value of an enumeration with its type in front.
                     return Lexeme::Word(text.to_owned());
                 }
-                self.error(
-                    "U1032",
-                    format!("`{word}#{text}` is no literal that is known here"),
-                    start,
-                )
+                self.error("U1032", format!("unknown literal `{word}#{text}`"), start)
             }
         }
     }
@@ -312,7 +310,10 @@ impl<'a> Lexer<'a> {
                 let text = &self.text[start..self.place];
                 self.error(
                     "U1032",
-                    format!("`{text}` is no whole number up to {}", u32::MAX),
+                    format!(
+                        "invalid number `{text}`: expected a whole number up to {}",
+                        u32::MAX
+                    ),
                     start,
                 )
             }
@@ -320,57 +321,9 @@ impl<'a> Lexer<'a> {
     }
 }
 
-/// A duration such as `1m30s` or `1.5s`, the larger units first, without its `T#`.
-pub(super) fn duration(text: &str) -> Option<Duration> {
-    let plain: String = text.chars().filter(|next| *next != '_').collect();
-    let lower = plain.to_ascii_lowercase();
-    if !lower.contains('.') {
-        // A word of nothing is no time, and the ladder's own reader takes it for 0.
-        return understudy_ladder::parse_time(&lower).filter(|_| !lower.is_empty());
-    }
-    // Only the last, smallest unit may have a fraction.
-    let letters = lower.trim_end_matches(|next: char| next.is_ascii_alphabetic());
-    let unit = &lower[letters.len()..];
-    let begin = letters.rfind(|next: char| next.is_ascii_alphabetic());
-    let (before, last) = letters.split_at(begin.map_or(0, |place| place + 1));
-    let (whole, fraction) = last.split_once('.')?;
-    let whole = understudy_ladder::parse_time(&format!("{before}{whole}{unit}"))?;
-    let unit = understudy_ladder::parse_time(&format!("1{unit}"))?;
-    if fraction.is_empty()
-        || fraction.len() > 9
-        || !fraction.bytes().all(|digit| digit.is_ascii_digit())
-    {
-        return None;
-    }
-    let parts: u128 = fraction.parse().ok()?;
-    let scale = 10_u128.pow(u32::try_from(fraction.len()).ok()?);
-    let nanoseconds = unit.as_nanos() * parts / scale;
-    whole.checked_add(Duration::from_nanos(u64::try_from(nanoseconds).ok()?))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn check(text: &str, expected: Option<u64>) {
-        let found = duration(text).map(|time| u64::try_from(time.as_micros()).expect("small"));
-        assert_eq!(found, expected, "{text}");
-    }
-
-    #[test]
-    fn durations() {
-        check("300ms", Some(300_000));
-        check("1M30S", Some(90_000_000));
-        check("1.5s", Some(1_500_000));
-        check("1m_2.25s", Some(62_250_000));
-        check("0ms", Some(0));
-        check("", None);
-        check("1.s", None);
-        check("1.5", None);
-        check("3", None);
-        check("-3s", None);
-        check("101d", None);
-    }
 
     #[test]
     fn lexemes_and_comments() {

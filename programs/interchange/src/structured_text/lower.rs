@@ -1,6 +1,6 @@
 //! Steps to rungs.
 //!
-//! Invariant: after each step on the outermost list, every bit of a cell stands in its signal (or is known to be constant), so
+//! Invariant: after each step on the outermost list, every bit of a cell is in its signal (or is known to be constant), so
 //! a step is expressions over signals as they are before it, and becomes rungs that write what it assigns. A choice is
 //! executed in both ways on paper and joined bit by bit; so the scan of the rungs is the execution of the text.
 
@@ -9,9 +9,9 @@ mod rungs;
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{Name, Program, Relation};
 use understudy_logic::{Expression, Graph, Operation, Variable};
+use understudy_text::Diagnostic;
 
 use self::rungs::Rungs;
 use super::bounds::Interval;

@@ -8,8 +8,8 @@ mod statement;
 use std::collections::HashSet;
 use std::ops::Range;
 
-use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS};
 use understudy_ladder::Name;
+use understudy_text::{Diagnostic, MAXIMUM_FINDINGS};
 
 use super::lexer::{Lexeme, Placed, lex};
 use super::syntax::{File, Statement, Unit};
@@ -123,7 +123,7 @@ pub(super) fn parse_type(text: &str) -> (Option<super::syntax::TypeName>, Vec<Di
     }
 }
 
-/// One expression, as it stands for an initial value.
+/// One expression, as for an initial value.
 pub(super) fn parse_expression(text: &str) -> (super::syntax::Expression, Vec<Diagnostic>) {
     match Parser::new(text) {
         Ok(mut parser) => {
@@ -239,7 +239,7 @@ impl Parser {
         found
     }
 
-    /// Diagnoses what stands here in place of `what`; a lexeme that was diagnosed already is not said again.
+    /// Reports the lexeme found in place of `what`; a lexeme that was reported already is not reported again.
     fn expected(&mut self, what: &str) {
         if *self.peek() == Lexeme::Faulty {
             return;
@@ -256,11 +256,7 @@ impl Parser {
         };
         // What is missing at the end of a line is missing there.
         let span = self.span();
-        let finding = Diagnostic::error(
-            "U1034",
-            format!("{what} is expected, and {found} stands here"),
-            span,
-        );
+        let finding = Diagnostic::error("U1034", format!("expected {what}, found {found}"), span);
         self.diagnostics.push(finding);
     }
 
@@ -307,7 +303,7 @@ impl Parser {
         Some(read)
     }
 
-    /// Skips to behind the next semicolon, or to one of `words`, which is not taken.
+    /// Skips to behind the next semicolon, or to one of `words`, which is not consumed.
     fn recover(&mut self, words: &[&str]) {
         while *self.peek() != Lexeme::End && !self.at_any(words) {
             if self.take_sign(";") {

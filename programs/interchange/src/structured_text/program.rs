@@ -19,7 +19,7 @@ pub(super) enum Role {
     Pin,
     /// A bit that means something only where this execution has written it.
     Passing,
-    /// A bit that stands for the output of a timer, which the calls of the timer alone write.
+    /// A bit that represents the output of a timer, which the calls of the timer alone write.
     Held,
 }
 

@@ -17,8 +17,8 @@ use std::ops::Range;
 use std::rc::Rc;
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS};
 use understudy_ladder::{KEYWORDS, MAXIMUM_NAME_LENGTH, Name};
+use understudy_text::{Diagnostic, MAXIMUM_FINDINGS};
 
 use self::leave::Left;
 use self::types::Types;
@@ -34,7 +34,7 @@ pub(super) const MAXIMUM_STEPS: usize = 100_000;
 /// The most instances of blocks and calls of functions.
 const MAXIMUM_INSTANCES: usize = 20_000;
 
-/// What a name stands for in an instance.
+/// The meaning of a name in an instance.
 #[derive(Debug, Clone)]
 enum Entity {
     Cell(usize),
@@ -55,7 +55,7 @@ enum Entity {
 struct Instance {
     /// Which of the units.
     unit: usize,
-    /// The standard block that stands in a rung, in its place.
+    /// The standard block in a rung, in its place.
     native: Option<&'static str>,
     /// The timer that it is, where not every execution calls it once.
     timer: Option<usize>,
@@ -266,6 +266,6 @@ impl Resolver {
             .declarations
             .iter()
             .map(|declaration| declaration.name.as_str());
-        understudy_diagnostic::spelling::nearest(name, known)
+        understudy_text::spelling::nearest(name, known)
     }
 }

@@ -118,7 +118,7 @@ pub(crate) enum StatementKind {
     ),
     For(Box<Loop>),
     Leave(Leave),
-    /// Understood, and not taken: what it is.
+    /// Understood, and unsupported: what it is.
     Refused(&'static str),
     /// Not understood and already diagnosed, or nothing but a semicolon.
     Nothing,

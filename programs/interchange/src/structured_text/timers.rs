@@ -1,7 +1,7 @@
 //! Timers that are called under a condition, or more than once in an execution.
 //!
 //! A timer of compiled code keeps the moment of its start and looks at the clock when it is called: where it is not called, its
-//! output stays, and the time goes on. A timer of a ladder counts scans and has to see each of them. So such a timer becomes
+//! output stays, and the time goes on. A timer of a ladder counts scans and must see each of them. So such a timer becomes
 //! a *clock*, a block that every scan passes, and bits that its calls write:
 //!
 //! ```text
@@ -24,8 +24,8 @@ use std::collections::{BTreeMap, BTreeSet, HashSet, VecDeque};
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::BlockKind;
+use understudy_text::Diagnostic;
 
 use super::bounds::Interval;
 use super::program::{Action, Cell, Kind, Resolved, Role, Step, Timer, Truth, walk};
@@ -169,7 +169,7 @@ impl Placing {
                     let message = format!(
                         "the {word} `{name}` may be called more than once in one execution"
                     );
-                    let help = "call it in the branches of one IF or CASE, or once with the condition in its IN; only IN := FALSE may come besides, for a TON";
+                    let help = "call it in the branches of one IF or CASE, or once with the condition in its IN; a TON may also be called with IN := FALSE";
                     self.error("U1050", message, calls.span.clone(), help);
                 }
                 known.running += calls.running;

@@ -1,7 +1,7 @@
 //! Whether two circuits do the same: a proof by induction where their registers correspond, and scans.
 //!
 //! The proof: corresponding registers begin with the same value, and as long as they hold the same, every output is the same and so are their
-//! next values, whatever the inputs are. It covers every state in which no counter is above its preset, which is proved of them besides; also
+//! next values, whatever the inputs are. It covers every state in which no counter is above its preset, which is proved separately; also
 //! states that no scan of a test would reach.
 
 use std::collections::{HashMap, HashSet};

@@ -8,14 +8,15 @@ use proptest::prelude::*;
 use understudy_interchange::digraph::{digraphs, draw_svg, read, write};
 use understudy_ladder::{Interpreter, Program, parse, print};
 
-use support::{Dice, PERIOD, findings};
+use support::{PERIOD, findings};
 use understudy_logic::Running;
+use understudy_testing::random::Dice;
 
 /// The program of an XML without errors.
 fn program(xml: &str) -> Program {
     let reading = read(xml);
     assert!(
-        !understudy_diagnostic::has_errors(&reading.diagnostics),
+        !understudy_text::has_errors(&reading.diagnostics),
         "{:#?}\n{xml}",
         reading.diagnostics
     );
@@ -113,14 +114,9 @@ proptest! {
 
     #[test]
     fn random_ladders_come_back(seed: u64) {
-        check_round_trip(&random::random_program(seed, 6), seed);
+        check_round_trip(&understudy_testing::random::random_program(seed, 6), seed);
     }
 }
-
-/// The ladder crate's own random programs.
-#[path = "../../../ladder/tests/ladder/random.rs"]
-#[allow(dead_code, reason = "its own tests use the rest")]
-mod random;
 
 /// Every element is one edge, and every graph begins at the left rail.
 #[test]

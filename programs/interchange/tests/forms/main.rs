@@ -7,9 +7,6 @@ use understudy_ladder::print;
 
 use crate::reading::reading;
 
-#[allow(dead_code, reason = "parts of it are for others")]
-#[path = "../../../ladder/tests/ladder/random.rs"]
-mod random;
 #[path = "../shared/reading.rs"]
 mod reading;
 
@@ -111,7 +108,7 @@ fn every_word_of_a_ladder_counts() {
     let text = include_str!("../../../ladder/tests/ladder/every-element.ladder");
     check(Format::Ladder, text, words(text).into_iter(), &[]);
     for seed in 0..6 {
-        let text = print(&random::random_program(seed, 5));
+        let text = print(&understudy_testing::random::random_program(seed, 5));
         check(Format::Ladder, &text, words(&text).into_iter(), &[]);
     }
 }
@@ -119,7 +116,7 @@ fn every_word_of_a_ladder_counts() {
 #[test]
 fn every_element_of_a_digraph_counts() {
     for seed in 0..6 {
-        let text = digraph::write(&random::random_program(seed, 5));
+        let text = digraph::write(&understudy_testing::random::random_program(seed, 5));
         let document = roxmltree::Document::parse(&text).expect("XML");
         let is_drawn = |node: &roxmltree::Node<'_, '_>| {
             let drawing = ["Vertices", "startX", "startY"];

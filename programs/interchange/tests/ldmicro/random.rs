@@ -7,8 +7,8 @@ use proptest::prelude::*;
 use understudy_interchange::ldmicro::read;
 use understudy_ladder::Interpreter;
 
-use crate::support::Dice;
 use understudy_logic::Running;
+use understudy_testing::random::Dice;
 
 enum Element {
     Contacts(&'static str, bool),

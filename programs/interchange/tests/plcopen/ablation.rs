@@ -3,13 +3,13 @@
 use std::ops::Range;
 
 use roxmltree::{Document, Node};
-use understudy_diagnostic::Severity;
 use understudy_interchange::Format;
 use understudy_interchange::plcopen::{read, write};
+use understudy_text::Severity;
 
-use crate::random::random_program;
 use crate::reading::reading;
 use crate::support::PERIOD;
+use understudy_testing::random::random_program;
 
 /// Elements that only say how a program is drawn; a wire is the `connection` at its end, and the right rail takes no power.
 const LAYOUT: [&str; 6] = [

@@ -2,8 +2,8 @@
 
 use understudy_interchange::plcopen::{MAXIMUM_BYTES, read, write};
 
-use crate::random::{Dice, random_program};
 use crate::support::{PERIOD, findings};
+use understudy_testing::random::{Dice, random_program};
 
 const START: &str = r#"<project xmlns="http://www.plcopen.org/xml/tc6_0201"><types><pous><pou name="p" pouType="program"><interface><localVars>
 <variable name="a" address="%IX0.0"><type><BOOL/></type></variable><variable name="y" address="%QX0.0"><type><BOOL/></type></variable>

@@ -8,8 +8,8 @@ use understudy_ladder::print;
 use understudy_logic::Running;
 
 use crate::meaning::{file, variables};
-use crate::random::Dice;
 use crate::support::{PERIOD, findings, program};
+use understudy_testing::random::Dice;
 
 const INPUTS: [&str; 3] = ["i0", "i1", "i2"];
 const OUTPUTS: [&str; 3] = ["q0", "q1", "q2"];

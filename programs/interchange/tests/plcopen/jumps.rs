@@ -7,9 +7,9 @@ use understudy_interchange::plcopen::read;
 use understudy_ladder::print;
 
 use crate::meaning::{RAIL, block, coil, contact, file, value, variables};
-use crate::random::Dice;
 use crate::support::{PERIOD, findings, program};
 use understudy_logic::Running;
+use understudy_testing::random::Dice;
 
 const INPUTS: [&str; 3] = ["i0", "i1", "i2"];
 const OUTPUTS: [&str; 3] = ["q0", "q1", "q2"];

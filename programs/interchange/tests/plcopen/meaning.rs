@@ -6,9 +6,9 @@ use std::fmt::Write;
 use understudy_interchange::plcopen::read;
 use understudy_ladder::print;
 
-use crate::random::Dice;
 use crate::support::{PERIOD, data, findings, program};
 use understudy_logic::Running;
+use understudy_testing::random::Dice;
 
 /// One contact or coil of a random ladder.
 pub(crate) struct Cell {

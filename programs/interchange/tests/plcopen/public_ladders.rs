@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use understudy_diagnostic::Severity;
 use understudy_interchange::plcopen::read;
+use understudy_text::Severity;
 
 use crate::support::{PERIOD, data};
 

@@ -7,9 +7,9 @@ use understudy_interchange::plcopen::{read, write};
 use understudy_ladder::{Program, from_circuit, parse};
 use understudy_logic::Circuit;
 
-use crate::random::random_program;
 use crate::support::{PERIOD, findings, outputs, program, xmllint};
 use understudy_logic::Running;
+use understudy_testing::random::random_program;
 
 fn check(original: &Program, seed: u64) {
     let text = write(original, PERIOD);

@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use understudy_diagnostic::{Report, Severity};
 use understudy_interchange::plcopen::{Reading, read};
 use understudy_ladder::Program;
 use understudy_logic::{Circuit, Running};
 use understudy_testing::skip;
+use understudy_text::{Report, Severity};
 
-use crate::random::Dice;
+use understudy_testing::random::Dice;
 
 pub(crate) const PERIOD: Duration = Duration::from_millis(100);
 
@@ -32,7 +32,7 @@ pub(crate) fn findings(text: &str, reading: &Reading) -> Vec<String> {
         text: text.to_owned(),
         diagnostics: Vec::new(),
     };
-    let line = |found: &understudy_diagnostic::Diagnostic| {
+    let line = |found: &understudy_text::Diagnostic| {
         let severity = match found.severity {
             Severity::Error => "error",
             Severity::Warning => "warning",

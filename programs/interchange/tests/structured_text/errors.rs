@@ -6,7 +6,7 @@ use crate::support::findings;
 
 fn check(text: &str) -> String {
     let reading = read(text);
-    if understudy_diagnostic::has_errors(&reading.diagnostics) {
+    if understudy_text::has_errors(&reading.diagnostics) {
         assert!(reading.programs.is_empty());
     }
     findings(text, reading.diagnostics)

@@ -7,7 +7,7 @@ fn codes(text: &str) -> Vec<&'static str> {
     let reading = read(text);
     let mut codes: Vec<_> = reading.diagnostics.iter().map(|found| found.code).collect();
     assert_eq!(
-        understudy_diagnostic::has_errors(&reading.diagnostics),
+        understudy_text::has_errors(&reading.diagnostics),
         reading.programs.is_empty()
     );
     codes.dedup();

@@ -8,8 +8,9 @@ use understudy_ladder::Interpreter;
 
 use self::execution::Execution;
 use self::text::Text;
-use crate::support::{Dice, PERIOD, program};
+use crate::support::{PERIOD, program};
 use understudy_logic::Running;
+use understudy_testing::random::Dice;
 
 fn check(seed: u64) {
     let mut dice = Dice::new(seed);

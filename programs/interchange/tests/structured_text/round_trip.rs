@@ -4,8 +4,9 @@ use proptest::prelude::*;
 use understudy_ladder::circuit_as_structured_text;
 use understudy_logic::{Circuit, CircuitBuilder};
 
-use crate::support::{Dice, PERIOD, program};
+use crate::support::{PERIOD, program};
 use understudy_logic::Running;
+use understudy_testing::random::Dice;
 
 /// A circuit with all operations and registers that read each other.
 fn random_circuit(seed: u64) -> Circuit {
@@ -84,7 +85,7 @@ proptest! {
 
     #[test]
     fn random_ladders_come_back(seed: u64) {
-        let ladder = crate::random_ladder::random_program(seed, 6);
+        let ladder = understudy_testing::random::random_program(seed, 6);
         check(&ladder.lower(PERIOD).expect("a sound program"), seed);
     }
 }

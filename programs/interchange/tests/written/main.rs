@@ -1,8 +1,5 @@
 //! Programs in every form that is written: what was written does the same, scan by scan, and holds the same declarations.
 
-#[path = "../../../ladder/tests/ladder/random.rs"]
-#[allow(dead_code, reason = "the generator of the ladder's own tests")]
-mod random;
 mod structured_text;
 
 use std::path::{Path, PathBuf};
@@ -11,7 +8,7 @@ use std::time::Duration;
 use understudy_interchange::{Format, Reading, read, write};
 use understudy_ladder::{Interpreter, Program, parse};
 
-use crate::random::{Dice, random_program};
+use understudy_testing::random::{Dice, random_program};
 
 const PERIOD: Duration = Duration::from_millis(100);
 

@@ -1,7 +1,7 @@
 //! What becomes of the reads, writes and undefined names that the check has met.
 
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::nearest;
+use understudy_text::Diagnostic;
+use understudy_text::spelling;
 
 use super::{Checker, Role, Symbol};
 
@@ -37,8 +37,8 @@ impl Checker<'_> {
                 ))
             } else if count >= MAXIMUM_SUGGESTIONS {
                 diagnostic
-            } else if let Some(near) = nearest(name, names) {
-                diagnostic.with_help(format!("did you mean `{near}`?"))
+            } else if let Some(help) = spelling::question(name, names) {
+                diagnostic.with_help(help)
             } else {
                 diagnostic.with_help(format!("declare it, such as `input {name}`"))
             };

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::fmt::Write;
+use understudy_text::markup::escaped;
 
 use crate::flow::Evaluation;
 use crate::layout::{Frame, Shape, rung};
@@ -369,21 +370,4 @@ fn meaning(signal: &Signal) -> String {
         .map(|initial| format!("= {}", u8::from(initial)));
     let parts = [address, initial, signal.description.clone()];
     parts.into_iter().flatten().collect::<Vec<_>>().join("  ")
-}
-
-/// Text as SVG and XML hold it.
-pub fn escaped(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            // XML has no way to write the other control characters.
-            _ if character.is_control() => escaped.push('\u{fffd}'),
-            _ => escaped.push(character),
-        }
-    }
-    escaped
 }

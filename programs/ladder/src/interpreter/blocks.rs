@@ -140,7 +140,7 @@ impl BlockState {
         })
     }
 
-    /// CV; 0 for what is no counter.
+    /// CV; 0 for a block that is not a counter.
     pub(super) fn counter_value(&self) -> u16 {
         match self.0 {
             Memory::Counter(counter) => counter.value,

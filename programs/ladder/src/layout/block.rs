@@ -1,8 +1,10 @@
 //! Where the parts of a function block stand.
 
+use understudy_text::duration;
+
 use super::{Piece, Shape, length, series, value_of, wire};
 use crate::flow::{ElementFlow, Flows, Reading};
-use crate::print::{series_text, time_text};
+use crate::print::series_text;
 use crate::program::Block;
 
 /// ```text
@@ -23,7 +25,7 @@ pub(super) fn block_piece<'e>(
         block
             .kind
             .preset_time()
-            .map(|time| (format!("PT {}", time_text(time)), String::new())),
+            .map(|time| (format!("PT {}", duration::text(time)), String::new())),
     );
     rows.extend(
         block
@@ -103,6 +105,6 @@ fn held(reading: Reading) -> Option<(String, String)> {
     match reading {
         Reading::Nothing | Reading::Bit(_) => None,
         Reading::Number(number) => Some(("CV".to_owned(), format!("={number}"))),
-        Reading::Time(time) => Some(("ET".to_owned(), format!("={}", time_text(time)))),
+        Reading::Time(time) => Some(("ET".to_owned(), format!("={}", duration::text(time)))),
     }
 }

@@ -38,7 +38,7 @@ impl Tapped {
     }
 }
 
-/// What a block shows besides its power, taken before it is evaluated and after.
+/// The values of a block in addition to its power, before and after its evaluation.
 pub(super) struct BlockTap(Option<Number>);
 
 impl<'a> Lowering<'a> {

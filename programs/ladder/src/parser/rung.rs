@@ -3,8 +3,8 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::nearest;
+use understudy_text::Diagnostic;
+use understudy_text::spelling::nearest;
 
 use super::{MAXIMUM_NESTING, Parser};
 use crate::lexer::Lexeme;
@@ -34,7 +34,7 @@ impl Parser {
             let behind = self.series(0);
             if !behind.is_empty() {
                 self.diagnostics.push(
-                    Diagnostic::error("U0118", "an element stands behind a coil", place)
+                    Diagnostic::error("U0118", "an element follows a coil", place)
                         .with_help("coils come last; begin a new rung for what follows"),
                 );
             }
@@ -85,7 +85,7 @@ impl Parser {
             Lexeme::Sign("|") => {
                 self.error(
                     "U0102",
-                    "`|` stands outside of brackets".into(),
+                    "`|` outside of brackets".into(),
                     "expected an element",
                 );
                 self.advance();
@@ -186,7 +186,9 @@ impl Parser {
                 self.diagnostics.push(
                     Diagnostic::error("U0118", "a branch is empty", place.start..self.span().end)
                         .with_label("expected a contact")
-                        .with_help("a wire beside other branches makes them idle; leave them out"),
+                        .with_help(
+                            "a wire in parallel with other branches makes them idle; remove them",
+                        ),
                 );
             }
             if !self.is_sign("|") {

@@ -18,7 +18,7 @@ pub(crate) struct Named {
 }
 
 impl Named {
-    /// Names for `circuit`; `suffix` stands behind a register's name in that of its held new value.
+    /// Names for `circuit`; `suffix` follows a register's name in that of its held new value.
     pub(crate) fn new(circuit: &Circuit, plan: &Plan<'_>, namer: &mut Namer, suffix: &str) -> Self {
         let mut name = |wanted: &str| namer.name(wanted);
         let inputs = circuit.inputs().iter().map(|input| name(input)).collect();
@@ -80,9 +80,9 @@ impl Target {
         match self {
             Self::Shared(_) => "expressions that are used more than once, or long",
             Self::Output(_) => "outputs",
-            Self::Register(_) => "the new state; nobody reads the old value of these any more",
+            Self::Register(_) => "the new state; the old values of these are not read again",
             Self::Next(_) => "the new state, held until all of it is known",
-            Self::Takeover(_) => "the new state is taken over",
+            Self::Takeover(_) => "the new state is stored",
         }
     }
 }

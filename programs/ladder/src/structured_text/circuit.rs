@@ -12,7 +12,7 @@ use crate::plan::{Named, Operand, Plan, Target};
 
 /// A PROGRAM whose execution is one step of `circuit`, and the task that executes it every `period`.
 ///
-/// Inputs and outputs are VAR_INPUT and VAR_OUTPUT. Names become identifiers of the standard; the name in the circuit stands behind one that
+/// Inputs and outputs are VAR_INPUT and VAR_OUTPUT. Names become identifiers of the standard; the name in the circuit follows one that
 /// was changed.
 pub fn circuit_as_structured_text(circuit: &Circuit, period: Duration) -> String {
     let plan = Plan::new(circuit, false);
@@ -106,7 +106,7 @@ impl Writer<'_> {
         }
     }
 
-    /// Writes an expression that stands where only `least` or a tighter binding needs no brackets.
+    /// Writes an expression where only `least` or a tighter binding needs no brackets.
     fn expression(&self, expression: Expression, least: u8, words: &mut Vec<String>) {
         match self.plan.operand(expression) {
             Operand::Shared(number) => words.push(self.names.shared[number].clone()),

@@ -16,7 +16,7 @@ use crate::program::{
 /// A PROGRAM whose execution is one scan of `program`, and the task that executes it every `period`.
 ///
 /// Timers, counters, latches and triggers are instances of the standard function blocks; edge contacts and edge coils are instances of R_TRIG and
-/// F_TRIG. Names become identifiers of the standard; the ladder's name stands in the comment behind one that was changed.
+/// F_TRIG. Names become identifiers of the standard; the ladder's name is in the comment behind one that was changed.
 pub fn structured_text(program: &Program, period: Duration) -> String {
     let mut writer = Writer::new(program);
     for rung in &program.rungs {

@@ -3,11 +3,11 @@
 use std::fmt::Write;
 
 use proptest::prelude::*;
-use understudy_diagnostic::{Report, Severity};
 use understudy_ladder::{
     KEYWORDS, MAXIMUM_NAME_LENGTH, MAXIMUM_NESTING, MAXIMUM_RUNGS, MAXIMUM_TEXT_BYTES, draw_text,
     parse, print,
 };
+use understudy_text::{Report, Severity};
 
 /// All diagnostics as lines: place, severity, code, message, label, related places, help.
 fn report(text: &str) -> String {

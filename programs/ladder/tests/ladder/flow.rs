@@ -9,8 +9,8 @@ use understudy_ladder::{
 };
 use understudy_logic::{Scan, Scratch};
 
-use crate::random::{Dice, random_program};
 use crate::support::PERIOD;
+use understudy_testing::random::{Dice, random_program};
 
 /// Follows the power through `series`; answers with the power behind it.
 fn follow(series: &Series, power: bool, flows: &mut std::slice::Iter<'_, ElementFlow>) -> bool {

@@ -4,10 +4,10 @@ use proptest::prelude::*;
 use understudy_ladder::{circuit_as_structured_text, from_circuit, parse, print, structured_text};
 use understudy_logic::{Circuit, CircuitBuilder};
 
-use crate::random::{Dice, random_program};
 use crate::structured_text_reader::StructuredText;
 use crate::support::{PERIOD, program};
 use understudy_logic::Running;
+use understudy_testing::random::{Dice, random_program};
 
 /// A circuit with all operations and registers that read each other.
 fn random_circuit(seed: u64) -> Circuit {
@@ -48,7 +48,7 @@ fn check(circuit: &Circuit, seed: u64) {
     let text = print(&ladder);
     let parsed = parse(&text);
     assert!(
-        !understudy_diagnostic::has_errors(&parsed.diagnostics),
+        !understudy_text::has_errors(&parsed.diagnostics),
         "{:#?}\n{text}",
         parsed.diagnostics
     );

@@ -8,9 +8,9 @@ use understudy_ladder::{
     Program, Relation, Rung, Series, Signal, print,
 };
 
-use crate::random::{Dice, random_program};
 use crate::support::{PERIOD, program};
 use understudy_logic::Running;
+use understudy_testing::random::{Dice, random_program};
 
 fn check(program: &Program, period: Duration, scans: impl Iterator<Item = Vec<bool>>) {
     let mut interpreter = Interpreter::new(program, period).expect("a sound program");
@@ -333,7 +333,7 @@ fn presets_are_rounded_up_to_the_period_with_a_warning() {
     assert_eq!(messages(50), [""; 0]);
     assert_eq!(
         messages(100),
-        ["the preset 250ms of `t` is no multiple of the period 100ms; it lasts 3 scans, 300ms"]
+        ["the preset 250ms of `t` is not a multiple of the period 100ms; it lasts 3 scans, 300ms"]
     );
     let scans = std::iter::repeat_n(vec![true], 8);
     check(&program, Duration::from_millis(100), scans);

@@ -8,7 +8,6 @@ mod format;
 mod generated;
 mod lowering;
 mod printing;
-mod random;
 mod semantics;
 mod structured_text_reader;
 mod support;

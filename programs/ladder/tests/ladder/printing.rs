@@ -3,8 +3,8 @@
 use proptest::prelude::*;
 use understudy_ladder::{draw_svg, draw_text, parse, print};
 
-use crate::random::random_program;
 use crate::support::program;
+use understudy_testing::random::random_program;
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
@@ -14,7 +14,7 @@ proptest! {
         let program = random_program(seed, 8);
         let text = print(&program);
         let parsed = parse(&text);
-        prop_assert!(!understudy_diagnostic::has_errors(&parsed.diagnostics), "{:#?}\n{text}", parsed.diagnostics);
+        prop_assert!(!understudy_text::has_errors(&parsed.diagnostics), "{:#?}\n{text}", parsed.diagnostics);
         prop_assert_eq!(&parsed.program, &program, "{}", text);
         prop_assert_eq!(print(&parsed.program), text);
         // Anything can be drawn.

@@ -1,7 +1,7 @@
 //! Another order of variables, found by sifting after Rudell: each variable in turn goes through all places, by swapping it with its neighbour, and stays
 //! where the diagrams were smallest.
 //!
-//! Functions keep their diagrams' identity through it, so whoever holds one notices nothing but its size. The library ends the process where a swap finds
+//! Functions keep their diagrams' identity through it, so the holder of one sees only its size change. The library ends the process where a swap finds
 //! no free node; so none is begun that could need more than there are.
 
 use std::sync::atomic::{AtomicUsize, Ordering};

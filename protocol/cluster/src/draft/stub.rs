@@ -4,8 +4,8 @@ use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use understudy_form::written_time;
 use understudy_ladder::{Language, MAXIMUM_PRESET_VALUE, Namer, Signal};
+use understudy_text::duration;
 
 use super::{DraftProgram, note};
 use crate::read::MARK;
@@ -122,7 +122,7 @@ program {}
         } = self;
         let half = inputs.len().min(MAXIMUM_PRESET_VALUE as usize / 2);
         let cycles = (ROUND_CYCLES / (2 * half)).clamp(2, 10);
-        let time = written_time(period * cycles as u32);
+        let time = duration::text(period * cycles as u32);
         let round = 2 * half;
         let _ = write!(
             text,

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::suggestion;
 use understudy_logic::Circuit;
+use understudy_text::Diagnostic;
+use understudy_text::spelling::suggestion;
 
 use super::Member;
 use crate::cluster::RemoteIo;
@@ -64,7 +64,7 @@ pub(super) fn device(
             }
         }
     }
-    let is_error = |found: &Diagnostic| found.severity == understudy_diagnostic::Severity::Error;
+    let is_error = |found: &Diagnostic| found.severity == understudy_text::Severity::Error;
     let address = section.address.as_ref()?.value;
     (!diagnostics[before..].iter().any(is_error)).then_some(FieldDevice {
         address,

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_remote_io::Diagnosis;
+use understudy_text::Diagnostic;
 
 use super::Member;
 use super::ladders::Ladders;

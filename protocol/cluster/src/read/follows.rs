@@ -1,8 +1,8 @@
 //! Sensors of other plants that the terminals of a plant follow: `{ pilot_flame = "pilot-burner.flame" }`.
 
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::suggestion;
 use understudy_plant::Followed;
+use understudy_text::Diagnostic;
+use understudy_text::spelling::suggestion;
 use understudy_wire::ProgramId;
 
 use super::Member;

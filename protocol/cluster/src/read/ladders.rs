@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use understudy_diagnostic::{Diagnostic, Report, has_errors};
 use understudy_interchange::parse_program;
 use understudy_ladder::{Parsed, Program};
 use understudy_logic::Circuit;
+use understudy_text::{Diagnostic, Report, has_errors};
 
 use crate::fields::Placed;
 

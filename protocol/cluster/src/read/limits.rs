@@ -2,8 +2,8 @@
 //!
 //! The bounds are those of the layout at its longest: an integer takes at most 9 bytes, and a frame has a header besides.
 
-use understudy_diagnostic::Diagnostic;
 use understudy_logic::Circuit;
+use understudy_text::Diagnostic;
 use understudy_wire::{MAXIMUM_FRAME_BYTES, MAXIMUM_IMAGE_BITS};
 
 use super::Member;

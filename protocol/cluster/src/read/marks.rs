@@ -1,6 +1,6 @@
 //! Marks in comments of a cluster file: what the engineer of the plant must still fill in.
 
-use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS};
+use understudy_text::{Diagnostic, MAXIMUM_FINDINGS};
 
 /// A comment line that begins with it asks for something.
 pub(crate) const MARK: &str = "FILL IN:";

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::suggestion;
+use understudy_text::Diagnostic;
+use understudy_text::spelling::suggestion;
 
 use super::Member;
 use crate::fields::Placed;

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::{nearest, suggestion};
 use understudy_logic::Circuit;
 use understudy_plant::{BindingProblem, Direction, Followed, ModelKind, Plant, Signals};
+use understudy_text::Diagnostic;
+use understudy_text::spelling::{nearest, suggestion};
 use understudy_wire::ProgramId;
 
 use super::Member;

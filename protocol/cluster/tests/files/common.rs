@@ -1,9 +1,9 @@
 //! Reading clusters from texts in memory.
 
 use understudy_cluster::{Cluster, Loaded, Overrides, TemplateFile, read_with};
-use understudy_diagnostic::Report;
 use understudy_logic::Scratch;
 use understudy_plant::Plant;
+use understudy_text::Report;
 use understudy_wire::{Image, ProgramId};
 
 /// Reads `cluster`; ladders come from `files`.

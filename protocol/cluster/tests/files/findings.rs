@@ -3,7 +3,7 @@
 use crate::common::{findings, load, split};
 use proptest::prelude::*;
 use understudy_cluster::press_cell;
-use understudy_diagnostic::Report;
+use understudy_text::Report;
 
 const ROBOT: &str = "program robot\ninput there\ninput lost\noutput go\nrung there lost ( go )\n";
 const PRESS: &str = "program press\ninput ram_up\noutput down\nrung ram_up ( down )\n";

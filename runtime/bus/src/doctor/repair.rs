@@ -4,6 +4,7 @@ use std::path::Path;
 
 use nix::unistd::geteuid;
 use serde::Serialize;
+use understudy_text::shell;
 
 /// A command of a shell that repairs one finding. It needs the rights of root.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -29,7 +30,7 @@ impl Repair {
         if self.command.chars().all(simple) {
             format!("sudo {}", self.command)
         } else {
-            format!("sudo sh -c {}", quoted(&self.command))
+            format!("sudo sh -c {}", shell::quoted(&self.command))
         }
     }
 
@@ -46,7 +47,7 @@ impl Repair {
     pub(super) fn real_time(program: &Path) -> Self {
         let program = program.display().to_string();
         Self {
-            command: format!("setcap cap_sys_nice+ep {}", quoted_where_needed(&program)),
+            command: format!("setcap cap_sys_nice+ep {}", shell::word(&program)),
             effect: "takes effect when the program is started again, until its file is replaced",
         }
     }
@@ -79,46 +80,9 @@ impl Repair {
     }
 }
 
-fn quoted_where_needed(text: &str) -> String {
-    let plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./".contains(letter);
-    match text.chars().all(plain) {
-        true => text.to_owned(),
-        false => quoted(text),
-    }
-}
-
-/// As one word of a shell.
-fn quoted(text: &str) -> String {
-    if text.contains('\'') && !text.contains(['"', '$', '`', '\\', '!']) {
-        format!("\"{text}\"")
-    } else {
-        format!("'{}'", text.replace('\'', r"'\''"))
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use std::process::Command;
-
     use super::*;
-
-    #[test]
-    fn a_shell_reads_the_words_as_they_are_meant() {
-        for text in [
-            "plain",
-            "with spaces",
-            "it's",
-            "it's $HOME",
-            "$HOME `id` \"x\"",
-            "a;b|c>d",
-        ] {
-            let printed = Command::new("sh")
-                .args(["-c", &format!("printf %s {}", quoted(text))])
-                .output()
-                .expect("a shell");
-            assert_eq!(String::from_utf8_lossy(&printed.stdout), text);
-        }
-    }
 
     #[test]
     fn sudo_gives_the_rights_to_the_whole_command() {

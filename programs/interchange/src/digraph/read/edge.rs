@@ -1,11 +1,11 @@
 //! Edges: their ends, and the elements that they are.
 
 use roxmltree::Node;
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{
     Block, BlockKind, Coil, Comparison, Contact, Element, MAXIMUM_PRESET_VALUE, Name, Relation,
-    parse_time,
 };
+use understudy_text::Diagnostic;
+use understudy_text::duration;
 
 use super::super::graph::{coil_kind, contact_kind, edge_types};
 use super::super::infer::Use;
@@ -24,7 +24,10 @@ impl Reader {
             };
             self.error(
                 "U1061",
-                format!("{what} is a whole number, and `{}` is none", word.as_str()),
+                format!(
+                    "invalid {what} `{}`: expected a whole number",
+                    word.as_str()
+                ),
                 span,
             );
         }
@@ -169,7 +172,7 @@ impl Reader {
         let preset = xml::child(node, "preset")
             .map(xml::word)
             .unwrap_or_default();
-        let time = parse_time(&preset).filter(|_| !preset.is_empty());
+        let time = duration::parse(&preset).ok();
         let number = preset
             .parse::<u16>()
             .ok()
@@ -188,14 +191,18 @@ impl Reader {
             other => {
                 self.error(
                     "U1061",
-                    format!("`{other}` is no block that is known here"),
+                    format!("unknown block `{other}`"),
                     xml::start_tag(node),
                 );
                 return None;
             }
         };
         if kind.is_none() {
-            let message = format!("`{}` is no preset of a {}", preset.as_str(), word.as_str());
+            let message = format!(
+                "invalid preset `{}` of a {}",
+                preset.as_str(),
+                word.as_str()
+            );
             self.error("U1061", message, xml::start_tag(node));
         }
         kind

@@ -1,6 +1,6 @@
 //! Elements that do more than to pass power: one-shots, timers, counters, calculations.
 
-use understudy_diagnostic::Diagnostic;
+use understudy_text::Diagnostic;
 
 use super::super::parse::{Counter, Edge, Element, Kind, Timer};
 use super::{Use, Writer};
@@ -53,7 +53,7 @@ impl Writer {
                 let name = self.name(name, Use::Timer, span);
                 if !is_new {
                     let message =
-                        format!("two elements share the timer `{name}`; that is not taken");
+                        format!("two elements share the timer `{name}`, which is not supported");
                     self.diagnostics
                         .push(Diagnostic::error("U1074", message, span.clone()));
                 }

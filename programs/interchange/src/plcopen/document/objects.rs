@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 
 use roxmltree::Node;
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Name;
+use understudy_text::Diagnostic;
 
 use super::read::Reader;
 use super::rungs::rung;
@@ -217,7 +217,7 @@ fn pins<'a, 'i>(reader: &mut Reader, list: Node<'a, 'i>) -> Vec<(Pin, Node<'a, '
 /// A variable at a connection point, in place of an object of its own.
 fn unread_expression(reader: &mut Reader, point: Node<'_, '_>) {
     if let Some(expression) = child(point, "expression") {
-        let message = "an expression at a connection point is not taken".to_owned();
+        let message = "an expression at a connection point is not supported".to_owned();
         reader.error("U1010", message, expression);
     }
 }

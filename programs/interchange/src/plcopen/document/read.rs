@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use std::time::Duration;
 
 use roxmltree::Node;
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{Name, PERIODS};
+use understudy_text::Diagnostic;
 
 use super::objects::graph;
 use super::{
@@ -95,7 +95,7 @@ impl Reader {
                 "function" => PouKind::Function,
                 other => {
                     let message = format!(
-                        "a unit is a program, functionBlock or function, and `{other}` is none"
+                        "invalid type of unit `{other}`: expected program, functionBlock or function"
                     );
                     self.error("U1002", message, pou);
                     continue;

@@ -120,7 +120,7 @@ impl Rung<'_> {
         id
     }
 
-    /// A block with its variables; the power that stands before it enters at its first input, if no variable does.
+    /// A block with its variables; the power before it enters at its first input, if no variable does.
     fn block(
         &mut self,
         node: Node<'_, '_>,

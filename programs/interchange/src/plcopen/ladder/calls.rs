@@ -243,13 +243,13 @@ impl Drawing<'_> {
             Some(Binding::Time(time)) if !self.writes(&read.text) => Some(time),
             Some(_) => {
                 self.general(
-                    format!("the preset `{}` is no constant time", read.text),
+                    format!("the preset `{}` is not a constant duration", read.text),
                     read.text.span(),
                 );
                 None
             }
             None => {
-                let message = format!("`{}` is no time", read.text);
+                let message = format!("`{}` is not a duration", read.text);
                 self.error("U1011", message, read.text.span());
                 None
             }
@@ -269,7 +269,7 @@ impl Drawing<'_> {
             (None, Some(Binding::Number(value))) if !self.writes(&read.text) => value,
             (None, Some(_)) => {
                 self.general(
-                    format!("the preset `{}` is no constant number", read.text),
+                    format!("the preset `{}` is not a constant number", read.text),
                     read.text.span(),
                 );
                 return None;
@@ -277,7 +277,7 @@ impl Drawing<'_> {
             (None, None) => {
                 self.error(
                     "U1011",
-                    format!("`{}` is no number", read.text),
+                    format!("`{}` is not a number", read.text),
                     read.text.span(),
                 );
                 return None;
@@ -304,7 +304,7 @@ impl Drawing<'_> {
     }
 }
 
-/// Calls `see` with the instance of each output that stands in a wire, not behind a negation or in a function.
+/// Calls `see` with the instance of each output in a wire, not behind a negation or in a function.
 fn count(power: &Power, hidden: bool, see: &mut impl FnMut(&str)) {
     match power {
         Power::Output(instance, _) if !hidden => see(instance),

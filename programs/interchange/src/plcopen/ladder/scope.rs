@@ -3,17 +3,16 @@
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
 use std::time::Duration;
+use understudy_text::spelling;
 
-use understudy_diagnostic::Diagnostic;
-use understudy_ladder::{
-    Address, Area, KEYWORDS, MAXIMUM_NAME_LENGTH, Name, Signal, parse_address,
-};
+use understudy_ladder::{Address, Area, KEYWORDS, Name, Signal, legal_name, parse_address};
+use understudy_text::Diagnostic;
 
 use crate::plcopen::document::{Ignored, Pou, Section, Variable, VariableType};
 use crate::plcopen::literal::{boolean, integer, time};
 use crate::plcopen::standard::StandardBlock;
 
-/// What a name stands for.
+/// The meaning of a name.
 #[derive(Debug, Clone)]
 pub(super) enum Binding {
     /// A bit, by its name in the ladder.
@@ -128,7 +127,7 @@ impl<'a> Scope<'a> {
         self.bindings.insert(name.to_uppercase(), binding);
     }
 
-    /// What a name stands for; an address stands for a bit.
+    /// The meaning of a name; an address means a bit.
     pub(super) fn find(&self, name: &Name) -> Option<Binding> {
         let name_text = name.trim();
         let key = name_text.to_uppercase();
@@ -161,23 +160,9 @@ impl<'a> Scope<'a> {
         fresh
     }
 
-    pub(super) fn nearest(&self, name: &str) -> Option<String> {
-        let wanted: Vec<char> = name.to_uppercase().chars().collect();
-        let near = |known: &str| {
-            let known: Vec<char> = known.chars().collect();
-            known.len().abs_diff(wanted.len()) <= 1
-                && known
-                    .iter()
-                    .filter(|letter| !wanted.contains(letter))
-                    .count()
-                    <= 1
-                && known.first() == wanted.first()
-        };
-        let mut names = self
-            .variables
-            .iter()
-            .map(|variable| variable.name.to_string());
-        names.find(|known| near(&known.to_uppercase()))
+    pub(super) fn nearest(&self, name: &str) -> Option<&str> {
+        let variables = self.variables.iter();
+        spelling::nearest(name, variables.map(|variable| variable.name.as_str()))
     }
 
     pub(super) fn program_name(&self, pou: &Pou) -> Name {
@@ -265,7 +250,7 @@ impl<'a> Scope<'a> {
             let initial = variable.initial.as_ref().and_then(|text| {
                 let value = boolean(text);
                 if value.is_none() {
-                    let message = format!("`{text}` is no initial value of a BOOL");
+                    let message = format!("invalid initial value `{text}` of a BOOL");
                     diagnostics.push(Diagnostic::error("U1011", message, text.span()));
                 }
                 value
@@ -305,7 +290,7 @@ impl<'a> Scope<'a> {
     }
 }
 
-/// Whether its value comes from outside, so that it is no constant.
+/// Whether its value comes from outside, so that it is not a constant.
 fn is_given(variable: &Variable) -> bool {
     let located = variable.address.as_ref();
     matches!(variable.section, Section::Input | Section::InOut)
@@ -317,24 +302,7 @@ fn bit_address(text: &str) -> Option<Address> {
     parse_address(&text.trim().strip_prefix('%')?.to_ascii_uppercase())
 }
 
-/// A name as the ladder format has them, without dots, and with room for a number.
+/// A name of the ladder without dots, and with room for a number.
 fn legal(wanted: &str) -> String {
-    let letters = wanted.trim().chars().take(MAXIMUM_NAME_LENGTH - 12);
-    let mut name: String = letters
-        .map(|letter| {
-            if letter.is_alphanumeric() {
-                letter
-            } else {
-                '_'
-            }
-        })
-        .collect();
-    if !name
-        .chars()
-        .next()
-        .is_some_and(|first| first.is_alphabetic() || first == '_')
-    {
-        name.insert(0, '_');
-    }
-    name
+    legal_name(&wanted.trim().replace('.', "_"))
 }

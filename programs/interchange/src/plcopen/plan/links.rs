@@ -3,8 +3,8 @@
 use std::cell::Cell;
 use std::collections::{HashMap, HashSet};
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Name;
+use understudy_text::Diagnostic;
 
 use super::is_ladder;
 use crate::plcopen::document::{CONDITION, Graph, Kind, Object, Pin, Wire};

@@ -4,8 +4,8 @@ mod finish;
 
 use std::collections::{HashMap, HashSet};
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Name;
+use understudy_text::Diagnostic;
 
 use super::Plan;
 use super::links::{Links, Source};
@@ -91,7 +91,7 @@ impl<'a> Walk<'a> {
             Some(found.with_help("connect it to what it drives, or remove it"))
         };
         let foreign = |what: &str| {
-            let message = format!("{what} is not taken");
+            let message = format!("{what} is not supported");
             Some(Diagnostic::error("U1010", message, object.span.clone()))
         };
         match &object.kind {
@@ -133,7 +133,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// When an object acts; a label without an order, just before what stands below it.
+    /// When an object acts; a label without an order, just before the object below it.
     fn order(&self, object: &Object) -> (u64, bool) {
         if object.order != 0 {
             return (object.order, true);

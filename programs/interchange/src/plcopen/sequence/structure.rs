@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use understudy_diagnostic::Diagnostic;
+use understudy_text::Diagnostic;
 
 use crate::plcopen::document::{Graph, Kind, Object, Pin};
 

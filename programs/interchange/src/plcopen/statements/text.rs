@@ -18,12 +18,12 @@ struct Piece {
     start: usize,
     /// Where it comes from.
     place: Range<usize>,
-    /// It stands there letter for letter.
+    /// It is there letter for letter.
     is_copy: bool,
 }
 
 impl Text {
-    /// A text that stands in the file as it is.
+    /// A text that is in the file as it is.
     pub(crate) fn verbatim(passage: &Passage) -> Self {
         let mut verbatim = Self::default();
         for (text, place) in passage.pieces() {
@@ -37,7 +37,7 @@ impl Text {
         self.add(text, place, false);
     }
 
-    /// Adds what stands in the file at `place`.
+    /// Adds the text of the file at `place`.
     pub(crate) fn copy(&mut self, text: &str, place: Range<usize>) {
         self.add(text, place, true);
     }

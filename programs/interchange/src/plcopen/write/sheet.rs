@@ -337,7 +337,7 @@ impl<'a> Sheet<'a> {
     }
 }
 
-/// The output that is no bit: editors show it.
+/// The output that is not a bit: editors show it.
 fn pin_of_value(block: &Block) -> Option<&'static str> {
     if block.kind.preset_time().is_some() {
         Some("ET")

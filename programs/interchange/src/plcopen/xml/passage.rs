@@ -10,7 +10,7 @@ const CDATA: (&str, &str) = ("<![CDATA[", "]]>");
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Passage {
     text: String,
-    /// From which byte of the text on, and where in the file that byte stands; ascending. Up to the next one, both go on together.
+    /// From which byte of the text on, and the place of that byte in the file; ascending. Up to the next one, both go on together.
     places: Vec<(usize, usize)>,
 }
 
@@ -67,7 +67,7 @@ impl Passage {
         &self.text
     }
 
-    /// Where a part of the text stands in the file.
+    /// The place of a part of the text in the file.
     pub(crate) fn place(&self, part: Range<usize>) -> Range<usize> {
         let at = |offset: usize| {
             let next = self.places.partition_point(|(start, _)| *start <= offset);
@@ -119,7 +119,7 @@ mod tests {
 
     use super::Passage;
 
-    /// Each word of the text stands in the file where the passage says.
+    /// Each word of the text is in the file where the passage says.
     fn check(file: &str, words: &[(&str, &str)]) {
         let document = Document::parse(file).expect("XML");
         let passage = Passage::of(document.root_element());

@@ -6,8 +6,8 @@ use super::super::syntax::{
     UnitKind,
 };
 use super::Parser;
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{Name, PERIODS};
+use understudy_text::Diagnostic;
 
 impl Parser {
     /// The unit that begins here, and the word that ends it.
@@ -48,7 +48,7 @@ impl Parser {
         }
     }
 
-    /// What stands between `VAR…` and `END_VAR`.
+    /// The content between `VAR…` and `END_VAR`.
     pub(super) fn declarations(
         &mut self,
         class: Class,
@@ -128,7 +128,7 @@ impl Parser {
         }
         let type_name = self.type_name()?;
         if self.at_any(&["R_EDGE", "F_EDGE"]) {
-            let message = "inputs that see edges are not taken";
+            let message = "inputs with edge detection are not supported";
             let finding = Diagnostic::error("U1040", message, self.span());
             self.diagnostics
                 .push(finding.with_help("declare an R_TRIG or F_TRIG and call it"));
@@ -160,7 +160,7 @@ impl Parser {
     /// `BOOL`, `INT (0..9)`, `MyType`.
     pub(super) fn type_name(&mut self) -> Option<TypeName> {
         if self.at_any(&["STRUCT", "ARRAY"]) || self.at_sign("(") {
-            let message = "structures, arrays and nameless enumerations are not taken";
+            let message = "structures, arrays and enumerations without a name are not supported";
             self.diagnostics
                 .push(Diagnostic::error("U1040", message, self.span()));
             while !self.at_sign(";")
@@ -198,7 +198,7 @@ impl Parser {
         Some(if negative { -number } else { number })
     }
 
-    /// What stands between `TYPE` and `END_TYPE`.
+    /// The content between `TYPE` and `END_TYPE`.
     pub(super) fn types(&mut self, into: &mut Vec<TypeDefinition>) {
         while !self.at_word("END_TYPE")
             && *self.peek() != Lexeme::End
@@ -282,7 +282,7 @@ impl Parser {
         self.take_sign(";");
     }
 
-    /// Skips to a word, which is not taken.
+    /// Skips to a word, which is not consumed.
     fn recover_to(&mut self, word: &str) {
         while !self.at_word(word) && *self.peek() != Lexeme::End {
             self.skip();

@@ -162,7 +162,7 @@ impl Parser {
         Some(Path { parts, span })
     }
 
-    /// What stands in the brackets of a call.
+    /// The content of the brackets of a call.
     pub(super) fn arguments(&mut self) -> Vec<Argument> {
         let mut arguments = Vec::new();
         self.need_sign("(");

@@ -24,7 +24,7 @@ const ENDS: [&str; 15] = [
 ];
 
 impl Parser {
-    /// Statements up to one of `ends`, or to a word that ends some other list; that word is not taken.
+    /// Statements up to one of `ends`, or to a word that ends some other list; that word is not consumed.
     pub(super) fn statements(&mut self, ends: &[&str]) -> Vec<Statement> {
         let mut statements = Vec::new();
         while *self.peek() != Lexeme::End
@@ -118,7 +118,7 @@ impl Parser {
             StatementKind::Assign(path, self.expression())
         } else {
             if self.at_sign("[") {
-                self.expected("`:=` or `(`; arrays are not taken, so that");
+                self.expected("`:=` or `(`; arrays are not supported, so");
             } else {
                 self.expected("`:=` or `(`");
             }

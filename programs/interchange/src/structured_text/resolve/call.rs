@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::BlockKind;
+use understudy_text::Diagnostic;
 
 use super::super::program::{Action, Truth};
 use super::super::syntax::{Argument, Class, Expression, Path};
@@ -32,7 +32,7 @@ impl Resolver {
             }
             Some(Entity::Broken) | None => {}
             Some(_) => {
-                let message = format!("`{}` is no block, and cannot be called", path.text());
+                let message = format!("`{}` is not a block and cannot be called", path.text());
                 self.error("U1041", message, path.span.clone());
             }
         }

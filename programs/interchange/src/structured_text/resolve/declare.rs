@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{Address, Area, Name, parse_address};
+use understudy_text::Diagnostic;
 
 use super::super::program::{Cell, Kind, Number, Role, Timer, Truth};
 use super::super::syntax::{Class, Declaration, Expression, UnitKind};
@@ -151,7 +151,7 @@ impl Resolver {
             Some(Type::Time) => Entity::Time(self.initial_time(instance, &as_local)),
             Some(Type::Block(_) | Type::Standard(_)) => {
                 let message = format!(
-                    "`{}` is a block that several programs share; that is not taken",
+                    "`{}` is a block that several programs share, which is not supported",
                     declaration.name
                 );
                 self.error("U1040", message, declaration.name.span());
@@ -206,7 +206,7 @@ impl Resolver {
             _ => None,
         };
         if value.is_none() {
-            let message = "this is no constant of the variable's type and range";
+            let message = "the value is not a constant of the variable's type and range";
             self.error("U1043", message, initial.span.clone());
         }
         value
@@ -234,7 +234,7 @@ impl Resolver {
         }
         if declaration.class == Class::InOut {
             let message =
-                format!("`{name}` is passed by reference (VAR_IN_OUT); that is not taken");
+                format!("`{name}` is passed by reference (VAR_IN_OUT), which is not supported");
             self.error("U1040", message, name.span());
             return Entity::Broken;
         }

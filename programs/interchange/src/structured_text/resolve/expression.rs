@@ -3,14 +3,14 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{Name, Relation};
+use understudy_text::Diagnostic;
 
 use super::super::program::{Action, Cell, Kind, Number, Role, Truth};
 use super::super::syntax::{Expression, ExpressionKind, Operator, Path};
 use super::{Entity, Resolver};
 
-/// Operands of one product past which it is not taken.
+/// The largest number of operands of one product.
 const MAXIMUM_FACTORS: usize = 64;
 
 /// What an expression is.
@@ -35,7 +35,7 @@ impl Value {
 }
 
 impl Resolver {
-    /// Its value where it is a number that no variable decides; nothing is said where it is none.
+    /// Its value where it is a constant number; otherwise nothing is reported.
     pub(super) fn constant(&mut self, instance: usize, expression: &Expression) -> Option<i64> {
         match &expression.kind {
             ExpressionKind::Integer(value) => Some(*value),
@@ -95,7 +95,7 @@ impl Resolver {
             ExpressionKind::Integer(value) => Value::Number(Number::Constant(*value)),
             ExpressionKind::Time(time) => Value::Time(Some(*time)),
             ExpressionKind::Foreign(what) => {
-                self.error("U1040", format!("{what} is not taken"), span.clone());
+                self.error("U1040", format!("{what} is not supported"), span.clone());
                 Value::Error
             }
             ExpressionKind::Faulty => Value::Error,
@@ -131,7 +131,7 @@ impl Resolver {
         let mut left = self.expression(instance, first);
         let mut span = first.span.clone();
         if rest.len() > MAXIMUM_FACTORS && rest[0].0.rank() == Operator::Multiply.rank() {
-            let message = format!("more than {MAXIMUM_FACTORS} factors in a row are not taken");
+            let message = format!("more than {MAXIMUM_FACTORS} factors in a row are not supported");
             self.error("U1040", message, span);
             return Value::Error;
         }
@@ -147,7 +147,7 @@ impl Resolver {
         left
     }
 
-    /// `counter.CV >= 5`, where the counter stands in a rung.
+    /// `counter.CV >= 5`, where the counter is in a rung.
     fn counted(
         &mut self,
         instance: usize,
@@ -215,7 +215,7 @@ impl Resolver {
                 })
             }
             Operator::Power => {
-                self.error("U1040", "powers are not taken", both);
+                self.error("U1040", "powers are not supported", both);
                 Value::Error
             }
             Operator::Equal | Operator::NotEqual if matches!(left, Value::Truth(_)) => {
@@ -273,8 +273,8 @@ impl Resolver {
                 found => {
                     let message = match found {
                         Some(0) => "a division by 0",
-                        Some(_) => "a division by a number of more than 32 bits is not taken",
-                        None => "a division by something that is not constant is not taken",
+                        Some(_) => "a division by a number of more than 32 bits is not supported",
+                        None => "a division by a value that is not constant is not supported",
                     };
                     self.error("U1046", message, right_span.clone());
                     return Value::Error;
@@ -310,7 +310,7 @@ impl Resolver {
         }
     }
 
-    /// What a path stands for; `None` where nothing does, which is said.
+    /// The meaning of a path; `None` where it has none, which is reported.
     pub(super) fn look_up(&mut self, instance: usize, path: &Path) -> Option<Entity> {
         let [names @ .., last] = path.parts.as_slice() else {
             return None;
@@ -321,8 +321,7 @@ impl Resolver {
                 Entity::Instance(next) => place = next,
                 Entity::Broken => return Some(Entity::Broken),
                 _ => {
-                    let message =
-                        format!("`{name}` is no block, so that nothing stands behind its dot");
+                    let message = format!("`{name}` is not a block and has no members");
                     self.error("U1041", message, path.span.clone());
                     return None;
                 }

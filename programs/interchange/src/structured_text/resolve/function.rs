@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::{Name, Relation};
+use understudy_text::Diagnostic;
 
 use super::super::program::{Action, Number, Role, Truth};
 use super::super::syntax::{Argument, UnitKind};
@@ -42,7 +42,7 @@ impl Resolver {
         match self.standard_function(&key, values, span) {
             Some(value) => value,
             None => {
-                let message = format!("the function `{name}` with these values is not taken");
+                let message = format!("the function `{name}` with these values is not supported");
                 let finding = Diagnostic::error("U1040", message, name.span());
                 self.say(finding.with_help("taken are NOT, AND, OR, XOR, comparisons, ADD, SUB, MUL, ABS, MIN, MAX, LIMIT, SEL, MOVE and conversions"));
                 Value::Error
@@ -236,7 +236,7 @@ impl Resolver {
         ))
     }
 
-    /// The one of two numbers that stands in `relation` to the other.
+    /// The one of two numbers that has `relation` to the other.
     fn better(
         &mut self,
         relation: Relation,

@@ -7,8 +7,8 @@ use super::super::syntax::{Expression, Label, Loop, Path, Statement, StatementKi
 use super::expression::Value;
 use super::leave::{Leaves, leaves, leaves_of};
 use super::{Entity, MAXIMUM_STEPS, Resolver};
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Relation;
+use understudy_text::Diagnostic;
 
 impl Resolver {
     /// The steps of one execution of an instance.
@@ -115,10 +115,10 @@ impl Resolver {
             StatementKind::For(content) => self.repeat(instance, content, &span),
             StatementKind::Leave(what) => self.leave(*what, span),
             StatementKind::Refused(what) => {
-                let message = format!("{what} not taken");
+                let message = format!("{what} not supported");
                 let finding = Diagnostic::error("U1040", message, span);
                 self.say(finding.with_help(
-                    "a scan has a fixed number of steps; FOR with constant bounds is taken, and EXIT in it",
+                    "a scan has a fixed number of steps; FOR with constant bounds and EXIT in it are supported",
                 ));
             }
             StatementKind::Nothing => {}
@@ -199,8 +199,7 @@ impl Resolver {
                 _ => None,
             };
             if found.is_none() {
-                let message =
-                    "a bound of a loop is a constant number; otherwise the loop is not taken";
+                let message = "the bounds of a loop must be constant numbers";
                 self.error("U1040", message, expression.span.clone());
             }
             found
@@ -270,7 +269,7 @@ impl Resolver {
         }
     }
 
-    /// Assigns a value to what a name stands for.
+    /// Assigns a value to the variable of a name.
     pub(super) fn store(
         &mut self,
         target: &Entity,

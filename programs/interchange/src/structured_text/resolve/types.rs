@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use understudy_diagnostic::Diagnostic;
+use understudy_text::Diagnostic;
 
 use super::super::program::Kind;
 use super::super::syntax::{TypeDefinition, TypeMeaning, TypeName, UnitKind};
@@ -89,7 +89,7 @@ impl Resolver {
                         let known = self.types.values.insert(value.to_ascii_uppercase(), number);
                         if known.is_some_and(|known| known != number) {
                             let message = format!(
-                                "the value `{value}` stands in two enumerations at different places"
+                                "the value `{value}` belongs to two enumerations at different places"
                             );
                             self.error("U1042", message, value.span());
                         }
@@ -128,7 +128,7 @@ impl Resolver {
             user.map(Type::Block).or(standard.map(Type::Standard))
         });
         let Some(found) = found else {
-            let message = format!("variables of the type `{}` are not taken", name.name);
+            let message = format!("variables of the type `{}` are not supported", name.name);
             let finding = Diagnostic::error("U1040", message, name.name.span());
             self.say(finding.with_help("taken are BOOL, SINT, INT, DINT, USINT, UINT, UDINT, TIME, enumerations, and function blocks"));
             return None;

@@ -13,7 +13,7 @@ use super::leave::leaves_of;
 pub(super) struct Uses {
     /// Calls in the text.
     pub(super) calls: usize,
-    /// One of them stands in a choice or a loop.
+    /// One of them is in a choice or a loop.
     pub(super) conditional: bool,
     /// Inputs that are assigned or read by name, in capitals.
     pub(super) touched: HashSet<String>,

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::support::Dice;
+use understudy_testing::random::Dice;
 
 #[derive(Debug, Clone)]
 pub(crate) enum Truth {

@@ -1,7 +1,7 @@
 //! What each object does once everything that feeds it is there.
 
-use understudy_diagnostic::Diagnostic;
 use understudy_ladder::Name;
+use understudy_text::Diagnostic;
 
 use super::{Walk, instance};
 use crate::plcopen::document::{CONDITION, Kind, Modifier, Object, Pin};

@@ -1,4 +1,4 @@
-//! Where an object stands, its connection points, and the bends of the wires between them.
+//! The position of an object, its connection points, and the bends of the wires between them.
 
 use super::Source;
 use crate::plcopen::write::tree::Tree;

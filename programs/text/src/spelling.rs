@@ -1,14 +1,29 @@
-//! What a misspelt name was meant to be: one rule for every reader of files.
+//! The known name that a misspelt one was meant to be: one rule for every reader of files.
 
-/// Names that a suggestion lists.
+/// Names that a suggestion lists at most.
 const MAXIMUM_LISTED: usize = 20;
 
-/// The known name that `name` is probably a misspelling of: at most a third of its letters differ, or one; case alone is no
-/// difference.
+/// The known name that `name` is probably a misspelling of.
 pub fn nearest<'n>(name: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
+    near(name, known).min().map(|(_, nearest)| nearest)
+}
+
+/// The known names that `name` may be a misspelling of, the nearest first.
+pub fn alike<'n>(name: &str, known: impl IntoIterator<Item = &'n str>) -> Vec<&'n str> {
+    let mut found: Vec<(usize, &str)> = near(name, known).collect();
+    found.sort_unstable();
+    found.into_iter().map(|(_, name)| name).collect()
+}
+
+/// The known names of which at most a third of the letters differ, or one, with the number of letters that do. A name in another
+/// case does not differ.
+fn near<'n>(
+    name: &str,
+    known: impl IntoIterator<Item = &'n str>,
+) -> impl Iterator<Item = (usize, &'n str)> {
     let furthest = (name.chars().count() / 3).max(1);
-    let near = |known: &'n str| {
-        // The distance is never less than what the lengths differ by, and a letter has four bytes at most.
+    known.into_iter().filter_map(move |known: &'n str| {
+        // The distance is never less than the difference of the lengths, and a letter has four bytes at most.
         if known.len().abs_diff(name.len()) > 4 * furthest {
             return None;
         }
@@ -18,16 +33,19 @@ pub fn nearest<'n>(name: &str, known: impl IntoIterator<Item = &'n str>) -> Opti
             strsim::damerau_levenshtein(name, known)
         };
         (distance <= furthest).then_some((distance, known))
-    };
-    let nearest = known.into_iter().filter_map(near).min();
-    nearest.map(|(_, nearest)| nearest)
+    })
 }
 
-/// The way out for a name that nothing has: the nearest known one, or the first of all where none is near.
+/// A question for the known name that `name` is probably a misspelling of.
+pub fn question<'n>(name: &str, known: impl IntoIterator<Item = &'n str>) -> Option<String> {
+    nearest(name, known).map(|near| format!("did you mean `{near}`?"))
+}
+
+/// The help for an unknown name: the nearest known one, or the known ones where none is near.
 pub fn suggestion<'n>(name: &str, known: impl IntoIterator<Item = &'n str>) -> String {
     let known: Vec<&str> = known.into_iter().collect();
-    if let Some(nearest) = nearest(name, known.iter().copied()) {
-        return format!("did you mean `{nearest}`?");
+    if let Some(question) = question(name, known.iter().copied()) {
+        return question;
     }
     match known.len() {
         0 => "none is known here".into(),

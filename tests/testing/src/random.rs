@@ -4,18 +4,21 @@ use std::time::Duration;
 
 use understudy_ladder::{
     Address, Area, Block, BlockKind, Coil, CoilKind, Comparison, Contact, ContactKind, Element,
-    Feed, Program, Relation, Rung, Series, Signal, visit,
+    Feed, Program, Relation, Rung, Series, Signal,
 };
 
-/// SplitMix64.
-pub(crate) struct Dice(u64);
+/// Random numbers, the same for the same seed: SplitMix64.
+#[derive(Debug, Clone)]
+pub struct Dice(u64);
 
 impl Dice {
-    pub(crate) fn new(seed: u64) -> Self {
+    /// The numbers of a seed.
+    pub fn new(seed: u64) -> Self {
         Self(seed)
     }
 
-    pub(crate) fn next(&mut self) -> u64 {
+    /// A random number.
+    pub fn number(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut mixed = self.0;
         mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -23,27 +26,29 @@ impl Dice {
         mixed ^ (mixed >> 31)
     }
 
-    /// 0 to `bound` - 1.
-    pub(crate) fn below(&mut self, bound: usize) -> usize {
-        (self.next() % bound as u64) as usize
+    /// A number from 0 to `bound` - 1.
+    pub fn below(&mut self, bound: usize) -> usize {
+        (self.number() % bound as u64) as usize
     }
 
-    pub(crate) fn pick<T: Clone>(&mut self, from: &[T]) -> T {
+    /// One of the values.
+    pub fn pick<T: Clone>(&mut self, from: &[T]) -> T {
         from[self.below(from.len())].clone()
     }
 
     /// True once in `out_of` times.
-    pub(crate) fn rarely(&mut self, out_of: usize) -> bool {
+    pub fn rarely(&mut self, out_of: usize) -> bool {
         self.below(out_of) == 0
     }
 
-    pub(crate) fn bits(&mut self, width: usize) -> Vec<bool> {
+    /// Random bits.
+    pub fn bits(&mut self, width: usize) -> Vec<bool> {
         (0..width).map(|_| self.rarely(2)).collect()
     }
 }
 
 /// A sound program with up to `rungs` rungs, of which some read below and some above what writes them.
-pub(crate) fn random_program(seed: u64, rungs: usize) -> Program {
+pub fn random_program(seed: u64, rungs: usize) -> Program {
     let mut dice = Dice::new(seed);
     let mut program = Program {
         name: "random".into(),
@@ -198,24 +203,30 @@ fn fill(dice: &mut Dice, series: &mut Series, readable: &[String], counters: &[S
     }
 }
 
-#[test]
-fn random_programs_have_every_kind_of_element() {
-    let mut seen = std::collections::BTreeSet::new();
-    for seed in 0..200 {
-        let program = random_program(seed, 6);
-        for rung in &program.rungs {
-            visit(&rung.network, &mut |element| {
-                seen.insert(match element {
-                    Element::Contact(contact) => format!("contact {:?}", contact.kind),
-                    Element::Comparison(comparison) => format!("{:?}", comparison.relation),
-                    Element::Branches(_) => "branches".to_owned(),
-                    Element::Block(block) => block.kind.word().to_owned(),
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use understudy_ladder::visit;
+
+    #[test]
+    fn random_programs_have_every_kind_of_element() {
+        let mut seen = std::collections::BTreeSet::new();
+        for seed in 0..200 {
+            let program = random_program(seed, 6);
+            for rung in &program.rungs {
+                visit(&rung.network, &mut |element| {
+                    seen.insert(match element {
+                        Element::Contact(contact) => format!("contact {:?}", contact.kind),
+                        Element::Comparison(comparison) => format!("{:?}", comparison.relation),
+                        Element::Branches(_) => "branches".to_owned(),
+                        Element::Block(block) => block.kind.word().to_owned(),
+                    });
                 });
-            });
-            for coil in &rung.coils {
-                seen.insert(format!("coil {:?}", coil.kind));
+                for coil in &rung.coils {
+                    seen.insert(format!("coil {:?}", coil.kind));
+                }
             }
         }
+        assert_eq!(seen.len(), 4 + 6 + 1 + 10 + 6, "{seen:?}");
     }
-    assert_eq!(seen.len(), 4 + 6 + 1 + 10 + 6, "{seen:?}");
 }

@@ -4,7 +4,7 @@
 //!
 //! ```text
 //! # U01: ladder programs
-//! About the group; its ```sh blocks set up the folder that each example stands in.
+//! About the group; its ```sh blocks set up the folder in which each example runs.
 //!
 //! ## U0101: a title in lower case
 //! What it means; ```toml NAME and ```text NAME blocks are files, ```sh blocks are commands, ```rust blocks are run as well.
@@ -37,7 +37,7 @@ pub struct Page {
     pub title: &'static str,
     /// The rest, as Markdown.
     pub text: &'static str,
-    /// What stands above the codes of its group, as Markdown.
+    /// The introduction of its group, as Markdown.
     pub group: &'static str,
 }
 
@@ -75,7 +75,7 @@ mod tests {
         for pair in all.windows(2) {
             assert!(
                 pair[0].code < pair[1].code,
-                "{} stands before {}",
+                "{} is before {}",
                 pair[0].code,
                 pair[1].code
             );

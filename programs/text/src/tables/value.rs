@@ -3,18 +3,17 @@
 use std::ops::{Range, RangeInclusive};
 use std::time::Duration;
 
+use super::Codes;
+use crate::Diagnostic;
+use crate::duration;
+use crate::spelling::suggestion;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::suggestion;
-
-use crate::Codes;
-use crate::time::{parse_time, written_time};
 
 /// The largest whole number that TOML knows.
 const LARGEST: u64 = i64::MAX as u64;
 
-/// A value and where it stands, as bytes of the text.
+/// A value and its place, as bytes of the text.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Placed<T> {
     /// The value.
@@ -33,7 +32,7 @@ impl<T> Placed<T> {
     }
 }
 
-/// What stands behind a key, or in the list behind it.
+/// The value of a key, or one in its list.
 #[derive(Clone, Copy)]
 pub struct Value<'a, 't> {
     name: &'a str,
@@ -47,7 +46,7 @@ impl<'a, 't> Value<'a, 't> {
         Self { name, value, codes }
     }
 
-    /// Where it stands.
+    /// Its place.
     pub fn span(self) -> Range<usize> {
         self.value.span()
     }
@@ -57,7 +56,7 @@ impl<'a, 't> Value<'a, 't> {
         self.text_as("a text in quotes", diagnostics)
     }
 
-    /// A text that stands for something, `wanted`.
+    /// A text with a meaning, `wanted`.
     pub fn text_as(
         self,
         wanted: &str,
@@ -129,12 +128,19 @@ impl<'a, 't> Value<'a, 't> {
         bounds: RangeInclusive<Duration>,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Option<Placed<Duration>> {
-        let (least, most) = (written_time(*bounds.start()), written_time(*bounds.end()));
+        let (least, most) = (
+            duration::text(*bounds.start()),
+            duration::text(*bounds.end()),
+        );
         let wanted = format!("a time with its unit in quotes, from \"{least}\" to \"{most}\"");
-        let time = self.value.get_ref().as_str().and_then(parse_time);
+        let time = self
+            .value
+            .get_ref()
+            .as_str()
+            .and_then(|text| duration::parse(text).ok());
         let time = self.expect(time, &wanted, diagnostics)?.value;
         let inside = bounds.contains(&time).then_some(time);
-        self.in_bounds(inside, &written_time(time), &wanted, diagnostics)
+        self.in_bounds(inside, &duration::text(time), &wanted, diagnostics)
     }
 
     /// The place of a text among `words`.

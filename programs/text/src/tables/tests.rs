@@ -1,9 +1,7 @@
 use std::time::Duration;
 
-use toml::de::DeTable;
-use understudy_diagnostic::Diagnostic;
-
 use super::*;
+use toml::de::DeTable;
 
 const CODES: Codes = Codes {
     no_toml: "toml",
@@ -14,7 +12,7 @@ const CODES: Codes = Codes {
     unknown_word: "word",
 };
 
-/// What `read` makes of `text`, and the findings: each with its code and what stands in its place.
+/// What `read` makes of `text`, and the findings: each with its code and the text in its place.
 fn check<T: PartialEq + std::fmt::Debug>(
     text: &str,
     read: impl FnOnce(&mut Fields<'_, '_>, &mut Vec<Diagnostic>) -> T,

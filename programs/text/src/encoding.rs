@@ -152,7 +152,7 @@ fn declared(bytes: &[u8]) -> Result<Encoding, NotText> {
     }
 }
 
-/// As Latin-1, but for what stands in place of its second control characters.
+/// As Latin-1, except for the characters in place of its second control characters.
 fn windows_1252(byte: u8) -> char {
     const OTHERS: [char; 32] = [
         '€', '\u{81}', '‚', 'ƒ', '„', '…', '†', '‡', 'ˆ', '‰', 'Š', '‹', 'Œ', '\u{8d}', 'Ž',

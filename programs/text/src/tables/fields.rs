@@ -1,18 +1,18 @@
 //! The keys of one table.
 //!
-//! Invariant: [`Fields::finish`] reports every key that nobody asked for, so no key of a file is passed over in silence.
+//! Invariant: [`Fields::finish`] reports every key that the reader did not ask for, so no key of a file is ignored in silence.
 
 use std::borrow::Cow;
 use std::ops::{Range, RangeInclusive};
 use std::time::Duration;
 
+use super::Codes;
+use super::format::{Kind, Table};
+use super::value::{Placed, Value};
+use crate::Diagnostic;
+use crate::spelling::suggestion;
 use toml::Spanned;
 use toml::de::DeTable;
-use understudy_diagnostic::Diagnostic;
-use understudy_diagnostic::spelling::suggestion;
-
-use crate::Codes;
-use crate::value::{Placed, Value};
 
 /// One table, `what`, and the keys that it was asked for.
 pub struct Fields<'a, 't> {
@@ -21,6 +21,7 @@ pub struct Fields<'a, 't> {
     span: Range<usize>,
     codes: &'static Codes,
     asked: Vec<&'static str>,
+    format: Option<&'static Table>,
 }
 
 impl<'a, 't> Fields<'a, 't> {
@@ -32,10 +33,94 @@ impl<'a, 't> Fields<'a, 't> {
             span: table.span,
             codes,
             asked: Vec::new(),
+            format: None,
         }
     }
 
-    /// Where the table stands.
+    /// A table of a format. Bounds and required keys are those of the format; its reader asks for no other key.
+    pub fn of(
+        format: &'static Table,
+        table: Placed<&'a DeTable<'t>>,
+        codes: &'static Codes,
+    ) -> Self {
+        Self {
+            format: Some(format),
+            ..Self::new(format.what, table, codes)
+        }
+    }
+
+    /// The values of a key in the format.
+    fn kind(&self, key: &str) -> Option<&'static Kind> {
+        self.format.map(|format| format.kind(key))
+    }
+
+    /// Reports the keys that the format requires and the table does not have.
+    pub fn require_all(&self, diagnostics: &mut Vec<Diagnostic>) {
+        let required = self.format.map(Table::required).unwrap_or_default();
+        self.require(&required, diagnostics);
+    }
+
+    /// As [`Value::count`], in the bounds of the format.
+    ///
+    /// # Panics
+    /// Where the key is not a whole number of the format, as the methods below where it is of another kind.
+    pub fn format_count(
+        &mut self,
+        key: &'static str,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Option<Placed<u64>> {
+        let bounds = self.kind(key)?.counts();
+        self.count(key, bounds, diagnostics)
+    }
+
+    /// As [`Value::number`], in the bounds of the format.
+    pub fn format_number(
+        &mut self,
+        key: &'static str,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Option<Placed<f64>> {
+        let bounds = self.kind(key)?.numbers();
+        self.number(key, bounds, diagnostics)
+    }
+
+    /// As [`Value::time`], in the bounds of the format.
+    pub fn format_time(
+        &mut self,
+        key: &'static str,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Option<Duration> {
+        let bounds = self.kind(key)?.times();
+        self.time(key, bounds, diagnostics)
+    }
+
+    /// The table of a key, in its own format.
+    pub fn format_table(
+        &mut self,
+        key: &'static str,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Option<Self> {
+        let format = self.kind(key)?.table();
+        let wanted = format!("a table, [{key}]");
+        let table = self.get(key)?.table(&wanted, diagnostics)?;
+        Some(Self::of(format, table, self.codes))
+    }
+
+    /// The tables under `[[key]]`, in their own format; none where the key is absent.
+    pub fn format_tables(
+        &mut self,
+        key: &'static str,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Vec<Self> {
+        let format = self.kind(key).map(Kind::table);
+        let value = self.get(key);
+        let tables = value.map_or_else(Vec::new, |value| value.tables(diagnostics));
+        let tables = tables.into_iter().zip(format.into_iter().cycle());
+        tables
+            .map(|(table, format)| Self::of(format, table, self.codes))
+            .collect()
+    }
+
+    /// The place of the table.
     pub fn span(&self) -> Range<usize> {
         self.span.clone()
     }
@@ -63,6 +148,8 @@ impl<'a, 't> Fields<'a, 't> {
 
     /// Asks for a key.
     pub fn get(&mut self, key: &'static str) -> Option<Value<'a, 't>> {
+        // A key that is not in the format would be missing in the schema.
+        self.kind(key);
         self.asked.push(key);
         let value = self.table.get(key)?;
         Some(Value::new(key, value, self.codes))

@@ -1,14 +1,19 @@
-//! What is wrong with a file, where, and what to do about it.
+//! What every reader of a text file shares: diagnostics, spelling, TOML tables and durations.
 //!
-//! Readers of files return what they understood *and* a list of [`Diagnostic`]s, so that one run shows everything that is
-//! wrong. A diagnostic has a stable code (`U0123`), a place in its source and, where one can be named, the way out. This
-//! crate only holds the data; the command line draws it. [`pages`] holds what is to be known about each code.
+//! Readers of files return what they understood *and* a list of [`Diagnostic`]s, so that one run shows every error.
+//! A diagnostic has a stable code (`U0123`), a place in its source and, where one can be named, the fix. This crate
+//! holds the data; the command line draws it. [`pages`] documents each code, [`spelling`] suggests the name that was
+//! meant, [`tables`] reads TOML as tables of known keys, and [`duration`] is the one form of a duration in text.
 
+pub mod duration;
 mod encoding;
 mod lines;
+pub mod markup;
 pub mod pages;
+pub mod shell;
 mod shown;
 pub mod spelling;
+pub mod tables;
 
 use std::fmt;
 use std::ops::Range;

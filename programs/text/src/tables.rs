@@ -4,16 +4,15 @@
 //! is reported, and the reader goes on without it to check the rest. What the values mean is the reader's own affair.
 
 mod fields;
-mod time;
+pub mod format;
 mod value;
 
 pub use fields::{Fields, unknown_key};
-pub use time::{parse_time, written_time};
 pub use value::{Placed, Value};
 
+use crate::{Diagnostic, MAXIMUM_FINDINGS};
 use toml::Spanned;
 use toml::de::DeTable;
-use understudy_diagnostic::{Diagnostic, MAXIMUM_FINDINGS};
 
 /// The largest file; readers of one kind may have a smaller bound.
 pub const MAXIMUM_TEXT_BYTES: usize = 16 << 20;
@@ -21,7 +20,7 @@ pub const MAXIMUM_TEXT_BYTES: usize = 16 << 20;
 /// The stable codes of one kind of file for what can be wrong with its form.
 #[derive(Debug)]
 pub struct Codes {
-    /// The text is no TOML.
+    /// The text is not TOML.
     pub no_toml: &'static str,
     /// A key that its table does not have.
     pub unknown_key: &'static str,
@@ -31,11 +30,11 @@ pub struct Codes {
     pub wrong_type: &'static str,
     /// A number or a time out of its bounds.
     pub out_of_bounds: &'static str,
-    /// A word that is none of those possible.
+    /// A word that is not one of the possible ones.
     pub unknown_word: &'static str,
 }
 
-/// The tables of `text`; nothing where it is no TOML, because what the recovery makes of a broken text would only bring
+/// The tables of `text`; nothing where it is not TOML, because what the recovery makes of a broken text would only bring
 /// errors that follow from the first ones.
 pub fn parse<'t>(
     text: &'t str,
@@ -53,7 +52,7 @@ pub fn parse<'t>(
     let (table, errors) = DeTable::parse_recoverable(text);
     for error in errors.iter().take(MAXIMUM_FINDINGS) {
         let span = error.span().unwrap_or(text.len()..text.len());
-        let message = format!("this is no TOML: {}", error.message().trim_end());
+        let message = format!("invalid TOML: {}", error.message().trim_end());
         diagnostics.push(Diagnostic::error(codes.no_toml, message, span));
     }
     errors.is_empty().then_some(table)
