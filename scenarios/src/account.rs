@@ -6,7 +6,6 @@
 //! read one of them long before another: only [`MAXIMUM_OPEN_CYCLES`], which bound its memory, end the wait for a remote I/O that is gone.
 
 mod closing;
-mod numbering;
 mod presence;
 mod service;
 mod stalls;
@@ -18,17 +17,15 @@ use std::time::Duration;
 
 use understudy_bus::HostEvent;
 use understudy_cycle::Agreement;
+use understudy_journal::{Happening, Members, Numbering, Record, RunEvent, moment};
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_simulator::{Action, Referee, Violation};
 use understudy_wire::{Member, Moment, ProgramId, ProgramSet, Source, StationId, StationSet};
 
 use crate::figure::Signals;
-use crate::members::Members;
-use crate::record::{Happening, Record, RunEvent, moment};
 use crate::scenario::{During, Scenario};
 
-pub use numbering::Numbering;
 pub use presence::{Interval, Presence};
 pub use service::{Counts, Service};
 pub use stalls::Stall;

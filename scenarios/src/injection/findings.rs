@@ -5,13 +5,13 @@ use std::fmt::{self, Write as _};
 use serde::{Deserialize, Serialize};
 use understudy_cluster::Cluster;
 use understudy_cycle::Mode;
+use understudy_journal::Members;
 use understudy_simulator::Tally;
 
 use super::coverage::CoverageRow;
 use super::kind::Phase;
 use super::minimise::Violating;
 use super::{Count, InjectionPlan};
-use crate::members::Members;
 use crate::write::write;
 
 /// Version of `campaign.json`.
