@@ -1,6 +1,5 @@
 //! The arbiter's side: what is added to the history of the program in each cycle.
 
-use understudy_cycle::Output;
 use understudy_wire::{Body, Moment, Sample, Source, Time};
 
 use super::{Floor, Phase, RemoteIo};
