@@ -16,18 +16,15 @@ mod relay;
 mod repair;
 mod turn;
 
-use std::collections::VecDeque;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
 use smallvec::SmallVec;
-use understudy_cycle::{
-    Admission, Arrival, Attendance, Copies, CycleClock, Input, Machine, Output, Reception, Waking,
-};
+use understudy_cycle::{Arrival, Input, Machine, Output, Participant};
 use understudy_logic::Scratch;
 use understudy_wire::{
-    Body, ConfigurationHash, Digest, Frame, Header, Holding, Image, Lineage, Member, Moment,
-    ProgramId, ProgramSet, Recalled, Sample, StationId, StationSet, Time,
+    Body, ConfigurationHash, Digest, Frame, Holding, Image, Lineage, Member, Moment, ProgramId,
+    ProgramSet, Recalled, Sample, StationId, StationSet, Time,
 };
 
 use crate::event::Event;
@@ -38,16 +35,11 @@ use crate::settings::Settings;
 #[derive(Debug, Clone)]
 pub struct Station {
     settings: Settings,
-    reception: Reception,
-    clock: CycleClock,
-    attendance: Attendance,
+    member: Participant<Event>,
     replicas: SmallVec<[Replica; 2]>,
     scratch: Scratch,
-    copies: Copies,
-    outbox: VecDeque<Output<Event>>,
     cycle: CycleNotes,
     started: Time,
-    waking: Waking,
     /// Whether this station starts the cycles.
     is_cycle_master: bool,
     wanted: ProgramSet,
@@ -102,16 +94,11 @@ impl Station {
             .map(|id| Replica::new(id, &settings.programs[id.index()], agreement.history))
             .collect();
         let mut station = Self {
-            reception: Reception::new(Member::Station(settings.station), agreement),
-            clock: CycleClock::default(),
-            attendance: Attendance::new(agreement.schedule.stations(), agreement.flag_after),
+            member: Participant::new(Member::Station(settings.station), agreement),
             replicas,
             scratch: Scratch::default(),
-            copies: Copies::default(),
-            outbox: VecDeque::new(),
             cycle: CycleNotes::default(),
             started: now,
-            waking: Waking::default(),
             is_cycle_master: false,
             wanted: ProgramSet::EMPTY,
             joining: StationSet::EMPTY,
@@ -120,7 +107,7 @@ impl Station {
             awaited: ProgramSet::EMPTY,
             settings,
         };
-        station.waking.ask(station.next_wakeup());
+        station.member.wake_at(station.next_wakeup());
         station
     }
 
@@ -159,59 +146,19 @@ impl Station {
     }
 
     fn report(&mut self, event: Event) {
-        self.outbox.push_back(Output::Report(event));
-    }
-
-    fn frame(&self, body: Body) -> Frame {
-        let agreement = &self.settings.agreement;
-        Frame {
-            header: Header {
-                cluster: agreement.cluster,
-                configuration: agreement.configuration,
-                moment: self.clock.moment().unwrap_or_default(),
-                sender: Member::Station(self.own()),
-                alone: self.clock.alone(),
-            },
-            body,
-        }
-    }
-
-    fn send(&mut self, body: Body) -> Arc<Frame> {
-        let frame = Arc::new(self.frame(body));
-        self.outbox.push_back(Output::Send(Arc::clone(&frame)));
-        frame
-    }
-
-    fn send_cyclic(&mut self, now: Time, body: Body) {
-        let frame = self.send(body);
-        self.copies
-            .sent(now, &frame, &self.settings.agreement.schedule);
+        self.member.report(event);
     }
 
     fn receive(&mut self, now: Time, frame: &Arc<Frame>) {
         if matches!(frame.body, Body::Field(_) | Body::Actuation(_)) {
             return;
         }
-        match self.reception.admit(&frame.header) {
-            Admission::Admitted => {}
-            Admission::Dropped => return,
-            Admission::Refused { theirs } => {
-                return self.report(Event::Refused {
-                    member: frame.header.sender,
-                    theirs,
-                    ours: self.settings.agreement.configuration,
-                });
-            }
-        }
-        match self
-            .clock
-            .arrival(now, frame, self.settings.agreement.schedule.period())
-        {
+        match self.member.arrival(now, frame) {
             Arrival::Stale => return,
             Arrival::Present => {}
             Arrival::Begins(anchor) => {
                 self.close_cycle();
-                self.clock.begin(now, frame.header.moment, anchor);
+                self.member.clock.begin(now, frame.header.moment, anchor);
                 let pacer = matches!(frame.body, Body::Sync);
                 self.is_cycle_master &= !pacer;
             }
@@ -245,11 +192,11 @@ impl Station {
         };
         replica.hear(&self.settings.programs[program.index()], moment, sample);
         if replica.set_excluded(excluded) {
-            self.outbox.push_back(Output::Report(if excluded {
+            self.member.report(if excluded {
                 Event::Excluded { moment, program }
             } else {
                 Event::Readmitted { moment, program }
-            }));
+            });
         }
         let followed = replica.follow(
             &self.settings.programs[program.index()],
@@ -286,20 +233,18 @@ impl Station {
     }
 
     fn next_wakeup(&self) -> Time {
-        let others = [self.copies.wakeup(), self.speaks_at(), self.asks_at()];
+        let others = [self.member.copies_at(), self.speaks_at(), self.asks_at()];
         let first = others.into_iter().flatten().fold(Time(u64::MAX), Time::min);
         // Nobody paces before the cycle is over.
-        let end = self.clock.anchor() + self.settings.agreement.schedule.period();
-        if self.clock.moment().is_some() && first <= end {
+        let end = self.member.clock.anchor() + self.settings.agreement.schedule.period();
+        if self.member.clock.moment().is_some() && first <= end {
             return first;
         }
         first.min(self.paces_at())
     }
 
     fn wake(&mut self, now: Time) {
-        while let Some(frame) = self.copies.take_due(now, &self.settings.agreement.schedule) {
-            self.outbox.push_back(Output::Send(frame));
-        }
+        self.member.send_copies(now);
         self.speak_if_it_is_time(now);
         if self.asks_at().is_some_and(|due| due <= now) {
             self.ask();
@@ -316,16 +261,11 @@ impl Hash for Station {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
         let Self {
             settings: _,
-            reception,
-            clock,
-            attendance,
+            member,
             replicas,
             scratch: _,
-            copies,
-            outbox: _,
             cycle,
             started,
-            waking,
             is_cycle_master,
             wanted,
             joining,
@@ -333,8 +273,8 @@ impl Hash for Station {
             lacked,
             awaited,
         } = self;
-        (reception, clock, attendance, replicas, copies).hash(hasher);
-        (cycle, started, waking, is_cycle_master, wanted).hash(hasher);
+        (member, replicas).hash(hasher);
+        (cycle, started, is_cycle_master, wanted).hash(hasher);
         (joining, differed, lacked, awaited).hash(hasher);
     }
 }
@@ -343,28 +283,20 @@ impl Machine for Station {
     type Event = Event;
 
     fn handle_input(&mut self, now: Time, input: Input<'_>) {
-        if let Some(late) = self.waking.stall(now, &self.settings.agreement.schedule) {
-            let moment = self.clock.moment().unwrap_or_default();
-            self.report(Event::Stalled { moment, late });
-        }
+        self.member.note_stall(now);
         match input {
             Input::Wakeup => self.wake(now),
             Input::Frame(frame) => self.receive(now, frame),
-            Input::Field(_)
-            | Input::FieldLost
-            | Input::Release
-            | Input::Choose(_)
-            | Input::Force(_)
-            | Input::Unforce(_) => {}
+            Input::RemoteIo(_) => {}
         }
-        self.waking.ask(self.next_wakeup());
+        self.member.wake_at(self.next_wakeup());
     }
 
     fn poll_output(&mut self) -> Option<Output<Event>> {
-        self.outbox.pop_front()
+        self.member.poll_output()
     }
 
     fn wakeup(&self) -> Time {
-        self.waking.asked()
+        self.member.wakeup()
     }
 }

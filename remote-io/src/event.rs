@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
+use understudy_cycle::{Notice, Refusal};
 use understudy_wire::{
     ConfigurationHash, Force, Image, Lineage, Member, Moment, ProgramId, SignalPlace, Source,
     StationId, StationSet,
@@ -266,4 +267,29 @@ pub enum Missing {
     TwoErasures,
     /// The paper's S2: two stations have failed.
     SecondFailure,
+}
+
+impl From<Refusal> for Event {
+    fn from(refusal: Refusal) -> Self {
+        let Refusal {
+            member,
+            theirs,
+            ours,
+        } = refusal;
+        Self::Refused {
+            member,
+            theirs,
+            ours,
+        }
+    }
+}
+
+impl From<Notice> for Event {
+    fn from(notice: Notice) -> Self {
+        match notice {
+            Notice::Flagged { moment, station } => Self::Flagged { moment, station },
+            Notice::Cleared { moment, station } => Self::Cleared { moment, station },
+            Notice::Stalled { moment, late } => Self::Stalled { moment, late },
+        }
+    }
 }

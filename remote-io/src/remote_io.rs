@@ -24,17 +24,13 @@ mod protection;
 mod recovery;
 mod sampling;
 
-use std::collections::VecDeque;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
-use understudy_cycle::{
-    Admission, Arrival, Attendance, Change, Copies, CycleClock, Input, Machine, Output, Reception,
-    Waking,
-};
+use understudy_cycle::{Arrival, Input, Machine, Output, Participant, RemoteIoInput};
 use understudy_wire::{
-    Body, ConfigurationHash, Frame, Header, Holding, Image, Lineage, Member, Moment, ProgramId,
-    Recalled, Source, StateChoice, StationId, StationSet, Time,
+    Body, ConfigurationHash, Frame, Holding, Image, Lineage, Member, Moment, ProgramId, Recalled,
+    Source, StateChoice, StationId, StationSet, Time,
 };
 
 use crate::diagnosis::Diagnosing;
@@ -52,9 +48,7 @@ use protection::Protection;
 #[derive(Debug, Clone)]
 pub struct RemoteIo {
     settings: Settings,
-    reception: Reception,
-    clock: CycleClock,
-    attendance: Attendance,
+    member: Participant<Event>,
     witnesses: Witnesses,
     phase: Phase,
     /// What the sensors show.
@@ -84,13 +78,10 @@ pub struct RemoteIo {
     /// Deadlines in a row at which nothing true was there.
     missed: u32,
     applied: Option<Applied>,
-    waking: Waking,
     last_true: Option<Image>,
     trust: Trust,
     /// Words and states that differed at the last deadline, with those who can be wrong.
     differed: Vec<(Option<ProgramId>, StationSet)>,
-    copies: Copies,
-    outbox: VecDeque<Output<Event>>,
 }
 
 /// The newest sample whose outputs were applied: an applied output has moved the plant, so the history never continues from a
@@ -135,14 +126,11 @@ impl RemoteIo {
     /// A remote I/O that has just started: it listens first, and drives the fail-safe values until it knows better.
     pub fn new(now: Time, settings: Settings) -> Self {
         let agreement = &settings.agreement;
-        let schedule = &agreement.schedule;
-        let stations = schedule.stations();
-        let mut clock = CycleClock::default();
-        clock.start(now);
+        let stations = agreement.schedule.stations();
+        let mut member = Participant::new(Member::RemoteIo(settings.program), agreement);
+        member.clock.start(now);
         let mut remote_io = Self {
-            reception: Reception::new(Member::RemoteIo(settings.program), agreement),
-            clock,
-            attendance: Attendance::new(stations, agreement.flag_after),
+            member,
             witnesses: Witnesses::new(settings.program, agreement),
             phase: Phase::Listening {
                 cycles: 0,
@@ -165,15 +153,12 @@ impl RemoteIo {
             idle: 0,
             missed: 0,
             applied: None,
-            waking: Waking::default(),
             last_true: None,
             trust: Trust::default(),
             differed: Vec::new(),
-            copies: Copies::default(),
-            outbox: VecDeque::new(),
             settings,
         };
-        remote_io.waking.ask(remote_io.next_wakeup());
+        remote_io.member.wake_at(remote_io.next_wakeup());
         remote_io
     }
 
@@ -188,43 +173,61 @@ impl RemoteIo {
     }
 
     fn moment(&self) -> Moment {
-        self.clock.moment().unwrap_or_default()
+        self.member.moment()
     }
 
     fn report(&mut self, event: Event) {
-        self.outbox.push_back(Output::Report(event));
+        self.member.report(event);
     }
 
     fn receive(&mut self, now: Time, frame: &Arc<Frame>) {
         let Member::Station(station) = frame.header.sender else {
             return;
         };
-        match self.reception.admit(&frame.header) {
-            Admission::Admitted => {}
-            Admission::Dropped => return,
-            Admission::Refused { theirs } => {
-                return self.report(Event::Refused {
-                    member: frame.header.sender,
-                    theirs,
-                    ours: self.settings.agreement.configuration,
-                });
-            }
-        }
-        match self
-            .clock
-            .arrival(now, frame, self.settings.agreement.schedule.period())
-        {
+        match self.member.arrival(now, frame) {
             Arrival::Stale => return,
             Arrival::Present => {}
             Arrival::Begins(anchor) => self.begin_cycle(now, frame.header.moment, anchor),
         }
         match &frame.body {
-            Body::Turn(turn) if self.attendance.heard(station) => {
+            Body::Turn(turn) if self.member.attendance.heard(station) => {
                 self.note(station, &turn.holdings, &turn.recalled);
                 self.turns[station.index()] = Some(Arc::clone(frame));
             }
             Body::Join(join) => self.note(station, &join.holdings, &join.recalled),
             _ => {}
+        }
+    }
+
+    fn take(&mut self, now: Time, input: RemoteIoInput<'_>) {
+        match input {
+            RemoteIoInput::Field(sensors) => {
+                if sensors.width() == self.settings.inputs {
+                    self.sensors.clone_from(sensors);
+                    self.field_lost = false;
+                }
+            }
+            RemoteIoInput::FieldLost => self.field_lost = true,
+            RemoteIoInput::Choose(choice) => self.choose(choice),
+            RemoteIoInput::Release => self.release(),
+            RemoteIoInput::Force(force) => self.force(now, force),
+            RemoteIoInput::Unforce(signal) => self.unforce(signal),
+        }
+    }
+
+    /// The operator releases the outputs, and all stations that were excluded.
+    fn release(&mut self) {
+        let moment = self.moment();
+        if self.question == Some(Question::Disputed) {
+            self.report(Event::Released { moment });
+            return self.choose(StateChoice::Newest { cycle: None });
+        }
+        self.pardons |= self.floor == Floor::Unknown;
+        self.diagnosing.release();
+        if !self.released || !self.trust.is_complete() {
+            self.released = true;
+            self.trust.release();
+            self.report(Event::Released { moment });
         }
     }
 
@@ -243,13 +246,13 @@ impl RemoteIo {
     }
 
     fn begin_cycle(&mut self, now: Time, moment: Moment, anchor: Time) {
-        if self.clock.moment().is_some() {
+        if self.member.clock.moment().is_some() {
             if !self.decided {
                 self.decide(now);
             }
             self.close_cycle();
         }
-        self.clock.begin(now, moment, anchor);
+        self.member.clock.begin(now, moment, anchor);
         self.decided = false;
         self.idle = 0;
         self.turns.fill(None);
@@ -258,49 +261,25 @@ impl RemoteIo {
     }
 
     fn close_cycle(&mut self) {
-        let moment = self.moment();
-        let outbox = &mut self.outbox;
-        self.attendance.close_cycle(|change| {
-            outbox.push_back(Output::Report(match change {
-                Change::Flagged(station) => Event::Flagged { moment, station },
-                Change::Cleared(station) => Event::Cleared { moment, station },
-            }));
-        });
+        self.member.close_cycle();
         self.witnesses.close_cycle();
-        self.copies.clear();
         if let Phase::Running { sampled, .. } = &mut self.phase {
             *sampled = false;
         }
     }
 
-    fn frame(&self, body: Body) -> Frame {
-        let agreement = &self.settings.agreement;
-        Frame {
-            header: Header {
-                cluster: agreement.cluster,
-                configuration: agreement.configuration,
-                moment: self.moment(),
-                sender: Member::RemoteIo(self.settings.program),
-                alone: self.clock.alone(),
-            },
-            body,
-        }
-    }
-
     fn next_wakeup(&self) -> Time {
         let decides_at = self.decides_at();
-        let copy = self.copies.wakeup();
+        let copy = self.member.copies_at();
         copy.map_or(decides_at, |copy| copy.min(decides_at))
     }
 
     fn wake(&mut self, now: Time) {
-        while let Some(frame) = self.copies.take_due(now, &self.settings.agreement.schedule) {
-            self.outbox.push_back(Output::Send(frame));
-        }
+        self.member.send_copies(now);
         if self.decides_at() > now {
             return;
         }
-        if !self.decided && self.clock.moment().is_some() {
+        if !self.decided && self.member.clock.moment().is_some() {
             self.decide(now);
             return;
         }
@@ -319,9 +298,7 @@ impl Hash for RemoteIo {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
         let Self {
             settings: _,
-            reception,
-            clock,
-            attendance,
+            member,
             witnesses,
             phase,
             sensors,
@@ -341,21 +318,15 @@ impl Hash for RemoteIo {
             idle,
             missed,
             applied,
-            waking,
             last_true,
             trust,
             differed,
-            copies,
-            outbox: _,
         } = self;
-        (
-            reception, clock, attendance, witnesses, phase, field, field_lost, forcing,
-        )
-            .hash(hasher);
+        (member, witnesses, phase, field, field_lost, forcing).hash(hasher);
         (sensors, diagnosing, diagnosed, pardons).hash(hasher);
         (floor, looked, question, protection).hash(hasher);
         (released, turns, decided, idle, missed, applied).hash(hasher);
-        (waking, last_true, trust, differed, copies).hash(hasher);
+        (last_true, trust, differed).hash(hasher);
     }
 }
 
@@ -363,49 +334,21 @@ impl Machine for RemoteIo {
     type Event = Event;
 
     fn handle_input(&mut self, now: Time, input: Input<'_>) {
-        if let Some(late) = self.waking.stall(now, &self.settings.agreement.schedule) {
-            let moment = self.moment();
-            self.report(Event::Stalled { moment, late });
-        }
+        self.member.note_stall(now);
         self.end_forces(now);
         match input {
             Input::Wakeup => self.wake(now),
             Input::Frame(frame) => self.receive(now, frame),
-            Input::Field(sensors) => {
-                if sensors.width() == self.settings.inputs {
-                    self.sensors.clone_from(sensors);
-                    self.field_lost = false;
-                }
-            }
-            Input::Choose(choice) => self.choose(choice),
-            Input::Release if self.question == Some(Question::Disputed) => {
-                self.report(Event::Released {
-                    moment: self.moment(),
-                });
-                self.choose(StateChoice::Newest { cycle: None });
-            }
-            Input::FieldLost => self.field_lost = true,
-            Input::Force(force) => self.force(now, force),
-            Input::Unforce(signal) => self.unforce(signal),
-            Input::Release => {
-                self.pardons |= self.floor == Floor::Unknown;
-                self.diagnosing.release();
-                if !self.released || !self.trust.is_complete() {
-                    self.released = true;
-                    self.trust.release();
-                    let moment = self.moment();
-                    self.report(Event::Released { moment });
-                }
-            }
+            Input::RemoteIo(input) => self.take(now, input),
         }
-        self.waking.ask(self.next_wakeup());
+        self.member.wake_at(self.next_wakeup());
     }
 
     fn poll_output(&mut self) -> Option<Output<Event>> {
-        self.outbox.pop_front()
+        self.member.poll_output()
     }
 
     fn wakeup(&self) -> Time {
-        self.waking.asked()
+        self.member.wakeup()
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_cycle::{Agreement, Input, Machine, Mode, Output, Schedule};
+use understudy_cycle::{Agreement, Input, Machine, Mode, Output, RemoteIoInput, Schedule};
 use understudy_remote_io::{Event, Missing, Release, RemoteIo, Settings, StaleState, ValueFault};
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Force, Frame, Header, Image, Join, Lineage,
@@ -121,7 +121,9 @@ fn a_forced_signal_is_sampled_and_driven_so_until_its_time_is_over() {
         remote_io: RemoteIo::new(Time::default(), settings()),
         cycle: 0,
     };
-    bench.tell(Input::Field(&Image::from_bits([true, false])));
+    bench.tell(Input::RemoteIo(RemoteIoInput::Field(&Image::from_bits([
+        true, false,
+    ]))));
     let started = (0..60).find_map(|_| bench.cycle().0);
     assert!(
         started.is_some(),
@@ -135,12 +137,28 @@ fn a_forced_signal_is_sampled_and_driven_so_until_its_time_is_over() {
         reason: "a test".to_owned(),
     };
     let (input, output) = (SignalPlace::Input(1), SignalPlace::Output(0));
-    bench.tell(Input::Force(&force(input, true, 1)));
-    bench.tell(Input::Force(&force(output, true, 1)));
+    bench.tell(Input::RemoteIo(RemoteIoInput::Force(&force(
+        input, true, 1,
+    ))));
+    bench.tell(Input::RemoteIo(RemoteIoInput::Force(&force(
+        output, true, 1,
+    ))));
     // None of these is a force.
-    bench.tell(Input::Force(&force(SignalPlace::Input(2), true, 1)));
-    bench.tell(Input::Force(&force(SignalPlace::Output(1), true, 1)));
-    bench.tell(Input::Force(&force(SignalPlace::Input(0), false, 0)));
+    bench.tell(Input::RemoteIo(RemoteIoInput::Force(&force(
+        SignalPlace::Input(2),
+        true,
+        1,
+    ))));
+    bench.tell(Input::RemoteIo(RemoteIoInput::Force(&force(
+        SignalPlace::Output(1),
+        true,
+        1,
+    ))));
+    bench.tell(Input::RemoteIo(RemoteIoInput::Force(&force(
+        SignalPlace::Input(0),
+        false,
+        0,
+    ))));
     let said = bench.drain();
     assert_eq!(forced_and_ended(&said), (2, 0), "{said:?}");
     let frames = |bench: &mut Bench| {
@@ -164,8 +182,8 @@ fn a_forced_signal_is_sampled_and_driven_so_until_its_time_is_over() {
     let (fail_safe, forced) = (image(&[false]), image(&[true]));
     let both = (image(&[true, true]), forced.clone(), fail_safe.clone(), 0);
     assert_eq!(frames(&mut bench), both);
-    bench.tell(Input::Unforce(output));
-    bench.tell(Input::Unforce(output));
+    bench.tell(Input::RemoteIo(RemoteIoInput::Unforce(output)));
+    bench.tell(Input::RemoteIo(RemoteIoInput::Unforce(output)));
     assert_eq!(forced_and_ended(&bench.drain()), (0, 1), "taken back once");
     let one = (
         image(&[true, true]),
@@ -202,18 +220,18 @@ fn without_sensors_nothing_is_sampled_and_the_program_stands_still() {
         cycle: 0,
     };
     let sensors = Image::from_bits([true, false]);
-    bench.tell(Input::Field(&sensors));
+    bench.tell(Input::RemoteIo(RemoteIoInput::Field(&sensors)));
     // It listens first whether somebody holds a state.
     let started = (0..60).find_map(|_| bench.cycle().0);
     let genesis = started.expect("it starts cold where nobody holds a state");
-    bench.tell(Input::FieldLost);
+    bench.tell(Input::RemoteIo(RemoteIoInput::FieldLost));
     for _ in 0..5 {
         let (sampled, source, missing) = bench.cycle();
         assert_eq!(sampled, None);
         assert_eq!(source, Source::FailSafe, "nothing was true before");
         assert_eq!(missing, Some(Missing::BadQuality));
     }
-    bench.tell(Input::Field(&sensors));
+    bench.tell(Input::RemoteIo(RemoteIoInput::Field(&sensors)));
     let (sampled, _, missing) = bench.cycle();
     assert_eq!(sampled, Some(genesis), "the history goes on where it was");
     assert_ne!(missing, Some(Missing::BadQuality));

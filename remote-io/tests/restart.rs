@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_cycle::{Agreement, Input, Machine, Mode, Output, Schedule};
+use understudy_cycle::{Agreement, Input, Machine, Mode, Output, RemoteIoInput, Schedule};
 use understudy_remote_io::{Event, Release, RemoteIo, Settings, StaleState, ValueFault};
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
@@ -89,7 +89,7 @@ fn run(held: [Held; 3], release: Release, released_at: u64, cycles: u64) -> Vec<
             remote_io.handle_input(start, Input::Frame(&frame));
         }
         if cycle == released_at {
-            remote_io.handle_input(start, Input::Release);
+            remote_io.handle_input(start, Input::RemoteIo(RemoteIoInput::Release));
         }
         remote_io.handle_input(start + PERIOD * 65 / 100, Input::Wakeup);
         while let Some(output) = remote_io.poll_output() {

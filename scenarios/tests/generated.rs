@@ -6,11 +6,12 @@ use std::collections::HashMap;
 
 use understudy_cluster::{Cluster, Overrides, press_cell};
 use understudy_cycle::Mode;
+use understudy_journal::{Happening, Members};
 use understudy_logic::Scratch;
 use understudy_node::Event as StationEvent;
 use understudy_parity::sum;
 use understudy_remote_io::Event as RemoteIoEvent;
-use understudy_scenarios::{Happening, Members, read, simulate};
+use understudy_scenarios::{read, simulate};
 use understudy_wire::{Image, Lineage, Member, Moment, ProgramId, ProgramSet, StationId, Word};
 
 fn cluster(mode: Mode) -> Cluster {

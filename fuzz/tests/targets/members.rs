@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use understudy_bus::{Endpoints, Peer};
-use understudy_cycle::{Input, Machine};
+use understudy_cycle::{Input, Machine, RemoteIoInput};
 use understudy_remote_io::RemoteIo;
 use understudy_seal::{ClusterSecret, Opener, Revocations, Seal, Title};
 use understudy_wire::{
@@ -113,10 +113,10 @@ fn force() {
         for line in bytes.split(|&byte| byte == b'\n').take(16) {
             if let Ok(force) = serde_json::from_slice::<Force>(line) {
                 if force.check().is_ok() {
-                    remote_io.handle_input(Time(1), Input::Force(&force));
+                    remote_io.handle_input(Time(1), Input::RemoteIo(RemoteIoInput::Force(&force)));
                 }
             } else if let Ok(place) = serde_json::from_slice::<SignalPlace>(line) {
-                remote_io.handle_input(Time(1), Input::Unforce(place));
+                remote_io.handle_input(Time(1), Input::RemoteIo(RemoteIoInput::Unforce(place)));
             }
         }
         for _ in 0..16 {

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use smallvec::smallvec;
-use understudy_cycle::{Agreement, Copies, Input, Machine, Output};
+use understudy_cycle::{Agreement, Copies, Input, Machine, Output, RemoteIoInput};
 use understudy_wire::{
     Body, Cycle, Epoch, Frame, Header, Image, Lineage, Member, Moment, ProgramHash, ProgramId,
     Sample, StationSet, Time,
@@ -124,7 +124,7 @@ impl Machine for Module {
                     self.driven.push((sender, word.sum.clone()));
                 }
             }
-            Input::Field(sensors) => self.field.clone_from(sensors),
+            Input::RemoteIo(RemoteIoInput::Field(sensors)) => self.field.clone_from(sensors),
             Input::Wakeup => {
                 while let Some(frame) = self.copies.take_due(now, &self.agreement.schedule) {
                     self.outbox.push_back(Output::Send(frame));

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use understudy_cluster::Cluster;
-use understudy_cycle::{Agreement, Input, Machine, Output};
+use understudy_cycle::{Agreement, Input, Machine, Output, RemoteIoInput};
 use understudy_logic::Scan;
 use understudy_plant::Plant;
 use understudy_simulator::Network;
@@ -116,7 +116,7 @@ impl Pairs {
             let plant = place.as_ref().map(|place| place.plant.clone());
             let shown = plant.as_ref().map(Plant::field);
             if let Some(field) = &shown {
-                module.handle_input(now, Input::Field(&field.sensors));
+                module.handle_input(now, Input::RemoteIo(RemoteIoInput::Field(&field.sensors)));
             }
             let partner = |rank| Some(Partner::first(now, pairs.settings(index, rank)));
             let cell = Cell {
@@ -279,7 +279,10 @@ impl Pairs {
         if let Some(plant) = plant {
             let field = plant.step(outputs, handed_over - *taken);
             *taken = handed_over;
-            module.handle_input(self.now, Input::Field(&field.sensors));
+            module.handle_input(
+                self.now,
+                Input::RemoteIo(RemoteIoInput::Field(&field.sensors)),
+            );
             *shown = Some(field);
         }
     }

@@ -1,6 +1,7 @@
 //! What a plant reports, for the journal.
 
 use serde::{Deserialize, Serialize};
+use understudy_cycle::Refusal;
 use understudy_wire::{ConfigurationHash, Field, Image, Member, Moment};
 
 /// One thing that happened to a plant.
@@ -39,4 +40,19 @@ pub enum Pace {
     Alone,
     /// Time: no actuation has come for so long that the watchdog has put the fail-safe outputs in force.
     Watchdog,
+}
+
+impl From<Refusal> for Event {
+    fn from(refusal: Refusal) -> Self {
+        let Refusal {
+            member,
+            theirs,
+            ours,
+        } = refusal;
+        Self::Refused {
+            member,
+            theirs,
+            ours,
+        }
+    }
 }

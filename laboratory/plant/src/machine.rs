@@ -18,11 +18,10 @@
 //! Invariant: an actuation steps the plant once, however often its frame arrives, and an older one never does, except where the
 //! watchdog has run out or the epoch of the last one bound nobody. At most one step a wake-up: time that its host lost is lost.
 
-use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_cycle::{Admission, Agreement, Input, Machine, Output, Reception};
+use understudy_cycle::{Agreement, Endpoint, Input, Machine, Output};
 use understudy_wire::{Body, Field, Frame, Header, Image, Member, Moment, ProgramId, Time};
 
 use crate::event::{Event, Pace};
@@ -61,8 +60,7 @@ pub struct PlantMachine {
     feed: Feed,
     /// By number of what it follows.
     hearings: Vec<Hearing>,
-    reception: Reception,
-    said: VecDeque<Output<Event>>,
+    endpoint: Endpoint<Event>,
 }
 
 #[derive(Debug, Clone)]
@@ -107,9 +105,8 @@ impl PlantMachine {
             wakeup: now,
             feed: Feed::default(),
             hearings: vec![Hearing::default(); settings.follows.len()],
-            reception: Reception::new(Member::Plant(settings.program), &settings.agreement),
+            endpoint: Endpoint::new(Member::Plant(settings.program), &settings.agreement),
             settings,
-            said: VecDeque::new(),
         }
     }
 
@@ -130,17 +127,8 @@ impl PlantMachine {
 
     fn hear(&mut self, now: Time, frame: &Frame) {
         let header = &frame.header;
-        match self.reception.admit(header) {
-            Admission::Admitted => {}
-            Admission::Refused { theirs } => {
-                self.said.push_back(Output::Report(Event::Refused {
-                    member: header.sender,
-                    theirs,
-                    ours: self.settings.agreement.configuration,
-                }));
-                return;
-            }
-            Admission::Dropped => return,
+        if !self.endpoint.admits(header) {
+            return;
         }
         match (&frame.body, header.sender) {
             (Body::Actuation(actuation), Member::RemoteIo(program))
@@ -194,7 +182,7 @@ impl PlantMachine {
         self.wakeup = now + self.period();
         let watchdog = self.watchdog_has_run_out(now);
         let Some(driven) = &self.driven else {
-            self.say_field(Moment::default(), self.field());
+            self.send_field(Moment::default(), self.field());
             return;
         };
         let moment = driven.moment;
@@ -208,27 +196,17 @@ impl PlantMachine {
     fn step(&mut self, moment: Moment, outputs: Image, pace: Pace) {
         let arrived = std::mem::take(&mut self.feed.arrived);
         let field = self.settings.plant.step(&outputs, arrived);
-        self.say_field(moment, field.clone());
-        self.said.push_back(Output::Report(Event::Stepped {
+        self.send_field(moment, field.clone());
+        self.endpoint.report(Event::Stepped {
             moment,
             pace,
             outputs,
             field,
-        }));
+        });
     }
 
-    fn say_field(&mut self, moment: Moment, field: Field) {
-        let agreement = &self.settings.agreement;
-        self.said.push_back(Output::Send(Arc::new(Frame {
-            header: Header {
-                cluster: agreement.cluster,
-                configuration: agreement.configuration,
-                moment,
-                sender: Member::Plant(self.settings.program),
-                alone: false,
-            },
-            body: Body::Field(field),
-        })));
+    fn send_field(&mut self, moment: Moment, field: Field) {
+        self.endpoint.send(moment, false, Body::Field(field));
     }
 }
 
@@ -239,17 +217,12 @@ impl Machine for PlantMachine {
         match input {
             Input::Wakeup => self.wake(now),
             Input::Frame(frame) => self.hear(now, frame),
-            Input::Field(_)
-            | Input::FieldLost
-            | Input::Release
-            | Input::Choose(_)
-            | Input::Force(_)
-            | Input::Unforce(_) => {}
+            Input::RemoteIo(_) => {}
         }
     }
 
     fn poll_output(&mut self) -> Option<Output<Event>> {
-        self.said.pop_front()
+        self.endpoint.poll_output()
     }
 
     fn wakeup(&self) -> Time {

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use serde::Serialize;
-use understudy_cycle::{Input, Machine, Output};
+use understudy_cycle::{Input, Machine, Output, RemoteIoInput};
 use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
 use understudy_wire::{
@@ -449,7 +449,10 @@ impl Simulation {
 
     fn show_field(&mut self, program: ProgramId) {
         if let Some(field) = self.plants.field(program) {
-            self.remote_ios[program.index()].give(self.now, Input::Field(&field.sensors));
+            self.remote_ios[program.index()].give(
+                self.now,
+                Input::RemoteIo(RemoteIoInput::Field(&field.sensors)),
+            );
         }
     }
 

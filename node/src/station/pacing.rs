@@ -12,27 +12,19 @@ use crate::event::Event;
 impl Station {
     /// Ends the current cycle: flags, and copies that have proved themselves.
     pub(super) fn close_cycle(&mut self) {
-        let Some(moment) = self.clock.moment() else {
+        let Some(moment) = self.member.clock.moment() else {
             return;
         };
         if self.cycle.published {
-            self.attendance.heard(self.own());
+            self.member.attendance.heard(self.own());
         }
-        let outbox = &mut self.outbox;
-        self.attendance.close_cycle(|change| {
-            outbox.push_back(Output::Report(match change {
-                Change::Flagged(station) => Event::Flagged { moment, station },
-                Change::Cleared(station) => Event::Cleared { moment, station },
-            }));
-        });
+        self.member.close_cycle();
         for replica in &mut self.replicas {
             if replica.close_cycle(moment) {
                 let program = replica.id();
-                self.outbox
-                    .push_back(Output::Report(Event::Synchronised { moment, program }));
+                self.member.report(Event::Synchronised { moment, program });
             }
         }
-        self.copies.clear();
         self.joining = self.cycle.joiners;
         self.close_relay();
         self.differed = std::mem::take(&mut self.cycle.differs);
@@ -44,12 +36,12 @@ impl Station {
         let agreement = &self.settings.agreement;
         let (schedule, own) = (&agreement.schedule, self.own());
         let lower = StationSet::first(own.index());
-        if self.clock.moment().is_none() {
+        if self.member.clock.moment().is_none() {
             let listens = schedule.period() * agreement.listen_cycles;
             return self.started + listens + schedule.guard() * u32::from(own.0);
         }
         let all = StationSet::first(schedule.stations());
-        let living = all.without(self.attendance.flagged());
+        let living = all.without(self.member.flagged());
         let first = if self.speaks() {
             living.and(lower)
         } else {
@@ -57,7 +49,7 @@ impl Station {
                 .or(self.joining.and(lower))
                 .without(StationSet::only(own))
         };
-        self.clock.anchor() + schedule.period() + schedule.guard() * first.len() as u32
+        self.member.clock.anchor() + schedule.period() + schedule.guard() * first.len() as u32
     }
 
     pub(super) fn pace(&mut self, now: Time, planned: Time) {
@@ -70,12 +62,13 @@ impl Station {
             now
         };
         let moment = self
+            .member
             .clock
             .pace(now, self.settings.epoch, anchor, schedule.period());
         if !self.is_cycle_master {
             self.is_cycle_master = true;
             self.report(Event::BecameCycleMaster { moment });
         }
-        self.send_cyclic(now, Body::Sync);
+        self.member.send_cyclic(now, Body::Sync);
     }
 }

@@ -57,7 +57,7 @@ impl Station {
         holdings: &[Holding],
         recalled: &[Recalled],
     ) {
-        let now = self.clock.moment().unwrap_or_default();
+        let now = self.member.moment();
         let silent_after = self.settings.agreement.flag_after;
         for holding in holdings {
             let mut replicas = self.replicas.iter_mut();
@@ -115,12 +115,12 @@ impl Station {
             .collect();
         // Which of them have to wait changes from cycle to cycle: a history bridges the cycles between.
         if let Some(first) = turn.relayed.len().checked_sub(1) {
-            let moment = self.clock.moment().unwrap_or_default();
+            let moment = self.member.moment();
             let by = moment.cycle.0 as usize % (first + 1);
             turn.relayed.rotate_left(by);
         }
         while !turn.relayed.is_empty() {
-            let frame = self.frame(Body::Turn(turn.clone()));
+            let frame = self.member.frame(Body::Turn(turn.clone()));
             if encode(&frame, &mut Vec::new()).is_ok() {
                 break;
             }

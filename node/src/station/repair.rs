@@ -30,7 +30,7 @@ impl Station {
                     replica.transfer(&self.settings.programs[program.index()], station)
                 });
             if let Some(transfer) = transfer {
-                self.send(Body::Transfer(transfer));
+                self.member.send(Body::Transfer(transfer));
             }
         }
     }
@@ -50,7 +50,7 @@ impl Station {
         let shadow_cycles = self.settings.agreement.shadow_cycles;
         if replica.adopt(program, &mut self.scratch, transfer, shadow_cycles) {
             let event = Event::Adopted {
-                moment: self.clock.moment().unwrap_or_default(),
+                moment: self.member.moment(),
                 program: transfer.program,
                 lineage: replica.lineage().unwrap_or(transfer.lineage),
                 from: Some(from),
@@ -61,7 +61,7 @@ impl Station {
 
     pub(super) fn ask(&mut self) {
         self.cycle.asked = true;
-        let Some(moment) = self.clock.moment() else {
+        let Some(moment) = self.member.clock.moment() else {
             return;
         };
         let lost = |replica: &&Replica| replica.standing() == Standing::Lost;
@@ -75,7 +75,7 @@ impl Station {
         if !wants.is_empty() || !self.speaks() {
             let holdings = self.holdings();
             let recalled = self.recalled(moment);
-            self.send(Body::Join(Join {
+            self.member.send(Body::Join(Join {
                 wants,
                 holdings,
                 recalled,
@@ -85,7 +85,7 @@ impl Station {
     }
 
     pub(super) fn asks_at(&self) -> Option<Time> {
-        let due = self.clock.anchor() + self.settings.agreement.schedule.rest();
-        (self.clock.moment().is_some() && !self.cycle.asked).then_some(due)
+        let due = self.member.clock.anchor() + self.settings.agreement.schedule.rest();
+        (self.member.clock.moment().is_some() && !self.cycle.asked).then_some(due)
     }
 }

@@ -18,7 +18,7 @@ const STATES_EVERY: Duration = Duration::from_secs(2);
 
 impl Station {
     pub(super) fn hear_turn(&mut self, station: StationId, turn: &Turn) {
-        if !self.attendance.heard(station) {
+        if !self.member.attendance.heard(station) {
             return;
         }
         let own_program = ProgramId(station.0);
@@ -47,7 +47,7 @@ impl Station {
 
     /// Equal lineages mean equal states; where the digests differ all the same, a value has been corrupted.
     pub(super) fn compare(&mut self, station: StationId, holdings: &[Holding]) {
-        let moment = self.clock.moment().unwrap_or_default();
+        let moment = self.member.moment();
         for theirs in holdings {
             let Some(replica) = self
                 .replicas
@@ -67,11 +67,11 @@ impl Station {
             }
             self.cycle.differs.push((theirs.program, station));
             if !self.differed.contains(&(theirs.program, station)) {
-                self.outbox.push_back(Output::Report(Event::DigestDiffers {
+                self.member.report(Event::DigestDiffers {
                     moment,
                     program: theirs.program,
                     station,
-                }));
+                });
             }
         }
     }
@@ -92,7 +92,7 @@ impl Station {
 
     /// It speaks when it has the token and knows its outputs, and at the last call whatever it knows.
     pub(super) fn speak_if_it_is_time(&mut self, now: Time) {
-        let Some(moment) = self.clock.moment() else {
+        let Some(moment) = self.member.clock.moment() else {
             return;
         };
         if self.cycle.published || !self.speaks() {
@@ -109,8 +109,8 @@ impl Station {
     /// Whether everybody whom it has to wait for has published: its predecessor, or for an understudy all before it.
     pub(super) fn has_token(&self) -> bool {
         let before = StationSet::first(self.own().index());
-        let waited_for = before.without(self.attendance.flagged());
-        let missing = waited_for.without(self.attendance.published());
+        let waited_for = before.without(self.member.flagged());
+        let missing = waited_for.without(self.member.published());
         if self.is_understudy() {
             missing.is_empty()
         } else {
@@ -156,7 +156,7 @@ impl Station {
         });
         self.report_states(moment);
         let turn = Turn {
-            heard: self.attendance.published(),
+            heard: self.member.published(),
             holdings: self.holdings(),
             words,
             recalled: self.recalled(moment),
@@ -164,7 +164,7 @@ impl Station {
             relayed: Vec::new(),
         };
         let body = self.with_relayed(turn);
-        self.send_cyclic(now, body);
+        self.member.send_cyclic(now, body);
     }
 
     fn words(&mut self, moment: Moment) -> SmallVec<[Word; 2]> {
@@ -194,14 +194,14 @@ impl Station {
     }
 
     pub(super) fn speaks_at(&self) -> Option<Time> {
-        let moment = self.clock.moment()?;
+        let moment = self.member.clock.moment()?;
         let may = !self.cycle.published && self.speaks();
         may.then(|| self.speaks_by(moment))
     }
 
     fn speaks_by(&self, moment: Moment) -> Time {
         let schedule = &self.settings.agreement.schedule;
-        self.clock.anchor()
+        self.member.clock.anchor()
             + if self.knows_all_outputs(moment) {
                 schedule.slot(self.own())
             } else {

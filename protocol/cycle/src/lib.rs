@@ -1,14 +1,16 @@
 //! What every member of a cluster shares, whether it is a station, a remote I/O or a plant.
 //!
-//! All members agree on the same configuration ([`Agreement`]) and compute the same [`Schedule`] from it. Each member admits frames
-//! by [`Reception`], knows its cycle and epoch by [`CycleClock`], which stations were received by [`Attendance`], and repeats its
-//! cyclic frames by [`Copies`]. A member is a [`Machine`].
+//! All members agree on the same configuration ([`Agreement`]) and compute the same [`Schedule`] from it. A member is a
+//! [`Machine`]. Each is built on an [`Endpoint`], which admits frames and sends frames; those that take part in the cycle are built on a
+//! [`Participant`], which also knows its cycle and epoch ([`CycleClock`]) and the stations that it receives ([`Attendance`]), and repeats
+//! its cyclic frames ([`Copies`]).
 
 mod agreement;
 mod attendance;
 mod clock;
 mod copies;
 mod machine;
+mod participant;
 mod reception;
 mod schedule;
 mod waking;
@@ -17,7 +19,6 @@ pub use agreement::{Agreement, Mode};
 pub use attendance::{Attendance, Change};
 pub use clock::{Arrival, CycleClock};
 pub use copies::Copies;
-pub use machine::{Input, Machine, Output};
-pub use reception::{Admission, Reception};
+pub use machine::{Input, Machine, Output, RemoteIoInput};
+pub use participant::{Endpoint, Notice, Participant, Refusal};
 pub use schedule::{Schedule, ScheduleError};
-pub use waking::Waking;

@@ -151,7 +151,7 @@ impl RemoteIo {
             outputs: outputs.clone(),
         });
         let driven = self.forcing.outputs(&outputs);
-        self.outbox.push_back(Output::Drive(driven));
+        self.member.put(Output::Drive(driven));
         self.report(Event::Applied {
             moment,
             sampled,
@@ -159,15 +159,15 @@ impl RemoteIo {
             source,
             word_of,
             missing,
-            heard: self.attendance.published(),
+            heard: self.member.published(),
         });
     }
 
     /// The next deadline: of this cycle, or of one that nobody has started in time.
     pub(super) fn decides_at(&self) -> Time {
         let schedule = &self.settings.agreement.schedule;
-        let deadline = self.clock.anchor() + schedule.deadline();
-        if !self.decided && self.clock.moment().is_some() {
+        let deadline = self.member.clock.anchor() + schedule.deadline();
+        if !self.decided && self.member.clock.moment().is_some() {
             return deadline;
         }
         deadline + schedule.period() * (self.idle + 1) + schedule.grace()

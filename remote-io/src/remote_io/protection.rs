@@ -86,7 +86,7 @@ impl RemoteIo {
         if self.settings.agreement.mode == Mode::Paper {
             let all = StationSet::first(self.turns.len());
             let part: StationSet = self.witnesses.stations().collect();
-            let failed = all.without(part).without(self.attendance.published());
+            let failed = all.without(part).without(self.member.published());
             let reason = LackingReason::Failed;
             lacking.extend(failed.iter().map(|station| Lacking { station, reason }));
         }
@@ -99,7 +99,7 @@ impl RemoteIo {
             return Some(LackingReason::Excluded);
         }
         let Some(turn) = self.turn_of(station) else {
-            let joins = self.attendance.flagged().contains(station);
+            let joins = self.member.flagged().contains(station);
             return Some(if joins && self.witnesses.is_living(station) {
                 LackingReason::Joining
             } else {

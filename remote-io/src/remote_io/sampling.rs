@@ -1,8 +1,5 @@
 //! The arbiter's side: what is added to the history of the program in each cycle.
 
-use std::sync::Arc;
-
-use understudy_cycle::Output;
 use understudy_wire::{Body, Moment, Sample, Source, Time};
 
 use super::{Floor, Phase, RemoteIo};
@@ -96,9 +93,6 @@ impl RemoteIo {
             born,
             before,
         });
-        let frame = Arc::new(self.frame(body));
-        self.outbox.push_back(Output::Send(Arc::clone(&frame)));
-        self.copies
-            .sent(now, &frame, &self.settings.agreement.schedule);
+        self.member.send_cyclic(now, body);
     }
 }

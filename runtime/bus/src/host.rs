@@ -10,7 +10,7 @@ use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, ppoll};
 use nix::sys::time::TimeSpec;
 use serde::{Deserialize, Serialize};
-use understudy_cycle::{Input, Machine, Output};
+use understudy_cycle::{Input, Machine, Output, RemoteIoInput};
 use understudy_wire::{Body, Frame, Moment, Time, encode};
 
 use crate::clock::Clock;
@@ -158,10 +158,10 @@ impl<M: Machine> Host<'_, M> {
                 Order::Stop => return true,
                 // Holds already: it is asked of the orders for each frame.
                 Order::Cut(_) => continue,
-                Order::Release => Input::Release,
-                Order::Choose(choice) => Input::Choose(*choice),
-                Order::Force(force) => Input::Force(force),
-                Order::Unforce(signal) => Input::Unforce(*signal),
+                Order::Release => Input::RemoteIo(RemoteIoInput::Release),
+                Order::Choose(choice) => Input::RemoteIo(RemoteIoInput::Choose(*choice)),
+                Order::Force(force) => Input::RemoteIo(RemoteIoInput::Force(force)),
+                Order::Unforce(signal) => Input::RemoteIo(RemoteIoInput::Unforce(*signal)),
             };
             let now = self.clock.now();
             self.machine.handle_input(now, input);
@@ -185,10 +185,16 @@ impl<M: Machine> Host<'_, M> {
         };
         let now = self.clock.now();
         let (input, event) = match &look {
-            Look::Sensors(sensors) => (Input::Field(sensors), HostEvent::FieldRegained),
+            Look::Sensors(sensors) => (
+                Input::RemoteIo(RemoteIoInput::Field(sensors)),
+                HostEvent::FieldRegained,
+            ),
             Look::Lost(reason) => {
                 let reason = reason.clone();
-                (Input::FieldLost, HostEvent::FieldLost { reason })
+                (
+                    Input::RemoteIo(RemoteIoInput::FieldLost),
+                    HostEvent::FieldLost { reason },
+                )
             }
         };
         let lost = matches!(look, Look::Lost(_));
@@ -227,7 +233,7 @@ impl<M: Machine> Host<'_, M> {
                         round.moment = said;
                     }
                     let input = match self.field.sense(&frame) {
-                        Some(sensors) => Input::Field(sensors),
+                        Some(sensors) => Input::RemoteIo(RemoteIoInput::Field(sensors)),
                         None => Input::Frame(&frame),
                     };
                     self.machine.handle_input(now, input);

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use understudy_cycle::{Agreement, Input, Machine};
+use understudy_cycle::{Agreement, Input, Machine, RemoteIoInput};
 use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
 use understudy_wire::{ConfigurationHash, Epoch, Frame, Member};
@@ -38,11 +38,15 @@ impl Simulation {
             }
             (Member::RemoteIo(program), Action::Release) => {
                 self.referees[program.index()].operator_chooses();
-                self.give(member, Input::Release, observe);
+                self.give(member, Input::RemoteIo(RemoteIoInput::Release), observe);
             }
             (Member::RemoteIo(program), Action::Choose { choice }) => {
                 self.referees[program.index()].operator_chooses();
-                self.give(member, Input::Choose(choice), observe);
+                self.give(
+                    member,
+                    Input::RemoteIo(RemoteIoInput::Choose(choice)),
+                    observe,
+                );
             }
             (Member::Station(station), _) => {
                 let waiting = disturb(&mut self.stations[station.index()], action);

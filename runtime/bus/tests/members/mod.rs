@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use understudy_bus::{Endpoints, Guard, Peer, free_addresses};
-use understudy_cycle::{Agreement, Input, Machine, Mode, Output, Schedule};
+use understudy_cycle::{Agreement, Input, Machine, Mode, Output, RemoteIoInput, Schedule};
 use understudy_seal::{ClusterSecret, FrameKey, Opener, Seal, Title};
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Field, Frame, Header, Image, Lineage,
@@ -101,10 +101,11 @@ impl Machine for Chatter {
                     hundreds: header.moment.cycle.0 / 100,
                 });
             }
-            Input::Field(_) => self.report_once(Chat::Sensed),
-            Input::FieldLost | Input::Force(_) | Input::Unforce(_) => {}
-            Input::Choose(_) => {}
-            Input::Release => self.said.push_back(Output::Report(Chat::Released)),
+            Input::RemoteIo(RemoteIoInput::Field(_)) => self.report_once(Chat::Sensed),
+            Input::RemoteIo(RemoteIoInput::Release) => {
+                self.said.push_back(Output::Report(Chat::Released));
+            }
+            Input::RemoteIo(_) => {}
         }
     }
 

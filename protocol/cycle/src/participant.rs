@@ -1,0 +1,283 @@
+//! What every member does in the same way: it admits frames, makes headers, knows its cycle, counts the stations that it receives,
+//! repeats its cyclic frames, and notices when its host has suspended it.
+//!
+//! A plant is an [`Endpoint`]: it takes frames and sends frames. A station and a remote I/O are each a [`Participant`] of the cycle.
+
+use std::collections::VecDeque;
+use std::hash::{Hash, Hasher};
+use std::sync::Arc;
+use std::time::Duration;
+
+use understudy_wire::{
+    Body, ConfigurationHash, Frame, Header, Member, Moment, StationId, StationSet, Time,
+};
+
+use crate::agreement::Agreement;
+use crate::attendance::{Attendance, Change};
+use crate::clock::{Arrival, CycleClock};
+use crate::copies::Copies;
+use crate::machine::Output;
+use crate::reception::{Admission, Reception};
+use crate::waking::Waking;
+
+/// A member of this cluster that has another configuration, reported once for each member.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Refusal {
+    /// Member whose frames are dropped.
+    pub member: Member,
+    /// Its configuration.
+    pub theirs: ConfigurationHash,
+    /// Configuration of the member that reports.
+    pub ours: ConfigurationHash,
+}
+
+/// What stations and remote I/Os report in the same way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Notice {
+    /// A station was not received for `flag_after` cycles: θ = 1.
+    Flagged {
+        /// Cycle that ends.
+        moment: Moment,
+        /// Station that is flagged.
+        station: StationId,
+    },
+    /// A flagged station was received again: θ = 0.
+    Cleared {
+        /// Cycle that ends.
+        moment: Moment,
+        /// Station that was received.
+        station: StationId,
+    },
+    /// The host woke this member too late to keep its times.
+    Stalled {
+        /// Current cycle.
+        moment: Moment,
+        /// Delay behind the time that the member had asked for.
+        late: Duration,
+    },
+}
+
+/// Frames in and out of one member.
+#[derive(Debug, Clone)]
+pub struct Endpoint<Event> {
+    own: Member,
+    agreement: Arc<Agreement>,
+    reception: Reception,
+    outbox: VecDeque<Output<Event>>,
+}
+
+impl<Event: From<Refusal>> Endpoint<Event> {
+    /// An endpoint of the member `own`.
+    pub fn new(own: Member, agreement: &Arc<Agreement>) -> Self {
+        Self {
+            own,
+            agreement: Arc::clone(agreement),
+            reception: Reception::new(own, agreement),
+            outbox: VecDeque::new(),
+        }
+    }
+
+    /// Whether a frame with this header counts; reports the first of a member with another configuration.
+    pub fn admits(&mut self, header: &Header) -> bool {
+        match self.reception.admit(header) {
+            Admission::Admitted => true,
+            Admission::Dropped => false,
+            Admission::Refused { theirs } => {
+                self.report(Event::from(Refusal {
+                    member: header.sender,
+                    theirs,
+                    ours: self.agreement.configuration,
+                }));
+                false
+            }
+        }
+    }
+
+    /// A frame of this member.
+    pub fn frame(&self, moment: Moment, alone: bool, body: Body) -> Frame {
+        Frame {
+            header: Header {
+                cluster: self.agreement.cluster,
+                configuration: self.agreement.configuration,
+                moment,
+                sender: self.own,
+                alone,
+            },
+            body,
+        }
+    }
+
+    /// Sends a frame.
+    pub fn send(&mut self, moment: Moment, alone: bool, body: Body) -> Arc<Frame> {
+        let frame = Arc::new(self.frame(moment, alone, body));
+        self.put(Output::Send(Arc::clone(&frame)));
+        frame
+    }
+
+    /// Reports an event.
+    pub fn report(&mut self, event: Event) {
+        self.put(Output::Report(event));
+    }
+
+    /// Appends an output.
+    pub fn put(&mut self, output: Output<Event>) {
+        self.outbox.push_back(output);
+    }
+
+    /// The oldest output that was not taken yet.
+    pub fn poll_output(&mut self) -> Option<Output<Event>> {
+        self.outbox.pop_front()
+    }
+}
+
+/// A member that takes part in the cycle.
+#[derive(Debug, Clone)]
+pub struct Participant<Event> {
+    endpoint: Endpoint<Event>,
+    /// Its cycle and epoch.
+    pub clock: CycleClock,
+    /// Stations that it receives.
+    pub attendance: Attendance,
+    copies: Copies,
+    waking: Waking,
+}
+
+impl<Event: From<Refusal> + From<Notice>> Participant<Event> {
+    /// The member `own`, in no cycle yet and with all stations flagged.
+    pub fn new(own: Member, agreement: &Arc<Agreement>) -> Self {
+        Self {
+            endpoint: Endpoint::new(own, agreement),
+            clock: CycleClock::default(),
+            attendance: Attendance::new(agreement.schedule.stations(), agreement.flag_after),
+            copies: Copies::default(),
+            waking: Waking::default(),
+        }
+    }
+
+    /// What all members agree on.
+    pub fn agreement(&self) -> &Agreement {
+        &self.endpoint.agreement
+    }
+
+    /// The current cycle; the default before the first one.
+    pub fn moment(&self) -> Moment {
+        self.clock.moment().unwrap_or_default()
+    }
+
+    /// The cycle of a frame that comes at `now`; a frame that is not admitted is stale.
+    pub fn arrival(&mut self, now: Time, frame: &Frame) -> Arrival {
+        if !self.endpoint.admits(&frame.header) {
+            return Arrival::Stale;
+        }
+        let period = self.agreement().schedule.period();
+        self.clock.arrival(now, frame, period)
+    }
+
+    /// Ends the current cycle: reports the flags that change, and sends no more copies.
+    pub fn close_cycle(&mut self) {
+        let moment = self.moment();
+        let endpoint = &mut self.endpoint;
+        self.attendance.close_cycle(|change| {
+            endpoint.report(Event::from(match change {
+                Change::Flagged(station) => Notice::Flagged { moment, station },
+                Change::Cleared(station) => Notice::Cleared { moment, station },
+            }));
+        });
+        self.copies.clear();
+    }
+
+    /// Stations that published in this cycle.
+    pub fn published(&self) -> StationSet {
+        self.attendance.published()
+    }
+
+    /// Flagged stations: θ = 1.
+    pub fn flagged(&self) -> StationSet {
+        self.attendance.flagged()
+    }
+
+    /// A frame of the current cycle.
+    pub fn frame(&self, body: Body) -> Frame {
+        let alone = self.clock.alone();
+        self.endpoint.frame(self.moment(), alone, body)
+    }
+
+    /// Sends a frame of the current cycle, once.
+    pub fn send(&mut self, body: Body) -> Arc<Frame> {
+        let (moment, alone) = (self.moment(), self.clock.alone());
+        self.endpoint.send(moment, alone, body)
+    }
+
+    /// Sends a frame of the current cycle, with its copies.
+    pub fn send_cyclic(&mut self, now: Time, body: Body) {
+        let frame = self.send(body);
+        let schedule = &self.endpoint.agreement.schedule;
+        self.copies.sent(now, &frame, schedule);
+    }
+
+    /// Sends the copies that are due at `now`.
+    pub fn send_copies(&mut self, now: Time) {
+        let schedule = &self.endpoint.agreement.schedule;
+        while let Some(frame) = self.copies.take_due(now, schedule) {
+            self.endpoint.outbox.push_back(Output::Send(frame));
+        }
+    }
+
+    /// Time of the next copy.
+    pub fn copies_at(&self) -> Option<Time> {
+        self.copies.wakeup()
+    }
+
+    /// Reports an input at `now` that shows the host to have woken this member too late.
+    pub fn note_stall(&mut self, now: Time) {
+        if let Some(late) = self.waking.stall(now, &self.endpoint.agreement.schedule) {
+            let moment = self.moment();
+            self.report(Event::from(Notice::Stalled { moment, late }));
+        }
+    }
+
+    /// Asks to be woken at `at`.
+    pub fn wake_at(&mut self, at: Time) {
+        self.waking.ask(at);
+    }
+
+    /// Time at which it asked to be woken.
+    pub fn wakeup(&self) -> Time {
+        self.waking.asked()
+    }
+
+    /// Reports an event.
+    pub fn report(&mut self, event: Event) {
+        self.endpoint.report(event);
+    }
+
+    /// Appends an output.
+    pub fn put(&mut self, output: Output<Event>) {
+        self.endpoint.put(output);
+    }
+
+    /// The oldest output that was not taken yet.
+    pub fn poll_output(&mut self) -> Option<Output<Event>> {
+        self.endpoint.poll_output()
+    }
+}
+
+/// Two participants of equal configurations that are drained and hash alike go on alike.
+impl<Event> Hash for Participant<Event> {
+    fn hash<H: Hasher>(&self, hasher: &mut H) {
+        let Self {
+            endpoint:
+                Endpoint {
+                    own: _,
+                    agreement: _,
+                    reception,
+                    outbox: _,
+                },
+            clock,
+            attendance,
+            copies,
+            waking,
+        } = self;
+        (reception, clock, attendance, copies, waking).hash(hasher);
+    }
+}
