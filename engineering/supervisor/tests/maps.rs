@@ -43,7 +43,7 @@ memory = "yes"
 event = "b"
 name = "t"
 runs_while = "x"
-preset = "5 s"
+preset = "5 sec"
 [[pulse]]
 event = ["c"]
 signal = "y"
@@ -54,13 +54,13 @@ x_a = "IX0.0"
     assert_eq!(read.map, None);
     insta::assert_snapshot!(shown(text, read.diagnostics), @r#"
     2:11 U0864 a text is wanted, not integer
-    3:1 U0862 a map has no "strat" (perhaps "start" is meant)
+    3:1 U0862 a map has no "strat" (did you mean `start`?)
     5:5 U0864 a number of an event is wanted, not string
     6:1 U0863 an input needs "signal"
-    8:8 U0865 "pulse " is none of pulse, rising, falling, high, low (perhaps "pulse" is meant)
+    8:8 U0865 "pulse " is none of pulse, rising, falling, high, low (did you mean `pulse`?)
     9:1 U0863 a switch needs "positions"
     11:10 U0864 true or false is wanted, not string
-    16:10 U0865 "5 s" is no time (such as "15s", "1500ms" or "2m")
+    16:10 U0865 invalid duration `5 sec`: expected a number with a unit, such as `10ms` (such as "15s", "1.5s" or "2m")
     18:9 U0864 a text is wanted, not array
     21:7 U0867 "IX0.0" is no address of a bit (addresses look like %IX0.3, %QX1.0 or %MX2.7)
     "#);
@@ -110,11 +110,11 @@ preset = "5s"
     8:9 U0854 `c_hi` is controllable (1, an odd label): the PLC generates it
     9:10 U0855 "x 1" cannot be a name in a ladder (letters, digits and `_`, single dots between its parts, a letter or `_` first, no word of the format)
     15:10 U0856 `x` brings two events in the same way (one event for `rising` and one for `falling` are possible)
-    17:9 U0851 there is no event `aa` (perhaps "a" is meant)
+    17:9 U0851 there is no event `aa` (did you mean `a`?)
     21:24 U0854 `a` is uncontrollable (0, an even label): no PLC can command it
     21:24 U0852 the event `a` has two meanings
     21:38 U0856 `x` is the signal of a position of a switch and of an input
-    25:14 U0857 no switch has the signal `y` (perhaps "x" is meant)
+    25:14 U0857 no switch has the signal `y` (did you mean `x`?)
     "#);
 }
 
@@ -157,7 +157,7 @@ fn addresses_stand_in_the_ladder() {
     let found = convert(&modules, &map, Mode::Automatic).expect_err("much is wrong");
     insta::assert_snapshot!(shown(&wrong, found), @r#"
     52:1 U0867 %QX0.0 is not the address of `x0`, which needs one of %IX
-    53:1 U0866 the ladder has no signal `x_c_hy` (perhaps "x_c_hi" is meant)
+    53:1 U0866 the ladder has no signal `x_c_hy` (did you mean `x_c_hi`?)
     54:1 U0867 %QX0.0 is the address of `x_c_hi` and of `x0`
     "#);
 }

@@ -118,15 +118,15 @@ door = "%IX"
 15:8 U0891 `held` is the name of two places or two transitions
 16:1 U0863 a place needs "name"
 17:12 U0865 "capacity" is a number from 1 to 32767
-20:9 U0824 there is no event brign [perhaps "bring" is meant]
-21:13 U0892 there is no place `fre` [perhaps "free" is meant]
+20:9 U0824 there is no event brign [did you mean `bring`?]
+21:13 U0892 there is no place `fre` [did you mean `free`?]
 21:19 U0893 an arc of weight 0 to `free` says nothing
 21:30 U0865 the weight of an arc is a number from 1 to 32767
 21:39 U0865 an arc is a place, or a weight and a place
 22:17 U0888 this is no condition: a branch is empty [a condition looks like "body_present /stop [ +start | -door ]"]
-25:1 U0862 a transition has no "taks" [perhaps "takes" is meant]
+25:1 U0862 a transition has no "taks" [did you mean `takes`?]
 26:15 U0888 this is no condition: this bracket is not closed [a condition looks like "body_present /stop [ +start | -door ]"]
-27:9 U0865 "5" is no time [such as "15s", "1500ms" or "2m"]
+27:9 U0865 invalid duration `5`: expected a number with a unit, such as `10ms` [such as "15s", "1.5s" or "2m"]
 29:8 U0890 `wait` has a delay and a condition on an edge, which holds for one scan only
 30:13 U0888 this is no condition: a `]` or `|` without its `[` [a condition looks like "body_present /stop [ +start | -door ]"]
 32:1 U0863 a transition needs "name"
@@ -135,7 +135,7 @@ door = "%IX"
 "#);
     let text = "name = \"a\"\n[[place]";
     insta::assert_snapshot!(shown(text, read_net(text).diagnostics), @r#"
-2:9 U0861 this is no TOML: unclosed array table, expected `]`
+2:9 U0861 invalid TOML: unclosed array table, expected `]`
 "#);
     insta::assert_snapshot!(shown("", read_net("").diagnostics), @r#"
 1:1 U0863 a net needs "name"

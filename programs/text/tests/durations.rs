@@ -37,12 +37,17 @@ fn spellings() -> BTreeSet<String> {
 #[test]
 fn the_pattern_matches_what_the_reader_accepts() {
     let spellings = spellings();
-    let accepted: BTreeSet<&String> = spellings
-        .iter()
-        .filter(|text| parse(text).is_ok())
-        .collect();
+    let accepted: BTreeSet<&String> = spellings.iter().filter(|text| has_form(text)).collect();
     assert!(accepted.len() > 500, "{}", accepted.len());
     assert_eq!(matched(&spellings), accepted);
+}
+
+/// Whether the reader accepts a text, or refuses it only for its bound, which is beyond a pattern.
+fn has_form(text: &str) -> bool {
+    match parse(text) {
+        Ok(_) => true,
+        Err(error) => error.to_string().ends_with("expected at most 100 days"),
+    }
 }
 
 /// The spellings that match the pattern, as an extended regular expression of POSIX, which is a part of those of JSON Schema.

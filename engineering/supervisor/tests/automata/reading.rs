@@ -82,7 +82,7 @@ fn empty_and_vocal_are_read_and_written() {
 fn all_that_is_wrong_with_an_ads_file_is_said_at_once() {
     let text = "A\nState size:\n3\nMaker states:\n0\nMarker states:\n4\nVocal states:\n0 9\n1\nTransitions:\n0 1000 1\n0 1 1\n0 1 2\n0 1 1\n5 2 0\n1 x 2\n1 2\nTransitions:\n";
     assert_snapshot!(places(text, &read_ads(text).diagnostics), @r#"
-4:1 U0812 "Maker states:" is neither a heading nor a list of numbers from 0 up [perhaps "Marker states:" is meant]
+4:1 U0812 "Maker states:" is neither a heading nor a list of numbers from 0 up [did you mean "Marker states:"?]
 7:1 U0814 there is no state 4: the automaton has states 0 to 2
 9:1 U0816 vocal output 9: outputs are 10 to 99
 10:1 U0813 a line of this list has more or fewer numbers
@@ -245,26 +245,26 @@ transitions = 3
     assert_snapshot!(places(text, &read.diagnostics), @r#"
 2:1 U0821 a model has no "title" [it has name, events, addresses, plant, specification, supervisor]
 4:41 U0827 label 2: odd labels are controllable, even ones are not
-5:52 U0823 "risin" is none of pulse, rising, falling, high, low [perhaps "rising" is meant]
-6:12 U0821 an event has no "controlable" [perhaps "controllable" is meant]
+5:52 U0823 "risin" is none of pulse, rising, falling, high, low [did you mean `rising`?]
+6:12 U0821 an event has no "controlable" [did you mean `controllable`?]
 6:40 U0827 label 4 stands for two events
 7:1 U0825 the name of an event is one word
 7:32 U0823 true or false is wanted, not integer
 10:55 U0856 `door` is the signal of two events [one uncontrollable event for `rising` and one for `falling` are possible]
 11:54 U0855 "the bar" cannot be a name in a ladder [letters, digits and `_`, single dots between its parts, a letter or `_` first, no word of the format]
 14:7 U0867 "QX1" is no address of a bit [addresses look like %IX0.3, %QX1.0 or %MX2.7]
-18:11 U0824 there is no event strat [perhaps "start" is meant]
+18:11 U0824 there is no event strat [did you mean `start`?]
 19:5 U0825 a transition is three words: a state, an event, and the state to which it leads
 21:5 U0826 from state idle event finish leads to state working and to state idle; an automaton must be deterministic
-22:6 U0828 no event leads to state wroking of machine [perhaps "working" is meant]
-24:12 U0828 a marked state is idel, and no transition knows it [perhaps "idle" is meant]
+22:6 U0828 no event leads to state wroking of machine [did you mean `working`?]
+24:12 U0828 a marked state is idel, and no transition knows it [did you mean `idle`?]
 26:8 U0829 GONE.ADS cannot be read: no such file
 27:1 U0822 an automaton needs "name"
 "#);
     let text = "name = \"a\n[events";
     assert_snapshot!(places(text, &read_model(text, |_| Err(String::new())).diagnostics), @r#"
-1:10 U0820 this is no TOML: invalid basic string, expected `"`
-2:8 U0820 this is no TOML: unclosed table, expected `]`
+1:10 U0820 invalid TOML: invalid basic string, expected `"`
+2:8 U0820 invalid TOML: unclosed table, expected `]`
 "#);
     assert_snapshot!(places("", &read_model("", |_| Err(String::new())).diagnostics), @r#"
 1:1 U0822 the model has no [[plant]], [[specification]] or [[supervisor]]

@@ -39,12 +39,37 @@ const LAYOUT_ATTRIBUTES: [&str; 14] = [
     "organization",
 ];
 
+/// Elements and attributes that the schema requires and that have no meaning for a program: the reader does not validate files
+/// against the schema, so a file without them is read in the same way. Elements are among them only while they are empty.
+const FORMAL: [&str; 10] = [
+    "<fileHeader>",
+    "<contentHeader>",
+    "name of <contentHeader>",
+    "<dataTypes>",
+    "<inOutVariables>",
+    "name of <configuration>",
+    "name of <resource>",
+    "name of <task>",
+    "priority of <task>",
+    "name of <pouInstance>",
+];
+
+/// Whether a missing part of a file violates its schema and nothing else.
+fn is_formal(node: Node<'_, '_>, what: &str) -> bool {
+    let mut children = node.children().filter(Node::is_element);
+    let is_empty = children.all(|child| LAYOUT.contains(&child.tag_name().name()));
+    FORMAL.contains(&what) && (is_empty || !what.starts_with('<'))
+}
+
 /// The elements and attributes of a file without which it is read in the same way.
 fn unread(text: &str) -> Vec<String> {
     let whole = reading(Format::PlcOpen, text);
     let document = Document::parse(text).expect("XML");
     let mut unread = Vec::new();
     let mut check = |place: Range<usize>, node: Node<'_, '_>, what: String| {
+        if is_formal(node, &what) {
+            return;
+        }
         let without = format!("{}{}", &text[..place.start], &text[place.end..]);
         if Document::parse(&without).is_ok() && reading(Format::PlcOpen, &without) == whole {
             let around: Vec<&str> = node

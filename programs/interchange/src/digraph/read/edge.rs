@@ -24,10 +24,7 @@ impl Reader {
             };
             self.error(
                 "U1061",
-                format!(
-                    "invalid {what} `{}`: expected a whole number",
-                    word.as_str()
-                ),
+                format!("{what} is `{}`: expected a whole number", word.as_str()),
                 span,
             );
         }

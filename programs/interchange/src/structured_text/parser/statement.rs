@@ -118,7 +118,7 @@ impl Parser {
             StatementKind::Assign(path, self.expression())
         } else {
             if self.at_sign("[") {
-                self.expected("`:=` or `(`; arrays are not supported, so");
+                self.expected("`:=` or `(` (arrays are not supported)");
             } else {
                 self.expected("`:=` or `(`");
             }
