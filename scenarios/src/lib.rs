@@ -17,6 +17,7 @@ mod outlook;
 mod read;
 mod record;
 mod report;
+mod rules;
 mod run_directory;
 mod scenario;
 mod schema;
@@ -60,6 +61,7 @@ pub use outlook::{JournalOutlook, look_ahead};
 pub use read::{MAXIMUM_CYCLES, MAXIMUM_STEPS, ReadScenario, looks_like_a_scenario, read};
 pub use record::{Happening, LABORATORY, Record, RunEvent, moment};
 pub use report::{ReportError, report};
+pub use rules::{Process, SourceCounts, is_blocked, is_provable};
 pub use run_directory::{RunDirectory, RunDirectoryError, time_name};
 pub use scenario::{
     ACTIONS, During, Expectation, SOURCES, Scenario, TABLE_TWO, action_word, source_word,
