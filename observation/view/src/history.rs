@@ -38,6 +38,8 @@ pub struct Driven {
     pub missing: Option<Missing>,
     /// Who was heard.
     pub heard: StationSet,
+    /// u(i) as last sampled, in this cycle or before.
+    pub inputs: Option<Image>,
 }
 
 /// One cycle of one program.
@@ -127,6 +129,14 @@ impl History {
         let newest = self.steps.iter().rev().take(NEWEST);
         let mut of_moment = newest.filter(|step| step.moment == moment && !step.void);
         Some(&of_moment.find_map(|step| step.sampled.as_ref())?.outputs)
+    }
+
+    /// The inputs that were sampled last before the newest deadline.
+    pub(crate) fn sampled_last(&mut self, inputs: Option<&Image>) {
+        let driven = self.steps.back_mut().and_then(|step| step.driven.as_mut());
+        if let Some(driven) = driven {
+            driven.inputs = inputs.cloned();
+        }
     }
 
     /// What its plant shows.
@@ -243,6 +253,7 @@ impl History {
                     word_of: *word_of,
                     missing: *missing,
                     heard: *heard,
+                    inputs: None,
                 };
                 match self.steps.back_mut() {
                     Some(last) if last.moment == *moment && last.driven.is_none() => {

@@ -1,8 +1,8 @@
 //! What a person asks of a run, live or finished, folded from its journal.
 //!
 //! ```text
-//!   journal ──► Source ──► Model::note(record) ──┬─► Snapshot: who works, margin of survival, alarms
-//!   (files that grow, or a channel)              ├─► events, trends, bands
+//!   journal ──► Source ──► Model::note(record) ──┬─► snapshot(cycle): states, sources, remaining redundancy, alarms
+//!   (files that grow, or a channel)              ├─► events, counters, trends, bands
 //!                                                ├─► History: x(i), u(i) of each cycle ──► why, power flow
 //!                                                └─► diff of two runs
 //! ```
@@ -41,13 +41,14 @@ pub use film::{Film, Scene};
 pub use history::{Driven, History, Sampled, Step};
 pub use listing::{Filter, JournalLine, Listing};
 pub use margin::{Holders, Loss, Margin, Outcome};
-pub use model::{Bounds, Model, SentTurn};
+pub use model::{Bounds, Counters, MemberCounters, Model, ProgramCounters, SentTurn};
 pub use protection::{LackingStation, LostState, Protection};
 pub use run::{Run, find_run, find_run_of, find_running, find_running_of};
 pub use series::Series;
 pub use snapshot::{
-    MarginSnapshot, OutcomeSnapshot, ProgramSnapshot, RunState, Snapshot, StationSnapshot,
-    TimingSnapshot,
+    LinkSnapshot, MarginSnapshot, OutcomeSnapshot, PlantSnapshot, PlantState, ProgramSnapshot,
+    RemoteIoSnapshot, RemoteIoState, RunState, Snapshot, StationSnapshot, TimingSnapshot,
+    WordSnapshot,
 };
 pub use source::{BEHIND, Feed, Progress, Reading, Source, Trouble};
 pub use station::StationState;

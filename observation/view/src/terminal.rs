@@ -23,9 +23,8 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Sparkline};
 
 use crate::alarm::Alarm;
-use crate::margin::{Holders, Margin};
 use crate::model::Model;
-use crate::snapshot::{RunState, Snapshot};
+use crate::snapshot::Snapshot;
 use crate::source::{BEHIND, Progress};
 
 /// What a person pressed.
@@ -72,8 +71,6 @@ pub struct Screen {
     above: usize,
     paused: bool,
     help: bool,
-    /// Calculated when somebody has come or gone.
-    margin: Option<(Holders, Margin)>,
     /// Of the newest record, where a live run has not written one lately.
     age: Option<Duration>,
 }
@@ -115,18 +112,6 @@ impl Screen {
         Vec::new()
     }
 
-    /// The case now, with the margin of survival.
-    pub fn snapshot(&mut self, model: &Model) -> Snapshot {
-        let holders = model.holders();
-        let margin = match self.margin.take() {
-            Some((known, margin)) if known == holders => margin,
-            _ => holders.margin(),
-        };
-        let snapshot = model.snapshot_with(&margin);
-        self.margin = Some((holders, margin));
-        snapshot
-    }
-
     /// Draws the present; while the journal is being read, only how much of it was. A screen that stands still shows what it showed.
     pub fn draw_live(
         &mut self,
@@ -149,7 +134,7 @@ impl Screen {
 
     /// Draws it all.
     pub fn draw(&mut self, frame: &mut Frame<'_>, model: &Model) {
-        let snapshot = self.snapshot(model);
+        let snapshot = model.snapshot();
         let area = frame.area();
         let stations = rows(snapshot.stations.len(), area.height);
         let programs = rows(snapshot.programs.len(), area.height);
@@ -187,12 +172,10 @@ impl Screen {
     }
 
     fn head(&self, snapshot: &Snapshot, width: u16) -> Line<'static> {
-        let run = match (self.paused, snapshot.run) {
-            (true, _) => "paused",
-            (_, RunState::Starting) => "starting",
-            (_, RunState::Running) => "running",
-            (_, RunState::Finished) => "finished",
-            (_, RunState::Interrupted) => "interrupted",
+        let run = if self.paused {
+            "paused"
+        } else {
+            snapshot.run.word()
         };
         let period = std::time::Duration::from_micros(snapshot.period_us);
         let left = format!(" {}  {}  {period:?}", snapshot.cluster, snapshot.mode);

@@ -5,15 +5,15 @@ use std::sync::Arc;
 use understudy_cluster::Cluster;
 use understudy_ladder::{Evaluation, Observer};
 use understudy_logic::Scratch;
-use understudy_scenarios::Members;
+use understudy_scenarios::{Members, SourceCounts};
 use understudy_wire::{Moment, ProgramId, StationId};
 
-use super::{Model, ProgramTrack, SentTurn};
+use super::{Counters, Model, SentTurn};
 use crate::alarm::Alarm;
 use crate::error::ViewError;
 use crate::event::Event;
 use crate::history::History;
-use crate::margin::Holders;
+use crate::protection::{LostState, Protection};
 use crate::series::Series;
 use crate::station::StationState;
 use crate::timing::CycleTiming;
@@ -54,16 +54,39 @@ impl Model {
         self.finished
     }
 
-    /// What the scenario came to, where it is over in this cycle and the cluster stays up.
-    pub fn scenario_over(&self, cycle: i64) -> Option<&str> {
-        let (over, verdict) = self.scenario_over.as_ref()?;
-        (*over <= cycle).then_some(verdict)
+    /// Events that are counted from the first record on.
+    pub fn counters(&self) -> &Counters {
+        &self.counters
     }
 
-    /// What a station is now.
+    /// Deadlines of a program by source, from the origin up to a cycle.
+    pub(crate) fn source_counts(&self, program: ProgramId, cycle: Option<i64>) -> SourceCounts {
+        let track = self.programs.get(program.index()).zip(cycle);
+        track.map_or_else(SourceCounts::default, |(track, cycle)| {
+            track.tally.counts(cycle)
+        })
+    }
+
+    /// The first cycle of those in a row that have the source of `cycle`.
+    pub(crate) fn since(&self, program: ProgramId, cycle: i64) -> Option<i64> {
+        self.programs.get(program.index())?.tally.since(cycle)
+    }
+
+    /// The present state of a station.
     pub fn station_state(&self, station: StationId) -> Option<StationState> {
-        let track = self.stations.get(station.index())?;
-        Some(track.state(self.cycles.latest(), 1))
+        let standing = self.changes.now();
+        standing.station(station)?;
+        Some(self.station_state_in(standing, station, self.newest()))
+    }
+
+    /// Whether a program is protected now; nothing while its remote I/O has not reported it.
+    pub fn protection(&self, program: ProgramId) -> Option<&Protection> {
+        self.changes.now().program(program)?.protection.as_ref()
+    }
+
+    /// What is left of the state of a program, where it is lost now.
+    pub fn lost_state(&self, program: ProgramId) -> Option<&LostState> {
+        self.changes.now().program(program)?.lost.as_ref()
     }
 
     /// What a program did in its last cycles.
@@ -99,34 +122,6 @@ impl Model {
     /// What the stations said in a cycle of the cluster.
     pub fn sent_turns(&self, moment: Moment) -> &[SentTurn] {
         self.turns.of(moment)
-    }
-
-    /// Who is alive, and holds what: what the margin of survival is calculated from.
-    pub fn holders(&self) -> Holders {
-        let latest = self.cycles.latest();
-        let widths = self.cluster.controllers().iter();
-        let holds = self.stations.iter().map(|track| {
-            if track.state(latest, 1) == StationState::Speaking {
-                track.covers.without(track.excluded)
-            } else {
-                Default::default()
-            }
-        });
-        Holders {
-            mode: self.cluster.agreement().mode,
-            widths: widths
-                .map(|controller| controller.circuit.outputs().len())
-                .collect(),
-            holds: holds.collect(),
-            heard: self.programs.iter().map(ProgramTrack::hears).collect(),
-            excluded: self.programs.iter().map(|track| track.excluded).collect(),
-            blocked: (0..)
-                .map(ProgramId)
-                .zip(&self.programs)
-                .filter(|(_, track)| track.is_blocked())
-                .map(|(program, _)| program)
-                .collect(),
-        }
     }
 
     /// The scan of a program in a cycle as its station evaluated it: what the power did in every rung.

@@ -30,11 +30,11 @@ pub(super) fn stations(snapshot: &Snapshot, above: usize) -> Table<'static> {
         .skip(clamped(above, snapshot.stations.len()));
     let rows = rows.map(|station| {
         let colour = match station.state {
-            StationState::Speaking => GOOD,
-            StationState::Joining | StationState::Shadow | StationState::NotStarted => MIDDLING,
+            StationState::Publishing => GOOD,
+            StationState::Joining | StationState::ShadowMode | StationState::NotStarted => MIDDLING,
             _ => BAD,
         };
-        let mut state = station.state.word().to_owned();
+        let mut state = station.state.text().to_owned();
         if station.flagged && station.state != StationState::Flagged {
             state += ", flagged";
         }
@@ -44,7 +44,7 @@ pub(super) fn stations(snapshot: &Snapshot, above: usize) -> Table<'static> {
         Row::new([
             Cell::from(format!(" {}", station.name)),
             Cell::from(state).style(Style::new().fg(colour)),
-            Cell::from(station.speaks_for.join(" ")),
+            Cell::from(station.publishes_for.join(" ")),
             Cell::from(station.done.clone().unwrap_or_default()),
         ])
     });
@@ -57,8 +57,8 @@ pub(super) fn stations(snapshot: &Snapshot, above: usize) -> Table<'static> {
     Table::new(rows.collect::<Vec<_>>(), widths).header(head(&[
         " station",
         "state",
-        "speaks for",
-        "last done",
+        "publishes for",
+        "last action",
     ]))
 }
 
@@ -71,11 +71,15 @@ pub(super) fn programs(snapshot: &Snapshot, model: &Model, above: usize) -> Tabl
             Some("reconstructed") | None => MIDDLING,
             _ => BAD,
         };
-        let source = found.source.unwrap_or("nothing yet");
+        let source = found.source.unwrap_or("not known");
         Row::new([
             Cell::from(format!(" {}", found.program)),
             Cell::from(source).style(Style::new().fg(colour)),
-            Cell::from(found.since.to_string()),
+            Cell::from(
+                found
+                    .since
+                    .map_or("-".to_owned(), |since| since.to_string()),
+            ),
             Cell::from(found.direct.to_string()),
             Cell::from(found.reconstructed.to_string()),
             Cell::from(found.held.to_string()),
@@ -98,7 +102,7 @@ pub(super) fn programs(snapshot: &Snapshot, model: &Model, above: usize) -> Tabl
         "outputs",
         "since",
         "direct",
-        "restored",
+        "reconstr.",
         "held",
         "safe",
         "last cycles",
@@ -162,7 +166,7 @@ pub(super) fn survives(snapshot: &Snapshot) -> Paragraph<'static> {
     let sentence = match (margin.served.is_empty(), lost.is_empty()) {
         (true, _) | (_, true) => sentence(margin),
         _ => format!(
-            "{} has no true outputs; of the others: {}",
+            "{} has no provable outputs; of the others: {}",
             lost.join(" and "),
             sentence(margin)
         ),
@@ -173,7 +177,7 @@ pub(super) fn survives(snapshot: &Snapshot) -> Paragraph<'static> {
 
 fn sentence(margin: &MarginSnapshot) -> String {
     if margin.served.is_empty() {
-        return "nothing true is driven now".to_owned();
+        return "no program has provable outputs".to_owned();
     }
     let stations = |outcomes: &[crate::snapshot::OutcomeSnapshot], count: usize| -> Vec<String> {
         let fatal = outcomes

@@ -54,7 +54,7 @@ fn each_station_is_seen_to_be_killed_and_repaired() {
     assert!(
         stations
             .iter()
-            .all(|station| station.state == StationState::Speaking)
+            .all(|station| station.state == StationState::Publishing)
     );
     // Each kill cost the protection of programs, and each return brought it back.
     assert_eq!(alarms.len(), 4, "{alarms:?}");
@@ -123,7 +123,10 @@ fn a_loss_is_an_alarm_with_its_cause() {
     let alarm = model.alarms().find(|alarm| alarm.alarm == "fail-safe");
     let alarm = alarm.expect("an alarm");
     assert_eq!((alarm.name.as_str(), alarm.over), ("press-io", None));
-    assert_eq!(alarm.text, "press is silent: press is killed in cycle 30");
+    assert_eq!(
+        alarm.text,
+        "press is not received: press is killed in cycle 30"
+    );
     let snapshot = model.snapshot();
     assert_eq!(snapshot.margin.survives, 0);
     assert_eq!(snapshot.margin.served, ["robot"]);
@@ -132,7 +135,7 @@ fn a_loss_is_an_alarm_with_its_cause() {
         .iter()
         .map(|station| station.state.word())
         .collect();
-    assert_eq!(states, ["speaking", "killed", "killed"]);
+    assert_eq!(states, ["publishing", "killed", "killed"]);
     let lost = model.why("press.move_down", Some(50)).expect("it is known");
     assert_eq!((lost.source, lost.because), (Some("fail-safe"), None));
 }

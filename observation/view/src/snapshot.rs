@@ -1,0 +1,297 @@
+//! The state of a run in one cycle, with the names of the cluster. Everything that shows a run shows this: `top`, the page, metrics,
+//! Modbus, OPC UA, Zenoh and `--json`.
+
+mod taken;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use understudy_wire::Force;
+
+use crate::alarm::Alarm;
+use crate::protection::{LostState, Protection};
+use crate::station::StationState;
+
+/// Progress of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RunState {
+    /// No deadline was reported yet.
+    Starting,
+    /// Cycles are run.
+    Running,
+    /// Its last record was read.
+    Finished,
+    /// It was ended early on request.
+    Interrupted,
+}
+
+impl RunState {
+    /// The state as JSON writes it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Starting => "starting",
+            Self::Running => "running",
+            Self::Finished => "finished",
+            Self::Interrupted => "interrupted",
+        }
+    }
+}
+
+/// A run in one cycle.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Snapshot {
+    /// The cluster's name.
+    pub cluster: String,
+    /// Progress of the run.
+    pub run: RunState,
+    /// The cycle, from the origin; nothing before the first deadline. The newest is the newest one of which every living remote I/O
+    /// has reported.
+    pub cycle: Option<i64>,
+    /// Whether cycles are counted from the origin of the run; otherwise as the cluster counts them.
+    pub from_origin: bool,
+    /// `full` or `paper`.
+    pub mode: &'static str,
+    /// Period of a cycle.
+    pub period_us: u64,
+    /// The station that starts the cycles.
+    pub cycle_master: Option<String>,
+    /// What the scenario came to, where it is over and the cluster stays up.
+    pub scenario_over: Option<String>,
+    /// Stations, by rank.
+    pub stations: Vec<StationSnapshot>,
+    /// Programs at their remote I/Os.
+    pub programs: Vec<ProgramSnapshot>,
+    /// Remote I/Os, by program.
+    pub remote_ios: Vec<RemoteIoSnapshot>,
+    /// Simulated plants.
+    pub plants: Vec<PlantSnapshot>,
+    /// The remaining redundancy.
+    pub margin: MarginSnapshot,
+    /// Times of the newest cycle whose times are known.
+    pub timing: Option<TimingSnapshot>,
+    /// Late wake-ups of all members so far.
+    pub host_stalls: u64,
+    /// Alarms that last or are not acknowledged.
+    pub alarms: Vec<Alarm>,
+    /// Events so far; the number of the newest.
+    pub events: u64,
+    /// Records read so far.
+    pub records: u64,
+    /// Records that were gone or could not be read, at least.
+    pub left_out: u64,
+}
+
+/// What others see of a member besides its state.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, JsonSchema)]
+pub struct LinkSnapshot {
+    /// Members that do not receive its frames.
+    pub cut_from: Vec<String>,
+    /// Whether no member receives its frames.
+    pub isolated: bool,
+    /// Whether its journal is not received here, so that only others tell of it.
+    pub detached: bool,
+}
+
+/// A controller or an understudy.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct StationSnapshot {
+    /// Its name.
+    pub name: String,
+    /// Its rank, from 0.
+    pub rank: u8,
+    /// Whether it is generated from the others.
+    pub understudy: bool,
+    /// Its state.
+    pub state: StationState,
+    /// Whether a remote I/O has closed its slot, θ = 1.
+    pub flagged: bool,
+    /// The programs that it publishes for.
+    pub publishes_for: Vec<String>,
+    /// The programs whose remote I/O has excluded it.
+    pub excluded_from: Vec<String>,
+    /// The last action on it.
+    pub done: Option<String>,
+    /// The parity words that it sent in this cycle.
+    pub words: Vec<WordSnapshot>,
+    /// Its links.
+    pub link: LinkSnapshot,
+}
+
+/// A parity word.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct WordSnapshot {
+    /// The programs in its mask.
+    pub mask: Vec<String>,
+    /// The sum of their outputs, element 1 first.
+    pub sum: String,
+}
+
+/// State of a remote I/O.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RemoteIoState {
+    /// It drives outputs at every deadline.
+    Serving,
+    /// It has reported no deadline of this cycle, or does not know the history of its program yet.
+    Listening,
+    /// The operator has to release its outputs.
+    AwaitsRelease,
+    /// No living station can prove the state of its program.
+    StateLost,
+    /// Its process is suspended.
+    Suspended,
+    /// Its process was killed.
+    Killed,
+    /// Its process ended unexpectedly.
+    Ended,
+}
+
+impl RemoteIoState {
+    /// The state as JSON and the page write it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Serving => "serving",
+            Self::Listening => "listening",
+            Self::AwaitsRelease => "awaits-release",
+            Self::StateLost => "state-lost",
+            Self::Suspended => "suspended",
+            Self::Killed => "killed",
+            Self::Ended => "ended",
+        }
+    }
+}
+
+/// A remote I/O.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct RemoteIoSnapshot {
+    /// Its name.
+    pub name: String,
+    /// Its state.
+    pub state: RemoteIoState,
+    /// Its links.
+    pub link: LinkSnapshot,
+}
+
+/// State of a simulated plant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum PlantState {
+    /// It runs.
+    Moving,
+    /// Its process is suspended.
+    Suspended,
+    /// Its process was killed.
+    Killed,
+    /// Its process ended unexpectedly.
+    Ended,
+}
+
+impl PlantState {
+    /// The state as JSON and the page write it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Moving => "moving",
+            Self::Suspended => "suspended",
+            Self::Killed => "killed",
+            Self::Ended => "ended",
+        }
+    }
+}
+
+/// A simulated plant.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct PlantSnapshot {
+    /// Its name.
+    pub name: String,
+    /// The controller of its program.
+    pub program: String,
+    /// Its state.
+    pub state: PlantState,
+    /// Its links.
+    pub link: LinkSnapshot,
+}
+
+/// A program at its remote I/O, with its plant.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct ProgramSnapshot {
+    /// The controller's name.
+    pub program: String,
+    /// The remote I/O's name.
+    pub remote_io: String,
+    /// The simulated plant's name.
+    pub plant: Option<String>,
+    /// `direct`, `reconstructed`, `held` or `fail-safe`; nothing where no deadline of this cycle was reported.
+    pub source: Option<&'static str>,
+    /// The first cycle of those in a row with this source.
+    pub since: Option<i64>,
+    /// The station whose parity word the outputs were reconstructed from.
+    pub word_of: Option<String>,
+    /// Why there was no provable output, in a missed cycle.
+    pub missing: Option<&'static str>,
+    /// u(i) as last sampled, element 1 first.
+    pub inputs: Option<String>,
+    /// y(i) as driven, element 1 first.
+    pub outputs: Option<String>,
+    /// Deadlines with direct outputs, from the origin of the run on; so are the following.
+    pub direct: u64,
+    /// Deadlines with reconstructed outputs.
+    pub reconstructed: u64,
+    /// Deadlines with held outputs.
+    pub held: u64,
+    /// Deadlines with fail-safe outputs.
+    pub fail_safe: u64,
+    /// Whether an operator has to release the outputs.
+    pub awaits_release: bool,
+    /// Signals that are forced, in words.
+    pub forced: Vec<String>,
+    /// Signals that are forced.
+    #[serde(skip)]
+    pub forces: Vec<Force>,
+    /// Whether the failure of one station would be masked; nothing while its remote I/O has not reported it.
+    pub protection: Option<Protection>,
+    /// What is available where no living station can prove its state.
+    pub lost: Option<LostState>,
+    /// Parts that the plant has finished.
+    pub finished: Option<u64>,
+    /// Plant faults.
+    pub plant_faults: Option<u64>,
+}
+
+/// The remaining redundancy: which further failures would be masked.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct MarginSnapshot {
+    /// Further failures of stations that are masked whichever they are: 0, 1, or 2 and perhaps more.
+    pub survives: u8,
+    /// Programs with provable outputs.
+    pub served: Vec<String>,
+    /// Each station that publishes, and each remote I/O, alone.
+    pub singles: Vec<OutcomeSnapshot>,
+    /// Each pair of stations that publish.
+    pub pairs: Vec<OutcomeSnapshot>,
+}
+
+/// Consequence of a failure.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct OutcomeSnapshot {
+    /// The members that fail at once.
+    pub failed: Vec<String>,
+    /// Whether every program that has provable outputs keeps them.
+    pub masked: bool,
+    /// The programs that would lose them.
+    pub lost: Vec<String>,
+    /// Why, in words; empty where the failure is masked.
+    pub why: String,
+}
+
+/// Times of one cycle, in microseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct TimingSnapshot {
+    /// The cycle.
+    pub cycle: i64,
+    /// From the first sample to the last turn.
+    pub token_us: f64,
+    /// From the last turn to the deadline.
+    pub margin_us: f64,
+    /// From the start of the cycle before.
+    pub cycle_us: Option<f64>,
+}
