@@ -5,7 +5,8 @@ use std::time::SystemTime;
 
 use clap::Args;
 use understudy_cluster::{Cluster, press_cell};
-use understudy_scenarios::{Members, RunDirectory, Scenario, Summary, TABLE_TWO, read};
+use understudy_journal::{Members, RunDirectory};
+use understudy_scenarios::{Scenario, Summary, TABLE_TWO, read};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;

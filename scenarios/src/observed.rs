@@ -9,9 +9,7 @@ use std::collections::BTreeMap;
 use understudy_reliability::Observed;
 use understudy_wire::{Member, ProgramId, Source, StationId};
 
-use crate::journal::JournalError;
-use crate::record::{Happening, Record, RunEvent};
-use crate::rules::{Process, is_provable};
+use understudy_journal::{Happening, JournalError, Process, Record, RunEvent, is_provable};
 
 /// Nanoseconds of an hour.
 const HOUR_NS: f64 = 3.6e12;

@@ -7,10 +7,9 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use serde::Serialize;
+use understudy_journal::Members;
 use understudy_simulator::{Action, Disturbance, Fault, Network};
 use understudy_wire::{ProgramId, Source};
-
-use crate::members::Members;
 
 /// A scenario whose names belong to a cluster.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -147,22 +146,4 @@ pub struct During {
     pub remote_io: ProgramId,
     /// Any of these.
     pub sources: Vec<Source>,
-}
-
-/// All sources, in the order of their worth.
-pub const SOURCES: [Source; 4] = [
-    Source::Direct,
-    Source::Reconstructed,
-    Source::Held,
-    Source::FailSafe,
-];
-
-/// A source as files and tables write it.
-pub fn source_word(source: Source) -> &'static str {
-    match source {
-        Source::Direct => "direct",
-        Source::Reconstructed => "reconstructed",
-        Source::Held => "held",
-        Source::FailSafe => "fail-safe",
-    }
 }

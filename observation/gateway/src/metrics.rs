@@ -15,7 +15,7 @@ use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::metrics::histogram::Histogram;
 use prometheus_client::registry::{Registry, Unit};
 use understudy_cluster::Cluster;
-use understudy_scenarios::Members;
+use understudy_journal::Members;
 use understudy_view::{Model, Run};
 use understudy_wire::Member;
 

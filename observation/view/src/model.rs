@@ -15,8 +15,8 @@ mod turns;
 use std::sync::{Arc, OnceLock};
 
 use understudy_cluster::Cluster;
+use understudy_journal::{Happening, Members, Record};
 use understudy_ladder::Observer;
-use understudy_scenarios::{Happening, Members, Record};
 use understudy_wire::{Member, Moment, ProgramId};
 
 use crate::alarm::Alarms;

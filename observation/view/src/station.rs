@@ -7,7 +7,7 @@
 //! ```
 
 use serde::{Deserialize, Serialize};
-use understudy_scenarios::Process;
+use understudy_journal::Process;
 use understudy_wire::ProgramSet;
 
 /// State of a station.

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use understudy_scenarios::Record;
+use understudy_journal::Record;
 use understudy_view::{Bounds, Model as RunModel, Progress, Reading, Run, Source, Trouble};
 use understudy_wire::Member;
 

@@ -5,7 +5,7 @@ use understudy_wire::{ProgramId, ProgramSet};
 use super::presence::{Interval, Presence, Presences};
 use super::stalls::Stall;
 use super::{Account, OpenCycle};
-use crate::rules::is_provable;
+use understudy_journal::is_provable;
 
 impl Account {
     pub(super) fn close(&mut self, number: i64, cycle: &OpenCycle) {

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use understudy_simulator::Action;
 use understudy_wire::{Member, StationId, StationSet};
 
-use crate::rules::Process;
+use understudy_journal::Process;
 
 /// What a station was.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]

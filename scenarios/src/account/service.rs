@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use understudy_wire::{Field, Source};
 
 use super::presence::{Interval, extend};
-use crate::rules::is_provable;
+use understudy_journal::is_provable;
 
 /// A deadline of a remote I/O.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -11,7 +11,7 @@ use serde::Serialize;
 use understudy_simulator::Action;
 use understudy_wire::Member;
 
-use crate::rules::Process;
+use understudy_journal::Process;
 
 /// One wake-up that came too late.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]

@@ -101,7 +101,7 @@ impl Changes {
 
 #[cfg(test)]
 mod tests {
-    use understudy_scenarios::Process;
+    use understudy_journal::Process;
     use understudy_wire::{ProgramId, StationId};
 
     use super::*;

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use understudy_bus::HostEvent;
+use understudy_journal::{Happening, Record};
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
-use understudy_scenarios::{Happening, Record};
 use understudy_wire::{Member, ProgramId, StationId};
 
 /// Counts of one member.

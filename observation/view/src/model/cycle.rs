@@ -6,8 +6,8 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use understudy_journal::is_blocked;
 use understudy_remote_io::Missing;
-use understudy_scenarios::is_blocked;
 use understudy_wire::{Member, Moment, ProgramId, ProgramSet, StationId, StationSet, Word};
 
 use super::Model;
@@ -88,7 +88,7 @@ impl Model {
     pub fn newest(&self) -> Option<i64> {
         let latest = self.cycles.latest()?;
         let reported = self.programs.iter().filter_map(|program| program.reported);
-        Some(reported.min().unwrap_or(latest).max(latest - LAG_CYCLES))
+        Some(reported.min().unwrap_or(latest).max(latest.saturating_sub(LAG_CYCLES)))
     }
 
     /// The oldest cycle that is remembered; cycles before the origin are not shown.
@@ -168,7 +168,7 @@ impl Model {
             masks.fold(ProgramSet::EMPTY, ProgramSet::or)
         };
         let own = of(cycle);
-        if own.is_empty() { of(cycle - 1) } else { own }
+        if own.is_empty() { of(cycle.saturating_sub(1)) } else { own }
     }
 
     /// The station that starts the cycles: the first by rank that has started some, and publishes.
@@ -205,7 +205,7 @@ impl Model {
         let heard: Vec<StationSet> = self
             .program_ids()
             .map(|program| {
-                let cycles = [cycle - 1, cycle];
+                let cycles = [cycle.saturating_sub(1), cycle];
                 let deadlines = cycles.map(|cycle| self.deadline(program, cycle));
                 let driven = deadlines.into_iter().flatten();
                 let heard = driven.filter_map(|step| Some(step.driven.as_ref()?.heard));

@@ -1,8 +1,8 @@
 //! What stations report, and the processes that carry members.
 
 use understudy_bus::HostEvent;
+use understudy_journal::{Process, Record, moment};
 use understudy_node::Event as StationEvent;
-use understudy_scenarios::{Process, Record, moment};
 use understudy_wire::{Member, ProgramId, ProgramSet, StationId, StationSet, Word};
 
 use super::Model;

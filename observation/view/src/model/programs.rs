@@ -1,8 +1,8 @@
 //! What remote I/Os and plants report.
 
+use understudy_journal::{Record, moment, source_word};
 use understudy_plant::Event as PlantEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
-use understudy_scenarios::{Record, moment, source_word};
 use understudy_wire::{Image, Member, Moment, ProgramId, Source, StationId, StationSet};
 
 use super::Model;

@@ -1,6 +1,6 @@
 //! What the laboratory does, and what it sees of the processes that it runs.
 
-use understudy_scenarios::{Action, Process, Record, RunEvent};
+use understudy_journal::{Action, Process, Record, RunEvent};
 use understudy_wire::Member;
 
 use super::Model;

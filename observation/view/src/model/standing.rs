@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use understudy_scenarios::Process;
+use understudy_journal::Process;
 use understudy_wire::{Force, Member, ProgramId, ProgramSet, SignalPlace, StationId, StationSet};
 
 use crate::protection::{LostState, Protection};

@@ -4,7 +4,7 @@
 
 use std::collections::VecDeque;
 
-use understudy_scenarios::SourceCounts;
+use understudy_journal::SourceCounts;
 use understudy_wire::Source;
 
 /// Cycles in a row with one source.

@@ -1,7 +1,7 @@
 //! How a snapshot is taken from the model of a run.
 
+use understudy_journal::{Process, SourceCounts, source_word};
 use understudy_remote_io::Missing;
-use understudy_scenarios::{Process, SourceCounts, source_word};
 use understudy_wire::{Member, Mode, ProgramId, ProgramSet, SignalPlace, StationId};
 
 use super::{
