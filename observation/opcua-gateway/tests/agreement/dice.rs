@@ -17,16 +17,16 @@ use understudy_wire::{
 
 /// A record, with the cycle that it takes effect in as it was numbered when it was written.
 #[derive(Debug, Clone)]
-pub struct Entry {
-    pub record: Record,
-    pub at: i64,
+pub(crate) struct Entry {
+    pub(crate) record: Record,
+    pub(crate) at: i64,
 }
 
 /// The cycle of the cluster in which a journal begins.
 const FIRST: u64 = 5;
 
 /// A journal, as it is written.
-pub struct Dice<'c> {
+pub(crate) struct Dice<'c> {
     chance: Pcg64Mcg,
     cluster: &'c Cluster,
     members: Members,
@@ -36,13 +36,15 @@ pub struct Dice<'c> {
     number: i64,
     /// The newest number with a deadline.
     latest: Option<i64>,
+    /// By program: the newest number with a deadline.
+    reported: Vec<Option<i64>>,
     moment: Moment,
     has_origin: bool,
     entries: Vec<Entry>,
 }
 
 /// A journal of so many cycles.
-pub fn journal(cluster: &Cluster, seed: u64, cycles: usize) -> Vec<Entry> {
+pub(crate) fn journal(cluster: &Cluster, seed: u64, cycles: usize) -> Vec<Entry> {
     let mut dice = Dice {
         chance: Pcg64Mcg::seed_from_u64(seed),
         cluster,
@@ -51,6 +53,7 @@ pub fn journal(cluster: &Cluster, seed: u64, cycles: usize) -> Vec<Entry> {
         suspended: Vec::new(),
         number: FIRST as i64 - 1,
         latest: None,
+        reported: vec![None; cluster.controllers().len()],
         moment: Moment {
             epoch: Epoch(1),
             cycle: Cycle(FIRST - 1),
@@ -111,7 +114,7 @@ impl Dice<'_> {
             let mut remote_ios = self.programs().map(Member::RemoteIo);
             remote_ios.all(|member| self.works(member))
         };
-        let was_whole = self.latest == Some(self.number);
+        let was_whole = self.reported.iter().all(|at| *at == Some(self.number));
         self.number += 1;
         if all_work && was_whole && self.one_in(12) {
             self.idle();
@@ -160,9 +163,14 @@ impl Dice<'_> {
     fn idle(&mut self) {
         for program in self.programs() {
             let applied = self.applied(program, StationSet::EMPTY, Some(Missing::NoCycle));
-            self.latest = Some(self.number);
+            self.has_reported(program);
             self.write(Some(Member::RemoteIo(program)), applied, self.number);
         }
+    }
+
+    fn has_reported(&mut self, program: ProgramId) {
+        self.latest = Some(self.number);
+        self.reported[program.index()] = self.latest;
     }
 
     fn turns(&mut self) -> StationSet {
@@ -193,7 +201,7 @@ impl Dice<'_> {
         let reason = reasons[self.chance.random_range(0..reasons.len())];
         let missing = self.one_in(4).then_some(reason);
         let applied = self.applied(program, heard, missing);
-        self.latest = self.latest.max(Some(self.number));
+        self.has_reported(program);
         self.write(Some(Member::RemoteIo(program)), applied, self.number);
     }
 

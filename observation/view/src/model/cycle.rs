@@ -88,7 +88,12 @@ impl Model {
     pub fn newest(&self) -> Option<i64> {
         let latest = self.cycles.latest()?;
         let reported = self.programs.iter().filter_map(|program| program.reported);
-        Some(reported.min().unwrap_or(latest).max(latest.saturating_sub(LAG_CYCLES)))
+        Some(
+            reported
+                .min()
+                .unwrap_or(latest)
+                .max(latest.saturating_sub(LAG_CYCLES)),
+        )
     }
 
     /// The oldest cycle that is remembered; cycles before the origin are not shown.
@@ -168,7 +173,11 @@ impl Model {
             masks.fold(ProgramSet::EMPTY, ProgramSet::or)
         };
         let own = of(cycle);
-        if own.is_empty() { of(cycle.saturating_sub(1)) } else { own }
+        if own.is_empty() {
+            of(cycle.saturating_sub(1))
+        } else {
+            own
+        }
     }
 
     /// The station that starts the cycles: the first by rank that has started some, and publishes.

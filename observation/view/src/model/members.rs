@@ -3,7 +3,7 @@
 use understudy_bus::HostEvent;
 use understudy_journal::{Process, Record, moment};
 use understudy_node::Event as StationEvent;
-use understudy_wire::{Member, ProgramId, ProgramSet, StationId, StationSet, Word};
+use understudy_wire::{Member, ProgramId, StationId, StationSet};
 
 use super::Model;
 use super::standing::{Change, ProgramChange, StationChange};
@@ -17,7 +17,7 @@ impl Model {
         let cycle = self.cycles.of(moment(&record.event));
         match event {
             StationEvent::Published { moment, words } => {
-                self.published(station, cycle, words);
+                self.published(station, cycle);
                 self.timings.published(*moment, record.at_ns);
                 self.turns.published(*moment, station, words);
                 self.check_words(*moment);
@@ -45,9 +45,6 @@ impl Model {
                 from: Some(_),
                 ..
             } => own(StationChange::Adopted(*program)),
-            StationEvent::Synchronised { program, .. } => {
-                own(StationChange::Synchronised(*program))
-            }
             StationEvent::BecameCycleMaster { .. } => Some(Change::BecameCycleMaster(station)),
             StationEvent::Excluded { program, .. } => {
                 let excluded = ProgramChange::Excluded(StationSet::only(station));
@@ -95,16 +92,13 @@ impl Model {
         }
     }
 
-    /// A turn. It is a change only for a station that was joining.
-    fn published(&mut self, station: StationId, cycle: i64, words: &[Word]) {
+    /// A turn. It is a change only for a station that was joining or in shadow mode, which it is until its first turn.
+    fn published(&mut self, station: StationId, cycle: i64) {
         let member = Member::Station(station);
         self.is_alive(member, cycle);
-        let covers = words
-            .iter()
-            .fold(ProgramSet::EMPTY, |covers, word| covers.or(word.mask));
         let own = self.changes.now().station(station);
-        if own.is_some_and(|own| own.joining || !own.shadow.and(covers).is_empty()) {
-            let change = Change::Station(station, StationChange::Published(covers));
+        if own.is_some_and(|own| own.joining || !own.shadow.is_empty()) {
+            let change = Change::Station(station, StationChange::Published);
             self.changes.reported(member, cycle, change);
         }
     }

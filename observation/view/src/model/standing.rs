@@ -197,8 +197,7 @@ pub(super) enum Change {
 pub(super) enum StationChange {
     Joins,
     Adopted(ProgramId),
-    Synchronised(ProgramId),
-    Published(ProgramSet),
+    Published,
     Received,
     Refused,
     Flagged(ProgramId),
@@ -211,10 +210,9 @@ impl StationChange {
         match self {
             Self::Joins => own.joining = true,
             Self::Adopted(program) => own.shadow.insert(*program),
-            Self::Synchronised(program) => own.shadow.remove(*program),
-            Self::Published(covers) => {
+            Self::Published => {
                 own.joining = false;
-                own.shadow = own.shadow.without(*covers);
+                own.shadow = ProgramSet::EMPTY;
             }
             Self::Received => {
                 own.was_received = true;

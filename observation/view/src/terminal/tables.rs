@@ -102,7 +102,7 @@ pub(super) fn programs(snapshot: &Snapshot, model: &Model, above: usize) -> Tabl
         "outputs",
         "since",
         "direct",
-        "reconstr.",
+        "reconst.",
         "held",
         "safe",
         "last cycles",
