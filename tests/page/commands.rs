@@ -158,7 +158,7 @@ fn every_command_is_done_or_refused_and_is_in_the_journal() {
     });
 
     assert_eq!(give(&page, "press", &simple("isolate")), done);
-    page.wait_for("a restored press", |state| {
+    page.wait_for("a reconstructed press", |state| {
         state["programs"][1]["source"] == "reconstructed"
     });
     assert_eq!(give(&page, "press", &simple("rejoin")), done);

@@ -13,7 +13,7 @@ fn a_finished_run_answers_every_question() {
     assert_eq!(facts["stations"].as_array().map(Vec::len), Some(3));
     assert!(facts["commands"]["why"].is_string(), "it only looks");
 
-    // While the robot's station is down, its outputs are restored, and the understudy must not fail too.
+    // While the robot's station is down, its outputs are reconstructed, and the understudy must not fail too.
     let down = page.get("/api/state?cycle=100").json();
     assert_eq!(member(&down, "robot")["state"], "killed");
     assert_eq!(down["programs"][0]["source"], "reconstructed");
@@ -62,7 +62,7 @@ fn a_finished_run_answers_every_question() {
 
     let why = page.get("/api/why/0/0?cycle=100").json();
     assert_eq!(why["source"], "reconstructed");
-    assert_eq!(why["restored"]["proved"], true);
+    assert_eq!(why["reconstructed"]["proved"], true);
 
     let trends = page
         .get("/api/trends?signals=0.output.0,1.input.1&from=0&to=290")

@@ -115,7 +115,7 @@ impl Followed {
             model,
             metrics: Arc::clone(&metrics),
             newest: Arc::clone(&newest),
-            said_events: None,
+            passed_on: None,
         };
         let ended = Arc::clone(&ends);
         let thread = Builder::new()
@@ -192,7 +192,7 @@ struct Reader {
     metrics: Arc<Metrics>,
     newest: Arc<RwLock<Newest>>,
     /// Number of the newest event that was passed on; nothing before the present is known.
-    said_events: Option<u64>,
+    passed_on: Option<u64>,
 }
 
 impl Reader {
@@ -239,10 +239,10 @@ impl Reader {
         let heard = progress.age(now).and_then(|age| now.checked_sub(age));
         let observation = Observation::new(&self.model, snapshot, heard.unwrap_or(now));
         let count = self.model.event_count();
-        let said = self.said_events.unwrap_or(count);
-        let tells = self.said_events.is_some() || progress.is_at_end();
-        self.said_events = tells.then_some(count);
-        let events = self.model.events().filter(|event| event.number > said);
+        let passed_on = self.passed_on.unwrap_or(count);
+        let is_present = self.passed_on.is_some() || progress.is_at_end();
+        self.passed_on = is_present.then_some(count);
+        let events = self.model.events().filter(|event| event.number > passed_on);
         let fresh: Vec<Event> = events.cloned().collect();
         let mut newest = self.newest_mut();
         newest.observation = Arc::new(observation);

@@ -82,7 +82,7 @@ fn asked_to_end() -> impl Future<Output = ()> {
     }
 }
 
-/// Runs `serve` on a listener at `address` until a signal; `ready` is told where it listens.
+/// Runs `serve` on a listener at `address` until a signal; `ready` gets its address.
 ///
 /// # Errors
 /// It cannot listen there, or `serve` fails.

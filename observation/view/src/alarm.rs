@@ -157,7 +157,7 @@ mod tests {
     fn an_alarm_lasts_until_it_is_over_and_seen() {
         let mut alarms = Alarms::default();
         let subject = || ("press-io".to_owned(), "fail-safe");
-        alarms.raise(subject(), 7, "nothing true".to_owned());
+        alarms.raise(subject(), 7, "no provable output".to_owned());
         alarms.raise(subject(), 8, "still".to_owned());
         assert_eq!(alarms.iter().count(), 1);
         alarms.over(&subject(), 9);

@@ -88,7 +88,7 @@ impl Model {
     /// Films a part of the run.
     ///
     /// # Errors
-    /// Where nothing says which part: no station was killed, or a name or a cycle is not in the journal.
+    /// No station was killed and no part is named, or a name or a cycle is not in the journal.
     pub fn film(&self, scene: Scene<'_>) -> Result<Film, ViewError> {
         let program = match scene.program {
             Some(name) => self.program_called(name)?,

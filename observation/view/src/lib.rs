@@ -1,4 +1,4 @@
-//! What a person asks of a run, live or finished, folded from its journal.
+//! The state of a run, live or finished, folded from its journal.
 //!
 //! ```text
 //!   journal ──► Source ──► Model::note(record) ──┬─► snapshot(cycle): states, sources, remaining redundancy, alarms
@@ -7,8 +7,9 @@
 //!                                                └─► diff of two runs
 //! ```
 //!
-//! A reader of files only: no member knows that it is looked at. Memory is bounded ([`Bounds`]); what is older is forgotten.
-//! Cycles are counted from the origin of the run, as its report counts them; those before it are negative.
+//! This is the only fold of the journal for views: page, terminal, metrics, Modbus, OPC UA and Zenoh show its snapshot. It reads files only
+//! and involves no member. Memory is bounded ([`Bounds`]); older records are forgotten. Cycles are counted from the origin of the run, as
+//! in its report; those before it are negative.
 
 mod alarm;
 mod cycles;
@@ -55,4 +56,4 @@ pub use station::StationState;
 pub use terminal::{Key, Screen};
 pub use timeline::{Span, Timeline};
 pub use timing::CycleTiming;
-pub use why::{Addend, Reason, Restored, Why};
+pub use why::{Addend, Reason, Reconstructed, Why};

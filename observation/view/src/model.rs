@@ -36,10 +36,10 @@ pub(crate) use standing::Standing;
 pub use turns::SentTurn;
 use turns::Turns;
 
-/// How much of a run is remembered.
+/// Bounds of the memory of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Bounds {
-    /// Cycles of each program, for states, words and causes.
+    /// Cycles of each program, for states, parity words and causes.
     pub cycles: usize,
     /// Events.
     pub events: usize,
@@ -61,7 +61,7 @@ impl Default for Bounds {
     }
 }
 
-/// Everything that is known of a run.
+/// The state of a run, folded from its records.
 #[derive(Debug, Clone)]
 pub struct Model {
     pub(crate) cluster: Arc<Cluster>,
@@ -89,7 +89,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// Of a run of which nothing is known yet.
+    /// The model of a run before its first record.
     pub fn new(cluster: Arc<Cluster>, bounds: Bounds) -> Self {
         let schedule = &cluster.agreement().schedule;
         let programs = cluster.controllers().len();
@@ -145,7 +145,7 @@ impl Model {
         }
     }
 
-    /// Something stood between the records and this model.
+    /// Records were lost before this model.
     pub fn trouble(&mut self, trouble: &Trouble) {
         self.left_out += match trouble {
             Trouble::Gone { count } => count.unwrap_or(1),
@@ -164,7 +164,7 @@ impl Model {
         self.events.push(event);
     }
 
-    /// Nothing more will come: the results of the run are there.
+    /// The run is over: its results are there.
     pub fn end(&mut self) {
         self.finished = true;
     }

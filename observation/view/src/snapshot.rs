@@ -81,14 +81,14 @@ pub struct Snapshot {
     pub left_out: u64,
 }
 
-/// What others see of a member besides its state.
+/// Links of a member.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, JsonSchema)]
 pub struct LinkSnapshot {
     /// Members that do not receive its frames.
     pub cut_from: Vec<String>,
     /// Whether no member receives its frames.
     pub isolated: bool,
-    /// Whether its journal is not received here, so that only others tell of it.
+    /// Whether its journal is not received here, so that its state is known from others only.
     pub detached: bool,
 }
 
@@ -240,7 +240,7 @@ pub struct ProgramSnapshot {
     pub held: u64,
     /// Deadlines with fail-safe outputs.
     pub fail_safe: u64,
-    /// Whether an operator has to release the outputs.
+    /// Whether the operator has to release the outputs.
     pub awaits_release: bool,
     /// Signals that are forced, in words.
     pub forced: Vec<String>,

@@ -1,4 +1,4 @@
-//! State of a station, from what its own records and those of others tell.
+//! State of a station, from its own records and those of others.
 //!
 //! ```text
 //!   (not started) ─► joining ─► shadow mode ─► publishing ◄──► not received ─► flagged
@@ -26,7 +26,7 @@ use understudy_wire::ProgramSet;
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum StationState {
-    /// No record tells of it yet.
+    /// No record of it exists yet.
     NotStarted,
     /// It takes its turns, and at least one remote I/O receives them.
     Publishing,
@@ -90,7 +90,7 @@ impl StationState {
     }
 }
 
-/// What the records up to a cycle tell of a station, except for its process.
+/// Standing of a station, from the records up to a cycle, except for its process.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct StationStanding {
     /// A remote I/O has received it at least once.

@@ -42,13 +42,13 @@ function source(answer) {
   if (answer.scanned !== null && answer.scanned !== answer.value) {
     lines.push(`The scan of the program yields ${bit(answer.scanned)}.`);
   }
-  const { restored } = answer;
-  if (restored) {
-    const others = restored.others.map((other) => `${other.outputs} (${other.said_by})`);
+  const { reconstructed } = answer;
+  if (reconstructed) {
+    const others = reconstructed.others.map((other) => `${other.outputs} (${other.published_by})`);
     lines.push(
-      `Not received: ${restored.silent.join(" and ") || "no station"}. Parity word of ${restored.word_of} over ${restored.members.join(" ⊕ ")}:`,
-      el("code", {}, [`${restored.word} (${restored.word_of})`, ...others].join(" ⊕ "), ` = ${restored.sum}`),
-      `Lineage ${restored.lineage}: ${restored.proved ? "the sum equals the outputs computed from the samples." : "the sum does NOT equal the outputs computed from the samples."}`,
+      `Not received: ${reconstructed.not_received.join(" and ") || "no station"}. Parity word of ${reconstructed.word_of} over ${reconstructed.mask.join(" ⊕ ")}:`,
+      el("code", {}, [`${reconstructed.word} (${reconstructed.word_of})`, ...others].join(" ⊕ "), ` = ${reconstructed.sum}`),
+      `Lineage ${reconstructed.lineage}: ${reconstructed.proved ? "the sum equals the outputs computed from the samples." : "the sum does NOT equal the outputs computed from the samples."}`,
     );
   }
   return lines;

@@ -1,4 +1,4 @@
-//! What views ask of the model.
+//! Answers of the model.
 
 use std::sync::Arc;
 
@@ -13,18 +13,17 @@ use crate::alarm::Alarm;
 use crate::error::ViewError;
 use crate::event::Event;
 use crate::history::History;
-use crate::protection::{LostState, Protection};
 use crate::series::Series;
 use crate::station::StationState;
 use crate::timing::CycleTiming;
 
 impl Model {
-    /// What is run.
+    /// The cluster of the run.
     pub fn cluster(&self) -> &Arc<Cluster> {
         &self.cluster
     }
 
-    /// Who is who.
+    /// Names of the members.
     pub fn members(&self) -> &Members {
         &self.members
     }
@@ -34,7 +33,7 @@ impl Model {
         self.cycles.latest()
     }
 
-    /// Whether it is known where cycles are counted from.
+    /// Whether the origin of the cycles is known.
     pub fn has_origin(&self) -> bool {
         self.cycles.has_origin()
     }
@@ -42,11 +41,6 @@ impl Model {
     /// Records taken so far, and those that were left out, at least.
     pub fn records(&self) -> (u64, u64) {
         (self.records, self.left_out)
-    }
-
-    /// The time of the newest record.
-    pub fn at_ns(&self) -> u64 {
-        self.at_ns
     }
 
     /// The last record of the run was read.
@@ -73,23 +67,13 @@ impl Model {
     }
 
     /// The present state of a station.
-    pub fn station_state(&self, station: StationId) -> Option<StationState> {
+    pub(crate) fn station_state(&self, station: StationId) -> Option<StationState> {
         let standing = self.changes.now();
         standing.station(station)?;
         Some(self.station_state_in(standing, station, self.newest()))
     }
 
-    /// Whether a program is protected now; nothing while its remote I/O has not reported it.
-    pub fn protection(&self, program: ProgramId) -> Option<&Protection> {
-        self.changes.now().program(program)?.protection.as_ref()
-    }
-
-    /// What is left of the state of a program, where it is lost now.
-    pub fn lost_state(&self, program: ProgramId) -> Option<&LostState> {
-        self.changes.now().program(program)?.lost.as_ref()
-    }
-
-    /// What a program did in its last cycles.
+    /// The last cycles of a program.
     pub fn history(&self, program: ProgramId) -> Option<&History> {
         self.histories.get(program.index())
     }
@@ -119,12 +103,12 @@ impl Model {
         self.timings.iter()
     }
 
-    /// What the stations said in a cycle of the cluster.
+    /// The turns of the stations in a cycle of the cluster.
     pub fn sent_turns(&self, moment: Moment) -> &[SentTurn] {
         self.turns.of(moment)
     }
 
-    /// The scan of a program in a cycle as its station evaluated it: what the power did in every rung.
+    /// The scan of a program in a cycle as its station evaluated it: the power flow of every rung.
     ///
     /// # Errors
     /// Where the cycle or the state is not known.
@@ -152,7 +136,7 @@ impl Model {
             no_state(
                 match step.driven.as_ref().and_then(|driven| driven.missing) {
                     Some(missing) => crate::describe::missing_text(missing),
-                    None => "the journal does not reach back to where its history starts",
+                    None => "the journal does not contain the start of its history",
                 },
             )
         })?;
@@ -162,7 +146,7 @@ impl Model {
             .get_or_init(|| Observer::new(&controller.program, period).ok());
         let observer = observer
             .as_ref()
-            .ok_or_else(|| no_state("its ladder cannot be lowered"))?;
+            .ok_or_else(|| no_state("its ladder cannot be evaluated"))?;
         let mut scratch = Scratch::default();
         Ok(observer.evaluate(&mut scratch, sampled.state.words(), sampled.inputs.words()))
     }

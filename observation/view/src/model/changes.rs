@@ -1,4 +1,4 @@
-//! The changes of the standing by cycle, so that the standing of every cycle that is remembered can be told.
+//! The changes of the standing by cycle, so that the standing of every remembered cycle is known.
 //!
 //! Invariant: `now` is `first` with all of `later` applied, in ascending order of cycles and, within a cycle, in the order of the records.
 //! Bounded: at the bound the oldest change becomes part of `first`.

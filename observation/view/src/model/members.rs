@@ -103,7 +103,7 @@ impl Model {
         }
     }
 
-    /// A member of which nothing else tells has a process, since it reports something.
+    /// A member that reports something has a process, if nothing else is known.
     fn is_alive(&mut self, member: Member, cycle: i64) {
         if self.changes.now().process(member).is_none() {
             self.changes.push(cycle, Change::Alive(member));

@@ -64,7 +64,7 @@ impl Model {
             } => {
                 let idle = *missing == Some(Missing::NoCycle);
                 let cycle = self.cycles.deadline(program, *moment, idle);
-                // It may tell of an epoch whose origin was awaited: what was told before moves, and this cycle is counted from there already.
+                // Its epoch may be the awaited one of the origin: earlier cycles move, and this cycle is counted from the origin already.
                 if let Some(shift) = self.cycles.take_shift() {
                     self.shift(shift);
                 }
@@ -105,7 +105,7 @@ impl Model {
         self.happened(record, cycle, cause);
     }
 
-    /// Whether the images of a report are as wide as those of the program: a journal of other programs is none of this cluster's.
+    /// Whether the images of a report are as wide as those of the program: a journal of other programs does not belong to this cluster.
     fn fits(&self, place: usize, event: &RemoteIoEvent) -> bool {
         let circuit = &self.cluster.controllers()[place].circuit;
         let inputs = |image: &Image| image.width() == circuit.inputs().len();

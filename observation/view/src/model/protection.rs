@@ -1,4 +1,4 @@
-//! Protection of programs, and states that are lost.
+//! Protection of programs, and lost states.
 
 use understudy_journal::Record;
 use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason};
@@ -13,7 +13,7 @@ const UNPROTECTED: &str = "unprotected";
 const STATE_LOST: &str = "state-lost";
 
 impl Model {
-    /// The process of a remote I/O begins or ends: the alarms about what it has reported and what it was told are over.
+    /// The process of a remote I/O begins or ends: the alarms about its reports and its commands are over.
     pub(super) fn remote_io_is_new(&mut self, program: ProgramId) {
         let name = self.members.name(Member::RemoteIo(program)).to_owned();
         let over = [STATE_LOST, "forced"];
@@ -111,7 +111,7 @@ impl Model {
             .reported(Member::RemoteIo(program), cycle, change);
     }
 
-    /// Why a station cannot stand in for a program: itself, or a link, as far as others say how it is.
+    /// Why a station cannot prove the outputs of a program: the station itself, or a link, as far as others report it.
     fn lacking(&self, program: ProgramId, lacking: &Lacking) -> LackingStation {
         let station = lacking.station;
         let name = self.members.name(Member::Station(station));
@@ -134,12 +134,12 @@ impl Model {
                         format!("the link {name} → {remote_io} is broken")
                     }
                     _ => format!(
-                        "{name} is not received: it is down, or the link {name} → {remote_io}"
+                        "{name} is not received: it or the link {name} → {remote_io} has failed"
                     ),
                 };
                 ("not-received", text)
             }
-            LackingReason::Joining => ("joining", format!("{name} asks for the state")),
+            LackingReason::Joining => ("joining", format!("{name} requests the state")),
             LackingReason::Behind { stepped } => {
                 link = Some(format!("{remote_io} → {name}"));
                 let last = self.cycles.of_known(stepped).map_or_else(
@@ -157,7 +157,7 @@ impl Model {
             ),
             LackingReason::Failed => (
                 "failed",
-                format!("{name} has failed, and the paper's mode masks one failure"),
+                format!("{name} has failed, and mode `paper` masks one failure only"),
             ),
         };
         LackingStation {

@@ -8,7 +8,7 @@ use understudy_wire::{Force, Member, ProgramId, ProgramSet, SignalPlace, Station
 use crate::protection::{LostState, Protection};
 use crate::station::StationStanding;
 
-/// What the records up to a cycle tell of a program at its remote I/O.
+/// Standing of a program at its remote I/O, from the records up to a cycle.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ProgramStanding {
     pub(crate) awaits_release: bool,
@@ -45,7 +45,7 @@ impl Standing {
         }
     }
 
-    /// The process of a member; nothing where no record tells of it.
+    /// The process of a member; nothing without a record of it.
     pub(crate) fn process(&self, member: Member) -> Option<Process> {
         self.processes.get(&member).copied()
     }
@@ -67,7 +67,7 @@ impl Standing {
         self.cycle_masters.iter().copied()
     }
 
-    /// Whether only the records of others tell of a member.
+    /// Whether the journal of a member is not received.
     pub(crate) fn is_detached(&self, member: Member) -> bool {
         self.detached.contains(&member)
     }
@@ -127,7 +127,7 @@ impl Standing {
         }
     }
 
-    /// The process of a member begins or ends: what it has reported and what it was told is void.
+    /// The process of a member begins or ends: its reports and the commands to it are void.
     fn process_changed(&mut self, member: Member, process: Process) {
         self.processes.insert(member, process);
         match member {

@@ -1,4 +1,4 @@
-//! The tables of stations and programs, and the margin of survival.
+//! The tables of stations and programs, and the remaining redundancy.
 
 use ratatui::layout::Constraint;
 use ratatui::style::{Color, Modifier, Style};
@@ -113,7 +113,7 @@ fn clamped(above: usize, count: usize) -> usize {
     above.min(count.saturating_sub(1))
 }
 
-/// A letter for each of the last cycles: | direct, + reconstructed, _ held, ! fail-safe, a gap for nothing.
+/// A character for each of the last cycles: | direct, + reconstructed, _ held, ! fail-safe, a space for none.
 fn last_sources(model: &Model, program: ProgramId, cycle: Option<i64>) -> String {
     let (Some(sources), Some(last)) = (model.series().sources(program), cycle) else {
         return String::new();
@@ -148,14 +148,14 @@ pub(super) fn protection(snapshot: &Snapshot) -> Vec<Line<'static>> {
         let text = if programs.all(|program| program.protection.is_some()) {
             "all programs"
         } else {
-            "not known of all programs yet"
+            "not reported by all remote I/Os yet"
         };
         lines.push(Line::from(vec![label("protected"), text.into()]));
     }
     lines
 }
 
-/// The margin of survival in a sentence.
+/// The remaining redundancy in a sentence.
 pub(super) fn survives(snapshot: &Snapshot) -> Paragraph<'static> {
     let margin = &snapshot.margin;
     let programs = snapshot.programs.iter().map(|program| &program.program);
@@ -171,7 +171,7 @@ pub(super) fn survives(snapshot: &Snapshot) -> Paragraph<'static> {
             sentence(margin)
         ),
     };
-    let line = Line::from(vec![label("survives"), sentence.into()]);
+    let line = Line::from(vec![label("redundancy"), sentence.into()]);
     Paragraph::new(line).wrap(Wrap { trim: false })
 }
 
@@ -198,11 +198,11 @@ fn sentence(margin: &MarginSnapshot) -> String {
     match margin.survives {
         0 => {
             let singles = margin.singles.iter().filter(|single| {
-                // A remote I/O has no second: that goes without saying.
+                // A remote I/O is never redundant.
                 !single.masked && !is_remote_io(single, margin)
             });
             let fatal = singles.map(|single| single.failed.join("+")).collect();
-            format!("NOT the failure of {}", most(fatal))
+            format!("NOT masked: {}", most(fatal))
         }
         1 => format!("any one station; not {}", most(stations(&margin.pairs, 2))),
         _ => "any two stations".to_owned(),

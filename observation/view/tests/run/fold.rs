@@ -156,9 +156,9 @@ fn an_unexpected_end_is_an_alarm_until_the_member_is_started_again() {
             how: "signal: 9 (SIGKILL)".to_owned(),
             said: vec!["killed".to_owned()],
         };
-        model.note(&Record::of_run(model.at_ns(), event));
+        model.note(&Record::of_run(0, event));
     }
-    assert_eq!(model.station_state(StationId(0)), Some(StationState::Ended));
+    assert_eq!(model.snapshot().stations[0].state, StationState::Ended);
     let open = |model: &Model| -> Vec<String> {
         let lasting = model.alarms().filter(|alarm| alarm.over.is_none());
         lasting.map(|alarm| alarm.text.clone()).collect()
@@ -171,10 +171,10 @@ fn an_unexpected_end_is_an_alarm_until_the_member_is_started_again() {
         ]
     );
     for member in [robot, press_io] {
-        model.note(&Record::of_run(model.at_ns(), RunEvent::Started { member }));
+        model.note(&Record::of_run(0, RunEvent::Started { member }));
     }
     assert_eq!(open(&model), [""; 0]);
-    assert_ne!(model.station_state(StationId(0)), Some(StationState::Ended));
+    assert_ne!(model.snapshot().stations[0].state, StationState::Ended);
 }
 
 /// A run that nobody disturbs has no event of note and a quiet margin; its times are those of the schedule.

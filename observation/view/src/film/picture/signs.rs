@@ -1,4 +1,4 @@
-//! What a state and a source look like: a sign, a colour and dashes, as on the page of a run. Nothing is told by colour alone.
+//! Signs, colours and dashes of states and sources, as on the page of a run. No state is shown by colour alone.
 
 use understudy_wire::Source;
 
