@@ -63,7 +63,7 @@ fn what_is_not_there_is_said() {
         "%QX0.0",
         None,
         "U0574",
-        "robot and press have an output `%QX0.0`; say which, as in `robot.%QX0.0`",
+        "robot and press have an output `%QX0.0`; name the program too, for example `robot.%QX0.0`",
     );
     assert!(model.why("press.%QX0.0", None).is_ok());
     let error = model
