@@ -70,7 +70,7 @@ fn answered(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answ
             .read(Bounds::default())
             .map_err(|error| refused(&error))?;
         let mut screen = Screen::default();
-        let snapshot = screen.snapshot(&model);
+        let snapshot = model.snapshot();
         return Ok(Answer::done(printed(&mut screen, &model)?, &snapshot));
     }
     if !io::stdout().is_terminal() || !io::stdin().is_terminal() {

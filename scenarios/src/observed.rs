@@ -7,10 +7,9 @@
 use std::collections::BTreeMap;
 
 use understudy_reliability::Observed;
-use understudy_simulator::Action;
 use understudy_wire::{Member, ProgramId, Source, StationId};
 
-use understudy_journal::{Happening, JournalError, Record, RunEvent};
+use understudy_journal::{Happening, JournalError, Process, Record, RunEvent, is_provable};
 
 /// Nanoseconds of an hour.
 const HOUR_NS: f64 = 3.6e12;
@@ -165,13 +164,15 @@ fn sign(record: &Record) -> Option<Sign> {
         ) => Some(Sign::Applied(program, *source)),
         (
             Happening::Run(RunEvent::Fault {
-                action: Action::Crash | Action::Stop,
+                action,
                 member: Member::Station(rank),
                 ..
             }),
             _,
-        )
-        | (
+        ) if Process::after(*action).is_some_and(|process| !process.is_running()) => {
+            Some(Sign::Taken(*rank))
+        }
+        (
             Happening::Run(RunEvent::Ended {
                 member: Member::Station(rank),
                 ..
@@ -294,7 +295,8 @@ impl Watch {
                 }
             }
             Sign::Flagged(rank) => self.flagged(at, rank),
-            Sign::Applied(_, Source::Direct | Source::Reconstructed) | Sign::Stalled => {}
+            Sign::Stalled => {}
+            Sign::Applied(_, source) if is_provable(source) => {}
             Sign::Applied(_, source) => {
                 self.fail_safe += u64::from(source == Source::FailSafe);
                 if !self.stands_still(at) && !self.has_failed() {

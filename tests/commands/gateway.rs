@@ -86,7 +86,7 @@ fn metrics_count_what_the_journal_has() {
         metric(
             text,
             "understudy_station_state",
-            &["station=\"tank\"", "state=\"speaking\""]
+            &["station=\"tank\"", "state=\"publishing\""]
         ),
         Some(1.0)
     );

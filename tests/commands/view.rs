@@ -41,7 +41,7 @@ fn an_output_is_explained() {
     assert_snapshot!(shown.shown());
     let json = understudy_in(&folder, &["why", "press.%QX0.0", "--at", "133", "--json"]).json();
     assert_eq!(json["result"]["source"], "reconstructed");
-    assert_eq!(json["result"]["restored"]["proved"], true);
+    assert_eq!(json["result"]["reconstructed"]["proved"], true);
     assert_eq!(json["result"]["because"]["rung"], 1);
     let unknown = understudy_in(&folder, &["why", "griip"]);
     assert_eq!(unknown.status, 2);

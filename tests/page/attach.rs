@@ -20,8 +20,8 @@ fn page(cluster: &str, runs: &Path, more: &[&str]) -> Page {
 
 fn synchronised(page: &Page) {
     page.wait_for("a cluster synchronised", |state| {
-        let speaking = |name| member(state, name)["state"] == "speaking";
-        ["robot", "press", "understudy"].into_iter().all(speaking)
+        let publishing = |name| member(state, name)["state"] == "publishing";
+        ["robot", "press", "understudy"].into_iter().all(publishing)
     });
 }
 

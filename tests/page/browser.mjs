@@ -128,9 +128,9 @@ async function drive() {
   await Promise.all(["Page.enable", "Runtime.enable", "Log.enable"].map((method) => call(method)));
   await size(1280, 900, false);
   await call("Page.navigate", { url });
-  await until("everybody", `['robot', 'press', 'understudy'].every((name) => document.querySelector('g.member[data-name="' + name + '"]')?.dataset.state === 'speaking')`);
+  await until("everybody", `['robot', 'press', 'understudy'].every((name) => document.querySelector('g.member[data-name="' + name + '"]')?.dataset.state === 'publishing')`);
   await scheme("light");
-  await until("a margin", `${text("#survival-words")}.includes("any one further failure")`);
+  await until("a margin", `${text("#redundancy-words")}.includes("any one further failure")`);
 
   // The tour: three steps beside the view, by keyboard or mouse, and not again.
   const tour = (part) => `document.querySelector("#tour ${part}")`;
@@ -147,7 +147,7 @@ async function drive() {
   await click("[data-tour=next]");
   await until("its end", `document.getElementById("tour") === null && document.querySelector(".tour-target") === null`);
   await call("Page.reload");
-  await until("everybody again", `${stateOf("robot")} === "speaking"`);
+  await until("everybody again", `${stateOf("robot")} === "publishing"`);
   if (await evaluate(`document.getElementById("tour") !== null`)) {
     problems.push("a tour that was ended came back");
   }
@@ -155,7 +155,7 @@ async function drive() {
   await until("the tour that was asked for", `document.activeElement?.dataset.tour === "next"`);
   await evaluate(`document.activeElement.dispatchEvent(new KeyboardEvent("keydown", { key: "Escape", bubbles: true }))`);
   await until("its end by a key", `document.getElementById("tour") === null && document.activeElement?.id === "tour-start"`);
-  await until("a margin again", `${text("#survival-words")}.includes("any one further failure")`);
+  await until("a margin again", `${text("#redundancy-words")}.includes("any one further failure")`);
   await picture("cluster");
   await accessible("cluster");
 
@@ -166,7 +166,7 @@ async function drive() {
   await accessible("command");
   await click("[data-command=kill]");
   await until("its end", `${stateOf("robot")} === "killed"`);
-  await until("a smaller margin", `${text("#survival-words")}.includes("1 of 2 failures")`);
+  await until("a smaller margin", `${text("#redundancy-words")}.includes("1 of 2 failures")`);
   await until("restored outputs", `document.querySelector(".picture-frame .flow[data-source=reconstructed]") !== null`);
   await picture("killed");
   await scheme("dark");
@@ -189,7 +189,7 @@ async function drive() {
   await click(member("robot"));
   await until("a reason", `document.querySelector("[data-command=kill]")?.disabled && ${text("#command .actions")}.includes("cannot: it is down")`);
   await click("[data-command=restart]");
-  await until("its return", `${stateOf("robot")} === "speaking"`);
+  await until("its return", `${stateOf("robot")} === "publishing"`);
 
   // A state that is lost: the understudy is cut off, then the controller is killed, then the understudy comes back with an old state.
   await until("protection", `${lampOf("robot")} === "protected" && ${lampOf("press")} === "protected"`);
@@ -208,7 +208,7 @@ async function drive() {
   await click("#confirm-choice");
   await until("an older state that goes on", `${lampOf("robot")} !== "lost" && document.querySelector(".picture-frame .flow[data-source=reconstructed]") !== null`);
   await command("robot", "restart");
-  await until("its return", `${stateOf("robot")} === "speaking" && ${lampOf("robot")} === "protected"`);
+  await until("its return", `${stateOf("robot")} === "publishing" && ${lampOf("robot")} === "protected"`);
 
   // A server that is suspended: its last values are old, and are shown so.
   if (server) {
@@ -286,7 +286,7 @@ async function drive() {
   await click("#live");
 
   await size(390, 844, true);
-  await until("live again", `${stateOf("robot")} === "speaking"`);
+  await until("live again", `${stateOf("robot")} === "publishing"`);
   for (const view of ["cluster", "ladder", "trends", "events"]) {
     await open(view);
     await until(view, `!document.getElementById("view-${view}").hidden`);

@@ -30,7 +30,7 @@ fn a_browser_sees_a_kill_and_asks_why() {
         .arg(folder.join("runs"));
     let page = Page::start(command);
     page.wait_for("a cluster synchronised", |state| {
-        member(state, "robot")["state"] == "speaking"
+        member(state, "robot")["state"] == "publishing"
     });
     let output = Command::new("node")
         .arg("tests/page/browser.mjs")

@@ -23,8 +23,8 @@ fn started(name: &str) -> (Page, std::path::PathBuf) {
         .arg(&runs);
     let page = Page::start(command);
     page.wait_for("a cluster synchronised", |state| {
-        let speaking = |name| member(state, name)["state"] == "speaking";
-        ["robot", "press", "understudy"].into_iter().all(speaking)
+        let publishing = |name| member(state, name)["state"] == "publishing";
+        ["robot", "press", "understudy"].into_iter().all(publishing)
     });
     (page, runs)
 }
@@ -115,7 +115,8 @@ fn the_page_shows_what_is_killed_from_outside_and_starts_it_again() {
         let restart = json!({ "command": "restart" });
         assert_eq!(give(&page, name, &restart), (200, String::new()));
         page.wait_for("its return", |state| {
-            ["speaking", "serving"].contains(&member(state, name)["state"].as_str().expect("text"))
+            ["publishing", "serving"]
+                .contains(&member(state, name)["state"].as_str().expect("text"))
         });
     }
     let alarms = page.get("/api/events").json().to_string();
@@ -143,26 +144,26 @@ fn every_command_is_done_or_refused_and_is_in_the_journal() {
     assert_eq!(give(&page, "robot", &simple("restart")), done);
     assert_eq!(give(&page, "robot", &simple("restart")), refused("U0552"));
     page.wait_for("its return", |state| {
-        member(state, "robot")["state"] == "speaking"
+        member(state, "robot")["state"] == "publishing"
     });
 
     assert_eq!(give(&page, "press", &simple("continue")), refused("U0553"));
     assert_eq!(give(&page, "press", &simple("stop")), done);
     page.wait_for("its silence", |state| {
-        member(state, "press")["state"] == "stopped"
+        member(state, "press")["state"] == "suspended"
     });
     assert_eq!(give(&page, "press", &simple("continue")), done);
     page.wait_for("its return", |state| {
-        member(state, "press")["state"] == "speaking"
+        member(state, "press")["state"] == "publishing"
     });
 
     assert_eq!(give(&page, "press", &simple("isolate")), done);
-    page.wait_for("a restored press", |state| {
+    page.wait_for("a reconstructed press", |state| {
         state["programs"][1]["source"] == "reconstructed"
     });
     assert_eq!(give(&page, "press", &simple("rejoin")), done);
     page.wait_for("its return", |state| {
-        member(state, "press")["state"] == "speaking"
+        member(state, "press")["state"] == "publishing"
     });
 
     assert_eq!(give(&page, "robot", &simple("release")), refused("U0554"));

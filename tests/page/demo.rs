@@ -19,7 +19,7 @@ fn the_cluster_of_a_demo_stays_up_for_the_visitor() {
     let page = Page::start(command);
     let kill = serde_json::json!({ "command": "kill" });
     page.wait_for("the first cycles", |state| {
-        member(state, "robot")["state"] == "speaking"
+        member(state, "robot")["state"] == "publishing"
     });
     // It would disturb the scenario.
     assert_eq!(give(&page, "robot", &kill), (409, "U0560".to_owned()));

@@ -13,18 +13,26 @@ fn a_finished_run_answers_every_question() {
     assert_eq!(facts["stations"].as_array().map(Vec::len), Some(3));
     assert!(facts["commands"]["why"].is_string(), "it only looks");
 
-    // While the robot's station is down, its outputs are restored, and the understudy must not fail too.
+    // While the robot's station is down, its outputs are reconstructed, and the understudy must not fail too.
     let down = page.get("/api/state?cycle=100").json();
     assert_eq!(member(&down, "robot")["state"], "killed");
     assert_eq!(down["programs"][0]["source"], "reconstructed");
     assert_eq!(down["programs"][0]["word_of"], "understudy");
-    assert_eq!(down["survival"]["level"], "some", "{}", down["survival"]);
+    assert_eq!(
+        down["redundancy"]["level"], "some",
+        "{}",
+        down["redundancy"]
+    );
     let before = page.get("/api/state?cycle=20").json();
-    assert_eq!(member(&before, "robot")["state"], "speaking");
+    assert_eq!(member(&before, "robot")["state"], "publishing");
     assert_eq!(before["programs"][0]["source"], "direct");
-    assert_eq!(before["survival"]["level"], "all", "{}", before["survival"]);
+    assert_eq!(
+        before["redundancy"]["level"], "all",
+        "{}",
+        before["redundancy"]
+    );
     let after = page.get("/api/state?cycle=280").json();
-    assert_eq!(member(&after, "robot")["state"], "speaking");
+    assert_eq!(member(&after, "robot")["state"], "publishing");
 
     let picture = page.get("/api/ladder/0?cycle=100").json();
     let svg = picture["svg"].as_str().expect("a picture");
@@ -54,7 +62,7 @@ fn a_finished_run_answers_every_question() {
 
     let why = page.get("/api/why/0/0?cycle=100").json();
     assert_eq!(why["source"], "reconstructed");
-    assert_eq!(why["restored"]["proved"], true);
+    assert_eq!(why["reconstructed"]["proved"], true);
 
     let trends = page
         .get("/api/trends?signals=0.output.0,1.input.1&from=0&to=290")
@@ -98,7 +106,7 @@ fn a_lost_state_is_told_for_each_cycle() {
         let state = page.get(&format!("/api/state?cycle={cycle}")).json();
         (
             state["programs"][0].clone(),
-            state["survival"].clone(),
+            state["redundancy"].clone(),
             member(&state, "robot-io").clone(),
         )
     };
@@ -112,12 +120,12 @@ fn a_lost_state_is_told_for_each_cycle() {
     assert_eq!(lacking["station"], "understudy");
     assert_eq!(lacking["reason"], "behind");
     assert_eq!(lacking["link"], "robot-io → understudy");
-    let (lost, survival, remote_io) = robot(380);
+    let (lost, redundancy, remote_io) = robot(380);
     assert_eq!(lost["lost"]["holder"], "understudy", "{lost:#}");
     assert_eq!(lost["lost"]["age_cycles"], 200, "{lost:#}");
     assert_eq!(lost["lost"]["asks"], true);
     assert_eq!(remote_io["state"], "state-lost");
-    assert_ne!(survival["level"], "all", "{survival:#}");
+    assert_ne!(redundancy["level"], "all", "{redundancy:#}");
     let (chosen, ..) = robot(450);
     assert!(chosen["lost"].is_null(), "{chosen:#}");
     assert_eq!(page.end(), 0);

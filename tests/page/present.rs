@@ -184,7 +184,7 @@ fn the_page_shows_no_past() {
         assert_eq!(status, 200, "{body}");
         let dead = member(&answer, "robot")["state"] == "killed";
         let cycle = answer["cycle"].as_i64().expect("a cycle");
-        Some((cycle, dead && answer["survival"]["level"] != "all"))
+        Some((cycle, dead && answer["redundancy"]["level"] != "all"))
     });
 }
 

@@ -8,8 +8,8 @@ use understudy_wire::ConfigurationHash;
 /// Why a cluster elsewhere cannot be looked at.
 #[derive(Debug, thiserror::Error)]
 pub enum AttachError {
-    /// Nobody listens at any of its addresses.
-    #[error("U0561: nobody of the cluster answers: {}", list(.tried))]
+    /// No member listens at any of its addresses.
+    #[error("U0561: no member of the cluster answers: {}", list(.tried))]
     Nobody {
         /// Who was called where, and what came of it.
         tried: Vec<Unheard>,
@@ -25,18 +25,18 @@ pub enum AttachError {
         "U0563: {name} at {address} runs configuration {theirs}, and the cluster file is configuration {ours}: take the file that it runs"
     )]
     OtherConfiguration {
-        /// Who said so first.
+        /// The first member that reported it.
         name: String,
         /// Where it listens.
         address: SocketAddr,
         /// What it runs.
         theirs: String,
-        /// What the file says.
+        /// Configuration of the file.
         ours: ConfigurationHash,
     },
     /// Its members take no calls.
     #[error(
-        "U0564: the cluster file says security = \"off\": its members have no keys and take no calls; look at the journals that they write (--journal)"
+        "U0564: the cluster file has security = \"off\": its members have no keys and take no calls; read the journals that they write (--journal)"
     )]
     NoKeys,
     /// The system refused something.

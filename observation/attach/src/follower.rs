@@ -14,7 +14,7 @@ use crate::found::{Line, Vain};
 /// Between two calls to a member that was not heard.
 const AGAIN: Duration = Duration::from_secs(2);
 
-/// What the recorder is told.
+/// Messages to the recorder.
 pub(crate) enum Told {
     /// A line of the member's journal.
     Line(Member, String),
@@ -24,7 +24,7 @@ pub(crate) enum Told {
     Detached(Member, String),
 }
 
-/// The calls that stand, for commands.
+/// Open calls, for commands.
 #[derive(Clone, Default)]
 pub(crate) struct Calls(Arc<Mutex<BTreeMap<Member, Arc<Call>>>>);
 
@@ -45,7 +45,7 @@ impl Calls {
     }
 }
 
-/// Follows one member until it is told to end.
+/// Follows one member until the end is requested.
 pub(crate) struct Follower {
     pub(crate) peer: Peer,
     pub(crate) line: Line,
@@ -68,7 +68,7 @@ impl Follower {
                 }
                 Err(reason) => reason,
             };
-            // Said once, however often it is tried.
+            // Reported once for all attempts.
             if said != reason && !self.ends.load(Ordering::Relaxed) {
                 said.clone_from(&reason);
                 if self
@@ -90,7 +90,7 @@ impl Follower {
         let call = Arc::new(call);
         self.calls.set(member, Some(Arc::clone(&call)));
         let mut heard = false;
-        // That it cannot be followed is said by whoever called this.
+        // The caller reports that it cannot be followed.
         let _ = call.follow(self.line.patience, |line| {
             if !std::mem::replace(&mut heard, true)
                 && self.told.blocking_send(Told::Attached(member)).is_err()

@@ -9,13 +9,13 @@ use understudy_wire::{ClusterHash, ConfigurationHash};
 
 use crate::error::{AttachError, Unheard};
 
-/// A machine that is there says so within this time.
+/// Time limit for the answer of a machine.
 const REACH: Duration = Duration::from_millis(1500);
 
 /// Members that are called at once, at most.
 const AT_ONCE: usize = 16;
 
-/// A cluster elsewhere of which somebody takes calls.
+/// A cluster elsewhere of which at least one member takes calls.
 pub struct Found {
     pub(crate) line: Line,
     pub(crate) members: Vec<(Peer, Result<Call, String>)>,
@@ -29,13 +29,13 @@ pub(crate) struct Line {
     pub(crate) cluster: ClusterHash,
     pub(crate) configuration: ConfigurationHash,
     pub(crate) keys: TlsKeys,
-    /// A member says something within this time.
+    /// Time limit for the first line of a member.
     pub(crate) patience: Duration,
 }
 
 /// Why a call was in vain.
 pub(crate) enum Vain {
-    /// Nobody listens there.
+    /// No process listens there.
     Nobody(String),
     /// One side does not believe the other.
     NotAdmitted(String),

@@ -26,9 +26,8 @@ const UNWRITTEN: usize = 16_384;
 /// How often readers of the journal see what is new.
 const SHOW: Duration = Duration::from_millis(50);
 
-const PROCESS: &str =
-    "its process runs elsewhere: end it, start it or make it stand still on its own machine";
-const LINKS: &str = "nothing stands between the members elsewhere that could cut their links";
+const PROCESS: &str = "its process runs elsewhere: end, start or suspend it on its own machine";
+const LINKS: &str = "links between members on other machines cannot be cut from here";
 
 /// The commands that cannot be given to a cluster elsewhere, each with the reason.
 pub fn impossible() -> Vec<(&'static str, String)> {
@@ -57,7 +56,7 @@ impl Drop for Attached {
         self.ends.store(true, Ordering::Relaxed);
         self.end = None;
         if let Some(recorder) = self.recorder.take() {
-            // One that panicked has said so. Followers that wait for a member end with the process.
+            // A panic has been reported. Followers that wait for a member end with the process.
             let _ = recorder.join();
         }
     }
@@ -122,7 +121,7 @@ impl Found {
             .name("attach-recorder".to_owned())
             .spawn(move || {
                 runtime.block_on(async {
-                    // Without it nobody can act from another process.
+                    // Without it no other process can give commands.
                     let _socket = RunSocket::open(directory.path(), commands.commander());
                     recorder.run(lines, commands, ended).await;
                 });
@@ -182,7 +181,7 @@ impl Recorder {
                 return self.own(RunEvent::Detached { member, reason });
             }
         };
-        // Whoever says something else than a record of its own is not worth believing.
+        // A line that is not a record of its sender is dropped.
         let Ok(record) = serde_json::from_str::<Record>(&line) else {
             return;
         };
@@ -260,7 +259,7 @@ impl Recorder {
         // Zenoh waits in threads of its own only.
         let (tell, told) = oneshot::channel();
         let asking = std::thread::Builder::new().spawn(move || {
-            // Nobody listens any more where the program ends.
+            // The receiver is gone when the program ends.
             let _ = tell.send(call.ask(&request));
         });
         let system = |reason: String| Refusal::System {

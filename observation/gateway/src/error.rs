@@ -1,4 +1,4 @@
-//! What can be wrong about a gateway.
+//! Errors of the gateways.
 
 use std::io;
 use std::net::SocketAddr;
@@ -6,27 +6,27 @@ use std::net::SocketAddr;
 use understudy_bus::BusError;
 use understudy_view::Trouble;
 
-/// Why a gateway does not run.
+/// Error of a gateway.
 #[derive(Debug, thiserror::Error)]
 pub enum GatewayError {
     /// It cannot listen.
     #[error("U0590: the gateway cannot listen on {address}: {source}")]
     Listen {
-        /// Where.
+        /// The address.
         address: SocketAddr,
-        /// What the system said.
+        /// Error of the system.
         source: io::Error,
     },
     /// The system refused something that it needs.
     #[error("U0591: {what}: {source}")]
     System {
-        /// What was asked of it.
+        /// What was requested.
         what: &'static str,
-        /// What it said.
+        /// Error of the system.
         source: io::Error,
     },
     /// More signals than a Modbus address can name.
-    #[error("U0592: the process image has {bits} bits, and a register map holds {most}")]
+    #[error("U0592: the process image has {bits} bits; a register map holds {most} at most")]
     TooManyBits {
         /// Of all programs.
         bits: usize,

@@ -1,5 +1,5 @@
-//! A run that is followed: a thread reads its journal while it is written, and whoever asks gets the present state. While the journal is
-//! still being read there is none: every question is answered by [`Reading`].
+//! A followed run: a thread reads its journal while it is written, and callers get the present state. While the journal is still being
+//! read there is none: every question is answered by [`Reading`].
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
@@ -7,21 +7,19 @@ use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
 use understudy_cluster::Cluster;
-use understudy_view::{
-    Bounds, Event, Holders, Margin, Model, Progress, Reading, Run, Snapshot, Source,
-};
+use understudy_view::{Bounds, Event, Model, Progress, Reading, Run, Snapshot, Source};
 use understudy_wire::ProgramId;
 
 use crate::error::GatewayError;
 use crate::metrics::Metrics;
 
-/// Between two looks at a journal that says nothing new.
+/// Time between two polls of a journal that has nothing new.
 const LOOK: Duration = Duration::from_millis(40);
 
-/// Between two snapshots, however much is new.
+/// Time between two snapshots, at least.
 const SHOW: Duration = Duration::from_millis(100);
 
-/// Gateways show what is the case; what was is for the views.
+/// Gateways show the present; the past is for the views.
 pub const BOUNDS: Bounds = Bounds {
     cycles: 64,
     events: 1000,
@@ -29,7 +27,7 @@ pub const BOUNDS: Bounds = Bounds {
     timings: 600,
 };
 
-/// What is newest of a run.
+/// The newest state of a run.
 #[derive(Debug)]
 pub struct Followed {
     cluster: Arc<Cluster>,
@@ -39,29 +37,31 @@ pub struct Followed {
     thread: Option<JoinHandle<()>>,
 }
 
-/// What is the case, and how fresh that is.
+/// The present state of a run, and its age.
 #[derive(Debug, Clone)]
 pub struct Observation {
-    /// All that a view shows.
+    /// The snapshot that every view shows.
     pub snapshot: Arc<Snapshot>,
-    /// By program: x(i) at its last sample, element 1 first; nothing where the journal does not tell it.
+    /// By program: x(i) at its last sample, element 1 first; nothing where the journal does not contain it.
     pub states: Vec<Option<Vec<bool>>>,
     /// The newest events, oldest first.
     pub recent: Vec<Event>,
-    /// When the newest record was written.
+    /// The time at which the newest record was written.
     pub heard: Instant,
 }
 
-/// In [`Observation::recent`].
+/// Events in [`Observation::recent`].
 const RECENT: usize = 20;
 
 impl Observation {
-    /// Of what `model` knows, whose newest record was written at `heard`.
+    /// The observation of a model whose newest record was written at `heard`.
     pub fn new(model: &Model, snapshot: Snapshot, heard: Instant) -> Self {
         let programs = 0..snapshot.programs.len();
+        let until = snapshot.cycle.unwrap_or(i64::MAX);
         let state = |program: usize| {
             let program = ProgramId(u8::try_from(program).ok()?);
-            let mut steps = model.history(program)?.steps().iter().rev();
+            let steps = model.history(program)?.steps().iter().rev();
+            let mut steps = steps.filter(|step| step.cycle <= until);
             let sampled = steps.find_map(|step| step.sampled.as_ref())?;
             Some(sampled.state.bits().collect())
         };
@@ -79,14 +79,14 @@ impl Observation {
 #[derive(Debug)]
 struct Newest {
     observation: Arc<Observation>,
-    /// Newer ones than were asked for the last time.
+    /// Events since they were taken last.
     events: Vec<Event>,
-    /// Of the reader, when it had folded the observation.
+    /// Progress of the reader when it made the observation.
     progress: Progress,
 }
 
 impl Newest {
-    /// What is the case now, unless it is not known yet.
+    /// The present state, unless it is not known yet.
     fn current(newest: &RwLock<Self>) -> Result<RwLockReadGuard<'_, Self>, Reading> {
         let newest = newest.read().unwrap_or_else(PoisonError::into_inner);
         newest.progress.current(Instant::now())?;
@@ -95,7 +95,7 @@ impl Newest {
 }
 
 impl Followed {
-    /// Begins to follow `run` from its first record.
+    /// Starts to follow `run` from its first record.
     ///
     /// # Errors
     /// The system refuses a thread.
@@ -113,10 +113,9 @@ impl Followed {
             source: run.follow(),
             run: run.clone(),
             model,
-            margin: None,
             metrics: Arc::clone(&metrics),
             newest: Arc::clone(&newest),
-            said_events: None,
+            passed_on: None,
         };
         let ended = Arc::clone(&ends);
         let thread = Builder::new()
@@ -135,12 +134,12 @@ impl Followed {
         })
     }
 
-    /// What the run is of.
+    /// The cluster of the run.
     pub fn cluster(&self) -> &Arc<Cluster> {
         &self.cluster
     }
 
-    /// Writes everything that was counted, in the OpenMetrics text format.
+    /// The metrics in the OpenMetrics text format.
     pub fn exposition(&self) -> impl Fn() -> Result<String, Reading> + Clone + use<> {
         let (metrics, newest) = (Arc::clone(&self.metrics), Arc::clone(&self.newest));
         move || {
@@ -153,7 +152,7 @@ impl Followed {
         }
     }
 
-    /// What is the case.
+    /// The present snapshot.
     ///
     /// # Errors
     /// [`Reading`].
@@ -161,7 +160,7 @@ impl Followed {
         Ok(Arc::clone(&self.observation()?.snapshot))
     }
 
-    /// The same with the states of programs, and with how fresh it is.
+    /// The present snapshot with the states of programs and its age.
     ///
     /// # Errors
     /// [`Reading`].
@@ -169,8 +168,8 @@ impl Followed {
         Ok(Arc::clone(&Newest::current(&self.newest)?.observation))
     }
 
-    /// Events since the last time that somebody asked, a thousand at most; the oldest go first. Those that were in the journal when the
-    /// present was first known are the past, and are not among them.
+    /// Events since the last call, a thousand at most; the oldest are dropped first. Events that were in the journal when the present was
+    /// first known are not among them.
     pub fn take_events(&self) -> Vec<Event> {
         let mut newest = self.newest.write().unwrap_or_else(PoisonError::into_inner);
         std::mem::take(&mut newest.events)
@@ -190,12 +189,10 @@ struct Reader {
     source: Source,
     run: Run,
     model: Model,
-    /// Of the same holders it is the same.
-    margin: Option<(Holders, Margin)>,
     metrics: Arc<Metrics>,
     newest: Arc<RwLock<Newest>>,
-    /// The number of the newest event that was told; nothing before the present is known.
-    said_events: Option<u64>,
+    /// Number of the newest event that was passed on; nothing before the present is known.
+    passed_on: Option<u64>,
 }
 
 impl Reader {
@@ -204,23 +201,20 @@ impl Reader {
         let mut unshown = true;
         while !ends.load(Ordering::Relaxed) {
             let is_finished = !self.model.is_finished() && self.run.is_finished();
-            let (model, metrics) = (&mut self.model, &self.metrics);
+            let model = &mut self.model;
             let taken = self.source.poll(&mut |found| match found {
-                Ok(record) => {
-                    metrics.note(&record);
-                    model.note(&record);
-                }
+                Ok(record) => model.note(&record),
                 Err(trouble) => model.trouble(&trouble),
             });
             self.metrics.times(&self.model);
             unshown |= taken > 0;
             if taken == 0 && is_finished {
-                // Its results lie beside the journal, which was read to its end since.
+                // Its results were there before the journal was read to its end.
                 self.model.end();
                 unshown = true;
             }
             let progress = self.source.progress().of_ended(self.model.is_finished());
-            // What is at the end is shown before it is said to be the present.
+            // The end of the journal is shown before it counts as the present.
             if unshown && (progress.is_at_end() || shown.elapsed() >= SHOW) {
                 self.show(progress);
                 shown = Instant::now();
@@ -239,23 +233,16 @@ impl Reader {
     }
 
     fn show(&mut self, progress: Progress) {
-        let holders = self.model.holders();
-        let known = self.margin.take().filter(|(of, _)| *of == holders);
-        let (holders, margin) = known.unwrap_or_else(|| {
-            let margin = holders.margin();
-            (holders, margin)
-        });
-        let snapshot = self.model.snapshot_with(&margin);
-        self.margin = Some((holders, margin));
-        self.metrics.state(&snapshot);
+        let snapshot = self.model.snapshot();
+        self.metrics.show(&self.model, &snapshot);
         let now = Instant::now();
         let heard = progress.age(now).and_then(|age| now.checked_sub(age));
         let observation = Observation::new(&self.model, snapshot, heard.unwrap_or(now));
         let count = self.model.event_count();
-        let said = self.said_events.unwrap_or(count);
-        let tells = self.said_events.is_some() || progress.is_at_end();
-        self.said_events = tells.then_some(count);
-        let events = self.model.events().filter(|event| event.number > said);
+        let passed_on = self.passed_on.unwrap_or(count);
+        let is_present = self.passed_on.is_some() || progress.is_at_end();
+        self.passed_on = is_present.then_some(count);
+        let events = self.model.events().filter(|event| event.number > passed_on);
         let fresh: Vec<Event> = events.cloned().collect();
         let mut newest = self.newest_mut();
         newest.observation = Arc::new(observation);

@@ -25,7 +25,7 @@ const MOST_CONNECTIONS: usize = 64;
 /// Who has not sent a whole request by then, or does not take the answer, is gone.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// Serves the metrics of `run` until SIGINT or SIGTERM; `ready` is told where.
+/// Serves the metrics of `run` until SIGINT or SIGTERM; `ready` gets the address.
 ///
 /// # Errors
 /// It cannot listen there.

@@ -1,12 +1,12 @@
-//! What a run is, for other systems, read-only.
+//! A run for other systems, read-only.
 //!
 //! ```text
-//!   journal ──► Followed ──┬─► Metrics          ──► Prometheus scrapes them over HTTP
-//!   (files that grow)      ├─► Snapshot ──► RegisterMap ──► Modbus TCP: bits and registers
-//!                          └─► Snapshot and events ──► JSON under keys of Zenoh, at a limited rate
+//!   journal ──► Followed: snapshot ──┬─► Metrics     ──► Prometheus, over HTTP
+//!   (files that grow)                ├─► RegisterMap ──► Modbus TCP: bits and registers
+//!                                    └─► documents   ──► JSON under keys of Zenoh, at a limited rate
 //! ```
 //!
-//! A reader of the journal only: no member knows that somebody looks, and nothing here can be written.
+//! The gateways read the journal only. No member is involved, and nothing here can be written.
 
 #![allow(
     clippy::disallowed_methods,
@@ -28,9 +28,9 @@ pub use http::serve_metrics;
 pub use metrics::{Metrics, exposition_of};
 pub use mirror::{Rate, mirror};
 pub use modbus::serve_modbus;
-pub use register_map::{Area, Place, RegisterMap};
+pub use register_map::{Area, Place, ProcessImage, RegisterMap};
 
-/// What is looked at.
+/// A run that is followed.
 pub use understudy_view::Run;
 
 use std::future::Future;
@@ -39,7 +39,7 @@ use std::net::SocketAddr;
 use tokio::net::TcpListener;
 use tokio::runtime::{Builder, Runtime};
 
-/// One thread serves all who ask: they look, and the cluster must not notice.
+/// One thread serves all clients, so that the cluster is not disturbed.
 fn runtime() -> Result<Runtime, GatewayError> {
     Builder::new_multi_thread()
         .worker_threads(1)
@@ -82,7 +82,7 @@ fn asked_to_end() -> impl Future<Output = ()> {
     }
 }
 
-/// Runs `serve` on a listener at `address` until a signal; `ready` is told where it listens.
+/// Runs `serve` on a listener at `address` until a signal; `ready` gets its address.
 ///
 /// # Errors
 /// It cannot listen there, or `serve` fails.
@@ -96,7 +96,7 @@ where
 {
     runtime()?.block_on(async {
         let listener = listen(address).await?;
-        // Whoever was told that it listens may ask it to end.
+        // A signal may come as soon as the address is known.
         let end = asked_to_end();
         let system = |source| GatewayError::System {
             what: "serving",

@@ -14,7 +14,7 @@ use crate::error::GatewayError;
 use crate::followed::Followed;
 use crate::{asked_to_end, runtime};
 
-/// How often each document may be said, at most.
+/// Maximum rate at which each document is published.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Rate(Duration);
 
@@ -26,13 +26,13 @@ impl FromStr for Rate {
         let times = text.strip_suffix("/s").and_then(|times| times.parse().ok());
         match times {
             Some(times @ 1..=50) => Ok(Self(Duration::from_secs(1) / times)),
-            _ => Err("a rate is 1/s to 50/s".to_owned()),
+            _ => Err("expected a rate from `1/s` to `50/s`".to_owned()),
         }
     }
 }
 
-/// Says what is new of `run` under `understudy/mirror/CLUSTER/...` until SIGINT or SIGTERM, to whoever calls `address`; `ready` is told
-/// when it listens. Who comes late asks for the newest.
+/// Publishes the changes of `run` under `understudy/mirror/CLUSTER/...` until SIGINT or SIGTERM, to the clients of `address`; `ready` gets the
+/// address when it listens. A late client queries the newest documents.
 ///
 /// # Errors
 /// Zenoh does not start there.
@@ -50,25 +50,25 @@ pub fn mirror(
         asked_to_end()
     };
     ready(address);
-    let mut said: BTreeMap<String, String> = BTreeMap::new();
+    let mut published: BTreeMap<String, String> = BTreeMap::new();
     runtime.block_on(async {
         tokio::pin!(end);
         loop {
             if let Ok(present) = run.snapshot() {
                 for (key, document) in documents(run.cluster(), &present) {
                     let text = document.to_string();
-                    if said.get(&key) != Some(&text) {
+                    if published.get(&key) != Some(&text) {
                         announcer.say(&key, &text);
-                        said.insert(key, text);
+                        published.insert(key, text);
                     }
                 }
                 for event in run.take_events() {
                     announcer.say_once("events", &json!(event).to_string());
                 }
-            } else if !said.is_empty() {
-                // What was said is not the present any more.
+            } else if !published.is_empty() {
+                // The published documents are stale.
                 announcer.forget();
-                said.clear();
+                published.clear();
             }
             tokio::select! {
                 () = tokio::time::sleep(rate.0) => {}

@@ -1,4 +1,4 @@
-//! The process image over Modbus TCP, read-only: whoever writes is told that there is no such function. While the journal is being read,
+//! The process image over Modbus TCP, read-only: write requests are answered by exception 1, *illegal function*. While the journal is being read,
 //! every request is answered by exception 6, *server device busy*.
 
 use std::future::{Ready, ready};
@@ -20,7 +20,7 @@ use crate::serve_until_asked;
 /// Connections at once.
 const MOST_CLIENTS: usize = 64;
 
-/// Who asks nothing for so long, or does not take the answer, is gone.
+/// Time limit for the next request and for taking an answer.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// By the standard, in one answer.
@@ -29,7 +29,7 @@ const MOST_BITS: u16 = 2000;
 /// Likewise.
 const MOST_REGISTERS: u16 = 125;
 
-/// Serves the process image of `run` until SIGINT or SIGTERM; `ready` is told where.
+/// Serves the process image of `run` until SIGINT or SIGTERM; `ready` gets the address.
 ///
 /// # Errors
 /// It cannot listen there, or the cluster has more signals than there are addresses.
@@ -56,10 +56,10 @@ async fn serve(
         let (run, map) = (Arc::clone(&run), Arc::clone(&map));
         async move { Ok(Some((Client { run, map }, stream))) }
     };
-    // The library ends with the first connection that the system refuses, and all clients with it; so it gets those that have a place.
+    // The library ends with the first connection that the system refuses, so it only gets admitted connections.
     let server = Server::new(inner);
     tokio::select! {
-        // A client that breaks its connection off, or says what is no request, is gone; the others stay.
+        // A client that closes its connection, or sends an invalid request, is disconnected; the others stay.
         ended = server.serve(&connected, |_| {}) => ended,
         never = relayed => match never {},
     }
@@ -77,7 +77,7 @@ impl Service for Client {
     type Future = Ready<Result<Response, ExceptionCode>>;
 
     fn call(&self, request: Self::Request) -> Self::Future {
-        // Old values would be taken for the present.
+        // Stale values would be mistaken for the present.
         let present = self.run.snapshot();
         let present = present.map_err(|_reading| ExceptionCode::ServerDeviceBusy);
         ready(present.and_then(|present| answer(&self.map.image(&present), &request)))

@@ -1,8 +1,8 @@
-//! Which bit and which register of Modbus says what.
+//! The register map: the meaning of each bit and each register of Modbus.
 //!
 //! ```text
 //!   discrete inputs   u(1), u(2), ... one after the other, element 1 first
-//!   coils             y(1), y(2), ... as they are driven; they can be read only
+//!   coils             y(1), y(2), ... as driven; read-only
 //!   registers         0..16 the run, 16.. the stations, 96.. the programs; read as input or as holding registers
 //! ```
 //!
@@ -14,19 +14,19 @@ use understudy_view::{RunState, Snapshot, StationState};
 
 use crate::error::GatewayError;
 
-/// Of the map, in register 0; it changes when a place does.
+/// Version of the map, in register 0; it changes when a place changes.
 const VERSION: u16 = 1;
 
-/// Where the stations begin, a register each.
+/// First register of the stations, one register each.
 const STATIONS: usize = 16;
 
-/// Where the programs begin.
+/// First register of the programs.
 const PROGRAMS: usize = 96;
 
-/// Registers of a program.
+/// Number of registers of a program.
 const OF_PROGRAM: usize = 16;
 
-/// What an address of 16 bits can name.
+/// Number of addresses of 16 bits.
 const MOST_BITS: usize = 1 << 16;
 
 /// One of the tables of Modbus.
@@ -44,15 +44,15 @@ pub enum Area {
 /// One line of the map.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Place {
-    /// In which table.
+    /// Its table.
     pub area: Area,
-    /// From 0.
+    /// Its address, from 0.
     pub address: u16,
     /// 1, or 2 for a number of 32 bits.
     pub width: u16,
-    /// A signal as `program.signal`, or what the register is called.
+    /// A signal as `program.signal`, or the name of the register.
     pub name: String,
-    /// What its values mean.
+    /// Meaning of its values.
     pub meaning: &'static str,
 }
 
@@ -65,19 +65,23 @@ pub struct RegisterMap {
     stations: usize,
 }
 
-/// What is read at one moment.
+/// The process image that clients read.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub(crate) struct ProcessImage {
-    pub(crate) inputs: Vec<bool>,
-    pub(crate) coils: Vec<bool>,
-    pub(crate) registers: Vec<u16>,
+pub struct ProcessImage {
+    /// Discrete inputs.
+    pub inputs: Vec<bool>,
+    /// Coils.
+    pub coils: Vec<bool>,
+    /// Input and holding registers.
+    pub registers: Vec<u16>,
 }
 
-const STATION_STATES: &str = "0 not-started, 1 speaking, 2 silent, 3 flagged, 4 joining, 5 shadow, 6 refused, 7 stopped, 8 killed, 9 ended";
+/// The numbers of [`StationState::ALL`].
+const STATION_STATES: &str = "0 not-started, 1 publishing, 2 not-received, 3 flagged, 4 joining, 5 shadow-mode, 6 refused, 7 suspended, 8 killed, 9 ended";
 
-const SOURCES: &str = "0 nothing yet, 1 direct, 2 reconstructed, 3 held, 4 fail-safe";
+const SOURCES: &str = "0 not known, 1 direct, 2 reconstructed, 3 held, 4 fail-safe";
 
-const PROTECTION: &str = "0 not known, 1 protected, 2 not protected: the failure of one station would not be masked, 3 the state is lost";
+const PROTECTION: &str = "0 not known, 1 protected, 2 not protected: the failure of one station would not be masked, 3 state lost";
 
 /// Of the run, with address, width and meaning.
 const OF_RUN: [(u16, u16, &str, &str); 8] = [
@@ -94,34 +98,49 @@ const OF_RUN: [(u16, u16, &str, &str); 8] = [
         6,
         1,
         "margin.survives",
-        "further failures of stations that are masked whichever they are",
+        "remaining redundancy: any further failures of stations that would be masked",
     ),
     (
         7,
         1,
         "alarms.open",
-        "alarms that last, or that nobody has acknowledged",
+        "alarms that last or are not acknowledged",
     ),
-    (8, 1, "cluster.programs", "how many"),
-    (9, 1, "cluster.stations", "how many"),
+    (8, 1, "cluster.programs", "number of programs"),
+    (9, 1, "cluster.stations", "number of stations"),
 ];
 
 /// Of a program, with its place behind the program's first register.
 const PROGRAM_REGISTERS: [(u16, u16, &str, &str); 10] = [
     (0, 1, "source", SOURCES),
-    (1, 1, "awaits_release", "1 where an operator has to release"),
-    (2, 1, "forced", "signals that are forced"),
+    (
+        1,
+        1,
+        "awaits_release",
+        "1 where the operator has to release the outputs",
+    ),
+    (2, 1, "forced", "number of forced signals"),
     (3, 1, "protection", PROTECTION),
-    (4, 2, "direct", "deadlines"),
-    (6, 2, "reconstructed", "deadlines"),
-    (8, 2, "held", "deadlines"),
-    (10, 2, "fail_safe", "deadlines"),
-    (12, 2, "finished", "parts"),
-    (14, 2, "plant_faults", "things that must not happen"),
+    (4, 2, "direct", "deadlines, from the origin of the run on"),
+    (
+        6,
+        2,
+        "reconstructed",
+        "deadlines, from the origin of the run on",
+    ),
+    (8, 2, "held", "deadlines, from the origin of the run on"),
+    (
+        10,
+        2,
+        "fail_safe",
+        "deadlines, from the origin of the run on",
+    ),
+    (12, 2, "finished", "finished parts"),
+    (14, 2, "plant_faults", "plant faults"),
 ];
 
 impl RegisterMap {
-    /// Of a cluster.
+    /// The map of a cluster.
     ///
     /// # Errors
     /// More signals than addresses.
@@ -133,8 +152,8 @@ impl RegisterMap {
             outputs.map(|output| output.name.clone()).collect()
         };
         for (area, meaning) in [
-            (Area::DiscreteInput, "an input, as last sampled"),
-            (Area::Coil, "an output, as it is driven"),
+            (Area::DiscreteInput, "input, as last sampled"),
+            (Area::Coil, "output, as driven"),
         ] {
             let names: Vec<String> = programs
                 .iter()
@@ -203,13 +222,13 @@ impl RegisterMap {
         })
     }
 
-    /// Every line, by table and address.
+    /// Every place, by table and address.
     pub fn places(&self) -> &[Place] {
         &self.places
     }
 
-    /// What is to be read now.
-    pub(crate) fn image(&self, snapshot: &Snapshot) -> ProcessImage {
+    /// The process image of a snapshot.
+    pub fn image(&self, snapshot: &Snapshot) -> ProcessImage {
         let mut image = ProcessImage {
             registers: vec![0; PROGRAMS + self.widths.len() * OF_PROGRAM],
             ..ProcessImage::default()
@@ -283,17 +302,8 @@ fn add_bits(bits: &mut Vec<bool>, text: Option<&str>, width: usize) {
     bits.resize(end, false);
 }
 
+/// The place of a state in [`StationState::ALL`].
 fn state_number(state: StationState) -> u16 {
-    match state {
-        StationState::NotStarted => 0,
-        StationState::Speaking => 1,
-        StationState::Silent => 2,
-        StationState::Flagged => 3,
-        StationState::Joining => 4,
-        StationState::Shadow => 5,
-        StationState::Refused => 6,
-        StationState::Stopped => 7,
-        StationState::Killed => 8,
-        StationState::Ended => 9,
-    }
+    let place = StationState::ALL.iter().position(|known| *known == state);
+    place.map_or(0, |place| place as u16)
 }

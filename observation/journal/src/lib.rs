@@ -12,6 +12,7 @@ mod named_files;
 mod numbering;
 mod operator;
 mod record;
+mod rules;
 mod run_directory;
 mod segments;
 mod source;
@@ -28,6 +29,7 @@ pub use operator::{
     commands,
 };
 pub use record::{Happening, LABORATORY, Record, RunEvent, moment};
+pub use rules::{Process, SourceCounts, is_blocked, is_provable};
 pub use run_directory::{KEYS, RunDirectory, RunDirectoryError, time_name};
 pub use segments::{Segments, closed_segments, segments_of};
 pub use source::{SOURCES, source_word};

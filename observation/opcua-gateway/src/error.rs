@@ -12,7 +12,7 @@ pub enum OpcuaError {
     /// There is no such run.
     #[error(transparent)]
     Run(#[from] ViewError),
-    /// Others could reach it, and nothing says who may read.
+    /// Other machines could reach it, and there is no access control.
     #[error(
         "U0594: {address} can be reached by others, and without --certificates there is neither a login nor encryption: listen on 127.0.0.1, or name a folder for certificates"
     )]

@@ -1,15 +1,12 @@
 //! A run as an OPC UA server that can only be read.
 //!
 //! ```text
-//!   journal ──► Followed ──► Observation ──► tree: what each variable says, and how far that can be trusted ──► server
+//!   journal ──► Followed ──► Observation ──► tree: variables with values and status codes ──► server
 //! ```
 //!
-//! A reader of the journal only, as the other gateways are. A binary of its own, so that nobody who does without OPC UA carries it.
+//! It reads the journal only, as the other gateways do. It is a binary of its own, so that other installations do not carry OPC UA.
 
-#![allow(
-    clippy::disallowed_methods,
-    reason = "it looks at a run again and again, by the clock"
-)]
+#![allow(clippy::disallowed_methods, reason = "it polls a run by the clock")]
 
 mod error;
 mod security;

@@ -68,13 +68,13 @@ struct ServeArguments {
     /// Where it listens; port 0 for any that is free
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:4840")]
     listen: SocketAddr,
-    /// What clients call this machine, in URLs and in the certificate; its address where nothing is said
+    /// Name of this machine in URLs and in the certificate; by default its address
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
     /// A folder for the certificate of the server, made where there is none, and for those of clients
     #[arg(long, value_name = "FOLDER")]
     certificates: Option<PathBuf>,
-    /// Who may log in; without it nobody has to
+    /// User name for the login; without it no login is needed
     #[arg(
         long,
         value_name = "NAME",
@@ -82,7 +82,7 @@ struct ServeArguments {
         requires = "certificates"
     )]
     user: Option<String>,
-    /// A file whose first line is the password, and that nobody else may read
+    /// File whose first line is the password, readable by its owner only
     #[arg(long, value_name = "FILE", requires = "user")]
     password_file: Option<PathBuf>,
 }
@@ -192,7 +192,7 @@ fn table(variables: &[Variable]) -> String {
         .collect()
 }
 
-/// Nobody may be there any more to read it.
+/// The reader of the output may have ended.
 fn print(bytes: &[u8]) {
     let _ = std::io::stdout().write_all(bytes);
 }

@@ -32,7 +32,7 @@ pub struct Settings {
     pub host: Option<String>,
     /// With a folder everything is signed and encrypted, and clients are known by their certificates.
     pub certificates: Option<PathBuf>,
-    /// Without one, whoever has a trusted certificate may read.
+    /// Without a login, every client with a trusted certificate may read.
     pub login: Option<Login>,
 }
 
@@ -52,7 +52,7 @@ impl std::fmt::Debug for Login {
 }
 
 impl Login {
-    /// The password is the first line of `file`, which nobody else may read.
+    /// The password is the first line of `file`, which only its owner may read.
     ///
     /// # Errors
     /// [`OpcuaError::Password`].
@@ -86,7 +86,7 @@ impl Settings {
             own.filter(|_| address.is_unspecified())
                 .unwrap_or_else(|| address.to_string())
         });
-        // An address of version 6 stands in brackets in a URL.
+        // An IPv6 address is in brackets in a URL.
         if host.contains(':') && !host.starts_with('[') {
             format!("[{host}]")
         } else {
@@ -99,7 +99,7 @@ impl Settings {
         format!("urn:{}:understudy-opcua", self.host())
     }
 
-    /// Checks all that can be wrong before something is served, and makes the certificate where there is none.
+    /// Checks the settings before serving, and makes the certificate if there is none.
     ///
     /// # Errors
     /// [`OpcuaError::InTheClear`], [`OpcuaError::Certificate`].
@@ -188,7 +188,7 @@ pub(crate) fn certificate_and_key(folder: &Path) -> (PathBuf, PathBuf) {
     )
 }
 
-/// Nobody but its owner reads it.
+/// Readable by its owner only.
 fn private(path: &Path) -> Result<(), String> {
     let mode = fs::metadata(path)
         .map(|metadata| metadata.permissions().mode())

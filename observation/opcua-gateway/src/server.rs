@@ -36,13 +36,13 @@ const LOOK: Duration = Duration::from_millis(100);
 /// At once, each of which takes three descriptors.
 const MOST_CONNECTIONS: usize = 64;
 
-/// A caller who has not said hello by then, in seconds, is gone.
+/// Time limit in seconds for the hello message of a client.
 const HELLO_TIMEOUT_S: u32 = 3;
 
 /// A connection over which the server sends nothing for so long is closed; a subscription is kept alive more often.
 const PATIENCE: Duration = Duration::from_secs(300);
 
-/// At once; whoever comes then is refused.
+/// Sessions at once; further ones are refused.
 const MOST_SESSIONS: usize = 64;
 
 /// Of a monitored item, for events that come at once.
@@ -77,7 +77,7 @@ const SECURE: [(&str, SecurityPolicy, MessageSecurityMode); 4] = [
     ),
 ];
 
-/// Serves `run` until SIGINT or SIGTERM; `ready` is told where.
+/// Serves `run` until SIGINT or SIGTERM; `ready` gets the address.
 ///
 /// # Errors
 /// All that can be wrong with `settings`; it cannot listen there.
@@ -126,7 +126,7 @@ async fn listen(listener: TcpListener, settings: &Settings, shown: Shown) -> io:
         &shown.variables,
     );
     let mut showing = Showing::new(&shown, &handle, manager, index);
-    // Nobody is served before there is something to see.
+    // Clients are served once there is a state.
     showing.look();
     let again = async {
         let mut looks = tokio::time::interval(LOOK);
@@ -191,7 +191,7 @@ fn server(
     let users = [user.to_owned()];
     let builder = match &settings.certificates {
         None => builder
-            // No folder can be made there: nothing is written where nobody asked for it.
+            // No folder can be made there, so that nothing is written unasked.
             .pki_dir("/dev/null/none")
             .add_endpoint("none", ServerEndpoint::new_none("/", &users)),
         Some(folder) => {
@@ -255,7 +255,7 @@ struct Showing<'a> {
     manager: Arc<SimpleNodeManager>,
     index: u16,
     nodes: Vec<NodeId>,
-    said: Vec<Option<Reading>>,
+    set: Vec<Option<Reading>>,
 }
 
 impl<'a> Showing<'a> {
@@ -274,12 +274,12 @@ impl<'a> Showing<'a> {
             handle,
             manager,
             index,
-            said: vec![None; nodes.len()],
+            set: vec![None; nodes.len()],
             nodes,
         }
     }
 
-    /// Sets what has changed, and tells the events.
+    /// Sets changed values and emits the events.
     fn look(&mut self) {
         // Until the journal is read, every variable waits for its first value.
         let observation = self.shown.followed.observation().ok();
@@ -291,7 +291,7 @@ impl<'a> Showing<'a> {
         let mut changed = Vec::new();
         for (place, variable) in self.shown.variables.iter().enumerate() {
             let reading = seen.map_or(Reading::WAITING, |seen| variable.read(&seen));
-            if self.said[place].as_ref() != Some(&reading) {
+            if self.set[place].as_ref() != Some(&reading) {
                 let value = DataValue {
                     // The library leaves out the status of a value that is not there.
                     value: Some(reading.value.clone().unwrap_or(Variant::Empty)),
@@ -301,7 +301,7 @@ impl<'a> Showing<'a> {
                     ..DataValue::default()
                 };
                 changed.push((place, value));
-                self.said[place] = Some(reading);
+                self.set[place] = Some(reading);
             }
         }
         let nodes = &self.nodes;
@@ -331,7 +331,7 @@ fn stamp(shown: &Shown, feed: Feed) -> DateTime {
     })
 }
 
-/// Every event, to whoever has subscribed to those of the server or of the cluster.
+/// Emits every event to the subscribers of the server and of the cluster.
 fn tell(handle: &ServerHandle, index: u16, events: &[Event], stamp: DateTime) {
     let told: Vec<BaseEventType> = events
         .iter()

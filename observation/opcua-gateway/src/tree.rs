@@ -1,4 +1,4 @@
-//! Which variables there are, and what each says: one table for the server, for `understudy-opcua nodes` and for the tests.
+//! The variables and their values: one table for the server, for `understudy-opcua nodes` and for the tests.
 //!
 //! ```text
 //!   CLUSTER
@@ -18,7 +18,7 @@ use understudy_view::{Event, ProgramSnapshot, StationSnapshot};
 
 use crate::trust::{self, Feed};
 
-/// What a variable holds.
+/// Type of a variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// One bit.
@@ -34,7 +34,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// As OPC UA calls it.
+    /// Name of the type in OPC UA.
     pub fn word(self) -> &'static str {
         match self {
             Self::Boolean => "Boolean",
@@ -55,7 +55,7 @@ impl Kind {
     }
 }
 
-/// What is looked at at one moment.
+/// What the variables are read from.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Seen<'a> {
     pub(crate) observation: &'a Observation,
@@ -71,7 +71,7 @@ impl Seen<'_> {
         self.observation.snapshot.stations.get(rank)
     }
 
-    /// Something that is so now.
+    /// A present value.
     fn present(&self, value: Option<Variant>, own: StatusCode) -> Reading {
         let own = match value {
             Some(_) => own,
@@ -83,7 +83,7 @@ impl Seen<'_> {
         }
     }
 
-    /// Something that was counted.
+    /// A counted value.
     fn counted(&self, value: Option<Variant>) -> Reading {
         let status = match value {
             Some(_) => trust::counted(self.feed),
@@ -93,7 +93,7 @@ impl Seen<'_> {
     }
 }
 
-/// What a variable says at one moment.
+/// Value of a variable at one moment, with its status.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Reading {
     pub(crate) value: Option<Variant>,
@@ -101,7 +101,7 @@ pub(crate) struct Reading {
 }
 
 impl Reading {
-    /// While the journal is being read.
+    /// Answer while the journal is being read.
     pub(crate) const WAITING: Self = Self {
         value: None,
         status: StatusCode::BadWaitingForInitialData,
@@ -120,7 +120,7 @@ pub struct Variable {
 }
 
 impl Variable {
-    /// The folders that it is in, the outermost first.
+    /// Its folders, the outermost first.
     pub fn folders(&self) -> &[String] {
         &self.folders
     }
@@ -135,14 +135,20 @@ impl Variable {
         format!("{}/{}", self.folders.join("/"), self.name)
     }
 
-    /// What it holds.
+    /// Its type.
     pub fn kind(&self) -> Kind {
         self.kind
     }
 
-    /// What that means.
+    /// Its meaning.
     pub fn meaning(&self) -> &'static str {
         self.meaning
+    }
+
+    /// Its value in an observation of a live run; nothing where it has none.
+    pub fn value(&self, observation: &Observation) -> Option<Variant> {
+        let feed = Feed::Live;
+        self.read(&Seen { observation, feed }).value
     }
 
     pub(crate) fn read(&self, seen: &Seen<'_>) -> Reading {
@@ -201,26 +207,18 @@ impl Tree {
             "State",
             Kind::String,
             "starting, running, finished or interrupted",
-            |seen| {
-                use understudy_view::RunState;
-                seen.counted(Some(text(match seen.observation.snapshot.run {
-                    RunState::Starting => "starting",
-                    RunState::Running => "running",
-                    RunState::Finished => "finished",
-                    RunState::Interrupted => "interrupted",
-                })))
-            },
+            |seen| seen.counted(Some(text(seen.observation.snapshot.run.word()))),
         );
         self.add(
             "Cycle",
             Kind::Int64,
-            "the newest, from the origin",
+            "newest cycle, from the origin of the run",
             |seen| seen.counted(seen.observation.snapshot.cycle.map(Variant::from)),
         );
         self.add(
             "Period",
             Kind::UInt64,
-            "of a cycle, in microseconds",
+            "period of a cycle, in microseconds",
             |seen| seen.counted(Some(seen.observation.snapshot.period_us.into())),
         );
         self.add("Mode", Kind::String, "full or paper", |seen| {
@@ -229,7 +227,7 @@ impl Tree {
         self.add(
             "Records",
             Kind::UInt64,
-            "of the journal, that were read",
+            "records of the journal that were read",
             |seen| seen.counted(Some(seen.observation.snapshot.records.into())),
         );
         self.add(
@@ -242,7 +240,7 @@ impl Tree {
         self.add(
             "Survives",
             Kind::UInt64,
-            "further failures of stations that are masked whichever they are",
+            "remaining redundancy: any further failures of stations that would be masked",
             |seen| {
                 let survives = u64::from(seen.observation.snapshot.margin.survives);
                 seen.present(Some(survives.into()), StatusCode::Good)
@@ -251,7 +249,7 @@ impl Tree {
         self.add(
             "Served",
             Kind::Strings,
-            "programs with true outputs",
+            "programs with provable outputs",
             |seen| {
                 let served = &seen.observation.snapshot.margin.served;
                 seen.present(Some(texts(served)), StatusCode::Good)
@@ -261,13 +259,13 @@ impl Tree {
         self.add(
             "Open",
             Kind::UInt64,
-            "that last, or that nobody has acknowledged",
+            "alarms that last or are not acknowledged",
             |seen| {
                 let open = seen.observation.snapshot.alarms.len() as u64;
                 seen.counted(Some(open.into()))
             },
         );
-        self.add("Texts", Kind::Strings, "the open ones, in words", |seen| {
+        self.add("Texts", Kind::Strings, "open alarms, in words", |seen| {
             let alarms = seen.observation.snapshot.alarms.iter();
             let alarms: Vec<String> = alarms
                 .map(|alarm| format!("cycle {}: {}: {}", alarm.cycle, alarm.name, alarm.text))
@@ -275,13 +273,13 @@ impl Tree {
             seen.counted(Some(texts(&alarms)))
         });
         self.enter(&["Events"]);
-        self.add("Count", Kind::UInt64, "so far", |seen| {
+        self.add("Count", Kind::UInt64, "events so far", |seen| {
             seen.counted(Some(seen.observation.snapshot.events.into()))
         });
         self.add(
             "Recent",
             Kind::Strings,
-            "the newest 20, in words, the newest last",
+            "the newest 20 events, in words, the newest last",
             |seen| {
                 let recent = seen.observation.recent.iter();
                 let recent = recent.map(|event| {
@@ -300,13 +298,13 @@ impl Tree {
         self.add(
             "State",
             Kind::String,
-            "speaking, silent, flagged, joining, shadow, refused, stopped, killed, ended or not-started",
+            "publishing, not-received, flagged, joining, shadow-mode, refused, suspended, killed, ended or not-started",
             of(|station| text(station.state.word())),
         );
         self.add(
             "Understudy",
             Kind::Boolean,
-            "whether it is generated from the others",
+            "whether it is generated from the controllers",
             of(|station| station.understudy.into()),
         );
         self.add(
@@ -316,15 +314,15 @@ impl Tree {
             of(|station| station.flagged.into()),
         );
         self.add(
-            "SpeaksFor",
+            "PublishesFor",
             Kind::Strings,
-            "programs",
-            of(|station| texts(&station.speaks_for)),
+            "programs that it publishes for",
+            of(|station| texts(&station.publishes_for)),
         );
         self.add(
             "ExcludedFrom",
             Kind::Strings,
-            "programs whose remote I/O has found its state faulty",
+            "programs whose remote I/O has excluded it",
             of(|station| texts(&station.excluded_from)),
         );
     }
@@ -345,37 +343,37 @@ impl Tree {
         self.add(
             "Source",
             Kind::String,
-            "of what is driven: direct, reconstructed, held or fail-safe",
+            "source of the outputs: direct, reconstructed, held or fail-safe",
             of(|program| program.source.map(text)),
         );
         self.add(
             "Since",
             Kind::Int64,
-            "since which cycle",
-            of(|program| program.source.map(|_| program.since.into())),
+            "first cycle of those in a row with this source",
+            of(|program| program.since.map(Variant::from)),
         );
         self.add(
             "WordOf",
             Kind::String,
-            "whose word restored it, or nothing",
+            "station whose parity word the outputs were reconstructed from, or empty",
             of(|program| Some(text(program.word_of.as_deref().unwrap_or_default()))),
         );
         self.add(
             "Missing",
             Kind::String,
-            "why nothing true is driven, or nothing",
+            "why there was no provable output in a missed cycle, or empty",
             of(|program| Some(text(program.missing.unwrap_or_default()))),
         );
         self.add(
             "AwaitsRelease",
             Kind::Boolean,
-            "whether an operator has to release the outputs",
+            "whether the operator has to release the outputs",
             of(|program| Some(program.awaits_release.into())),
         );
         self.add(
             "Forced",
             Kind::Strings,
-            "signals that are forced, by whom and why",
+            "forced signals, with owner and reason",
             of(|program| Some(texts(&program.forced))),
         );
         self.add(
@@ -387,7 +385,7 @@ impl Tree {
         self.add(
             "Protection",
             Kind::String,
-            "protected, or since which cycle not, and why",
+            "protected; otherwise the first cycle without protection, and the reason",
             of(|program| Some(text(&program.protection.as_ref()?.text()))),
         );
         self.add(
@@ -399,7 +397,7 @@ impl Tree {
         self.add(
             "LostState",
             Kind::String,
-            "the newest available state of a lost one, or nothing",
+            "newest available state where the state is lost, or empty",
             of(|program| {
                 let lost = program.lost.as_ref().map(understudy_view::LostState::text);
                 Some(text(&lost.unwrap_or_default()))
@@ -414,7 +412,7 @@ impl Tree {
         self.add(
             "LostStateAge",
             Kind::UInt64,
-            "by how many cycles that state is too old; 0 where no state is lost",
+            "age of that state in cycles; 0 where no state is lost",
             of(|program| {
                 let age = program
                     .lost
@@ -423,7 +421,7 @@ impl Tree {
                 age.map(Variant::from)
             }),
         );
-        let deadlines = "deadlines";
+        let deadlines = "deadlines with this source, from the origin of the run on";
         self.add(
             "Direct",
             Kind::UInt64,
@@ -446,13 +444,13 @@ impl Tree {
         self.add(
             "Finished",
             Kind::UInt64,
-            "parts, where its plant is simulated",
+            "finished parts of a simulated plant",
             count(|of| of.finished),
         );
         self.add(
             "PlantFaults",
             Kind::UInt64,
-            "things that must not happen, where its plant is simulated",
+            "plant faults of a simulated plant",
             count(|of| of.plant_faults),
         );
         self.signals(place, controller);

@@ -1,14 +1,14 @@
-//! How far a value can be trusted, as OPC UA says it: the status codes that stand beside every value.
+//! Trust in a value: the OPC UA status code of every value.
 //!
 //! | the run | what is now (signals, states, margin) | what is counted |
 //! |---|---|---|
 //! | its journal is still being read | Bad_WaitingForInitialData | Bad_WaitingForInitialData |
 //! | has not begun | Bad_WaitingForInitialData | Good |
-//! | says something | as below | Good |
+//! | is live | as below | Good |
 //! | is silent for 2 s and 20 cycles | Bad_NoCommunication | Uncertain_NoCommunicationLastUsableValue |
 //! | has ended | Uncertain_NoCommunicationLastUsableValue, unless it was bad | Good |
 //!
-//! An output is Good where it is direct or reconstructed, which is the same value; the variable `Source` beside it says which. Held
+//! An output is Good where it is direct or reconstructed, which is the same value; the variable `Source` names it. Held
 //! is Uncertain_LastUsableValue, fail-safe Bad_DeviceFailure, forced Good_LocalOverride.
 
 use std::time::{Duration, Instant};
@@ -17,13 +17,13 @@ use opcua::types::StatusCode;
 use understudy_gateway::Observation;
 use understudy_view::{ProgramSnapshot, RunState};
 
-/// How long a run may say nothing, at least.
+/// Minimum time without records after which a run is silent.
 const SILENCE: Duration = Duration::from_secs(2);
 
-/// And in its own time.
+/// Minimum number of cycles for the same.
 const SILENT_CYCLES: u32 = 20;
 
-/// Whether anything comes from the run.
+/// Whether records of the run arrive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Feed {
     Waiting,
@@ -92,7 +92,7 @@ pub(crate) fn input(program: &ProgramSnapshot, name: &str, has_failed: bool) -> 
     }
 }
 
-/// Of its state: nobody advances it where its outputs are not true.
+/// Of its state, which does not advance without provable outputs.
 pub(crate) fn state(program: &ProgramSnapshot) -> StatusCode {
     if outputs(program).is_good() {
         StatusCode::Good

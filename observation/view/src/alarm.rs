@@ -1,4 +1,4 @@
-//! What somebody has to look at, until he says that he has.
+//! Alarms: conditions that an operator has to acknowledge.
 
 use std::collections::BTreeMap;
 
@@ -12,28 +12,28 @@ const MOST: usize = 1000;
 /// One alarm: a value fault, an exclusion, a dispute, a loss.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Alarm {
-    /// Names it.
+    /// Number of the alarm.
     pub number: u64,
-    /// Since when, from the origin of the run.
+    /// The cycle in which it was raised, from the origin of the run.
     pub cycle: i64,
-    /// When it was over; nothing while it lasts.
+    /// The cycle in which it was over; nothing while it lasts.
     pub over: Option<i64>,
-    /// Of whom.
+    /// The member.
     pub name: String,
-    /// What, in one word, such as `value-fault`.
+    /// Kind of alarm, such as `value-fault`.
     pub alarm: &'static str,
     /// What is wrong.
     pub text: String,
     /// The time of the record that raised it.
     pub raised_ns: u64,
-    /// Who has seen it.
+    /// Name of the person who acknowledged it.
     pub acknowledged_by: Option<String>,
-    /// In which cycle.
+    /// The cycle of the acknowledgement.
     pub acknowledged_in: Option<i64>,
 }
 
 impl Alarm {
-    /// What the journal keeps when `owner` has seen it.
+    /// Record of the journal for an acknowledgement by `owner`.
     pub fn acknowledgement(&self, owner: String, at_unix_s: u64) -> Acknowledgement {
         Acknowledgement {
             name: self.name.clone(),
@@ -45,7 +45,18 @@ impl Alarm {
         }
     }
 
-    /// Whether it still asks for somebody.
+    /// The alarm as it was in a cycle; nothing where it was raised later.
+    pub fn at(&self, cycle: i64) -> Option<Self> {
+        let acknowledged = self.acknowledged_in.is_some_and(|at| at <= cycle);
+        (self.cycle <= cycle).then(|| Self {
+            over: self.over.filter(|over| *over <= cycle),
+            acknowledged_by: self.acknowledged_by.clone().filter(|_| acknowledged),
+            acknowledged_in: self.acknowledged_in.filter(|_| acknowledged),
+            ..self.clone()
+        })
+    }
+
+    /// Whether it lasts or is not acknowledged.
     pub fn is_open(&self) -> bool {
         self.over.is_none() || self.acknowledged_by.is_none()
     }
@@ -102,7 +113,7 @@ impl Alarms {
         }
     }
 
-    /// All that is wrong with one member is over.
+    /// These alarms of one member are over.
     pub(crate) fn all_over(&mut self, name: &str, alarms: &[&'static str], cycle: i64) {
         for alarm in alarms {
             self.over(&(name.to_owned(), alarm), cycle);
@@ -118,7 +129,7 @@ impl Alarms {
         }
     }
 
-    /// Somebody has seen one; one that is not kept any more is passed over.
+    /// An alarm was acknowledged; one that is not kept any more is ignored.
     pub(crate) fn acknowledged(&mut self, seen: &Acknowledgement, cycle: i64) {
         let found = self.alarms.values_mut().find(|alarm| {
             alarm.raised_ns == seen.raised_ns
@@ -146,7 +157,7 @@ mod tests {
     fn an_alarm_lasts_until_it_is_over_and_seen() {
         let mut alarms = Alarms::default();
         let subject = || ("press-io".to_owned(), "fail-safe");
-        alarms.raise(subject(), 7, "nothing true".to_owned());
+        alarms.raise(subject(), 7, "no provable output".to_owned());
         alarms.raise(subject(), 8, "still".to_owned());
         assert_eq!(alarms.iter().count(), 1);
         alarms.over(&subject(), 9);

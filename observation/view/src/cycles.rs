@@ -1,4 +1,4 @@
-//! Which cycle of the run a record belongs to.
+//! The cycle of the run that a record belongs to.
 
 use understudy_journal::Numbering;
 use understudy_wire::{Moment, ProgramId};
@@ -9,7 +9,7 @@ use understudy_wire::{Moment, ProgramId};
 pub(crate) struct Cycles {
     numbering: Numbering,
     origin: Option<i64>,
-    /// An origin that was told before its epoch was seen.
+    /// An origin whose epoch is not known yet.
     awaited: Option<(Moment, i64)>,
     shift: i64,
 }
@@ -56,7 +56,7 @@ impl Cycles {
         }
     }
 
-    /// What is to be added to every cycle that was told before.
+    /// Offset to be added to every earlier cycle.
     pub(crate) fn take_shift(&mut self) -> Option<i64> {
         Some(std::mem::take(&mut self.shift)).filter(|shift| *shift != 0)
     }

@@ -1,4 +1,4 @@
-//! Records in words.
+//! Records as sentences.
 
 mod members;
 mod processes;
@@ -10,20 +10,20 @@ use understudy_wire::{Element, Member, ProgramId, ProgramSet, Set, StationId, St
 use crate::event::Level;
 pub(crate) use processes::fault_text;
 
-/// A record as a person reads it.
+/// A record as a sentence.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Description {
-    /// What, in one word, as the journal has it.
+    /// Kind of event, as in the journal.
     pub event: &'static str,
-    /// How much a person should care.
+    /// Severity of the event.
     pub level: Level,
-    /// What happened.
+    /// The event in words.
     pub text: String,
-    /// Whether it belongs to the ordinary course of every cycle.
+    /// Whether it occurs in every cycle.
     pub is_ordinary: bool,
 }
 
-/// Every word that [`Description::event`] can be.
+/// Every value of [`Description::event`].
 pub(crate) const EVENTS: [&str; 65] = [
     "acknowledged",
     "adopted",
@@ -92,7 +92,7 @@ pub(crate) const EVENTS: [&str; 65] = [
     "voided",
 ];
 
-/// A record in words, with the names of its cluster.
+/// Describes a record with the names of its cluster.
 pub fn describe(record: &Record, names: &Members) -> Description {
     let (event, level, text) = match &record.event {
         Happening::Station(event) => members::station(event, names),
@@ -114,23 +114,25 @@ pub fn describe(record: &Record, names: &Members) -> Description {
 
 type Words = (&'static str, Level, String);
 
-/// Why nothing true was there.
+/// Why there was no provable output.
 pub(crate) fn missing_text(missing: Missing) -> &'static str {
     match missing {
-        Missing::NoCycle => "nobody started a cycle",
+        Missing::NoCycle => "no station started a cycle",
         Missing::TooLate => "the host woke the remote I/O more than a period after the deadline",
-        Missing::BadQuality => "the sensors cannot be seen",
+        Missing::BadQuality => "the sensors cannot be read",
         Missing::NoHistory => "the remote I/O does not know its program's history yet",
         Missing::StateLost => "no living station can prove the program's state",
-        Missing::NotReleased => "an operator has to release the outputs",
-        Missing::ValueFault => "stations disagree, and nobody can say who is right",
-        Missing::NotSynchronised => "nobody who is synchronised published for it",
-        Missing::TwoErasures => "a word was there, and another member of it was not",
-        Missing::SecondFailure => "two stations have failed, S2",
+        Missing::NotReleased => "the operator has to release the outputs",
+        Missing::ValueFault => "stations disagree and no majority exists",
+        Missing::NotSynchronised => "no synchronised station published for it",
+        Missing::TwoErasures => {
+            "another output in the parity word's mask was not received (two erasures)"
+        }
+        Missing::SecondFailure => "two stations have failed (S2)",
     }
 }
 
-/// A program is called by its controller.
+/// A program has the name of its controller.
 pub(crate) fn program_name(program: ProgramId, members: &Members) -> &str {
     members.name(Member::Station(StationId(program.0)))
 }
@@ -155,7 +157,7 @@ fn names<E: Element>(set: Set<E>, name: impl Fn(E) -> String) -> String {
 /// `a, b and c`.
 pub(crate) fn list(names: &[String]) -> String {
     match names {
-        [] => "nobody".to_owned(),
+        [] => "no station".to_owned(),
         [one] => one.clone(),
         [first @ .., last] => format!("{} and {last}", first.join(", ")),
     }

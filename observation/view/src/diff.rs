@@ -39,7 +39,7 @@ pub struct Difference {
     pub count: u64,
 }
 
-/// Two runs beside each other.
+/// Comparison of two runs.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct RunDiff {
     /// Whether both ran the same programs with the same timing; otherwise only what has the same name is compared.

@@ -19,7 +19,7 @@ pub enum ViewError {
     #[error(transparent)]
     Kept(#[from] KeptError),
     /// The journal cannot be read.
-    #[error("U0572: {} cannot be read: {reason}", path.display())]
+    #[error("U0572: cannot read {}: {reason}", path.display())]
     Journal {
         /// Which file.
         path: PathBuf,
@@ -35,7 +35,7 @@ pub enum ViewError {
         hint: String,
     },
     /// Several programs have an output of this name.
-    #[error("U0574: {} have an output `{name}`; say which, as in `{}.{name}`", programs.join(" and "), programs.first().map_or("robot", String::as_str))]
+    #[error("U0574: {} have an output `{name}`; name the program too, for example `{}.{name}`", programs.join(" and "), programs.first().map_or("robot", String::as_str))]
     SeveralOutputs {
         /// As it was asked for.
         name: String,
@@ -63,7 +63,7 @@ pub enum ViewError {
         reason: String,
     },
     /// No member or program has this name.
-    #[error("U0577: no {kind} is called `{name}`; {hint}")]
+    #[error("U0577: unknown {kind} `{name}`; {hint}")]
     NoName {
         /// What was looked for.
         kind: &'static str,
@@ -72,7 +72,7 @@ pub enum ViewError {
         /// The nearest name, or all.
         hint: String,
     },
-    /// Nothing says which part of the run is to be shown.
+    /// The part of the run to be shown is not given.
     #[error("U0579: no part of the run to show: {0}")]
     NoScene(String),
 }

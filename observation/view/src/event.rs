@@ -1,26 +1,26 @@
-//! What happened, in the order in which it was said: everything but the ordinary course of a cycle.
+//! Events in the order of their records: everything but the records of every cycle.
 
 use std::collections::VecDeque;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// How much a person should care.
+/// Severity of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Level {
-    /// The ordinary course of things.
+    /// Normal operation.
     Info,
-    /// Something changed.
+    /// A change.
     Notice,
-    /// Something is worse than it was.
+    /// A degradation.
     Warning,
-    /// Somebody has to look.
+    /// Requires action by the operator.
     Alarm,
 }
 
 impl Level {
-    /// In one word.
+    /// The level in one word.
     pub fn word(self) -> &'static str {
         match self {
             Self::Info => "info",
@@ -31,24 +31,24 @@ impl Level {
     }
 }
 
-/// One thing that happened.
+/// One event.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Event {
-    /// Counts up from 1 over the whole run.
+    /// Number of the event in the run, from 1.
     pub number: u64,
     /// From the origin of the run.
     pub cycle: i64,
-    /// As its record says it.
+    /// Time of its record.
     pub at_ns: u64,
-    /// Who says it.
+    /// The member that reports it.
     pub name: String,
-    /// What, in one word, such as `flagged`.
+    /// Kind of event, such as `flagged`.
     pub event: &'static str,
-    /// How much a person should care.
+    /// Its severity.
     pub level: Level,
-    /// What happened.
+    /// The event in words.
     pub text: String,
-    /// Why, where that is known.
+    /// Its cause, where it is known.
     pub cause: Option<String>,
 }
 

@@ -88,7 +88,7 @@ impl Model {
     /// Films a part of the run.
     ///
     /// # Errors
-    /// Where nothing says which part: no station was killed, or a name or a cycle is not in the journal.
+    /// No station was killed and no part is named, or a name or a cycle is not in the journal.
     pub fn film(&self, scene: Scene<'_>) -> Result<Film, ViewError> {
         let program = match scene.program {
             Some(name) => self.program_called(name)?,
@@ -120,8 +120,9 @@ impl Model {
     }
 
     fn program_called(&self, name: &str) -> Result<ProgramId, ViewError> {
-        let names: Vec<&str> = (0..self.programs.len() as u8)
-            .map(|program| self.program_name(ProgramId(program)))
+        let names: Vec<&str> = self
+            .program_ids()
+            .map(|program| self.program_name(program))
             .collect();
         let place = names.iter().position(|known| *known == name);
         let place = place.ok_or_else(|| ViewError::NoName {
@@ -134,8 +135,9 @@ impl Model {
 
     /// The controller that was killed first.
     fn first_killed(&self) -> Option<ProgramId> {
-        let programs = (0..self.programs.len() as u8).map(ProgramId);
-        let killed = programs.filter_map(|program| Some((self.killed_at(program)?, program)));
+        let killed = self
+            .program_ids()
+            .filter_map(|program| Some((self.killed_at(program)?, program)));
         Some(killed.min_by_key(|(cycle, _)| *cycle)?.1)
     }
 

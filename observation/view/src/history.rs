@@ -1,4 +1,4 @@
-//! What one program did, cycle by cycle, made again from the samples of its remote I/O.
+//! The cycles of one program, recomputed from the samples of its remote I/O.
 //!
 //! The [`Referee`] of the simulator runs the program from the samples, each of which names the state that it extends. A step keeps
 //! x(t), u(t) and the lineages before and after, so that a scan can be looked at as its station evaluated it.
@@ -10,7 +10,7 @@ use understudy_remote_io::{Event, Missing};
 use understudy_simulator::{Referee, Violation};
 use understudy_wire::{Image, Lineage, Moment, ProgramId, Source, StationId, StationSet};
 
-/// A sample, and what it did to the program.
+/// A sample and its effect on the program.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Sampled {
     /// u(t).
@@ -25,19 +25,21 @@ pub struct Sampled {
     pub outputs: Image,
 }
 
-/// What was driven at a deadline.
+/// The outputs at a deadline.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Driven {
     /// y(i).
     pub outputs: Image,
-    /// Where it came from.
+    /// Their source.
     pub source: Source,
-    /// Whose word restored it.
+    /// The station whose parity word they were reconstructed from.
     pub word_of: Option<StationId>,
-    /// Why nothing true was there.
+    /// Why there was no provable output.
     pub missing: Option<Missing>,
-    /// Who was heard.
+    /// The stations that were received.
     pub heard: StationSet,
+    /// u(i) as last sampled, in this cycle or before.
+    pub inputs: Option<Image>,
 }
 
 /// One cycle of one program.
@@ -49,9 +51,9 @@ pub struct Step {
     pub moment: Moment,
     /// Nothing where no sample was taken, or where the state before it is not known.
     pub sampled: Option<Sampled>,
-    /// Nothing while its deadline is ahead, or where the remote I/O died before it.
+    /// Nothing before its deadline, or where the remote I/O died before it.
     pub driven: Option<Driven>,
-    /// Whether nobody heard the sample, so that the program went on without it.
+    /// Whether no station received the sample, so that the program continued without it.
     pub void: bool,
 }
 
@@ -86,7 +88,7 @@ impl History {
         })
     }
 
-    /// Whose.
+    /// The program.
     pub fn program(&self) -> ProgramId {
         self.program
     }
@@ -101,7 +103,7 @@ impl History {
         self.cut
     }
 
-    /// The step of a cycle; the last one where a cycle was told of twice.
+    /// The step of a cycle; the last one where several records tell of it.
     pub fn at(&self, cycle: i64) -> Option<&Step> {
         self.place_of(cycle).map(|place| &self.steps[place])
     }
@@ -129,12 +131,20 @@ impl History {
         Some(&of_moment.find_map(|step| step.sampled.as_ref())?.outputs)
     }
 
+    /// The inputs that were sampled last before the newest deadline.
+    pub(crate) fn sampled_last(&mut self, inputs: Option<&Image>) {
+        let driven = self.steps.back_mut().and_then(|step| step.driven.as_mut());
+        if let Some(driven) = driven {
+            driven.inputs = inputs.cloned();
+        }
+    }
+
     /// What its plant shows.
     pub(crate) fn saw(&mut self, sensors: &Image) {
         self.referee.saw(sensors);
     }
 
-    /// Records of its remote I/O are missing here; where the program stands is known again when a station says what it holds.
+    /// Records of its remote I/O are missing; its state is known again when a station reports the state that it holds.
     pub(crate) fn misses_records(&mut self) {
         self.referee.misses_records();
         self.cut = true;
@@ -243,6 +253,7 @@ impl History {
                     word_of: *word_of,
                     missing: *missing,
                     heard: *heard,
+                    inputs: None,
                 };
                 match self.steps.back_mut() {
                     Some(last) if last.moment == *moment && last.driven.is_none() => {

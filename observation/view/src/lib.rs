@@ -1,14 +1,15 @@
-//! What a person asks of a run, live or finished, folded from its journal.
+//! The state of a run, live or finished, folded from its journal.
 //!
 //! ```text
-//!   journal ──► Source ──► Model::note(record) ──┬─► Snapshot: who works, margin of survival, alarms
-//!   (files that grow, or a channel)              ├─► events, trends, bands
+//!   journal ──► Source ──► Model::note(record) ──┬─► snapshot(cycle): states, sources, remaining redundancy, alarms
+//!   (files that grow, or a channel)              ├─► events, counters, trends, bands
 //!                                                ├─► History: x(i), u(i) of each cycle ──► why, power flow
 //!                                                └─► diff of two runs
 //! ```
 //!
-//! A reader of files only: no member knows that it is looked at. Memory is bounded ([`Bounds`]); what is older is forgotten.
-//! Cycles are counted from the origin of the run, as its report counts them; those before it are negative.
+//! This is the only fold of the journal for views: page, terminal, metrics, Modbus, OPC UA and Zenoh show its snapshot. It reads files only
+//! and involves no member. Memory is bounded ([`Bounds`]); older records are forgotten. Cycles are counted from the origin of the run, as
+//! in its report; those before it are negative.
 
 mod alarm;
 mod cycles;
@@ -41,17 +42,18 @@ pub use film::{Film, Scene};
 pub use history::{Driven, History, Sampled, Step};
 pub use listing::{Filter, JournalLine, Listing};
 pub use margin::{Holders, Loss, Margin, Outcome};
-pub use model::{Bounds, Model, SentTurn};
+pub use model::{Bounds, Counters, MemberCounters, Model, ProgramCounters, SentTurn};
 pub use protection::{LackingStation, LostState, Protection};
 pub use run::{Run, find_run, find_run_of, find_running, find_running_of};
 pub use series::Series;
 pub use snapshot::{
-    MarginSnapshot, OutcomeSnapshot, ProgramSnapshot, RunState, Snapshot, StationSnapshot,
-    TimingSnapshot,
+    LinkSnapshot, MarginSnapshot, OutcomeSnapshot, PlantSnapshot, PlantState, ProgramSnapshot,
+    RemoteIoSnapshot, RemoteIoState, RunState, Snapshot, StationSnapshot, TimingSnapshot,
+    WordSnapshot,
 };
 pub use source::{BEHIND, Feed, Progress, Reading, Source, Trouble};
 pub use station::StationState;
 pub use terminal::{Key, Screen};
 pub use timeline::{Span, Timeline};
 pub use timing::CycleTiming;
-pub use why::{Addend, Reason, Restored, Why};
+pub use why::{Addend, Reason, Reconstructed, Why};

@@ -28,7 +28,7 @@ pub struct Filter {
     pub from: Option<i64>,
     /// The last cycle.
     pub to: Option<i64>,
-    /// Also what every member says in every cycle. What is named in `events` is wanted anyhow.
+    /// Also the records of every cycle. Those named in `events` are listed anyway.
     pub ordinary: bool,
 }
 
@@ -37,7 +37,7 @@ pub struct Filter {
 pub struct JournalLine {
     /// From the origin of the run; nothing while that is not known.
     pub cycle: Option<i64>,
-    /// As the record says it.
+    /// Time of the record.
     pub at_ns: u64,
     /// Who.
     pub name: String,

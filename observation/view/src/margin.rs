@@ -1,8 +1,8 @@
-//! The margin of survival: which further failures would be masked now, and which not.
+//! The remaining redundancy: which further failures would be masked, and which not.
 //!
-//! Nothing of the rule is said again here. For every failure that could come, the turns are made that would then be heard, with the
-//! words that stations say ([`words_of_controller`], [`words_of_understudy`]), and the remote I/O's own selection is asked
-//! ([`Foreseen`]). What is not true now already is no loss of that failure.
+//! The rule itself is not repeated here. For every possible failure the turns are made that would then be received, with the parity words of
+//! the stations ([`words_of_controller`], [`words_of_understudy`]), and the selection of the remote I/O is asked ([`Foreseen`]). An output
+//! that is not provable already is not a loss of that failure.
 
 use std::sync::Arc;
 
@@ -14,78 +14,78 @@ use understudy_wire::{
     Moment, ProgramId, ProgramSet, StationId, StationSet, Turn, Word,
 };
 
-/// Who is alive, and holds what.
+/// The living members and the states that they hold.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Holders {
-    /// How many failures are masked.
+    /// Mode of the cluster.
     pub mode: Mode,
-    /// The width of y(i), by program; so many controllers.
+    /// The width of y(i), by program.
     pub widths: Vec<usize>,
-    /// By rank: the programs whose state a station speaks from; none for one that is silent.
+    /// By rank: the programs that a station publishes for; none for one that is not received.
     pub holds: Vec<ProgramSet>,
-    /// By program: whom its remote I/O hears.
+    /// By program: the stations that its remote I/O receives.
     pub heard: Vec<StationSet>,
-    /// By program: whose state of it its remote I/O has found faulty.
+    /// By program: the stations that its remote I/O has excluded.
     pub excluded: Vec<StationSet>,
-    /// Programs that nothing true can be driven of now, whoever speaks: their outputs are not released, their sensors not seen.
+    /// Programs without a provable output for a reason that no station can remove: outputs not released, sensors not readable.
     pub blocked: ProgramSet,
 }
 
-/// What a failure would do.
+/// Consequence of a failure.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Outcome {
-    /// Who fails, all at once.
+    /// The members that fail at once.
     pub failed: Vec<Member>,
-    /// The programs whose outputs would be true no more; none where it is masked.
+    /// The programs that would lose their provable outputs; none where it is masked.
     pub lost: Vec<Loss>,
 }
 
-/// A program that a failure would take.
+/// A program that would lose its provable outputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Loss {
-    /// Which.
+    /// The program.
     pub program: ProgramId,
-    /// Why nothing true would be there; nothing where its own remote I/O fails.
+    /// Why there would be no provable output; nothing where its own remote I/O fails.
     pub missing: Option<Missing>,
 }
 
 impl Outcome {
-    /// Whether every program that has true outputs now keeps them.
+    /// Whether every program that has provable outputs keeps them.
     pub fn is_masked(&self) -> bool {
         self.lost.is_empty()
     }
 }
 
-/// Which further failures would be masked now.
+/// The remaining redundancy.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Margin {
-    /// Programs with true outputs now.
+    /// Programs with provable outputs.
     pub served: ProgramSet,
-    /// Each member alone: the stations that speak by rank, then the remote I/Os of the programs that are served.
+    /// Each member alone: the publishing stations by rank, then the remote I/Os of the served programs.
     pub singles: Vec<Outcome>,
-    /// Each pair of stations that speak.
+    /// Each pair of publishing stations.
     pub pairs: Vec<Outcome>,
     /// Further failures of stations that are masked whichever they are: 0, 1, or 2 and perhaps more.
     pub survives: u8,
 }
 
 impl Holders {
-    /// The margin. Some thousand selections for a cluster of 64 stations, so it is asked for when somebody has come or gone.
+    /// The remaining redundancy. It takes some thousand selections for a cluster of 64 stations.
     pub fn margin(&self) -> Margin {
         let served = self.served(StationSet::EMPTY);
-        let speaking: Vec<StationId> = (0..)
+        let publishing: Vec<StationId> = (0..)
             .map(StationId)
             .zip(&self.holds)
             .filter(|(_, holds)| !holds.is_empty())
             .map(|(station, _)| station)
             .collect();
-        let stations: Vec<Outcome> = speaking
+        let stations: Vec<Outcome> = publishing
             .iter()
             .map(|&station| self.outcome(served, StationSet::only(station)))
             .collect();
         let mut pairs = Vec::new();
-        for (place, &first) in speaking.iter().enumerate() {
-            for &second in &speaking[place + 1..] {
+        for (place, &first) in publishing.iter().enumerate() {
+            for &second in &publishing[place + 1..] {
                 pairs.push(self.outcome(served, [first, second].into_iter().collect()));
             }
         }
@@ -111,7 +111,7 @@ impl Holders {
         }
     }
 
-    /// Programs whose outputs would be true if these stations were silent too.
+    /// Programs with provable outputs if these stations failed too.
     pub fn served(&self, failed: StationSet) -> ProgramSet {
         let sources = self.sources(failed);
         let served = sources.iter().filter(|(_, source)| source.is_ok());
@@ -134,7 +134,7 @@ impl Holders {
         }
     }
 
-    /// What each remote I/O would find.
+    /// What each remote I/O would select.
     fn sources(&self, failed: StationSet) -> Vec<(ProgramId, Result<(), Missing>)> {
         let turns = self.turns(failed);
         let programs = (0..).map(ProgramId).zip(&self.widths);
@@ -163,7 +163,7 @@ impl Holders {
             .collect()
     }
 
-    /// What would be said in a cycle in which `failed` are silent.
+    /// The turns of a cycle in which `failed` do not publish.
     fn turns(&self, failed: StationSet) -> Vec<Option<Arc<Frame>>> {
         let controllers = self.widths.len();
         let all = ProgramSet::first(controllers);
@@ -172,20 +172,20 @@ impl Holders {
             .iter()
             .map(|&width| Image::zero(width))
             .collect();
-        let speaks = |station: StationId| {
+        let publishes = |station: StationId| {
             let holds = self.holds[station.index()];
             (!failed.contains(station) && !holds.is_empty()).then_some(holds)
         };
         let published: ProgramSet = all
             .iter()
             .filter(|program| {
-                speaks(StationId(program.0)).is_some_and(|holds| holds.contains(*program))
+                publishes(StationId(program.0)).is_some_and(|holds| holds.contains(*program))
             })
             .collect();
         let ranks = (0..self.holds.len()).map(|rank| StationId(rank as u8));
         ranks
             .map(|station| {
-                let holds = speaks(station)?;
+                let holds = publishes(station)?;
                 let words = if station.index() < controllers {
                     let own = ProgramId(station.0);
                     words_of_controller(own, outputs.get(own.index())?)
@@ -200,7 +200,7 @@ impl Holders {
     }
 }
 
-/// Every holder of a state is on its one true history: who is not does not speak.
+/// Every holder of a state is on its one true history: others do not publish.
 fn lineage(program: ProgramId) -> Lineage {
     Lineage(u64::from(program.0) + 1)
 }

@@ -1,20 +1,20 @@
-//! Whether the failure of one station would be masked, as the remote I/O of a program reports it, and what is left where a state is lost.
+//! Protection of a program as its remote I/O reports it, and what is left of a lost state.
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Whether a program is protected.
+/// Protection of a program.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Protection {
     /// Whether the failure of one station would be masked.
     pub protected: bool,
-    /// Since which cycle, from the origin.
+    /// The first cycle, from the origin.
     pub since: i64,
-    /// The stations that cannot stand in; none where the program is protected.
+    /// The stations that cannot prove the outputs; none where the program is protected.
     pub lacking: Vec<LackingStation>,
 }
 
-/// A station that cannot stand in for a program.
+/// A station that cannot prove the outputs of a program.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct LackingStation {
     /// Its name.
@@ -23,20 +23,20 @@ pub struct LackingStation {
     pub reason: &'static str,
     /// The link that is broken, as `from → to`, where the cause is a link.
     pub link: Option<String>,
-    /// In words.
+    /// The reason in words.
     pub text: String,
 }
 
 /// What is available of a program whose state is lost.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct LostState {
-    /// Since which cycle, from the origin.
+    /// The first cycle, from the origin.
     pub since: i64,
     /// The cycle of the newest available state, as the cluster counts: the operator's choice names it.
     pub newest: u64,
     /// The station that holds it.
     pub holder: String,
-    /// By how many cycles it was older than the newest applied output when the state was lost; nothing where that is not known.
+    /// Its age in cycles, compared with the newest applied output, when the state was lost; nothing where that is not known.
     pub age_cycles: Option<u64>,
     /// Whether the operator is asked.
     pub asks: bool,

@@ -121,7 +121,7 @@ impl Run {
     /// A run in a directory, finished or not.
     ///
     /// # Errors
-    /// Where there is none, or where it does not say which programs it ran.
+    /// There is none, or it does not contain its cluster.
     pub fn open(path: &Path) -> Result<Self, ViewError> {
         let path = find_run(path)?;
         let cluster = Arc::new(kept_cluster(&path)?);
@@ -138,7 +138,7 @@ impl Run {
         &self.cluster
     }
 
-    /// Whether nothing more will come: its results lie there, or whoever wrote it does not any more.
+    /// Whether its journal is complete: its results are there, or its writer has ended.
     pub fn is_finished(&self) -> bool {
         self.path.join("summary.json").is_file() || writing(&self.path) == Writing::Over
     }
@@ -148,7 +148,7 @@ impl Run {
         writing(&self.path) == Writing::Now
     }
 
-    /// The end of whoever acts on it, by the process that writes it.
+    /// Reaches the process that writes it.
     pub fn commander(&self) -> Commander {
         Commander::of_run(self.path.clone())
     }
@@ -210,7 +210,7 @@ impl Run {
         }
     }
 
-    /// Its journal as a list, which counts cycles from the origin also before that was told.
+    /// Its journal as a list, which counts cycles from the origin also before the record of it.
     ///
     /// # Errors
     /// Every name and word of the filter that does not exist.
@@ -233,7 +233,7 @@ impl Run {
         Ok(listing.again())
     }
 
-    /// As the summary says it, for journals whose own record of it is gone.
+    /// The origin of the summary, for journals whose own record of it is gone.
     fn origin_of_summary(&self) -> Option<Moment> {
         let summary = std::fs::read(self.path.join("summary.json")).ok()?;
         let summary: Value = serde_json::from_slice(&summary).ok()?;

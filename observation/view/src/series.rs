@@ -1,4 +1,4 @@
-//! What the trends show: images and sources of each program, and what each station was, over the cycles.
+//! The trends: images and sources of each program, and states of each station, over the cycles.
 
 use understudy_wire::{Image, ProgramId, Source, StationId};
 
@@ -34,12 +34,12 @@ impl Series {
         self.outputs.get(program.index())
     }
 
-    /// Where it came from.
+    /// Sources of its outputs.
     pub fn sources(&self, program: ProgramId) -> Option<&Timeline<Source>> {
         self.sources.get(program.index())
     }
 
-    /// What a station was.
+    /// States of a station.
     pub fn station(&self, station: StationId) -> Option<&Timeline<StationState>> {
         self.stations.get(station.index())
     }

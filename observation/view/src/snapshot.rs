@@ -1,55 +1,77 @@
-//! What is the case now, with the names of the cluster: for a table, a page, or a machine.
+//! The state of a run in one cycle, with the names of the cluster. Everything that shows a run shows this: `top`, the page, metrics,
+//! Modbus, OPC UA, Zenoh and `--json`.
+
+mod taken;
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use understudy_journal::source_word;
-use understudy_wire::{Member, ProgramId, StationId};
+use understudy_wire::Force;
 
 use crate::alarm::Alarm;
-use crate::describe::missing_text;
-use crate::margin::{Margin, Outcome};
-use crate::model::Model;
 use crate::protection::{LostState, Protection};
 use crate::station::StationState;
 
-/// How far a run is.
+/// Progress of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RunState {
-    /// Nothing has been decided yet.
+    /// No deadline was reported yet.
     Starting,
     /// Cycles are run.
     Running,
     /// Its last record was read.
     Finished,
-    /// It was asked to end early, and did.
+    /// It was ended early on request.
     Interrupted,
 }
 
-/// A run as it is now.
+impl RunState {
+    /// The state as JSON writes it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Starting => "starting",
+            Self::Running => "running",
+            Self::Finished => "finished",
+            Self::Interrupted => "interrupted",
+        }
+    }
+}
+
+/// A run in one cycle.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Snapshot {
     /// The cluster's name.
     pub cluster: String,
-    /// How far it is.
+    /// Progress of the run.
     pub run: RunState,
-    /// The newest cycle, from the origin; nothing before the first deadline.
+    /// The cycle, from the origin; nothing before the first deadline. The newest is the newest one of which every living remote I/O
+    /// has reported.
     pub cycle: Option<i64>,
-    /// Whether cycles are counted from the origin of the run; otherwise from where the cluster did.
+    /// Whether cycles are counted from the origin of the run; otherwise as the cluster counts them.
     pub from_origin: bool,
     /// `full` or `paper`.
     pub mode: &'static str,
-    /// Of one cycle.
+    /// Period of a cycle.
     pub period_us: u64,
-    /// By rank.
+    /// The station that starts the cycles.
+    pub cycle_master: Option<String>,
+    /// What the scenario came to, where it is over and the cluster stays up.
+    pub scenario_over: Option<String>,
+    /// Stations, by rank.
     pub stations: Vec<StationSnapshot>,
-    /// By program.
+    /// Programs at their remote I/Os.
     pub programs: Vec<ProgramSnapshot>,
-    /// What would be survived.
+    /// Remote I/Os, by program.
+    pub remote_ios: Vec<RemoteIoSnapshot>,
+    /// Simulated plants.
+    pub plants: Vec<PlantSnapshot>,
+    /// The remaining redundancy.
     pub margin: MarginSnapshot,
-    /// Of the newest cycle whose times are known.
+    /// Times of the newest cycle whose times are known.
     pub timing: Option<TimingSnapshot>,
-    /// Alarms that last, or that nobody has acknowledged.
+    /// Late wake-ups of all members so far.
+    pub host_stalls: u64,
+    /// Alarms that last or are not acknowledged.
     pub alarms: Vec<Alarm>,
     /// Events so far; the number of the newest.
     pub events: u64,
@@ -57,6 +79,17 @@ pub struct Snapshot {
     pub records: u64,
     /// Records that were gone or could not be read, at least.
     pub left_out: u64,
+}
+
+/// Links of a member.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, JsonSchema)]
+pub struct LinkSnapshot {
+    /// Members that do not receive its frames.
+    pub cut_from: Vec<String>,
+    /// Whether no member receives its frames.
+    pub isolated: bool,
+    /// Whether its journal is not received here, so that its state is known from others only.
+    pub detached: bool,
 }
 
 /// A controller or an understudy.
@@ -68,16 +101,114 @@ pub struct StationSnapshot {
     pub rank: u8,
     /// Whether it is generated from the others.
     pub understudy: bool,
-    /// What it is.
+    /// Its state.
     pub state: StationState,
     /// Whether a remote I/O has closed its slot, θ = 1.
     pub flagged: bool,
-    /// The programs that it speaks for.
-    pub speaks_for: Vec<String>,
-    /// The programs whose remote I/O has found its state faulty.
+    /// The programs that it publishes for.
+    pub publishes_for: Vec<String>,
+    /// The programs whose remote I/O has excluded it.
     pub excluded_from: Vec<String>,
-    /// What was last done to it.
+    /// The last action on it.
     pub done: Option<String>,
+    /// The parity words that it sent in this cycle.
+    pub words: Vec<WordSnapshot>,
+    /// Its links.
+    pub link: LinkSnapshot,
+}
+
+/// A parity word.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct WordSnapshot {
+    /// The programs in its mask.
+    pub mask: Vec<String>,
+    /// The sum of their outputs, element 1 first.
+    pub sum: String,
+}
+
+/// State of a remote I/O.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RemoteIoState {
+    /// It drives outputs at every deadline.
+    Serving,
+    /// It has reported no deadline of this cycle, or does not know the history of its program yet.
+    Listening,
+    /// The operator has to release its outputs.
+    AwaitsRelease,
+    /// No living station can prove the state of its program.
+    StateLost,
+    /// Its process is suspended.
+    Suspended,
+    /// Its process was killed.
+    Killed,
+    /// Its process ended unexpectedly.
+    Ended,
+}
+
+impl RemoteIoState {
+    /// The state as JSON and the page write it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Serving => "serving",
+            Self::Listening => "listening",
+            Self::AwaitsRelease => "awaits-release",
+            Self::StateLost => "state-lost",
+            Self::Suspended => "suspended",
+            Self::Killed => "killed",
+            Self::Ended => "ended",
+        }
+    }
+}
+
+/// A remote I/O.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct RemoteIoSnapshot {
+    /// Its name.
+    pub name: String,
+    /// Its state.
+    pub state: RemoteIoState,
+    /// Its links.
+    pub link: LinkSnapshot,
+}
+
+/// State of a simulated plant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum PlantState {
+    /// It runs.
+    Moving,
+    /// Its process is suspended.
+    Suspended,
+    /// Its process was killed.
+    Killed,
+    /// Its process ended unexpectedly.
+    Ended,
+}
+
+impl PlantState {
+    /// The state as JSON and the page write it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Moving => "moving",
+            Self::Suspended => "suspended",
+            Self::Killed => "killed",
+            Self::Ended => "ended",
+        }
+    }
+}
+
+/// A simulated plant.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct PlantSnapshot {
+    /// Its name.
+    pub name: String,
+    /// The controller of its program.
+    pub program: String,
+    /// Its state.
+    pub state: PlantState,
+    /// Its links.
+    pub link: LinkSnapshot,
 }
 
 /// A program at its remote I/O, with its plant.
@@ -89,19 +220,19 @@ pub struct ProgramSnapshot {
     pub remote_io: String,
     /// The simulated plant's name.
     pub plant: Option<String>,
-    /// `direct`, `reconstructed`, `held` or `fail-safe`; nothing before the first deadline.
+    /// `direct`, `reconstructed`, `held` or `fail-safe`; nothing where no deadline of this cycle was reported.
     pub source: Option<&'static str>,
-    /// Since which cycle.
-    pub since: i64,
-    /// Whose word restored it.
+    /// The first cycle of those in a row with this source.
+    pub since: Option<i64>,
+    /// The station whose parity word the outputs were reconstructed from.
     pub word_of: Option<String>,
-    /// Why nothing true is driven, where that is so.
+    /// Why there was no provable output, in a missed cycle.
     pub missing: Option<&'static str>,
     /// u(i) as last sampled, element 1 first.
     pub inputs: Option<String>,
-    /// y(i) as last driven, element 1 first.
+    /// y(i) as driven, element 1 first.
     pub outputs: Option<String>,
-    /// Deadlines with direct outputs.
+    /// Deadlines with direct outputs, from the origin of the run on; so are the following.
     pub direct: u64,
     /// Deadlines with reconstructed outputs.
     pub reconstructed: u64,
@@ -109,48 +240,53 @@ pub struct ProgramSnapshot {
     pub held: u64,
     /// Deadlines with fail-safe outputs.
     pub fail_safe: u64,
-    /// Whether an operator has to release the outputs.
+    /// Whether the operator has to release the outputs.
     pub awaits_release: bool,
-    /// Signals that are forced.
+    /// Signals that are forced, in words.
     pub forced: Vec<String>,
+    /// Signals that are forced.
+    #[serde(skip)]
+    pub forces: Vec<Force>,
     /// Whether the failure of one station would be masked; nothing while its remote I/O has not reported it.
     pub protection: Option<Protection>,
     /// What is available where no living station can prove its state.
     pub lost: Option<LostState>,
     /// Parts that the plant has finished.
     pub finished: Option<u64>,
-    /// Things that must not happen to the plant and did.
+    /// Plant faults.
     pub plant_faults: Option<u64>,
 }
 
-/// Which further failures would be masked now.
+/// The remaining redundancy: which further failures would be masked.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct MarginSnapshot {
     /// Further failures of stations that are masked whichever they are: 0, 1, or 2 and perhaps more.
     pub survives: u8,
-    /// Programs with true outputs now.
+    /// Programs with provable outputs.
     pub served: Vec<String>,
-    /// Each station that speaks, and each remote I/O, alone.
+    /// Each station that publishes, and each remote I/O, alone.
     pub singles: Vec<OutcomeSnapshot>,
-    /// Each pair of stations that speak.
+    /// Each pair of stations that publish.
     pub pairs: Vec<OutcomeSnapshot>,
 }
 
-/// What a failure would do.
+/// Consequence of a failure.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct OutcomeSnapshot {
-    /// Who fails, all at once.
+    /// The members that fail at once.
     pub failed: Vec<String>,
-    /// Whether every program that has true outputs now keeps them.
+    /// Whether every program that has provable outputs keeps them.
     pub masked: bool,
     /// The programs that would lose them.
     pub lost: Vec<String>,
+    /// Why, in words; empty where the failure is masked.
+    pub why: String,
 }
 
 /// Times of one cycle, in microseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct TimingSnapshot {
-    /// Which.
+    /// The cycle.
     pub cycle: i64,
     /// From the first sample to the last turn.
     pub token_us: f64,
@@ -158,144 +294,4 @@ pub struct TimingSnapshot {
     pub margin_us: f64,
     /// From the start of the cycle before.
     pub cycle_us: Option<f64>,
-}
-
-impl Model {
-    /// What is the case now. The margin is calculated anew: see [`Self::snapshot_with`].
-    pub fn snapshot(&self) -> Snapshot {
-        self.snapshot_with(&self.holders().margin())
-    }
-
-    /// The same with a margin that was calculated before, of the same [`Self::holders`].
-    pub fn snapshot_with(&self, margin: &Margin) -> Snapshot {
-        let agreement = self.cluster.agreement();
-        let (records, left_out) = self.records();
-        let run = match (self.finished, self.interrupted, self.cycle()) {
-            (true, true, _) => RunState::Interrupted,
-            (true, false, _) => RunState::Finished,
-            (false, _, None) => RunState::Starting,
-            (false, _, Some(_)) => RunState::Running,
-        };
-        Snapshot {
-            cluster: self.cluster.name().to_owned(),
-            run,
-            cycle: self.cycle(),
-            from_origin: self.has_origin(),
-            mode: match agreement.mode {
-                understudy_cycle::Mode::Full => "full",
-                understudy_cycle::Mode::Paper => "paper",
-            },
-            period_us: u64::try_from(agreement.schedule.period().as_micros()).unwrap_or(u64::MAX),
-            stations: (0..self.stations.len() as u8)
-                .map(|rank| self.station_snapshot(StationId(rank)))
-                .collect(),
-            programs: (0..self.programs.len() as u8)
-                .map(|program| self.program_snapshot(ProgramId(program)))
-                .collect(),
-            margin: self.margin_snapshot(margin),
-            timing: self.timings().next_back().map(|timing| TimingSnapshot {
-                cycle: timing.cycle,
-                token_us: timing.token_ns as f64 / 1e3,
-                margin_us: timing.margin_ns as f64 / 1e3,
-                cycle_us: timing.cycle_ns.map(|cycle| cycle as f64 / 1e3),
-            }),
-            alarms: self
-                .alarms()
-                .filter(|alarm| alarm.is_open())
-                .cloned()
-                .collect(),
-            events: self.event_count(),
-            records,
-            left_out,
-        }
-    }
-
-    fn station_snapshot(&self, station: StationId) -> StationSnapshot {
-        let track = &self.stations[station.index()];
-        let state = track.state(self.cycle(), 1);
-        let names = |programs: understudy_wire::ProgramSet| {
-            programs
-                .iter()
-                .map(|program| self.program_name(program).to_owned())
-                .collect()
-        };
-        StationSnapshot {
-            name: self.members.name(Member::Station(station)).to_owned(),
-            rank: station.0,
-            understudy: self.cluster.agreement().schedule.is_understudy(station),
-            state,
-            flagged: track.is_flagged(),
-            speaks_for: if state == StationState::Speaking {
-                names(track.covers)
-            } else {
-                Vec::new()
-            },
-            excluded_from: names(track.excluded),
-            done: track
-                .done
-                .as_ref()
-                .map(|(what, cycle)| format!("{what} in cycle {cycle}")),
-        }
-    }
-
-    fn program_snapshot(&self, program: ProgramId) -> ProgramSnapshot {
-        let track = &self.programs[program.index()];
-        let plant = Member::Plant(program);
-        let has_plant = self.cluster.member_name(plant).is_some();
-        let [direct, reconstructed, held, fail_safe] = track.counts;
-        ProgramSnapshot {
-            program: self.program_name(program).to_owned(),
-            remote_io: self.members.name(Member::RemoteIo(program)).to_owned(),
-            plant: has_plant.then(|| self.members.name(plant).to_owned()),
-            source: track.source.map(source_word),
-            since: track.since,
-            word_of: track
-                .word_of
-                .map(|station| self.members.name(Member::Station(station)).to_owned()),
-            missing: track.missing.map(missing_text),
-            inputs: track.inputs.as_ref().map(ToString::to_string),
-            outputs: track.outputs.as_ref().map(ToString::to_string),
-            direct,
-            reconstructed,
-            held,
-            fail_safe,
-            awaits_release: track.awaits_release,
-            forced: track
-                .forced
-                .iter()
-                .map(|force| {
-                    let name = self.signal_name(program, force.signal);
-                    format!(
-                        "{name} = {} by {}: {}",
-                        u8::from(force.value),
-                        force.owner,
-                        force.reason
-                    )
-                })
-                .collect(),
-            protection: track.protection.clone(),
-            lost: track.lost.clone(),
-            finished: track.plant.as_ref().map(|field| field.finished),
-            plant_faults: track.plant.as_ref().map(|field| field.plant_faults),
-        }
-    }
-
-    fn margin_snapshot(&self, margin: &Margin) -> MarginSnapshot {
-        let name = |program: ProgramId| self.program_name(program).to_owned();
-        let outcome = |outcome: &Outcome| OutcomeSnapshot {
-            failed: outcome
-                .failed
-                .iter()
-                .map(|member| self.members.name(*member).to_owned())
-                .collect(),
-            masked: outcome.is_masked(),
-            lost: outcome.lost.iter().map(|loss| name(loss.program)).collect(),
-        };
-        MarginSnapshot {
-            survives: margin.survives,
-            served: margin.served.iter().map(name).collect(),
-            singles: margin.singles.iter().map(outcome).collect(),
-            pairs: margin.pairs.iter().map(outcome).collect(),
-        }
-    }
 }

@@ -1,6 +1,6 @@
 //! Records as they come: from the files of a journal, also while they are written and closed, or handed over in this process.
 //!
-//! A reader of files only, that never blocks and never waits: [`Source::poll`] takes what is there and says how much that was.
+//! A reader of files that never blocks: [`Source::poll`] takes the records that are there and returns their number.
 
 mod channel;
 mod follow;
@@ -15,7 +15,7 @@ pub use channel::Feed;
 use follow::Follower;
 pub use progress::{BEHIND, Progress, Reading};
 
-/// What stands between a reader and the records.
+/// Loss of records on the way to a reader.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Trouble {
     /// A file or its folder cannot be read.
@@ -33,7 +33,7 @@ pub enum Trouble {
         reason: String,
     },
     /// Records went before they were read: the journal has reached its limit, or the reader was too slow.
-    #[error("records are gone that nobody has read here{}", count.map_or(String::new(), |count| format!(": {count}")))]
+    #[error("some records were rotated out before they were read{}", count.map_or(String::new(), |count| format!(": {count}")))]
     Gone {
         /// How many, where that is known.
         count: Option<u64>,
@@ -71,7 +71,7 @@ impl Source {
         }
     }
 
-    /// How far the last poll came. Whoever shows what was folded asks this first.
+    /// Progress of the last poll. Callers check it before they show a state.
     pub fn progress(&self) -> Progress {
         match &self.0 {
             Kind::Files(follower) => follower.progress(),

@@ -1,15 +1,15 @@
-//! A run on a terminal: a table that lives. It is drawn into any buffer of letters, and knows no terminal itself.
+//! A run on a terminal, as a table that is updated. It is drawn into any buffer of characters.
 //!
 //! ```text
 //!   press-cell  full  10ms                         running  cycle 1234
-//!   station      state      speaks for             last done
-//!   program      outputs from   since  direct  restored  held  safe  last cycles
-//!   survives     any one further failure; not: robot + understudy
+//!   station      state      publishes for          last action
+//!   program      outputs from   since  direct  reconstr.  held  safe  last cycles
+//!   redundancy   any one station; not robot+understudy
 //!   margin       ▅▅▆▅▅▅▄▅▅▅                        3.6 ms before the deadline
-//!   events       cycle, who, what, why
+//!   events       cycle, member, event, cause
 //! ```
 //!
-//! Nothing is said by colour alone.
+//! No state is shown by colour alone.
 
 mod lists;
 mod tables;
@@ -23,12 +23,11 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Sparkline};
 
 use crate::alarm::Alarm;
-use crate::margin::{Holders, Margin};
 use crate::model::Model;
-use crate::snapshot::{RunState, Snapshot};
+use crate::snapshot::Snapshot;
 use crate::source::{BEHIND, Progress};
 
-/// What a person pressed.
+/// A key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Key {
     /// Up in the list at the bottom.
@@ -43,17 +42,17 @@ pub enum Key {
     Left,
     /// The tables down.
     Right,
-    /// Events, alarms, failures: the next of them.
+    /// The next list: events, alarms, failures.
     Next,
-    /// All alarms have been seen.
+    /// Acknowledge all alarms.
     Acknowledge,
-    /// Stand still, or go on.
+    /// Pause or resume.
     Pause,
-    /// What the keys do.
+    /// Show the keys.
     Help,
 }
 
-/// What stands at the bottom.
+/// The list at the bottom.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum Bottom {
     #[default]
@@ -62,7 +61,7 @@ pub(crate) enum Bottom {
     Failures,
 }
 
-/// What a person looks at.
+/// The screen of `top`.
 #[derive(Debug, Clone, Default)]
 pub struct Screen {
     bottom: Bottom,
@@ -72,21 +71,19 @@ pub struct Screen {
     above: usize,
     paused: bool,
     help: bool,
-    /// Calculated when somebody has come or gone.
-    margin: Option<(Holders, Margin)>,
-    /// Of the newest record, where a live run has not written one lately.
+    /// Age of the newest record, where a live run has not written one lately.
     age: Option<Duration>,
 }
 
 const PAGE: usize = 10;
 
 impl Screen {
-    /// Whether it stands still: then no record is to be noted.
+    /// Whether it is paused: then no record is to be noted.
     pub fn is_paused(&self) -> bool {
         self.paused
     }
 
-    /// Does what a key asks for; answers with the alarms that have been seen by that.
+    /// Handles a key; returns the alarms that it acknowledges.
     pub fn press(&mut self, key: Key, model: &Model) -> Vec<Alarm> {
         match key {
             Key::Up => self.back += 1,
@@ -115,19 +112,7 @@ impl Screen {
         Vec::new()
     }
 
-    /// The case now, with the margin of survival.
-    pub fn snapshot(&mut self, model: &Model) -> Snapshot {
-        let holders = model.holders();
-        let margin = match self.margin.take() {
-            Some((known, margin)) if known == holders => margin,
-            _ => holders.margin(),
-        };
-        let snapshot = model.snapshot_with(&margin);
-        self.margin = Some((holders, margin));
-        snapshot
-    }
-
-    /// Draws the present; while the journal is being read, only how much of it was. A screen that stands still shows what it showed.
+    /// Draws the present; while the journal is being read, only its progress. A paused screen does not change.
     pub fn draw_live(
         &mut self,
         frame: &mut Frame<'_>,
@@ -149,7 +134,7 @@ impl Screen {
 
     /// Draws it all.
     pub fn draw(&mut self, frame: &mut Frame<'_>, model: &Model) {
-        let snapshot = self.snapshot(model);
+        let snapshot = model.snapshot();
         let area = frame.area();
         let stations = rows(snapshot.stations.len(), area.height);
         let programs = rows(snapshot.programs.len(), area.height);
@@ -187,12 +172,10 @@ impl Screen {
     }
 
     fn head(&self, snapshot: &Snapshot, width: u16) -> Line<'static> {
-        let run = match (self.paused, snapshot.run) {
-            (true, _) => "paused",
-            (_, RunState::Starting) => "starting",
-            (_, RunState::Running) => "running",
-            (_, RunState::Finished) => "finished",
-            (_, RunState::Interrupted) => "interrupted",
+        let run = if self.paused {
+            "paused"
+        } else {
+            snapshot.run.word()
         };
         let period = std::time::Duration::from_micros(snapshot.period_us);
         let left = format!(" {}  {}  {period:?}", snapshot.cluster, snapshot.mode);
@@ -213,13 +196,13 @@ impl Screen {
     }
 }
 
-/// A table's head and its rows; of a large cluster a part.
+/// Height of a table with its head; limited for a large cluster.
 fn rows(count: usize, height: u16) -> u16 {
     let most = (height / 4).max(3);
     u16::try_from(count + 1).unwrap_or(most).min(most)
 }
 
-/// A word before a line.
+/// The label of a line.
 pub(crate) fn label(text: &str) -> Span<'static> {
     Span::styled(
         format!(" {text:10} "),
@@ -270,7 +253,7 @@ fn milliseconds(us: f64) -> String {
 
 fn help() -> Paragraph<'static> {
     Paragraph::new(
-        " q quit            space  stand still, go on\n tab  events, alarms, failures to come\n a    all alarms have been seen\n \
+        " q quit            space  pause, resume\n tab  events, alarms, further failures\n a    acknowledge all alarms\n \
          up, down, page up, page down   scroll the list\n left, right                    scroll the tables\n h    back",
     )
 }

@@ -33,7 +33,7 @@ impl<T: Clone + PartialEq> Timeline<T> {
         }
     }
 
-    /// The value in cycle `at`. What is told of a cycle again, or of an earlier one, is ignored.
+    /// The value in cycle `at`. A second value of a cycle, or one of an earlier cycle, is ignored.
     pub(crate) fn push(&mut self, at: i64, value: &T) {
         if let Some(last) = self.spans.back_mut() {
             if at < last.to {
@@ -110,7 +110,7 @@ mod tests {
             for cycle in 0..6 {
                 if let Some(value) = value(cycle) {
                     timeline.push(i64::from(cycle), &value);
-                    // Told once more, with something else: the first counts.
+                    // A second value: the first counts.
                     timeline.push(i64::from(cycle), &7);
                 }
             }

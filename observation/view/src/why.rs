@@ -1,5 +1,5 @@
-//! Why an output is as it is: the chain of contacts that made it so, through memory bits and earlier cycles, and where it was
-//! restored the word, its members and the lineage that proves it.
+//! Why an output has its value: the chain of contacts that caused it, through memory bits and earlier cycles; for a reconstructed output
+//! the parity word, its mask and the lineage that proves it.
 
 mod explain;
 mod power;
@@ -17,82 +17,82 @@ use crate::history::{Driven, History, Step};
 use crate::model::Model;
 use explain::Explainer;
 
-/// Why an output or a memory bit of a program is as it is.
+/// Why an output or a memory bit of a program has its value.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Why {
     /// Its name.
     pub signal: String,
-    /// Of which program.
+    /// Its program.
     pub program: String,
     /// The remote I/O that drives it.
     pub remote_io: String,
     /// From the origin of the run.
     pub cycle: i64,
-    /// As it was driven; a memory bit as it was after the scan.
+    /// Its value as driven; of a memory bit after the scan.
     pub value: bool,
     /// `direct`, `reconstructed`, `held` or `fail-safe`; nothing for a cycle whose deadline is not in the journal.
     pub source: Option<&'static str>,
-    /// Why nothing true was there, where that is so.
+    /// Why there was no provable output, in a missed cycle.
     pub missing: Option<&'static str>,
-    /// What the program's own scan says, where that was not driven.
+    /// The value of the program's own scan, where it was not driven.
     pub scanned: Option<bool>,
-    /// How it was restored.
-    pub restored: Option<Restored>,
+    /// How it was reconstructed.
+    pub reconstructed: Option<Reconstructed>,
     /// The chain of contacts; nothing for a fail-safe value.
     pub because: Option<Reason>,
 }
 
-/// How an output was restored: equation (12) with its numbers.
+/// How an output was reconstructed: equation (12) with its numbers.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
-pub struct Restored {
-    /// Who said the word.
+pub struct Reconstructed {
+    /// The station that sent the parity word.
     pub word_of: String,
-    /// The programs whose sum it is.
-    pub members: Vec<String>,
-    /// The word, element 1 first.
+    /// The programs in its mask.
+    pub mask: Vec<String>,
+    /// The parity word, element 1 first.
     pub word: String,
-    /// The outputs of the other members, as their controllers said them.
+    /// The outputs of the other programs in the mask, as their controllers published them.
     pub others: Vec<Addend>,
     /// The sum of them all.
     pub sum: String,
-    /// L(t+1) of the program: who speaks from it has seen the same inputs since the same start.
+    /// L(t+1) of the program: a station at this lineage has the same inputs since the same start.
     pub lineage: String,
-    /// Whether the sum is what the samples lead to.
+    /// Whether the sum equals the outputs that the samples yield.
     pub proved: bool,
-    /// Who was silent in that cycle.
-    pub silent: Vec<String>,
+    /// The stations that were not received in that cycle.
+    pub not_received: Vec<String>,
 }
 
-/// The outputs of one member.
+/// The outputs of one program in the mask.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Addend {
-    /// Who said them.
-    pub said_by: String,
+    /// The controller that published them.
+    pub published_by: String,
     /// Element 1 first.
     pub outputs: String,
 }
 
-/// A signal in a cycle, and what made it so.
+/// A signal in a cycle, and the reason for its value.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Reason {
     /// A signal, a pin of a block, or a comparison.
     pub signal: String,
-    /// What it was in that place of the scan.
+    /// Its value at that place of the scan.
     pub value: bool,
     /// From the origin of the run.
     pub cycle: i64,
-    /// The rung that decided it, counted from 1.
+    /// The rung that determined it, counted from 1.
     pub rung: Option<usize>,
     /// The title of that rung.
     pub title: Option<String>,
-    /// How.
+    /// The reason in words.
     pub text: String,
-    /// What that rests on.
+    /// The reasons behind it.
     pub because: Vec<Reason>,
 }
 
 impl Model {
-    /// Why a signal is as it is: `ram_down`, or `press.ram_down` where several programs have one of that name; an address such as
+    /// Why a signal has its value: `ram_down`, or `press.ram_down` where several programs have one of that name; an address such as
     /// `%QX0.0` will do. Without a cycle, in the newest one that is known.
     ///
     /// # Errors
@@ -158,10 +158,10 @@ impl Model {
                 .and_then(|driven| driven.missing)
                 .map(missing_text),
             scanned: scanned.filter(|scanned| *scanned != value),
-            restored: step
+            reconstructed: step
                 .driven
                 .as_ref()
-                .and_then(|driven| self.restored(program, step, driven)),
+                .and_then(|driven| self.reconstructed(program, step, driven)),
             because,
         })
     }
@@ -202,8 +202,13 @@ impl Model {
         }
     }
 
-    /// The word that restored the outputs of a program, with what was added to it.
-    fn restored(&self, program: ProgramId, step: &Step, driven: &Driven) -> Option<Restored> {
+    /// The parity word that the outputs of a program were reconstructed from, with its addends.
+    fn reconstructed(
+        &self,
+        program: ProgramId,
+        step: &Step,
+        driven: &Driven,
+    ) -> Option<Reconstructed> {
         let station = driven
             .word_of
             .filter(|_| driven.source == Source::Reconstructed)?;
@@ -214,23 +219,23 @@ impl Model {
         let mut others = Vec::new();
         for other in word.mask.iter().filter(|other| *other != program) {
             let own = StationId(other.0);
-            let said = turns.iter().find(|turn| turn.station == own);
-            let said = said.and_then(|turn| turn.words.first())?;
-            sum.add(&said.sum);
+            let turn = turns.iter().find(|turn| turn.station == own);
+            let published = turn.and_then(|turn| turn.words.first())?;
+            sum.add(&published.sum);
             others.push(Addend {
-                said_by: self.members.name(Member::Station(own)).to_owned(),
-                outputs: said.sum.to_string(),
+                published_by: self.members.name(Member::Station(own)).to_owned(),
+                outputs: published.sum.to_string(),
             });
         }
         let sum = sum.narrowed(driven.outputs.width()).unwrap_or(sum);
-        let silent = (0..self.cluster.agreement().schedule.stations() as u8)
+        let not_received = (0..self.cluster.agreement().schedule.stations() as u8)
             .map(StationId)
             .filter(|station| !driven.heard.contains(*station))
             .map(|station| self.members.name(Member::Station(station)).to_owned());
         let sampled = step.sampled.as_ref();
-        Some(Restored {
+        Some(Reconstructed {
             word_of: self.members.name(Member::Station(station)).to_owned(),
-            members: word
+            mask: word
                 .mask
                 .iter()
                 .map(|member| self.program_name(member).to_owned())
@@ -240,7 +245,7 @@ impl Model {
             lineage: sampled.map_or_else(String::new, |sampled| sampled.after.to_string()),
             proved: sampled.is_some_and(|sampled| sampled.outputs == sum),
             sum: sum.to_string(),
-            silent: silent.collect(),
+            not_received: not_received.collect(),
         })
     }
 }

@@ -14,14 +14,14 @@ export async function tell(path, body) {
 }
 
 async function answered(answer) {
-  const said = await answer.json().catch(() => null);
+  const content = await answer.json().catch(() => null);
   if (answer.ok) {
-    return said;
+    return content;
   }
   if (answer.status === 401) {
     location.assign("/login.html");
   }
-  const error = said?.error;
+  const error = content?.error;
   throw new Error(error ? `${error.message} (${error.code})` : `the page answered ${answer.status}`);
 }
 
@@ -42,7 +42,7 @@ export function toast(text) {
   }, 8000);
 }
 
-// Runs an action of somebody; what it throws is shown.
+// Runs an action and shows its error.
 export async function act(work) {
   try {
     return await work();

@@ -1,4 +1,4 @@
-// The cluster: who works, from where each plant gets its outputs, and what could fail now.
+// The cluster: states of the members, source of the outputs of each plant, and remaining redundancy.
 
 import { el, keyed, setText, setAttribute } from "/element.js";
 import { signalLegend, sourceLegend, stateLegend } from "/legend.js";
@@ -7,8 +7,8 @@ import { continueWords, openChoice, openMember } from "/commands.js";
 import { SOURCES } from "/sources.js";
 import { openWhy } from "/why.js";
 
-// The states that a visitor meets; the others say themselves what they are.
-const LEGEND_STATES = ["speaking", "silent", "flagged", "joining", "shadow", "stopped", "killed"];
+// States that are common; the others need no explanation.
+const LEGEND_STATES = ["publishing", "not-received", "flagged", "joining", "shadow-mode", "suspended", "killed"];
 
 let run = null;
 let place = null;
@@ -27,9 +27,9 @@ export function prepare(facts) {
     el("div", { class: "legends", id: "cluster-legend" }, sourceLegend(), stateLegend(LEGEND_STATES.map((name) => STATES[name]))),
     el("div", { class: "cards" },
       card("protection", "Protection", el("ul", { id: "protection-list", class: "plain" })),
-      card("survival", "What could fail now", el("p", { id: "survival-words", class: "verdict" }), el("ul", { id: "survival-list", class: "plain" })),
+      card("redundancy", "Remaining redundancy", el("p", { id: "redundancy-words", class: "verdict" }), el("ul", { id: "redundancy-list", class: "plain" })),
       card("timing", "Cycle", el("dl", { id: "timing-list" })),
-      card("counts", "Cycles so far, by source of the outputs", el("div", { class: "wide", tabindex: "0", role: "region", "aria-label": "Table of cycles by source" }, table("counts-table", ["program", ...["direct", "reconstructed", "held", "fail-safe"].map((source) => `${SOURCES[source].sign} ${SOURCES[source].words}`)]))),
+      card("counts", "Deadlines by source of the outputs", el("div", { class: "wide", tabindex: "0", role: "region", "aria-label": "Table of deadlines by source" }, table("counts-table", ["program", ...["direct", "reconstructed", "held", "fail-safe"].map((source) => `${SOURCES[source].sign} ${SOURCES[source].words}`)]))),
       card("signals", "Inputs and outputs", signalLegend(), el("div", { id: "signals-list" })),
     ),
   );
@@ -38,20 +38,20 @@ export function prepare(facts) {
 export function show(state) {
   picture.show(state);
   protection(state.programs);
-  survival(state.survival);
+  redundancy(state.redundancy);
   timing(state);
   counts(state);
   signals(state);
 }
 
-// A lamp for each program: whether the failure of one station would be masked, and what the operator chooses where its state is lost.
+// A lamp for each program: whether the failure of one station would be masked, and the choices of the operator where its state is lost.
 function protection(programs) {
   const look = ({ protection, lost }) => {
     if (lost) {
       return ["lost", "✗", lost.words];
     }
     if (!protection) {
-      return ["unknown", "?", "not known yet"];
+      return ["unknown", "?", "not reported yet"];
     }
     return protection.protected ? ["protected", "●", protection.words] : ["unprotected", "⚠", protection.words];
   };
@@ -78,14 +78,14 @@ function protection(programs) {
   );
 }
 
-function survival(margin) {
-  const words = document.getElementById("survival-words");
-  setText(words, margin.words);
-  setAttribute(words, "data-level", margin.level);
+function redundancy(remaining) {
+  const words = document.getElementById("redundancy-words");
+  setText(words, remaining.words);
+  setAttribute(words, "data-level", remaining.level);
   const item = (failure) => (failure.masked ? `✓ ${failure.names.join(" and ")}: masked` : `✗ ${failure.names.join(" and ")}: ${failure.why}`);
   keyed(
-    document.getElementById("survival-list"),
-    margin.failures,
+    document.getElementById("redundancy-list"),
+    remaining.failures,
     (failure) => failure.names.join("+"),
     () => el("li"),
     (line, failure) => {
@@ -100,10 +100,10 @@ function timing(state) {
   const { timing } = state;
   const lines = [
     ["period", micro(run.period_us)],
-    ["last cycle took", micro(timing.cycle_us)],
+    ["last cycle time", micro(timing.cycle_us)],
     ["deadline", micro(run.deadline_us)],
-    ["last turn before it", micro(timing.margin_us)],
-    ["least so far", micro(timing.least_margin_us)],
+    ["last turn before the deadline", micro(timing.margin_us)],
+    ["minimum", micro(timing.least_margin_us)],
     ["cycle master", state.cycle_master ?? "none"],
     ["host stalls", timing.stalls === 1 ? "1 stall" : `${timing.stalls} stalls`],
   ];
@@ -148,7 +148,7 @@ function signals(state) {
     },
     (details, program) => {
       const source = SOURCES[program.source] ?? SOURCES.unknown;
-      setText(details.querySelector(".source-words"), `${source.sign} ${source.words}${program.word_of ? ` by ${program.word_of}` : ""}`);
+      setText(details.querySelector(".source-words"), `${source.sign} ${source.words}${program.word_of ? ` from a parity word of ${program.word_of}` : ""}`);
       for (const button of details.querySelectorAll(".signal")) {
         const { kind, index } = button.dataset;
         const values = kind === "input" ? program.inputs : program.outputs;

@@ -1,4 +1,4 @@
-// What somebody does to a member. A button that cannot act says why beside it.
+// Commands to members. The reason is shown next to a button that is disabled.
 
 import { act, tell, toast } from "/ask.js";
 import { el } from "/element.js";
@@ -6,7 +6,7 @@ import { isLive, stale, state } from "/time.js";
 
 let run = null;
 
-export const owner = () => run?.person || localStorage.getItem("owner") || "somebody";
+export const owner = () => run?.person || localStorage.getItem("owner") || "operator";
 
 export function prepare(facts) {
   run = facts;
@@ -17,7 +17,7 @@ export function prepare(facts) {
   });
 }
 
-// Why nothing at all can be commanded now; nothing where it can.
+// Reason why no command can be given now, if there is one.
 function obstacle() {
   if (run.commands.why) {
     return run.commands.why;
@@ -31,10 +31,10 @@ function obstacle() {
 const DOWN = "it is down";
 const UP = "it is running";
 
-// Each action with the reason why it cannot act now, if there is one.
+// The actions, each with the reason why it is impossible now, if there is one.
 function actions(member) {
   const { down } = member;
-  const still = member.state === "stopped";
+  const still = member.state === "suspended";
   const all = [
     ["kill", "Kill", "as kill -9", down ? DOWN : null],
     ["restart", "Start again", "", down ? null : UP],
@@ -60,21 +60,21 @@ function find(wanted) {
   return members.find((member) => member.kind === wanted.kind && member.program === wanted.program);
 }
 
-// Who gives a command to a member and why, and a function that gives it.
+// Fields for owner and reason of a command to a member, and a function that gives it.
 function giver(member) {
   const dialog = document.getElementById("command");
-  const reason = el("input", { id: "command-reason", type: "text", maxlength: "120", value: "try it", required: true });
+  const reason = el("input", { id: "command-reason", type: "text", maxlength: "120", value: "test", required: true });
   const who = el("input", { id: "command-owner", type: "text", maxlength: "40", value: owner(), required: true, disabled: Boolean(run.person) });
   const give = async (command) => {
     localStorage.setItem("owner", who.value);
     const body = { member: member.name, command, owner: who.value, reason: reason.value };
     const done = await act(() => tell("/api/command", body));
     if (done) {
-      toast(`${member.name}: done`);
+      toast(`${member.name}: command done`);
       dialog.close();
     }
   };
-  const asked = el("p", { class: "who" }, el("label", {}, "Who ", who), " ", el("label", {}, "Why ", reason));
+  const asked = el("p", { class: "who" }, el("label", {}, "Name ", who), " ", el("label", {}, "Reason ", reason));
   return { asked, give };
 }
 
@@ -109,9 +109,9 @@ export function openMember(wanted, signal) {
 }
 
 export const continueWords = (lost) =>
-  `Continue from cycle ${lost.newest}, ${lost.age_cycles === null ? "age not known" : `${lost.age_cycles} cycles old`}`;
+  `Continue from cycle ${lost.newest}, ${lost.age_cycles === null ? "age unknown" : `${lost.age_cycles} cycles old`}`;
 
-// The operator's answer where the state of a program is lost: what it does is said, and it is done when it is confirmed.
+// The operator's choice where the state of a program is lost: its effect is shown, and it has to be confirmed.
 export function openChoice(name, which) {
   const member = find({ name });
   const lost = member && state().programs[member.program].lost;
@@ -123,12 +123,12 @@ export function openChoice(name, which) {
   const cold = which === "cold";
   const command = { command: "choose", choice: cold ? "cold" : { newest: { cycle: lost.newest } } };
   const warning = cold
-    ? "The program starts from its initial state: counters, steps and timers begin anew. The plant stays as it is."
-    : `Counters, steps and timers of the program are as they were in cycle ${lost.newest}. The plant has moved on since.`;
+    ? "The program starts from its initial state: counters, steps and timers are reset. The plant is not moved."
+    : `Counters, steps and timers of the program have the values of cycle ${lost.newest}. The plant has moved on since.`;
   open([
     el("h2", { id: "command-title" }, `${name}: ${cold ? "Cold start" : continueWords(lost)}`),
     el("p", {}, lost.words),
-    el("p", {}, `${warning} Compare the plant with the program first.`),
+    el("p", {}, `${warning} Compare the state of the plant with the program first.`),
     because ? el("p", { class: "obstacle" }, `cannot: ${because}`) : null,
     asked,
     el("p", {}, el("button", { type: "button", id: "confirm-choice", disabled: Boolean(because), click: () => give(command) }, cold ? "Start cold" : "Continue")),

@@ -1,4 +1,4 @@
-// This run beside another one: the first cycle in which they differ, and what differs.
+// Comparison with another run: the first cycle with a difference, and the differences.
 
 import { act, ask } from "/ask.js";
 import { el } from "/element.js";
@@ -12,7 +12,7 @@ export function prepare(run) {
       el("h2", { id: "compare-title" }, "Compare with another run"),
       run.others.length
         ? el("p", {}, el("label", {}, "Run ", select), " ", button)
-        : el("p", {}, "cannot: there is no other run beside this one"),
+        : el("p", {}, "There is no other run in the same directory."),
       el("div", { id: "compare-answer" })),
   );
 }
@@ -35,8 +35,8 @@ async function compare(name) {
     el("p", { class: "verdict" }, answer.words),
     rows.length
       ? el("div", { class: "wide", tabindex: "0", role: "region", "aria-label": "Differences" }, el("table", {},
-          el("thead", {}, el("tr", {}, ["cycle", "what", "here", "there"].map((head) => el("th", { scope: "col" }, head)))),
+          el("thead", {}, el("tr", {}, ["cycle", "difference", "this run", "other run"].map((head) => el("th", { scope: "col" }, head)))),
           el("tbody", {}, rows)))
-      : el("p", {}, "nothing differs"),
+      : el("p", {}, "no differences"),
   );
 }

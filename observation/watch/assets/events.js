@@ -1,4 +1,4 @@
-// What happened, in order, with cycle and cause; and the alarms, which somebody acknowledges.
+// Events in order, with cycle and cause, and alarms, which an operator acknowledges.
 
 import { act, ask, tell } from "/ask.js";
 import { el, keyed, setText } from "/element.js";
@@ -18,7 +18,7 @@ export function prepare(facts) {
       el("label", {}, "Find ", el("input", { id: "event-find", type: "search", input: (event) => { filter = event.target.value; asked = ""; refresh(isLive() ? undefined : stateNow()?.cycle); } })),
       el("div", { class: "wide", tabindex: "0", role: "region", "aria-label": "Table of events" },
         el("table", { id: "event-table" },
-          el("thead", {}, el("tr", {}, ["cycle", "who", "what"].map((head) => el("th", { scope: "col" }, head)))),
+          el("thead", {}, el("tr", {}, ["cycle", "member", "event"].map((head) => el("th", { scope: "col" }, head)))),
           el("tbody")))),
   );
 }

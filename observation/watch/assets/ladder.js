@@ -1,5 +1,4 @@
-// A program as a ladder, with the power flow that the station evaluated in the cycle that is shown; and the understudy's word beside the
-// outputs that it is the sum of.
+// A program as a ladder with the power flow of the shown cycle; for an understudy its parity words, with the outputs of their masks.
 
 import { act, ask } from "/ask.js";
 import { el, setText } from "/element.js";
@@ -143,26 +142,26 @@ async function cross() {
       el("table", {}, el("thead", {}, el("tr", {}, head.map((text) => el("th", { scope: "col" }, text)))), el("tbody", {}, answer.signals.map(row)))));
 }
 
-const sumOf = (word) => word.members.join(" ⊕ ");
+const sumOf = (word) => word.mask.join(" ⊕ ");
 
-// y(N+1) is the sum of the outputs in each place: shown beside what it is the sum of.
+// y(N+1), element by element, with the outputs that it is the sum of.
 function sum() {
   const now = state();
   const members = run.programs;
   const station = now.members.find((member) => member.name === program);
   const width = Math.max(...members.map((item) => item.outputs.length));
-  const words = station?.words ?? [];
+  const words = station?.parity_words ?? [];
   const column = (item, place) => {
     const output = item.outputs[place];
-    const value = now.programs[item.index].said?.[place];
+    const value = now.programs[item.index].published?.[place];
     return el("td", {}, output ? `${output.name} = ${value ?? "?"}` : "");
   };
   const rows = [...Array(width).keys()].map((place) =>
     el("tr", {}, el("th", { scope: "row" }, `y${place + 1}`), members.map((item) => column(item, place)), words.map((word) => el("td", { class: "sum" }, word.sum[place] ?? ""))));
-  const said = words.length === 0 ? "nothing" : words.map((word) => `the sum of ${sumOf(word)}`).join(", and ");
-  setText(id("ladder-stamp"), `cycle ${now.cycle}: ${program} says ${said}`);
+  const published = words.length === 0 ? "published no parity word" : `published ${words.map((word) => `the sum of ${sumOf(word)}`).join(" and ")}`;
+  setText(id("ladder-stamp"), `cycle ${now.cycle}: ${program} ${published}`);
   shown = "";
-  const heads = ["place", ...members.map((item) => item.name), ...words.map((word) => `${program} says: ${sumOf(word)}`)];
+  const heads = ["element", ...members.map((item) => item.name), ...words.map((word) => `parity word ${sumOf(word)}`)];
   id("ladder-picture").replaceChildren(
     el("table", {}, el("thead", {}, el("tr", {}, heads.map((head) => el("th", { scope: "col" }, head)))), el("tbody", {}, rows)));
 }

@@ -1,4 +1,4 @@
-// Legends: what signs, lines and colours mean, drawn with the very styles that the views use.
+// Legends of signs, lines and colours, drawn with the styles of the views.
 
 import { el, svg } from "/element.js";
 import { SOURCES } from "/sources.js";
@@ -11,9 +11,9 @@ const flow = (source) =>
 
 const MEANINGS = {
   direct: "from the controller",
-  reconstructed: "by XOR, from the understudy",
-  held: "the last values",
-  "fail-safe": "the configured values",
+  reconstructed: "from a parity word of an understudy",
+  held: "last provable values",
+  "fail-safe": "configured values",
 };
 
 export const sourceLegend = () =>
@@ -26,7 +26,7 @@ export const signalLegend = () =>
   list("Signals", [
     item(el("span", { class: "lamp", "data-on": "1", "aria-hidden": "true" }), "1, on"),
     item(el("span", { class: "lamp", "aria-hidden": "true" }), "0, off"),
-    el("li", {}, "a click on an output explains its value"),
+    el("li", {}, "click an output to see why it has its value"),
   ]);
 
 export const bandLegend = () => {
@@ -42,7 +42,7 @@ export const ladderLegend = () => {
     item(line("live"), "power flows"),
     item(line("wire"), "no power"),
     item(el("span", { class: "closed-contact", "aria-hidden": "true" }), "closed contact"),
-    el("li", {}, "1 and 0 beside a name: its value in the cycle above"),
-    el("li", {}, "a click on an output explains its value"),
+    el("li", {}, "1 and 0 next to a name: its value in the cycle shown above"),
+    el("li", {}, "click an output to see why it has its value"),
   ]);
 };

@@ -15,6 +15,6 @@ document.getElementById("form").addEventListener("submit", async (event) => {
     location.assign("/");
     return;
   }
-  const said = await answer.json().catch(() => null);
-  problem.textContent = said?.error?.message ?? `the page answered ${answer.status}`;
+  const content = await answer.json().catch(() => null);
+  problem.textContent = content?.error?.message ?? `the page answered ${answer.status}`;
 });

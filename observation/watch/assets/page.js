@@ -1,4 +1,4 @@
-// The page: its views, its head, and who is told of what.
+// The page: its views and its head.
 
 import { act, ask, tell, toast } from "/ask.js";
 import { setText } from "/element.js";
@@ -40,9 +40,9 @@ let period = 0;
 
 function head(state, live) {
   const when = !live ? "replay" : state.finished ? "finished" : time.stale() ? "old" : "live";
-  setText(document.getElementById("status"), `${when} · cycle ${state.cycle} of ${state.newest} · ${period} ms each`);
+  setText(document.getElementById("status"), `${when} · cycle ${state.cycle} of ${state.newest} · period ${period} ms`);
   document.body.dataset.when = when;
-  const open = state.alarms.filter((alarm) => !alarm.acknowledged).length;
+  const open = state.open_alarms;
   const button = document.getElementById("alarm-count");
   button.hidden = open === 0;
   setText(button, open === 1 ? "⚠ 1 alarm" : `⚠ ${open} alarms`);
@@ -56,7 +56,7 @@ function scenarioOver(state, run) {
   setText(place, `The scenario is over (${state.scenario_over}).${invitation}`);
 }
 
-// Values that are not the present are greyed out, and it is said why.
+// Stale values are greyed out, with the reason.
 function showStale() {
   const why = time.stale();
   if (time.state() && Boolean(why) !== document.body.hasAttribute("data-stale")) {
@@ -68,7 +68,7 @@ function showStale() {
   document.body.toggleAttribute("data-stale", Boolean(why));
 }
 
-// What is run is known when its directory says it.
+// The facts of the run are known as soon as its directory contains them.
 async function facts() {
   for (;;) {
     try {

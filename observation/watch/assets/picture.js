@@ -1,21 +1,20 @@
 // The cluster as a picture: stations above, the network, remote I/Os and plants below, and a line for each source of outputs.
 //
-// What a shape means is said by its words and its sign as well as by its colour.
+// Words and signs carry the meaning as well as colours.
 
 import { setAttribute, setText, shorten, svg } from "/element.js";
 import { SOURCES } from "/sources.js";
 
 export const STATES = {
-  speaking: { sign: "●", words: "speaking" },
-  silent: { sign: "○", words: "silent" },
+  publishing: { sign: "●", words: "publishing" },
+  "not-received": { sign: "○", words: "not received" },
   flagged: { sign: "⚑", words: "flagged" },
   joining: { sign: "↻", words: "joining" },
-  shadow: { sign: "◐", words: "shadow mode" },
+  "shadow-mode": { sign: "◐", words: "shadow mode" },
   refused: { sign: "✗", words: "refused" },
-  excluded: { sign: "⊘", words: "excluded" },
-  stopped: { sign: "‖", words: "suspended" },
+  suspended: { sign: "‖", words: "suspended" },
   killed: { sign: "✕", words: "killed" },
-  ended: { sign: "✕", words: "has ended" },
+  ended: { sign: "✕", words: "ended" },
   "not-started": { sign: "…", words: "not started" },
   "state-lost": { sign: "✗", words: "state lost" },
   "awaits-release": { sign: "⚠", words: "awaits release" },
@@ -24,7 +23,7 @@ export const STATES = {
   moving: { sign: "●", words: "moving" },
 };
 
-// A box is as wide as the longest name wants, within these.
+// Limits of the width of a box, which follows the longest name.
 const NARROWEST = 168;
 const WIDEST = 208;
 const LETTER = 8;
@@ -112,7 +111,7 @@ function showAll(run, boxes, flows, state) {
       setAttribute(line, "data-source", program.source);
     }
     const by = program.source === "reconstructed" && program.word_of;
-    setText(words, `${source.sign} ${source.words}${by ? " by" : ""}`);
+    setText(words, `${source.sign} ${source.words}${by ? " from" : ""}`);
     setText(whose, by ? shorten(by, letters * 2) : "");
     setText(outWords, program.forced.some((force) => force.kind === "output") ? "⚠ forced" : "");
   });

@@ -1,4 +1,4 @@
-// Where outputs come from, as the page says it: a sign and words for each.
+// Sources of outputs: a sign and words for each.
 
 export const SOURCES = {
   direct: { sign: "→", words: "direct" },

@@ -1,4 +1,4 @@
-// Light and dark: as the system is, or as somebody chose. Runs before the page is painted, so that nothing flashes.
+// Light or dark: the setting of the system, or the choice of the user. Runs before the page is painted to avoid flashing.
 
 (() => {
   const dark = matchMedia("(prefers-color-scheme: dark)");

@@ -1,11 +1,11 @@
-// What time the page shows: the newest cycle as it comes, or one of the run's cycles.
+// The cycle that the page shows: the newest one, or a chosen one.
 //
-// Whoever wants to show a cycle listens with `onState`. There is one stream from the server, and it is followed only while the page is
-// live; a cycle of the past is asked for once, and answers that came too late are dropped.
+// Views register with `onState`. There is one stream from the server, which is followed only while the page is live; a past cycle is
+// requested once, and late answers are dropped.
 
 import { act, ask } from "/ask.js";
 
-// Older values are not the present: the server sends something twice a second.
+// Older values are stale: the server sends an event at least twice a second.
 const STALE_MS = 2000;
 const STALE_CYCLES = 20;
 
@@ -29,7 +29,7 @@ function hear() {
   heard = { date: Date.now(), clock: performance.now() };
 }
 
-// Why what is shown is not the present; nothing where it is, and for a cycle that was asked for.
+// Reason why the shown values are stale; nothing for the present and for a chosen cycle.
 export function stale() {
   if (!live || shown?.finished) {
     return null;
@@ -200,7 +200,7 @@ function follow() {
   stream.addEventListener("error", () => {
     const status = document.getElementById("status");
     status.classList.add("lost");
-    status.textContent = shown?.finished ? "the page's server has ended" : "no connection to the server; trying again";
+    status.textContent = shown?.finished ? "the server of the page has ended" : "no connection to the server; reconnecting";
     if (stream.readyState === EventSource.CLOSED) {
       setTimeout(follow, 3000);
     }

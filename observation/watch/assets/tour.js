@@ -1,5 +1,5 @@
-// A tour of three steps over the first view. It lies beside what it explains and keeps nobody from acting; a browser that has ended or
-// skipped it is not shown it again, but for the button with the question mark.
+// A tour of three steps over the first view. It does not block the page. A browser that has ended or skipped it shows it again only on
+// request (button with the question mark).
 
 import { el, setText } from "/element.js";
 
@@ -9,12 +9,12 @@ const STEPS = [
   {
     target: ".picture-frame",
     title: "The hardware, and the source of each output",
-    words: "Stations above the network, remote I/Os and plants below it. The line into a remote I/O shows where its outputs come from: a solid line from its own controller, a dashed one reconstructed from the understudy.",
+    words: "Stations above the network, remote I/Os and plants below it. The line into a remote I/O shows the source of its outputs: solid for direct outputs of its own controller, dashed for outputs reconstructed from the parity word of an understudy.",
   },
   {
-    target: "#protection-card, #survival-card",
-    title: "What another failure would do",
-    words: "A program is protected while the failure of one station would be masked. The list names each station, and what its failure would do now.",
+    target: "#protection-card, #redundancy-card",
+    title: "Remaining redundancy",
+    words: "A program is protected while the failure of one station would be masked. The list shows the effect of the failure of each station.",
   },
   {
     target: ".member[data-kind=controller], .member[data-kind=understudy], .timebar",
@@ -36,13 +36,13 @@ export function prepare(run) {
     }
   });
   if (localStorage.getItem(KEY) !== "seen") {
-    // Not asked for: the focus stays where it is.
+    // The tour was not requested, so the focus stays.
     show(0, false);
   }
 }
 
 const lastWords = () =>
-  `${mayCommand ? "Click a station and kill it: the outputs go on." : "Click a station to see its state; this page is read-only."} Click an output to see why it has its value. The bar below the tabs goes back to any cycle.`;
+  `${mayCommand ? "Click a station and kill it: the outputs continue." : "Click a station to see its state; this page is read-only."} Click an output to see why it has its value. The bar below the tabs selects any cycle.`;
 
 function show(number, focus = true) {
   step = number;

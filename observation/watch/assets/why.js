@@ -1,4 +1,4 @@
-// Why an output is as it is: the chain of contacts that made it so, and where it was restored, what proved it.
+// Why an output has its value: the chain of contacts that caused it; for a reconstructed output also its proof.
 
 import { act, ask } from "/ask.js";
 import { bit, el } from "/element.js";
@@ -27,28 +27,28 @@ export async function openWhy(program, output) {
   const close = el("button", { type: "button", click: hide }, "Close");
   drawer.replaceChildren(
     el("div", { class: "drawer-head" }, el("h2", {}, `Why is ${answer.signal} ${bit(answer.value)}?`), close),
-    el("p", { class: "soft" }, `${answer.program}, cycle ${answer.cycle}; driven by ${answer.remote_io}`),
+    el("p", { class: "soft" }, `${answer.program}, cycle ${answer.cycle}; remote I/O ${answer.remote_io}`),
     ...source(answer).map((line) => el("p", {}, line)),
-    answer.because ? el("ul", { class: "cause" }, tree(answer.because)) : el("p", {}, "No rung made it so."),
-    el("p", {}, el("a", { href: `#ladder/${program}/${encodeURIComponent(answer.signal)}`, click: () => (drawer.hidden = true) }, "Show it in the ladder")),
+    answer.because ? el("ul", { class: "cause" }, tree(answer.because)) : el("p", {}, "No rung caused this value."),
+    el("p", {}, el("a", { href: `#ladder/${program}/${encodeURIComponent(answer.signal)}`, click: () => (drawer.hidden = true) }, "Show the rung")),
   );
   drawer.hidden = false;
   close.focus();
 }
 
-// Where the value came from, and what proves it: equation (12) with its numbers.
+// Source of the value and its proof: equation (12) with its numbers.
 function source(answer) {
-  const lines = [`It is ${SOURCES[answer.source]?.words ?? "not decided yet"}${answer.missing ? `: ${answer.missing}` : ""}.`];
+  const lines = [`It is ${SOURCES[answer.source]?.words ?? "not known yet"}${answer.missing ? `: ${answer.missing}` : ""}.`];
   if (answer.scanned !== null && answer.scanned !== answer.value) {
-    lines.push(`Its own scan says ${bit(answer.scanned)}.`);
+    lines.push(`The scan of the program yields ${bit(answer.scanned)}.`);
   }
-  const { restored } = answer;
-  if (restored) {
-    const others = restored.others.map((other) => `${other.outputs} (${other.said_by})`);
+  const { reconstructed } = answer;
+  if (reconstructed) {
+    const others = reconstructed.others.map((other) => `${other.outputs} (${other.published_by})`);
     lines.push(
-      `${restored.silent.join(" and ") || "Nobody"} was silent. ${restored.word_of} said the sum of ${restored.members.join(" ⊕ ")}:`,
-      el("code", {}, [`${restored.word} (${restored.word_of})`, ...others].join(" ⊕ "), ` = ${restored.sum}`),
-      `Lineage ${restored.lineage}: ${restored.proved ? "the sum is what the samples lead to." : "the sum is NOT what the samples lead to."}`,
+      `Not received: ${reconstructed.not_received.join(" and ") || "no station"}. Parity word of ${reconstructed.word_of} over ${reconstructed.mask.join(" ⊕ ")}:`,
+      el("code", {}, [`${reconstructed.word} (${reconstructed.word_of})`, ...others].join(" ⊕ "), ` = ${reconstructed.sum}`),
+      `Lineage ${reconstructed.lineage}: ${reconstructed.proved ? "the sum equals the outputs computed from the samples." : "the sum does NOT equal the outputs computed from the samples."}`,
     );
   }
   return lines;

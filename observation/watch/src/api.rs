@@ -63,7 +63,7 @@ async fn page(uri: Uri) -> Response {
 }
 
 async fn wrong_method(uri: Uri) -> Problem {
-    Problem::wrong_method(format!("{} is not asked in this way", uri.path()))
+    Problem::wrong_method(format!("{} does not support this method", uri.path()))
 }
 
 impl From<QueryRejection> for Problem {

@@ -1,4 +1,4 @@
-//! What all answers are made from.
+//! Shared state of the server.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError, RwLock, RwLockReadGuard};
@@ -13,17 +13,17 @@ use crate::follower::Newest;
 use crate::login::{Logins, Person, Role};
 use crate::model::{Known, Model};
 
-/// Viewers at once that are told what is newest.
+/// Viewers at once that follow the newest state.
 pub(crate) const MAXIMUM_VIEWERS: usize = 100;
 
-/// What the page may do to the run besides looking.
+/// Commands that the page may give.
 #[derive(Debug, Clone)]
 pub struct Commanding {
-    /// Reaches whoever writes the run: for commands, and for alarms that somebody has seen.
+    /// Reaches the process that writes the run, for commands and acknowledgements.
     pub commander: Commander,
-    /// Why nothing can be commanded; alarms can be acknowledged all the same.
+    /// Reason why no command can be given; alarms can be acknowledged all the same.
     pub forbidden: Option<String>,
-    /// Commands that cannot be given in this run, each with the reason.
+    /// Commands that are impossible in this run, each with the reason.
     pub impossible: Vec<(&'static str, String)>,
 }
 
@@ -33,13 +33,13 @@ pub(crate) struct App {
     pub(crate) newest: watch::Receiver<Newest>,
     pub(crate) commanding: Commanding,
     pub(crate) logins: Option<Logins>,
-    /// Under which the page is known besides its addresses.
+    /// Names of the page besides its addresses.
     pub(crate) names: Vec<String>,
     pub(crate) run: PathBuf,
     pub(crate) viewers: Arc<Semaphore>,
     /// One other journal is read at a time.
     pub(crate) reader: Semaphore,
-    /// What was read again from the journal for cycles that are not remembered any more.
+    /// The run as it was read again for a cycle that is not remembered any more.
     older: Mutex<Option<Arc<Known>>>,
 }
 
@@ -65,27 +65,27 @@ impl App {
         }
     }
 
-    /// For the time of an answer; the follower waits meanwhile.
+    /// The model, locked for an answer.
     pub(crate) fn model(&self) -> RwLockReadGuard<'_, Model> {
         self.model.read().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Why somebody may not command; nothing where they may.
+    /// Reason why a person may not give commands, if there is one.
     pub(crate) fn why_not(&self, person: &Person) -> Option<&str> {
         let forbidden = self.commanding.forbidden.as_deref();
         forbidden.or_else(|| Self::why_not_act(person))
     }
 
-    /// Why somebody may do nothing but look.
+    /// Reason why a person may change nothing, if there is one.
     pub(crate) fn why_not_act(person: &Person) -> Option<&'static str> {
-        (person.role == Role::Viewer).then_some("whoever is logged in may only look")
+        (person.role == Role::Viewer).then_some("a viewer may not give commands")
     }
 
-    /// What the journal says of a cycle that is not remembered any more. To be called where nobody else waits for the thread.
+    /// The run up to a cycle that is not remembered any more, from its journal. It blocks the thread.
     pub(crate) fn reread(&self, cycle: i64) -> Result<Arc<Known>, Problem> {
         let mut older = self.older.lock().unwrap_or_else(PoisonError::into_inner);
         let remembers = |known: &Known| {
-            let ends = known.oldest().zip(known.newest());
+            let ends = known.run.oldest().zip(known.run.newest());
             ends.is_some_and(|(oldest, newest)| (oldest..=newest).contains(&cycle))
         };
         if let Some(known) = older.as_ref().filter(|known| remembers(known)) {

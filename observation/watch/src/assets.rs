@@ -45,7 +45,7 @@ const ASSETS: &[(&str, &str, &str)] = assets![
     "vendor/uPlot.min.css": STYLE,
 ];
 
-/// What somebody needs who is not logged in yet.
+/// Assets that need no login.
 pub(crate) const BEFORE_LOGIN: &[&str] = &["/login.html", "/login.js", "/page.css", "/icon.svg"];
 
 /// The asset of a path such as `page.js`.

@@ -1,4 +1,4 @@
-//! Why the page is not served, and why a request is not answered.
+//! Errors of the page and of its requests.
 
 use std::io;
 use std::net::SocketAddr;
@@ -15,7 +15,7 @@ use understudy_view::{Reading, ViewError};
 pub enum WatchError {
     /// The address cannot be listened at.
     #[error(
-        "U0671: the page cannot be served at {address}: {source}; name another address, with port 0 for any that is free"
+        "U0671: cannot serve the page at {address}: {source}; choose another address (port 0 takes any free port)"
     )]
     Listen {
         /// The address.
@@ -24,9 +24,9 @@ pub enum WatchError {
         source: io::Error,
     },
     /// The certificate or its key cannot be used.
-    #[error("U0672: the certificate of the page cannot be used: {0}")]
+    #[error("U0672: cannot use the certificate of the page: {0}")]
     Certificate(String),
-    /// The file of those who may log in cannot be used.
+    /// The file of logins cannot be used.
     #[error("U0673: {}: {reason}", path.display())]
     Logins {
         /// The file.
@@ -34,9 +34,9 @@ pub enum WatchError {
         /// Why.
         reason: String,
     },
-    /// The address can be reached from other machines, and nobody said who may log in.
+    /// The address can be reached from other machines, and there are no logins.
     #[error(
-        "U0674: {0} can be reached from other machines: say who may log in (--logins FILE), or serve the page at 127.0.0.1"
+        "U0674: {0} can be reached from other machines: add logins (--logins FILE), or serve the page at 127.0.0.1"
     )]
     NoLogins(SocketAddr),
     /// The system refused something else.
@@ -79,22 +79,22 @@ impl Problem {
         }
     }
 
-    /// There is nothing of that name.
+    /// Unknown name.
     pub(crate) fn unknown(message: impl Into<String>) -> Self {
         Self::new(StatusCode::NOT_FOUND, "U0681", message)
     }
 
-    /// The request does not say what it has to, or says nonsense.
+    /// Malformed request.
     pub(crate) fn bad(message: impl Into<String>) -> Self {
         Self::new(StatusCode::BAD_REQUEST, "U0682", message)
     }
 
-    /// A question where a command is wanted, or the other way round.
+    /// Wrong method.
     pub(crate) fn wrong_method(message: impl Into<String>) -> Self {
         Self::new(StatusCode::METHOD_NOT_ALLOWED, "U0682", message)
     }
 
-    /// The run has no record of it, or not any more.
+    /// The journal does not contain it.
     pub(crate) fn unrecorded(message: impl Into<String>) -> Self {
         Self::new(StatusCode::NOT_FOUND, "U0683", message)
     }
@@ -104,7 +104,7 @@ impl Problem {
         Self::new(StatusCode::NOT_FOUND, error.code(), error.words())
     }
 
-    /// This page, or who asks, may not.
+    /// The page or the person is not allowed to do this.
     pub(crate) fn forbidden(message: impl Into<String>) -> Self {
         Self::new(StatusCode::FORBIDDEN, "U0684", message)
     }
@@ -114,17 +114,17 @@ impl Problem {
         Self::new(StatusCode::FORBIDDEN, "U0685", message)
     }
 
-    /// Nobody is logged in.
+    /// Login required.
     pub(crate) fn log_in(message: impl Into<String>) -> Self {
         Self::new(StatusCode::UNAUTHORIZED, "U0686", message)
     }
 
-    /// Too many at once.
+    /// Too many requests at once.
     pub(crate) fn too_many(message: impl Into<String>) -> Self {
         Self::new(StatusCode::SERVICE_UNAVAILABLE, "U0687", message)
     }
 
-    /// The laboratory refused a command; its words begin with their code.
+    /// The laboratory refused a command; its text begins with the code.
     pub(crate) fn refused(words: &str) -> Self {
         let (code, message) = words.split_once(": ").unwrap_or(("U0682", words));
         Self::new(StatusCode::CONFLICT, code, message)

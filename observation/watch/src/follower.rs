@@ -10,13 +10,13 @@ use understudy_view::{Progress, Run};
 use crate::model::{Known, Model};
 use crate::shown::{NOTHING, newest_state};
 
-/// Between two looks at a journal that says nothing new.
+/// Time between two polls of a journal that has nothing new.
 const LOOK: Duration = Duration::from_millis(40);
 
-/// The newest state, written once for all viewers, and how far its reader was.
+/// The newest state, written once for all viewers, and the progress of its reader.
 #[derive(Debug, Clone)]
 pub(crate) struct Newest {
-    /// As JSON.
+    /// The state as JSON.
     pub(crate) state: Arc<str>,
     pub(crate) progress: Progress,
 }
@@ -30,10 +30,10 @@ impl Default for Newest {
     }
 }
 
-/// Between two words to the viewers.
+/// Time between two messages to the viewers.
 const SAY: Duration = Duration::from_millis(200);
 
-/// Between two looks for a run that has not begun.
+/// Time between two checks for a run that has not started.
 const WAIT: Duration = Duration::from_millis(200);
 
 pub(crate) fn follow(
@@ -47,7 +47,7 @@ pub(crate) fn follow(
             return;
         }
         match Run::open(path) {
-            // What it runs is written down before its journal begins.
+            // The cluster is written before the journal begins.
             Ok(_) if !has_journal(path) => {}
             Ok(run) => {
                 let source = lock(model, |model| model.begin(&run));
@@ -61,7 +61,7 @@ pub(crate) fn follow(
     let mut unsaid = true;
     let mut ended = false;
     while !*ends.borrow() {
-        // Read first, so that nobody who asks waits for a disk.
+        // Records are read before the model is locked, so that no request waits for a disk.
         let mut found = Vec::new();
         let taken = source.poll(&mut |record| found.push(record));
         lock(model, |model| {
@@ -91,7 +91,7 @@ pub(crate) fn follow(
             said = now;
             unsaid = false;
         } else {
-            // Viewers look at this by themselves.
+            // Viewers poll the progress.
             newest.send_if_modified(|newest| {
                 newest.progress = progress;
                 false

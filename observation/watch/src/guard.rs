@@ -23,7 +23,7 @@ use crate::assets::BEFORE_LOGIN;
 use crate::error::Problem;
 use crate::login::{Person, Role};
 
-/// Pictures of ladders set their own lengths and fonts, so styles may stand in the page; scripts may not.
+/// Pictures of ladders set their own lengths and fonts, so inline styles are allowed; inline scripts are not.
 const POLICY: &str = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'; form-action 'self'; base-uri 'none'";
 
 pub(crate) async fn guard(
@@ -68,7 +68,7 @@ fn admit(app: &App, request: &Request) -> Result<Person, Refused> {
     }
     let path = request.uri().path();
     match &app.logins {
-        // Who reaches the loopback interface is somebody of this machine.
+        // The loopback interface is reached from this machine only.
         None => Ok(Person {
             name: String::new(),
             role: Role::Operator,

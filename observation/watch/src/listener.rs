@@ -20,7 +20,7 @@ const MAXIMUM_CONNECTIONS: usize = 512;
 /// Who does not finish the handshake by then is gone.
 const HANDSHAKE_PATIENCE: Duration = Duration::from_secs(3);
 
-/// Who has not sent a whole request by then, or does not take the answer, is gone. A viewer is told something more often.
+/// Time limit for a whole request and for its answer. A viewer gets a message more often.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// A connection that counts among the bounded.
@@ -29,7 +29,7 @@ pub(crate) enum Connection {
     Tls(Box<TlsStream<Limited>>),
 }
 
-/// Accepts connections; handshakes go on beside each other.
+/// Accepts connections; handshakes run concurrently.
 pub(crate) struct Doors {
     accepted: mpsc::Receiver<(Connection, SocketAddr)>,
     address: SocketAddr,
@@ -65,7 +65,7 @@ async fn accept_all(
                     }
                 }
             };
-            // The server has ended where nobody takes it.
+            // Without a receiver the server has ended.
             let _ = sender.send((connection, peer)).await;
         });
     }

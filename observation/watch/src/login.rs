@@ -29,19 +29,19 @@ const MAXIMUM_SESSIONS: usize = 256;
 
 const SESSION_TIME: Duration = Duration::from_secs(12 * 3600);
 
-/// Between two failures to log in, whoever they are of.
+/// Time between two failed logins, of any client.
 const FAILURE_PAUSE: Duration = Duration::from_millis(300);
 
 const COOKIE_NAME: &str = "understudy_session";
 
-/// What somebody may do.
+/// Role of a person.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Role {
     Viewer,
     Operator,
 }
 
-/// Somebody who is logged in.
+/// A person who is logged in.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Person {
     pub(crate) name: String,
@@ -57,10 +57,10 @@ pub struct Logins {
 }
 
 impl Logins {
-    /// Reads the file of those who may log in; where there is none, makes one with an operator.
+    /// Reads the file of logins; makes one with an operator if there is none.
     ///
     /// # Errors
-    /// [`WatchError::Logins`] where it cannot be read or made, is readable by others, or has a line that is none.
+    /// [`WatchError::Logins`] where it cannot be read or made, is readable by others, or has an invalid line.
     pub fn of_file(path: &Path) -> Result<Self, WatchError> {
         let bad = |reason: String| WatchError::Logins {
             path: path.to_owned(),
@@ -82,7 +82,7 @@ impl Logins {
         })
     }
 
-    /// Who shows this token. A wrong one costs time, so that nobody tries many.
+    /// The person with this token. A wrong token costs time.
     pub(crate) async fn admit(&self, token: &str) -> Option<Person> {
         let hash = blake3::hash(token.trim().as_bytes());
         let found = self.tokens.iter().find(|(known, _)| *known == hash);
@@ -191,7 +191,7 @@ fn read_tokens(text: &str) -> Result<Vec<(Hash, Person)>, String> {
         return Err(wrong.join("; "));
     }
     if tokens.is_empty() {
-        return Err("nobody may log in: it has no line".to_owned());
+        return Err("it contains no login".to_owned());
     }
     Ok(tokens)
 }
@@ -225,7 +225,7 @@ mod tests {
         let line = |role: &str| format!("# who\n\n{role} anna {TOKEN}\n");
         check(&line("viewer"), Ok(&[("anna", Role::Viewer)]));
         check(&line("operator"), Ok(&[("anna", Role::Operator)]));
-        check("", Err("nobody may log in: it has no line"));
+        check("", Err("it contains no login"));
         check(
             "viewer anna secret\nanna\n",
             Err(

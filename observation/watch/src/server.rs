@@ -25,7 +25,7 @@ use crate::tls::{Certificate, acceptor};
 /// Few: what they do has time.
 const THREADS: usize = 2;
 
-/// What the page is told.
+/// Settings of the page.
 #[derive(Debug)]
 pub struct Settings {
     /// The directory of the run: finished, being written, or not there yet.
@@ -97,7 +97,7 @@ impl Drop for Served {
         self.ending.send_replace(true);
         self.stop = None;
         for thread in self.threads.drain(..) {
-            // One that panicked has said so.
+            // A panic has been reported.
             let _ = thread.join();
         }
     }

@@ -1,30 +1,33 @@
-//! What the page shows of one cycle, as JSON: who works, what is driven from which source, what could fail, what somebody has to look at.
+//! What the page shows of one cycle, as JSON: a presentation of the snapshot of the run.
 
 mod members;
 
 use std::time::Instant;
 
 use serde::Serialize;
-use understudy_journal::source_word;
-use understudy_remote_io::Missing;
-use understudy_view::{Alarm, LostState, Margin, Outcome, Protection};
-use understudy_wire::{Member, ProgramId, ProgramSet, SignalPlace, Source, StationId};
+use understudy_view::{
+    Alarm, LostState, MarginSnapshot, Model as RunModel, OutcomeSnapshot, ProgramSnapshot,
+    Protection, Snapshot,
+};
+use understudy_wire::{Force, Member, ProgramId, SignalPlace, StationId};
 
-use self::members::{ShownMember, words_of};
-use crate::changes::Standing;
-use crate::model::{Known, Model};
+use self::members::{ShownMember, members};
+use crate::model::Model;
 
 /// Failures that are listed, at most.
 const LISTED_FAILURES: usize = 40;
+
+/// Alarms that are listed, at most.
+const LISTED_ALARMS: usize = 100;
 
 /// One cycle.
 #[derive(Debug, Serialize)]
 pub(crate) struct State {
     /// Of the newest record, in milliseconds, when this was written.
     age_ms: u64,
-    pub(crate) cycle: i64,
-    pub(crate) oldest: i64,
-    pub(crate) newest: i64,
+    cycle: i64,
+    oldest: i64,
+    newest: i64,
     finished: bool,
     /// What the scenario came to, where it is over and the cluster stays up.
     scenario_over: Option<String>,
@@ -32,7 +35,9 @@ pub(crate) struct State {
     members: Vec<ShownMember>,
     programs: Vec<ShownProgram>,
     timing: Timing,
-    survival: Survival,
+    redundancy: Redundancy,
+    /// Alarms that last or are not acknowledged.
+    open_alarms: usize,
     alarms: Vec<ShownAlarm>,
     event_count: u64,
 }
@@ -42,13 +47,15 @@ struct ShownProgram {
     index: usize,
     name: String,
     source: &'static str,
+    /// The station whose parity word the outputs were reconstructed from.
     word_of: Option<String>,
-    /// Why nothing true was there.
-    missing: Option<String>,
+    /// Why there was no provable output, in a missed cycle.
+    missing: Option<&'static str>,
     inputs: Option<String>,
     outputs: Option<String>,
-    /// What its own controller said.
-    said: Option<String>,
+    /// The outputs that its own controller published.
+    published: Option<String>,
+    awaits_release: bool,
     forced: Vec<ShownForce>,
     /// Nothing while the remote I/O has not reported it.
     protection: Option<ShownProtection>,
@@ -80,7 +87,7 @@ struct ShownForce {
     reason: String,
 }
 
-#[derive(Debug, Default, Serialize)]
+#[derive(Debug, Serialize)]
 struct Counts {
     direct: u64,
     reconstructed: u64,
@@ -94,13 +101,16 @@ struct Timing {
     cycle_us: Option<u64>,
     margin_us: Option<i64>,
     least_margin_us: Option<i64>,
-    stalls: usize,
+    stalls: u64,
 }
 
+/// The remaining redundancy.
 #[derive(Debug, Serialize)]
-struct Survival {
+struct Redundancy {
     level: &'static str,
     words: String,
+    /// Further failures of stations that are masked whichever they are.
+    survives: u8,
     failures: Vec<Failure>,
 }
 
@@ -129,7 +139,7 @@ pub(crate) const NOTHING: &str = "null";
 pub(crate) fn newest_state(model: &Model) -> String {
     let mut state = model
         .known()
-        .and_then(|known| state(known, known.newest()?));
+        .and_then(|known| state(&known.run, known.run.newest()?, known.has_ended()));
     if let Some(state) = &mut state {
         let age = model.progress.age(Instant::now()).unwrap_or_default();
         state.age_ms = u64::try_from(age.as_millis()).unwrap_or(u64::MAX);
@@ -137,245 +147,178 @@ pub(crate) fn newest_state(model: &Model) -> String {
     serde_json::to_string(&state).unwrap_or_else(|_| NOTHING.to_owned())
 }
 
+/// The answer of `/api/state` for a cycle of a run; null for a cycle that is not remembered.
+pub fn page_state(run: &RunModel, cycle: i64) -> serde_json::Value {
+    let state = state(run, cycle, run.is_finished());
+    serde_json::to_value(state).unwrap_or_default()
+}
+
 /// The state of a cycle; nothing where it is not remembered.
-pub(crate) fn state(known: &Known, cycle: i64) -> Option<State> {
-    let (oldest, newest) = (known.oldest()?, known.newest()?);
-    if !(oldest.min(newest)..=newest).contains(&cycle) {
-        return None;
-    }
-    let run = &known.run;
-    let standing = known.changes.at(cycle);
-    let excluded: Vec<_> = known
-        .programs()
-        .map(|program| standing.excluded(program))
-        .collect();
-    let margin = known.margin(cycle, &excluded);
-    let cycle_master = members::cycle_master(known, &standing, cycle);
-    let stations = known
-        .stations()
-        .map(|station| members::station(known, &standing, station, cycle));
-    let remote_ios = known
-        .programs()
-        .map(|program| members::remote_io(known, &standing, program, cycle));
-    let plants = known
-        .programs()
-        .filter_map(|program| members::plant(known, &standing, program));
+pub(crate) fn state(run: &RunModel, cycle: i64, finished: bool) -> Option<State> {
+    let snapshot = run.snapshot_at(cycle)?;
+    let (oldest, newest) = (run.oldest()?, run.newest()?);
+    let programs = snapshot.programs.iter().enumerate();
+    let alarms = run.alarms_at(cycle).rev().take(LISTED_ALARMS);
     Some(State {
         age_ms: 0,
         cycle,
         oldest,
         newest,
-        finished: known.has_ended(),
-        scenario_over: run.scenario_over(cycle).map(str::to_owned),
-        cycle_master: cycle_master.map(|station| name(known, Member::Station(station))),
-        members: stations.chain(remote_ios).chain(plants).collect(),
-        programs: known
-            .programs()
-            .map(|program| shown_program(known, &standing, program, cycle))
+        finished,
+        members: members(&snapshot),
+        programs: programs
+            .map(|(index, program)| shown_program(&snapshot, index, program))
             .collect(),
-        timing: timing(known, cycle),
-        survival: survival(known, &margin),
-        alarms: run
-            .alarms()
-            .rev()
-            .filter(|alarm| alarm.cycle <= cycle)
-            .take(100)
-            .map(shown_alarm)
-            .collect(),
-        event_count: run.event_count(),
+        timing: timing(run, &snapshot),
+        redundancy: redundancy(&snapshot),
+        open_alarms: snapshot.alarms.len(),
+        alarms: alarms.map(shown_alarm).collect(),
+        event_count: snapshot.events,
+        cycle_master: snapshot.cycle_master,
+        scenario_over: snapshot.scenario_over,
     })
 }
 
-pub(crate) fn name(known: &Known, member: Member) -> String {
-    known.run.members().name(member).to_owned()
-}
-
 /// A program has the name of its controller.
-pub(crate) fn program_name(known: &Known, program: ProgramId) -> String {
-    name(known, Member::Station(StationId(program.0)))
+pub(crate) fn program_name(run: &RunModel, program: ProgramId) -> String {
+    let controller = Member::Station(StationId(program.0));
+    run.members().name(controller).to_owned()
 }
 
-fn program_names(known: &Known, programs: ProgramSet) -> Vec<String> {
-    let names = programs.iter().map(|program| program_name(known, program));
-    names.collect()
-}
-
-fn shown_program(
-    known: &Known,
-    standing: &Standing,
-    program: ProgramId,
-    cycle: i64,
-) -> ShownProgram {
-    let run = &known.run;
-    let step = run.history(program).and_then(|steps| steps.at(cycle));
-    let driven = step.and_then(|step| step.driven.as_ref());
-    let sampled = step.and_then(|step| step.sampled.as_ref());
-    let own = words_of(known, StationId(program.0), cycle);
-    let protected = standing.protection(program);
+fn shown_program(snapshot: &Snapshot, index: usize, program: &ProgramSnapshot) -> ShownProgram {
+    let controller = snapshot.stations.get(index);
+    let published = controller.and_then(|controller| controller.words.first());
     ShownProgram {
-        index: program.index(),
-        name: program_name(known, program),
-        source: driven.map_or("unknown", |driven| source_word(driven.source)),
-        word_of: driven
-            .and_then(|driven| driven.word_of)
-            .map(|station| name(known, Member::Station(station))),
-        missing: driven.and_then(|driven| driven.missing).map(missing_words),
-        inputs: sampled.map(|sampled| sampled.inputs.to_string()),
-        outputs: driven.map(|driven| driven.outputs.to_string()),
-        said: own.into_iter().next().map(|word| word.sum),
-        forced: standing
-            .forced(program)
-            .map(|force| {
-                let (kind, index) = match force.signal {
-                    SignalPlace::Input(index) => ("input", index),
-                    SignalPlace::Output(index) => ("output", index),
-                };
-                ShownForce {
-                    kind,
-                    index,
-                    value: force.value,
-                    seconds: force.seconds,
-                    owner: force.owner.clone(),
-                    reason: force.reason.clone(),
-                }
-            })
-            .collect(),
-        protection: protected.protection.map(|protection| ShownProtection {
-            words: protection.text(),
-            protection,
-        }),
-        lost: protected.lost.map(|lost| ShownLost {
+        index,
+        name: program.program.clone(),
+        source: program.source.unwrap_or("unknown"),
+        word_of: program.word_of.clone(),
+        missing: program.missing,
+        inputs: program.inputs.clone(),
+        outputs: program.outputs.clone(),
+        published: published.map(|word| word.sum.clone()),
+        awaits_release: program.awaits_release,
+        forced: program.forces.iter().map(shown_force).collect(),
+        protection: program
+            .protection
+            .clone()
+            .map(|protection| ShownProtection {
+                words: protection.text(),
+                protection,
+            }),
+        lost: program.lost.clone().map(|lost| ShownLost {
             words: lost.text(),
             lost,
         }),
-        counts: counts(known, program, cycle),
+        counts: Counts {
+            direct: program.direct,
+            reconstructed: program.reconstructed,
+            held: program.held,
+            fail_safe: program.fail_safe,
+        },
     }
 }
 
-/// As the journal says it, for people.
-pub(crate) fn missing_words(missing: Missing) -> String {
-    let word = serde_json::to_value(missing).ok();
-    let word = word.as_ref().and_then(|word| word.as_str());
-    word.unwrap_or_default().replace('-', " ")
-}
-
-fn counts(known: &Known, program: ProgramId, cycle: i64) -> Counts {
-    let mut counts = Counts::default();
-    let Some(sources) = known.run.series().sources(program) else {
-        return counts;
+fn shown_force(force: &Force) -> ShownForce {
+    let (kind, index) = match force.signal {
+        SignalPlace::Input(index) => ("input", index),
+        SignalPlace::Output(index) => ("output", index),
     };
-    // As the report counts: not before everybody was synchronised.
-    let first = if known.run.has_origin() { 0 } else { i64::MIN };
-    for span in sources.spans(first, cycle + 1) {
-        let cycles = u64::try_from(span.to - span.from).unwrap_or(0);
-        match span.value {
-            Source::Direct => counts.direct += cycles,
-            Source::Reconstructed => counts.reconstructed += cycles,
-            Source::Held => counts.held += cycles,
-            Source::FailSafe => counts.fail_safe += cycles,
-        }
+    ShownForce {
+        kind,
+        index,
+        value: force.value,
+        seconds: force.seconds,
+        owner: force.owner.clone(),
+        reason: force.reason.clone(),
     }
-    counts
 }
 
-fn timing(known: &Known, cycle: i64) -> Timing {
-    let until = || known.run.timings().filter(|timing| timing.cycle <= cycle);
-    let least = until().map(|timing| timing.margin_ns).min();
+fn timing(run: &RunModel, snapshot: &Snapshot) -> Timing {
+    let until = snapshot.cycle.unwrap_or(i64::MAX);
+    let timings = || run.timings().filter(|timing| timing.cycle <= until);
+    let least = timings().map(|timing| timing.margin_ns).min();
     // The newest cycles are not closed yet.
-    let own = until().next_back();
-    let stalls = known.run.events();
+    let own = timings().next_back();
     Timing {
         cycle_us: own
             .and_then(|timing| timing.cycle_ns)
             .map(|cycle_ns| cycle_ns / 1000),
         margin_us: own.map(|timing| timing.margin_ns / 1000),
         least_margin_us: least.map(|least| least / 1000),
-        stalls: stalls
-            .filter(|event| event.event == "stalled" && event.cycle <= cycle)
-            .count(),
+        stalls: snapshot.host_stalls,
     }
 }
 
-fn survival(known: &Known, margin: &Margin) -> Survival {
-    let of_stations = |outcome: &&Outcome| {
-        let mut failed = outcome.failed.iter();
-        failed.all(|member| matches!(member, Member::Station(_)))
+fn redundancy(snapshot: &Snapshot) -> Redundancy {
+    let margin = &snapshot.margin;
+    let is_station = |name: &String| snapshot.stations.iter().any(|known| known.name == *name);
+    let singles = margin.singles.iter();
+    let singles: Vec<&OutcomeSnapshot> = singles
+        .filter(|outcome| outcome.failed.iter().all(is_station))
+        .collect();
+    let (level, words) = in_words(margin, &singles);
+    // A program that has no provable outputs is no good sign, whatever else would be masked.
+    let programs = snapshot.programs.iter().map(|program| &program.program);
+    let lost: Vec<&str> = programs
+        .filter(|program| !margin.served.contains(program))
+        .map(String::as_str)
+        .collect();
+    let (level, words) = if lost.is_empty() || level == "none" {
+        (level, words)
+    } else {
+        let lost = lost.join(" and ");
+        let words = format!("{lost} has no provable outputs; of the others: {words}");
+        ("some", words)
     };
-    let singles: Vec<&Outcome> = margin.singles.iter().filter(of_stations).collect();
-    let masked = singles.iter().filter(|outcome| outcome.is_masked()).count();
-    let (level, words) = match (margin.survives, masked) {
-        _ if margin.served.is_empty() => ("none", "no program has true outputs now".to_owned()),
-        (0, 0) => (
-            "none",
-            "no further failure of a station would be masked".to_owned(),
-        ),
-        (0, _) => (
-            "some",
-            format!(
-                "{masked} of {} failures of a single station would be masked",
-                singles.len()
-            ),
-        ),
-        (1, _) => (
-            "all",
-            "any one further failure of a station would be masked".to_owned(),
-        ),
-        _ => (
-            "all",
-            "any two further failures of stations would be masked".to_owned(),
-        ),
-    };
-    // A program that has lost its outputs already is no good sign, whatever else would be masked.
-    let lost = known
-        .programs()
-        .filter(|program| !margin.served.contains(*program));
-    let lost = program_names(known, lost.collect());
-    let (level, words) = match (lost.is_empty(), level) {
-        (true, _) | (_, "none") => (level, words),
-        _ => (
-            "some",
-            format!(
-                "{} has no true outputs now; of the others: {words}",
-                lost.join(" and ")
-            ),
-        ),
-    };
-    let unmasked_pairs = margin.pairs.iter().filter(|pair| !pair.is_masked());
+    let unmasked_pairs = margin.pairs.iter().filter(|pair| !pair.masked);
     let failures = singles.into_iter().chain(unmasked_pairs);
-    Survival {
+    Redundancy {
         level,
         words,
-        failures: failures
-            .take(LISTED_FAILURES)
-            .map(|outcome| failure(known, outcome))
-            .collect(),
+        survives: margin.survives,
+        failures: failures.take(LISTED_FAILURES).map(failure).collect(),
     }
 }
 
-fn failure(known: &Known, outcome: &Outcome) -> Failure {
-    let lost = outcome.lost.iter().map(|loss| {
-        let program = program_name(known, loss.program);
-        match loss.missing {
-            Some(missing) => format!("{program} loses its outputs ({})", missing_words(missing)),
-            None => format!("{program} loses its outputs"),
+fn in_words(margin: &MarginSnapshot, singles: &[&OutcomeSnapshot]) -> (&'static str, String) {
+    let masked = singles.iter().filter(|outcome| outcome.masked).count();
+    let (level, words) = match (margin.survives, masked) {
+        _ if margin.served.is_empty() => ("none", "no program has provable outputs"),
+        (0, 0) => ("none", "no further failure of a station would be masked"),
+        (0, _) => {
+            let of = singles.len();
+            let words = format!("{masked} of {of} failures of a single station would be masked");
+            return ("some", words);
         }
-    });
-    let failed = outcome.failed.iter();
+        (1, _) => (
+            "all",
+            "any one further failure of a station would be masked",
+        ),
+        _ => (
+            "all",
+            "any two further failures of stations would be masked",
+        ),
+    };
+    (level, words.to_owned())
+}
+
+fn failure(outcome: &OutcomeSnapshot) -> Failure {
     Failure {
-        names: failed.map(|&member| name(known, member)).collect(),
-        masked: outcome.is_masked(),
-        why: lost.collect::<Vec<_>>().join("; "),
+        names: outcome.failed.clone(),
+        masked: outcome.masked,
+        why: outcome.why.clone(),
     }
 }
 
-fn shown_alarm(alarm: &Alarm) -> ShownAlarm {
+fn shown_alarm(alarm: Alarm) -> ShownAlarm {
     ShownAlarm {
         id: alarm.number,
         cycle: alarm.cycle,
-        who: alarm.name.clone(),
-        what: alarm.text.clone(),
+        who: alarm.name,
+        what: alarm.text,
         lasts: alarm.over.is_none(),
-        acknowledged: alarm.acknowledged_by.clone(),
+        acknowledged: alarm.acknowledged_by,
         acknowledged_in: alarm.acknowledged_in,
     }
 }

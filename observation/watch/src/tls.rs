@@ -1,4 +1,4 @@
-//! The certificate of the page: one that was given, or one that is made for this run and signed by nobody.
+//! The certificate of the page: a given one, or a self-signed one that is made for this run.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;

@@ -1,10 +1,11 @@
 //! The end of a cycle, and of a run: what was open is counted.
 
-use understudy_wire::{ProgramId, ProgramSet, Source};
+use understudy_wire::{ProgramId, ProgramSet};
 
 use super::presence::{Interval, Presence, Presences};
 use super::stalls::Stall;
 use super::{Account, OpenCycle};
+use understudy_journal::is_provable;
 
 impl Account {
     pub(super) fn close(&mut self, number: i64, cycle: &OpenCycle) {
@@ -33,9 +34,9 @@ impl Account {
             if source.is_some_and(|source| during.sources.contains(&source)) {
                 continue;
             }
-            // What comes from a fresh word is the cluster's own doing; a stall explains only that there was none in time.
-            let without_word = matches!(source, None | Some(Source::Held | Source::FailSafe));
-            if stalled && without_word {
+            // A stall explains a missed cycle, and nothing else.
+            let is_missed = !source.is_some_and(is_provable);
+            if stalled && is_missed {
                 finding.missed_by_stall += 1;
             } else {
                 finding.missed += 1;

@@ -9,6 +9,8 @@ use serde::{Deserialize, Serialize};
 use understudy_simulator::Action;
 use understudy_wire::{Member, StationId, StationSet};
 
+use understudy_journal::Process;
+
 /// What a station was.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -93,15 +95,8 @@ impl Presences {
         let Member::Station(station) = member else {
             return;
         };
-        match action {
-            Action::Crash | Action::Stop => self.changes.push((at, station, true)),
-            Action::Restart
-            | Action::RestartMisconfigured
-            | Action::RestartInEpoch { .. }
-            | Action::Continue => {
-                self.changes.push((at, station, false));
-            }
-            _ => {}
+        if let Some(process) = Process::after(action) {
+            self.changes.push((at, station, !process.is_running()));
         }
     }
 

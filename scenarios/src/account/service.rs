@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use understudy_wire::{Field, Source};
 
 use super::presence::{Interval, extend};
+use understudy_journal::is_provable;
 
 /// A deadline of a remote I/O.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -113,11 +114,9 @@ impl ServiceTrack {
                 counts.wrong += 1;
                 Service::Wrong
             }
-            Some(outcome) => match outcome.source {
-                Source::Direct | Source::Reconstructed => Service::Functional,
-                Source::Held => Service::Held,
-                Source::FailSafe => Service::FailSafe,
-            },
+            Some(outcome) if is_provable(outcome.source) => Service::Functional,
+            Some(outcome) if outcome.source == Source::Held => Service::Held,
+            Some(_) => Service::FailSafe,
         };
         extend(&mut self.intervals, at, service);
     }

@@ -11,6 +11,8 @@ use serde::Serialize;
 use understudy_simulator::Action;
 use understudy_wire::Member;
 
+use understudy_journal::Process;
+
 /// One wake-up that came too late.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Stall {
@@ -43,23 +45,15 @@ pub(crate) struct Stalls {
 
 impl Stalls {
     pub(crate) fn step(&mut self, number: i64, member: Member, action: Action) {
-        match action {
-            Action::Slow { by } if !by.is_zero() => {
-                self.disturbed.insert(member, None);
-            }
-            Action::Crash | Action::Stop => {
-                self.disturbed.insert(member, None);
-            }
-            Action::Restart
-            | Action::RestartMisconfigured
-            | Action::RestartInEpoch { .. }
-            | Action::Continue
-            | Action::Slow { .. } => {
-                self.disturbed
-                    .insert(member, Some(number + OWN_DOING_CYCLES));
-            }
-            _ => {}
-        }
+        let is_undisturbed = match action {
+            Action::Slow { by } => by.is_zero(),
+            _ => match Process::after(action) {
+                Some(process) => process.is_running(),
+                None => return,
+            },
+        };
+        let until = is_undisturbed.then_some(number + OWN_DOING_CYCLES);
+        self.disturbed.insert(member, until);
     }
 
     /// `member` was woken too late in the cycle with this number.

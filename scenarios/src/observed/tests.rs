@@ -3,6 +3,8 @@ use understudy_node::Event as StationEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_wire::{Image, Moment, StationSet};
 
+use understudy_simulator::Action;
+
 use super::*;
 use crate::outlook::look_ahead;
 

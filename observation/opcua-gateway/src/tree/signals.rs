@@ -30,18 +30,13 @@ impl Tree {
         self.enter(&["Programs", &controller.name, "Outputs"]);
         for (bit, output) in circuit.outputs().iter().enumerate() {
             let name = output.name.clone();
-            self.add(
-                &output.name,
-                Kind::Boolean,
-                "as it is driven",
-                move |seen| {
-                    let program = seen.program(place);
-                    let image = program.and_then(|program| program.outputs.as_deref());
-                    let own = program.map(|program| trust::output(program, &name));
-                    let value = bit_of(image, bit).map(Variant::from);
-                    seen.present(value, own.unwrap_or_default())
-                },
-            );
+            self.add(&output.name, Kind::Boolean, "as driven", move |seen| {
+                let program = seen.program(place);
+                let image = program.and_then(|program| program.outputs.as_deref());
+                let own = program.map(|program| trust::output(program, &name));
+                let value = bit_of(image, bit).map(Variant::from);
+                seen.present(value, own.unwrap_or_default())
+            });
         }
         self.enter(&["Programs", &controller.name, "Markers"]);
         let names: Vec<&str> = circuit
@@ -54,7 +49,7 @@ impl Tree {
             self.add(
                 &word.name,
                 kind,
-                "in the state before its last sample",
+                "value in the state before the last sample",
                 move |seen| {
                     let states = &seen.observation.states;
                     let state = states.get(place).and_then(Option::as_deref);

@@ -1,8 +1,8 @@
-//! What stations, remote I/Os and plants say of themselves.
+//! Events of stations, remote I/Os and plants.
 
 use understudy_journal::{Members, source_word};
 use understudy_node::Event as StationEvent;
-use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason};
+use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason, ValueFault};
 use understudy_wire::{Member, SignalPlace, StationId};
 
 use super::{Words, list, missing_text, program_name, programs, stations};
@@ -16,7 +16,7 @@ pub(super) fn station(event: &StationEvent, members: &Members) -> Words {
                 .iter()
                 .map(|word| format!("{} {}", programs(word.mask, members), word.sum))
                 .collect();
-            ("published", Info, format!("says {}", list(&words)))
+            ("published", Info, format!("publishes {}", list(&words)))
         }
         StationEvent::Holds {
             program, lineage, ..
@@ -31,7 +31,7 @@ pub(super) fn station(event: &StationEvent, members: &Members) -> Words {
         StationEvent::BecameCycleMaster { .. } => (
             "became-cycle-master",
             Notice,
-            "starts the cycles from now on".to_owned(),
+            "is the cycle master".to_owned(),
         ),
         StationEvent::Flagged { station, .. } => flagged(*station, members),
         StationEvent::Cleared { station, .. } => cleared(*station, members),
@@ -40,7 +40,7 @@ pub(super) fn station(event: &StationEvent, members: &Members) -> Words {
                 "listens".to_owned()
             } else {
                 format!(
-                    "listens, and asks for the state of {}",
+                    "listens and requests the state of {}",
                     programs(*wants, members)
                 )
             };
@@ -56,7 +56,7 @@ pub(super) fn station(event: &StationEvent, members: &Members) -> Words {
             let text = match from {
                 Some(from) => {
                     let from = members.name(Member::Station(*from));
-                    format!("has the state of {whose} from {from}, at lineage {lineage}")
+                    format!("has received the state of {whose} from {from}, at lineage {lineage}")
                 }
                 None => format!("starts {whose} from its initial state"),
             };
@@ -67,7 +67,7 @@ pub(super) fn station(event: &StationEvent, members: &Members) -> Words {
             (
                 "synchronised",
                 Notice,
-                format!("is synchronised with {whose}, and speaks for it"),
+                format!("is synchronised with {whose} and publishes for it"),
             )
         }
         StationEvent::DigestDiffers {
@@ -78,7 +78,7 @@ pub(super) fn station(event: &StationEvent, members: &Members) -> Words {
             (
                 "digest-differs",
                 Warning,
-                format!("has another state of {whose} than {other}, after the same inputs"),
+                format!("has a different state of {whose} than {other} after the same inputs"),
             )
         }
         StationEvent::Excluded { program, .. } => {
@@ -86,12 +86,16 @@ pub(super) fn station(event: &StationEvent, members: &Members) -> Words {
             (
                 "excluded",
                 Alarm,
-                format!("says nothing of {whose}: its state was found faulty"),
+                format!("does not publish for {whose}: its state was found faulty"),
             )
         }
         StationEvent::Readmitted { program, .. } => {
             let whose = program_name(*program, members);
-            ("readmitted", Notice, format!("begins again with {whose}"))
+            (
+                "readmitted",
+                Notice,
+                format!("is readmitted and requests the state of {whose}"),
+            )
         }
         StationEvent::Refused {
             member,
@@ -116,7 +120,7 @@ pub(super) fn remote_io(event: &RemoteIoEvent, members: &Members) -> Words {
             let mut text = format!("drives {outputs}, {}", source_word(*source));
             if let Some(station) = word_of {
                 text += &format!(
-                    " from a word of {}",
+                    " from a parity word of {}",
                     members.name(Member::Station(*station))
                 );
             }
@@ -127,7 +131,7 @@ pub(super) fn remote_io(event: &RemoteIoEvent, members: &Members) -> Words {
         }
         RemoteIoEvent::StartedCold { awaits_release, .. } => {
             let release = if *awaits_release {
-                "; an operator has to release its outputs"
+                "; the operator has to release its outputs"
             } else {
                 ""
             };
@@ -142,7 +146,7 @@ pub(super) fn remote_io(event: &RemoteIoEvent, members: &Members) -> Words {
             (
                 "adopted-lineage",
                 Notice,
-                format!("goes on from the state that {from} has, at lineage {lineage}"),
+                format!("continues from the state of {from}, at lineage {lineage}"),
             )
         }
         RemoteIoEvent::Disputed { stations: who, .. } => {
@@ -151,7 +155,7 @@ pub(super) fn remote_io(event: &RemoteIoEvent, members: &Members) -> Words {
                 "disputed",
                 Alarm,
                 format!(
-                    "{who} hold different states of one cycle: an operator has to decide by releasing its outputs"
+                    "{who} hold different states of the same cycle: the operator has to decide by releasing its outputs"
                 ),
             )
         }
@@ -164,7 +168,7 @@ pub(super) fn remote_io(event: &RemoteIoEvent, members: &Members) -> Words {
         } => {
             let holder = members.name(Member::Station(*holder));
             let behind = applied.map_or_else(
-                || "it cannot know whether newer outputs were applied".to_owned(),
+                || "it is not known whether newer outputs were applied".to_owned(),
                 |applied| format!("outputs of cycle {} were applied", applied.cycle.0),
             );
             let next = if *asks {
@@ -214,23 +218,23 @@ pub(super) fn remote_io(event: &RemoteIoEvent, members: &Members) -> Words {
             "voided",
             Warning,
             format!(
-                "{samples} samples that nobody heard are void; it goes on from lineage {lineage}"
+                "{samples} samples that no station received are void; it continues from lineage {lineage}"
             ),
         ),
         RemoteIoEvent::Released { .. } => (
             "released",
             Notice,
-            "an operator has released its outputs and whom it had accused".to_owned(),
+            "the operator has released its outputs and the stations that it excluded".to_owned(),
         ),
         RemoteIoEvent::RecalledExclusion { stations: who, .. } => {
             let who = stations(*who, members);
             let text = format!(
-                "{who} stays excluded, as other stations recall, until an operator releases it"
+                "{who} remains excluded, as other stations recall, until the operator releases it"
             );
             ("recalled-exclusion", Alarm, text)
         }
         RemoteIoEvent::Diagnosed { failed, .. } => {
-            let text = format!("its diagnosis finds these channels failed: {failed}");
+            let text = format!("diagnoses these channels as failed: {failed}");
             ("diagnosed", Warning, text)
         }
         RemoteIoEvent::Flagged { station, .. } => flagged(*station, members),
@@ -242,7 +246,7 @@ pub(super) fn remote_io(event: &RemoteIoEvent, members: &Members) -> Words {
             (
                 "syndrome",
                 Warning,
-                format!("the words do not add up, syndrome {syndrome}: one of {who} is wrong"),
+                format!("the syndrome is {syndrome}, not 0: one of {who} is wrong"),
             )
         }
         RemoteIoEvent::ValueFault {
@@ -253,9 +257,14 @@ pub(super) fn remote_io(event: &RemoteIoEvent, members: &Members) -> Words {
         } => {
             let who = stations(*accused, members);
             let text = if *located {
-                format!("{who} is wrong by majority, and excluded until an operator releases it")
+                format!("{who} is wrong by majority and excluded until the operator releases it")
             } else {
-                format!("one of {who} is wrong, and nobody can say who; the answer is {answer:?}")
+                {
+                    let reaction = value_fault_word(*answer);
+                    format!(
+                        "{who} disagree and no majority exists; configured reaction: {reaction}"
+                    )
+                }
             };
             ("value-fault", Alarm, text)
         }
@@ -291,16 +300,25 @@ pub(super) fn remote_io(event: &RemoteIoEvent, members: &Members) -> Words {
             signal, expired, ..
         } => {
             let why = if *expired {
-                "its time is over"
+                "its time has elapsed"
             } else {
-                "taken back"
+                "removed by the operator"
             };
             (
                 "unforced",
                 Notice,
-                format!("{} is its own again: {why}", place(*signal)),
+                format!("{} is no longer forced: {why}", place(*signal)),
             )
         }
+    }
+}
+
+/// A reaction as the cluster file names it.
+fn value_fault_word(reaction: ValueFault) -> &'static str {
+    match reaction {
+        ValueFault::Hold => "hold",
+        ValueFault::Alarm => "alarm",
+        ValueFault::FailSafe => "fail-safe",
     }
 }
 
@@ -315,7 +333,7 @@ pub(super) fn plant(event: &understudy_plant::Event, members: &Members) -> Words
     match event {
         understudy_plant::Event::Stepped { field, .. } => {
             let text = format!(
-                "its sensors see {}, {} finished",
+                "sensors {}, {} parts finished",
                 field.sensors, field.finished
             );
             ("stepped", Level::Info, text)
@@ -333,13 +351,17 @@ fn flagged(station: StationId, members: &Members) -> Words {
     (
         "flagged",
         Level::Warning,
-        format!("{name} has been silent for too long, and its slot is closed"),
+        format!("{name} was not received for too long and is flagged: its slot is closed"),
     )
 }
 
 fn cleared(station: StationId, members: &Members) -> Words {
     let name = members.name(Member::Station(station));
-    ("cleared", Level::Notice, format!("{name} speaks again"))
+    (
+        "cleared",
+        Level::Notice,
+        format!("{name} is received again, and its slot is open"),
+    )
 }
 
 fn refused(member: Member, theirs: String, ours: String, members: &Members) -> Words {
@@ -347,7 +369,7 @@ fn refused(member: Member, theirs: String, ours: String, members: &Members) -> W
     (
         "refused",
         Level::Warning,
-        format!("{name} runs configuration {theirs}, not {ours}; its frames are dropped"),
+        format!("{name} runs configuration {theirs} instead of {ours}; its frames are dropped"),
     )
 }
 
@@ -355,16 +377,16 @@ fn stalled(late: std::time::Duration) -> Words {
     (
         "stalled",
         Level::Notice,
-        format!("the host woke it {late:.1?} late"),
+        format!("host stall: woken {late:.1?} late"),
     )
 }
 
-/// Why a station cannot stand in for a program.
+/// Why a station cannot prove the outputs of a program.
 fn lacking_text(lacking: &Lacking, members: &Members) -> String {
     let name = members.name(Member::Station(lacking.station));
     match lacking.reason {
         LackingReason::NotReceived => {
-            format!("{name} is not received (it is down, or the link from it)")
+            format!("{name} is not received: it or its link has failed")
         }
         LackingReason::Joining => format!("{name} is joining"),
         LackingReason::Behind { stepped } => {
@@ -372,7 +394,7 @@ fn lacking_text(lacking: &Lacking, members: &Members) -> String {
         }
         LackingReason::Excluded => format!("{name} is excluded"),
         LackingReason::Failed => {
-            format!("{name} has failed, and the paper's mode masks one failure")
+            format!("{name} has failed, and mode `paper` masks one failure only")
         }
     }
 }

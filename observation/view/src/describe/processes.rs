@@ -1,4 +1,4 @@
-//! What the processes of the members say, and whoever runs them.
+//! Events of the processes of members, and of the laboratory that runs them.
 
 use understudy_bus::HostEvent;
 use understudy_journal::{Action, Members, RunEvent};
@@ -20,47 +20,50 @@ pub(super) fn host(event: &HostEvent, names: &Members) -> Words {
         HostEvent::RefusedBytes { datagrams, reason } => (
             "refused-bytes",
             Warning,
-            format!("{datagrams} datagrams were no frames: {reason}"),
+            format!("{datagrams} datagrams were not frames: {reason}"),
         ),
         HostEvent::RefusedFrames {
             datagrams, reason, ..
         } => (
             "refused-frames",
             Warning,
-            format!("{datagrams} frames did not count: {reason}"),
+            format!("{datagrams} frames were rejected: {reason}"),
         ),
         HostEvent::ChannelOpened { address, .. } => (
             "channel-opened",
             Info,
-            format!("operators can call at {address}"),
+            format!("listens for operators at {address}"),
         ),
         HostEvent::ChannelFailed { reason } => (
             "channel-failed",
             Warning,
-            format!("operators cannot call: {reason}"),
+            format!("cannot listen for operators: {reason}"),
         ),
         HostEvent::DuplicateFound { member } => (
             "duplicate-found",
             Alarm,
             format!(
-                "receives frames of two lives of {}: two processes run with its keys",
+                "receives frames of two processes that run with the keys of {}",
                 names.name(*member)
             ),
         ),
         HostEvent::DuplicateGone { member } => (
             "duplicate-gone",
             Notice,
-            format!("receives one life of {} only again", names.name(*member)),
+            format!(
+                "receives frames of one process only that runs with the keys of {}",
+                names.name(*member)
+            ),
         ),
         HostEvent::NewLife { life } => (
             "new-life",
             Warning,
-            format!("is not received by the others and goes on in a new life, {life}"),
+            format!("is not received by the others and continues in a new life, {life}"),
         ),
         HostEvent::NoNewLife { reason } => (
             "no-new-life",
             Warning,
-            format!("is not received by the others and cannot begin a new life: {reason}"),
+            format!("is not received by the others and cannot start a new life: {reason}"),
         ),
         HostEvent::RefusedConnections {
             connections,
@@ -69,7 +72,7 @@ pub(super) fn host(event: &HostEvent, names: &Members) -> Words {
             "refused-connections",
             Warning,
             format!(
-                "{connections} connections to the operators' port were refused: too many at once, the last from {address}"
+                "{connections} connections to the operators' port were refused because of the limit, the last from {address}"
             ),
         ),
         HostEvent::UnsendableFrames { frames, reason } => (
@@ -80,14 +83,12 @@ pub(super) fn host(event: &HostEvent, names: &Members) -> Words {
         HostEvent::LinkReopened { silence_ms } => (
             "link-reopened",
             Warning,
-            format!("received no member for {silence_ms} ms and opened its link anew"),
+            format!("received no member for {silence_ms} ms and reopened its link"),
         ),
         HostEvent::LinkFailed { silence_ms, reason } => (
             "link-failed",
             Alarm,
-            format!(
-                "received no member for {silence_ms} ms and cannot open its link anew: {reason}"
-            ),
+            format!("received no member for {silence_ms} ms and cannot reopen its link: {reason}"),
         ),
         HostEvent::FieldLost { reason } => (
             "field-lost",
@@ -102,12 +103,12 @@ pub(super) fn host(event: &HostEvent, names: &Members) -> Words {
         HostEvent::FieldContested => (
             "field-contested",
             Alarm,
-            "another master writes the outputs of its equipment too".to_owned(),
+            "another master writes the outputs of its equipment".to_owned(),
         ),
         HostEvent::FieldUncontested => (
             "field-uncontested",
             Notice,
-            "its equipment holds what it wrote".to_owned(),
+            "its equipment holds the outputs that it wrote".to_owned(),
         ),
         HostEvent::JournalLost { records } => (
             "journal-lost",
@@ -117,14 +118,14 @@ pub(super) fn host(event: &HostEvent, names: &Members) -> Words {
         HostEvent::UnknownCommand { line } => (
             "unknown-command",
             Warning,
-            format!("was told what is no command: {line}"),
+            format!("received an unknown command: {line}"),
         ),
         HostEvent::Exchange(exchange) => (
             "exchange",
             Info,
             format!("{} complete cycles", exchange.complete_cycles),
         ),
-        HostEvent::Stopped(_) => ("stopped", Info, "ended as it was told to".to_owned()),
+        HostEvent::Stopped(_) => ("stopped", Info, "ended as requested".to_owned()),
     }
 }
 
@@ -150,7 +151,7 @@ pub(super) fn run(event: &RunEvent, members: &Members) -> Words {
             let what = what["command"].as_str().unwrap_or("command").to_owned();
             let refused = refused
                 .as_ref()
-                .map_or(String::new(), |why| format!("; not done: {why}"));
+                .map_or(String::new(), |why| format!("; refused: {why}"));
             let text = format!(
                 "{owner} commands {what} of {}: {reason}{refused}",
                 members.name(*member)
@@ -161,19 +162,22 @@ pub(super) fn run(event: &RunEvent, members: &Members) -> Words {
             "acknowledged",
             Notice,
             format!(
-                "{} has seen the alarm {} of {}, of cycle {}",
+                "{} has acknowledged the alarm {} of {} of cycle {}",
                 seen.owner, seen.alarm, seen.name, seen.cycle
             ),
         ),
         RunEvent::Attached { member } => (
             "attached",
             Notice,
-            format!("{} tells its journal here", members.name(*member)),
+            format!("the journal of {} is received", members.name(*member)),
         ),
         RunEvent::Detached { member, reason } => (
             "detached",
             Warning,
-            format!("{} is not heard here: {reason}", members.name(*member)),
+            format!(
+                "the journal of {} is not received: {reason}",
+                members.name(*member)
+            ),
         ),
         RunEvent::Ended { member, how, said } => {
             let last = said
@@ -185,33 +189,33 @@ pub(super) fn run(event: &RunEvent, members: &Members) -> Words {
         RunEvent::Origin { .. } => (
             "origin",
             Info,
-            "everybody is synchronised: cycles are counted from here".to_owned(),
+            "all stations are synchronised: cycles are counted from here".to_owned(),
         ),
         RunEvent::ScenarioOver { verdict } => (
             "scenario-over",
             Notice,
-            format!("the scenario is over, and the cluster stays up; {verdict}"),
+            format!("the scenario is over and the cluster stays up; {verdict}"),
         ),
         RunEvent::Interrupted => (
             "interrupted",
             Notice,
-            "the run was asked to end early".to_owned(),
+            "the run was ended early on request".to_owned(),
         ),
         RunEvent::Finished => ("finished", Info, "the run is over".to_owned()),
     }
 }
 
-/// What was done to a member.
+/// An action on a member.
 pub(crate) fn fault_text(action: Action, member: Member, members: &Members) -> String {
     let name = members.name(member);
     match action {
         Action::Crash => format!("{name} is killed"),
         Action::Restart => format!("{name} is started again"),
-        Action::Stop => format!("{name} is stopped"),
-        Action::Continue => format!("{name} goes on"),
+        Action::Stop => format!("{name} is suspended"),
+        Action::Continue => format!("{name} is resumed"),
         Action::Cut { to } => format!("{name} is cut off from {}", members.name(to)),
         Action::Heal { to } => format!("{name} is connected to {} again", members.name(to)),
-        Action::Delay { to, by } => format!("{} hears {name} {by:?} later", members.name(to)),
+        Action::Delay { to, by } => format!("{} receives {name} {by:?} later", members.name(to)),
         Action::Release => format!("{name} is released"),
         Action::Choose {
             choice: StateChoice::Cold,
@@ -219,6 +223,6 @@ pub(crate) fn fault_text(action: Action, member: Member, members: &Members) -> S
         Action::Choose { .. } => {
             format!("the operator continues the program of {name} from the newest available state")
         }
-        other => format!("{} is done to {name}", other.word()),
+        other => format!("{} of {name}", other.word()),
     }
 }

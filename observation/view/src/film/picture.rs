@@ -189,7 +189,7 @@ impl<'f> Drawing<'f> {
             let (x, width) = self.place(place);
             for (state, spans) in by_value(&station.states) {
                 self.during(&spans, |drawing| {
-                    drawing.frame((x, STATIONS_TOP, width), &of_state(state), state.word());
+                    drawing.frame((x, STATIONS_TOP, width), &of_state(state), state.text());
                 });
             }
             let kind = match station.understudy {

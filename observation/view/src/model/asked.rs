@@ -1,30 +1,29 @@
-//! What views ask of the model.
+//! Answers of the model.
 
 use std::sync::Arc;
 
 use understudy_cluster::Cluster;
-use understudy_journal::Members;
+use understudy_journal::{Members, SourceCounts};
 use understudy_ladder::{Evaluation, Observer};
 use understudy_logic::Scratch;
 use understudy_wire::{Moment, ProgramId, StationId};
 
-use super::{Model, ProgramTrack, SentTurn};
+use super::{Counters, Model, SentTurn};
 use crate::alarm::Alarm;
 use crate::error::ViewError;
 use crate::event::Event;
 use crate::history::History;
-use crate::margin::Holders;
 use crate::series::Series;
 use crate::station::StationState;
 use crate::timing::CycleTiming;
 
 impl Model {
-    /// What is run.
+    /// The cluster of the run.
     pub fn cluster(&self) -> &Arc<Cluster> {
         &self.cluster
     }
 
-    /// Who is who.
+    /// Names of the members.
     pub fn members(&self) -> &Members {
         &self.members
     }
@@ -34,7 +33,7 @@ impl Model {
         self.cycles.latest()
     }
 
-    /// Whether it is known where cycles are counted from.
+    /// Whether the origin of the cycles is known.
     pub fn has_origin(&self) -> bool {
         self.cycles.has_origin()
     }
@@ -44,29 +43,37 @@ impl Model {
         (self.records, self.left_out)
     }
 
-    /// The time of the newest record.
-    pub fn at_ns(&self) -> u64 {
-        self.at_ns
-    }
-
     /// The last record of the run was read.
     pub fn is_finished(&self) -> bool {
         self.finished
     }
 
-    /// What the scenario came to, where it is over in this cycle and the cluster stays up.
-    pub fn scenario_over(&self, cycle: i64) -> Option<&str> {
-        let (over, verdict) = self.scenario_over.as_ref()?;
-        (*over <= cycle).then_some(verdict)
+    /// Events that are counted from the first record on.
+    pub fn counters(&self) -> &Counters {
+        &self.counters
     }
 
-    /// What a station is now.
-    pub fn station_state(&self, station: StationId) -> Option<StationState> {
-        let track = self.stations.get(station.index())?;
-        Some(track.state(self.cycles.latest(), 1))
+    /// Deadlines of a program by source, from the origin up to a cycle.
+    pub(crate) fn source_counts(&self, program: ProgramId, cycle: Option<i64>) -> SourceCounts {
+        let track = self.programs.get(program.index()).zip(cycle);
+        track.map_or_else(SourceCounts::default, |(track, cycle)| {
+            track.tally.counts(cycle)
+        })
     }
 
-    /// What a program did in its last cycles.
+    /// The first cycle of those in a row that have the source of `cycle`.
+    pub(crate) fn since(&self, program: ProgramId, cycle: i64) -> Option<i64> {
+        self.programs.get(program.index())?.tally.since(cycle)
+    }
+
+    /// The present state of a station.
+    pub(crate) fn station_state(&self, station: StationId) -> Option<StationState> {
+        let standing = self.changes.now();
+        standing.station(station)?;
+        Some(self.station_state_in(standing, station, self.newest()))
+    }
+
+    /// The last cycles of a program.
     pub fn history(&self, program: ProgramId) -> Option<&History> {
         self.histories.get(program.index())
     }
@@ -96,40 +103,12 @@ impl Model {
         self.timings.iter()
     }
 
-    /// What the stations said in a cycle of the cluster.
+    /// The turns of the stations in a cycle of the cluster.
     pub fn sent_turns(&self, moment: Moment) -> &[SentTurn] {
         self.turns.of(moment)
     }
 
-    /// Who is alive, and holds what: what the margin of survival is calculated from.
-    pub fn holders(&self) -> Holders {
-        let latest = self.cycles.latest();
-        let widths = self.cluster.controllers().iter();
-        let holds = self.stations.iter().map(|track| {
-            if track.state(latest, 1) == StationState::Speaking {
-                track.covers.without(track.excluded)
-            } else {
-                Default::default()
-            }
-        });
-        Holders {
-            mode: self.cluster.agreement().mode,
-            widths: widths
-                .map(|controller| controller.circuit.outputs().len())
-                .collect(),
-            holds: holds.collect(),
-            heard: self.programs.iter().map(ProgramTrack::hears).collect(),
-            excluded: self.programs.iter().map(|track| track.excluded).collect(),
-            blocked: (0..)
-                .map(ProgramId)
-                .zip(&self.programs)
-                .filter(|(_, track)| track.is_blocked())
-                .map(|(program, _)| program)
-                .collect(),
-        }
-    }
-
-    /// The scan of a program in a cycle as its station evaluated it: what the power did in every rung.
+    /// The scan of a program in a cycle as its station evaluated it: the power flow of every rung.
     ///
     /// # Errors
     /// Where the cycle or the state is not known.
@@ -157,7 +136,7 @@ impl Model {
             no_state(
                 match step.driven.as_ref().and_then(|driven| driven.missing) {
                     Some(missing) => crate::describe::missing_text(missing),
-                    None => "the journal does not reach back to where its history starts",
+                    None => "the journal does not contain the start of its history",
                 },
             )
         })?;
@@ -167,7 +146,7 @@ impl Model {
             .get_or_init(|| Observer::new(&controller.program, period).ok());
         let observer = observer
             .as_ref()
-            .ok_or_else(|| no_state("its ladder cannot be lowered"))?;
+            .ok_or_else(|| no_state("its ladder cannot be evaluated"))?;
         let mut scratch = Scratch::default();
         Ok(observer.evaluate(&mut scratch, sampled.state.words(), sampled.inputs.words()))
     }

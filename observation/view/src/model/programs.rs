@@ -1,69 +1,53 @@
-//! What is driven of each program, and why.
+//! What remote I/Os and plants report.
 
 use understudy_journal::{Record, moment, source_word};
 use understudy_plant::Event as PlantEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
-use understudy_wire::{
-    Field, Force, Image, Member, Moment, ProgramId, SignalPlace, Source, StationId, StationSet,
-};
+use understudy_wire::{Image, Member, Moment, ProgramId, Source, StationId, StationSet};
 
 use super::Model;
+use super::standing::{Change, ProgramChange, StationChange};
+use super::tally::Tally;
 use crate::describe::{describe, missing_text};
 use crate::event::{Event, Level};
-use crate::protection::{LostState, Protection};
 
-/// One program at its remote I/O.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct ProgramTrack {
-    pub(crate) inputs: Option<Image>,
-    pub(crate) outputs: Option<Image>,
-    pub(crate) source: Option<Source>,
-    pub(crate) word_of: Option<StationId>,
-    pub(crate) missing: Option<Missing>,
-    /// Since when its outputs come from there.
-    pub(crate) since: i64,
-    /// Cycles with direct, reconstructed, held and fail-safe outputs.
-    pub(crate) counts: [u64; 4],
-    /// At the last two deadlines: a single frame may be lost.
+/// Cycles that are closed at once, at most.
+const MOST_CLOSED: i64 = 64;
+
+/// The deadlines of one program at its remote I/O.
+#[derive(Debug, Clone)]
+pub(super) struct ProgramTrack {
+    /// u(i) as last sampled.
+    inputs: Option<Image>,
+    source: Option<Source>,
+    pub(super) tally: Tally,
+    /// The stations that it received at the last two deadlines: a single frame may be lost.
     heard: [StationSet; 2],
-    pub(crate) excluded: StationSet,
-    pub(crate) awaits_release: bool,
-    pub(crate) forced: Vec<Force>,
-    pub(crate) plant: Option<Field>,
-    pub(crate) protection: Option<Protection>,
-    pub(crate) lost: Option<LostState>,
-    /// Whether it was ever driven by true outputs.
+    /// The newest cycle whose deadline was reported.
+    pub(super) reported: Option<i64>,
+    /// Whether its outputs were provable in any cycle.
     served: bool,
 }
 
 impl ProgramTrack {
-    pub(crate) fn hears(&self) -> StationSet {
-        self.heard[0].or(self.heard[1])
-    }
-
-    pub(crate) fn shift(&mut self, by: i64) {
-        let protection = self.protection.as_mut().map(|of| &mut of.since);
-        let lost = self.lost.as_mut().map(|of| &mut of.since);
-        for since in [Some(&mut self.since), protection, lost]
-            .into_iter()
-            .flatten()
-        {
-            *since = since.saturating_add(by);
+    pub(super) fn new(most: usize) -> Self {
+        Self {
+            inputs: None,
+            source: None,
+            tally: Tally::new(most),
+            heard: [StationSet::EMPTY; 2],
+            reported: None,
+            served: false,
         }
     }
 
-    /// Whether nothing true is driven for a reason that no station can help.
-    pub(crate) fn is_blocked(&self) -> bool {
-        let reasons = [
-            Missing::BadQuality,
-            Missing::NoHistory,
-            Missing::StateLost,
-            Missing::NotReleased,
-            Missing::ValueFault,
-            Missing::TooLate,
-        ];
-        self.missing
-            .is_some_and(|missing| reasons.contains(&missing))
+    pub(super) fn hears(&self) -> StationSet {
+        self.heard[0].or(self.heard[1])
+    }
+
+    pub(super) fn shift(&mut self, by: i64) {
+        self.reported = self.reported.map(|cycle| cycle.saturating_add(by));
+        self.tally.shift(by);
     }
 }
 
@@ -80,7 +64,7 @@ impl Model {
             } => {
                 let idle = *missing == Some(Missing::NoCycle);
                 let cycle = self.cycles.deadline(program, *moment, idle);
-                // It may tell of an epoch whose origin was awaited: what was told before moves, and this cycle is counted from there already.
+                // Its epoch may be the awaited one of the origin: earlier cycles move, and this cycle is counted from the origin already.
                 if let Some(shift) = self.cycles.take_shift() {
                     self.shift(shift);
                 }
@@ -121,7 +105,7 @@ impl Model {
         self.happened(record, cycle, cause);
     }
 
-    /// Whether the images of a report are as wide as those of the program: a journal of other programs is none of this cluster's.
+    /// Whether the images of a report are as wide as those of the program: a journal of other programs does not belong to this cluster.
     fn fits(&self, place: usize, event: &RemoteIoEvent) -> bool {
         let circuit = &self.cluster.controllers()[place].circuit;
         let inputs = |image: &Image| image.width() == circuit.inputs().len();
@@ -136,55 +120,65 @@ impl Model {
         }
     }
 
-    /// What changes a program's standing.
+    /// What changes the standing of a program, with the alarms that it raises and ends.
     fn changed(&mut self, record: &Record, program: ProgramId, cycle: i64, event: &RemoteIoEvent) {
-        let track = &mut self.programs[program.index()];
         let subject = |alarm| (record.name.clone(), alarm);
+        let own = |change| Some(Change::Program(program, change));
         let mut alarm = None;
-        match event {
-            RemoteIoEvent::StartedCold { awaits_release, .. } => {
-                track.awaits_release = *awaits_release;
-                track.excluded = StationSet::EMPTY;
-            }
+        let change = match event {
+            RemoteIoEvent::StartedCold { awaits_release, .. } => own(ProgramChange::StartedCold {
+                awaits_release: *awaits_release,
+            }),
             RemoteIoEvent::Released { .. } => {
-                track.awaits_release = false;
-                track.excluded = StationSet::EMPTY;
                 let over = ["value-fault", "disputed"];
                 self.alarms.all_over(&record.name, &over, cycle);
+                own(ProgramChange::Released)
             }
-            RemoteIoEvent::Disputed { .. } => alarm = Some("disputed"),
             RemoteIoEvent::ValueFault {
                 accused, located, ..
             } => {
-                if *located {
-                    track.excluded = track.excluded.or(*accused);
-                }
                 alarm = Some("value-fault");
+                let excluded = own(ProgramChange::Excluded(*accused));
+                excluded.filter(|_| *located)
             }
             RemoteIoEvent::RecalledExclusion { stations, .. } => {
-                track.excluded = track.excluded.or(*stations);
                 alarm = Some("value-fault");
+                own(ProgramChange::Excluded(*stations))
             }
-            RemoteIoEvent::AdoptedLineage { .. } => self.alarms.over(&subject("disputed"), cycle),
-            RemoteIoEvent::Flagged { station, .. } | RemoteIoEvent::Cleared { station, .. } => {
-                let flagged = matches!(event, RemoteIoEvent::Flagged { .. });
-                if let Some(silent) = self.stations.get_mut(station.index()) {
-                    silent.flagged_by_remote_io(program, flagged);
-                }
+            RemoteIoEvent::Disputed { .. } => {
+                alarm = Some("disputed");
+                None
             }
-            RemoteIoEvent::Refused { member, .. } => self.refused(*member),
+            RemoteIoEvent::AdoptedLineage { .. } => {
+                self.alarms.over(&subject("disputed"), cycle);
+                None
+            }
+            RemoteIoEvent::Flagged { station, .. } => {
+                let flagged = StationChange::Flagged(program);
+                Some(Change::Station(*station, flagged))
+            }
+            RemoteIoEvent::Cleared { station, .. } => {
+                let cleared = StationChange::Cleared(program);
+                Some(Change::Station(*station, cleared))
+            }
+            RemoteIoEvent::Refused { member, .. } => {
+                self.refused(*member, cycle);
+                None
+            }
             RemoteIoEvent::Forced { force, .. } => {
-                track.forced.retain(|other| other.signal != force.signal);
-                track.forced.push(force.clone());
                 alarm = Some("forced");
+                own(ProgramChange::Forced(force.clone()))
             }
-            RemoteIoEvent::Unforced { signal, .. } => {
-                track.forced.retain(|other| other.signal != *signal);
-                if track.forced.is_empty() {
-                    self.alarms.over(&subject("forced"), cycle);
-                }
-            }
-            _ => {}
+            RemoteIoEvent::Unforced { signal, .. } => own(ProgramChange::Unforced(*signal)),
+            _ => None,
+        };
+        if let Some(change) = change {
+            self.changes
+                .reported(Member::RemoteIo(program), cycle, change);
+        }
+        let standing = self.changes.now().program(program);
+        if standing.is_none_or(|own| own.forced.is_empty()) {
+            self.alarms.over(&subject("forced"), cycle);
         }
         if let Some(alarm) = alarm {
             let text = describe(record, &self.members).text;
@@ -204,7 +198,6 @@ impl Model {
             sampled,
             outputs,
             source,
-            word_of,
             missing,
             heard,
             ..
@@ -215,44 +208,49 @@ impl Model {
         self.timings.decided(moment, cycle);
         self.series
             .applied(program, cycle, sampled.as_ref(), outputs, *source);
-        for station in heard.iter() {
-            if let Some(track) = self.stations.get_mut(station.index()) {
-                track.heard(cycle);
-            }
-        }
-        self.close_up_to(cycle.saturating_sub(1));
+        self.received_at(cycle, *heard);
         let track = &mut self.programs[program.index()];
-        track.counts[*source as usize] += 1;
+        track.tally.push(cycle, *source);
         track.heard = [*heard, track.heard[0]];
-        track.word_of = *word_of;
-        track.missing = *missing;
-        track.outputs = Some(outputs.clone());
+        track.reported = track.reported.max(Some(cycle));
         if let Some(inputs) = sampled {
             track.inputs = Some(inputs.clone());
         }
+        self.histories[program.index()].sampled_last(track.inputs.as_ref());
         let before = track.source.replace(*source);
         let was_served = track.served;
         track.served |= missing.is_none();
-        let changed = before != Some(*source);
-        if changed {
-            track.since = cycle;
+        if before != Some(*source) && (was_served || missing.is_none()) {
+            self.source_changed(record, program, cycle, event);
         }
-        if changed && (was_served || missing.is_none()) {
-            self.source_changed(record, program, cycle, *source);
-        }
+        self.close();
     }
 
-    fn source_changed(&mut self, record: &Record, program: ProgramId, cycle: i64, source: Source) {
-        let track = &self.programs[program.index()];
+    fn source_changed(
+        &mut self,
+        record: &Record,
+        program: ProgramId,
+        cycle: i64,
+        event: &RemoteIoEvent,
+    ) {
+        let RemoteIoEvent::Applied {
+            source,
+            word_of,
+            missing,
+            heard,
+            ..
+        } = event
+        else {
+            return;
+        };
+        let source = *source;
         let mut text = format!("its outputs are {}", source_word(source));
-        if let Some(station) = track.word_of {
-            text += &format!(
-                " from a word of {}",
-                self.members.name(Member::Station(station))
-            );
+        if let Some(station) = word_of {
+            let name = self.members.name(Member::Station(*station));
+            text += &format!(" from a parity word of {name}");
         }
-        if let Some(missing) = track.missing {
-            text += &format!(": {}", missing_text(missing));
+        if let Some(missing) = missing {
+            text += &format!(": {}", missing_text(*missing));
         }
         let level = match source {
             Source::Direct | Source::Reconstructed => Level::Notice,
@@ -262,12 +260,12 @@ impl Model {
         let own = StationId(program.0);
         let cause = match source {
             Source::Direct => None,
-            _ if !track.heard[0].contains(own) => {
+            _ if !heard.contains(own) => {
                 let name = self.members.name(Member::Station(own));
                 let why = self.cause_of_silence(own);
                 Some(match why {
-                    Some(why) => format!("{name} is silent: {why}"),
-                    None => format!("{name} is silent"),
+                    Some(why) => format!("{name} is not received: {why}"),
+                    None => format!("{name} is not received"),
                 })
             }
             _ => None,
@@ -308,64 +306,70 @@ impl Model {
     }
 
     pub(super) fn plant(&mut self, record: &Record, program: ProgramId, event: &PlantEvent) {
-        let Some(track) = self.programs.get_mut(program.index()) else {
-            return;
-        };
         match event {
             PlantEvent::Stepped { moment, field, .. } => {
-                self.histories[program.index()].saw(&field.sensors);
-                let before = track.plant.as_ref().map_or(0, |plant| plant.plant_faults);
-                track.plant = Some(field.clone());
-                if field.plant_faults > before {
-                    let cycle = self.cycles.of(Some(*moment));
-                    let text = format!(
-                        "something happened to it that must not: {} so far",
-                        field.plant_faults
-                    );
-                    self.alarms
-                        .raise((record.name.clone(), "plant_fault"), cycle, text.clone());
-                    self.events.push(Event {
-                        number: 0,
-                        cycle,
-                        at_ns: record.at_ns,
-                        name: record.name.clone(),
-                        event: "plant_fault",
-                        level: Level::Alarm,
-                        text,
-                        cause: None,
-                    });
+                let Some(history) = self.histories.get_mut(program.index()) else {
+                    return;
+                };
+                history.saw(&field.sensors);
+                let known = self.changes.now().program(program);
+                let before = known.and_then(|known| known.plant);
+                let now = (field.finished, field.plant_faults);
+                if before == Some(now) {
+                    return;
+                }
+                let cycle = self.cycles.of(Some(*moment));
+                let change = ProgramChange::Plant {
+                    finished: field.finished,
+                    plant_faults: field.plant_faults,
+                };
+                self.changes.push(cycle, Change::Program(program, change));
+                if field.plant_faults > before.map_or(0, |(_, plant_faults)| plant_faults) {
+                    self.plant_fault(record, cycle, field.plant_faults);
                 }
             }
             PlantEvent::Refused { member, .. } => {
-                self.refused(*member);
                 let cycle = self.cycles.of(None);
+                self.refused(*member, cycle);
                 self.happened(record, cycle, None);
             }
         }
     }
 
-    /// What every station was up to `cycle`, of which all remote I/Os have told but for the slowest.
-    pub(super) fn close_up_to(&mut self, cycle: i64) {
-        if self.closed.is_some_and(|closed| closed >= cycle) {
-            return;
-        }
-        self.closed = Some(cycle);
-        for (rank, track) in self.stations.iter().enumerate() {
-            self.series
-                .station_was(rank, cycle, track.state(Some(cycle), 0));
-        }
+    fn plant_fault(&mut self, record: &Record, cycle: i64, plant_faults: u64) {
+        let text = format!("a plant fault occurred: {plant_faults} so far");
+        let subject = (record.name.clone(), "plant_fault");
+        self.alarms.raise(subject, cycle, text.clone());
+        self.events.push(Event {
+            number: 0,
+            cycle,
+            at_ns: record.at_ns,
+            name: record.name.clone(),
+            event: "plant_fault",
+            level: Level::Alarm,
+            text,
+            cause: None,
+        });
     }
 
-    /// The name of a signal that is forced.
-    pub(crate) fn signal_name(&self, program: ProgramId, signal: SignalPlace) -> String {
-        let circuit = &self.cluster.controllers()[program.index()].circuit;
-        let name = match signal {
-            SignalPlace::Input(place) => circuit.inputs().get(usize::from(place)).cloned(),
-            SignalPlace::Output(place) => {
-                let output = circuit.outputs().get(usize::from(place));
-                output.map(|output| output.name.clone())
-            }
+    /// The states of the stations in every cycle of which all living remote I/Os have reported.
+    fn close(&mut self) {
+        let Some(newest) = self.newest() else {
+            return;
         };
-        name.unwrap_or_else(|| "a signal that it has not".to_owned())
+        // The newest cycle itself is still the present.
+        let last = newest.saturating_sub(1);
+        let first = self.closed.map_or(last, |closed| closed.saturating_add(1));
+        for cycle in first.max(last.saturating_sub(MOST_CLOSED))..=last {
+            let standing = self.changes.at(cycle);
+            let states: Vec<_> = self
+                .station_ids()
+                .map(|station| self.station_state_in(&standing, station, Some(cycle)))
+                .collect();
+            for (rank, state) in states.into_iter().enumerate() {
+                self.series.station_was(rank, cycle, state);
+            }
+            self.closed = Some(cycle);
+        }
     }
 }

@@ -1,10 +1,11 @@
-//! Protection of programs, and states that are lost.
+//! Protection of programs, and lost states.
 
 use understudy_journal::Record;
 use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason};
 use understudy_wire::{Member, ProgramId};
 
 use super::Model;
+use super::standing::{Change, ProgramChange};
 use crate::protection::{LackingStation, LostState, Protection};
 use crate::station::StationState;
 
@@ -12,24 +13,11 @@ const UNPROTECTED: &str = "unprotected";
 const STATE_LOST: &str = "state-lost";
 
 impl Model {
-    /// Whether a program is protected; nothing while its remote I/O has not reported it.
-    pub fn protection(&self, program: ProgramId) -> Option<&Protection> {
-        self.programs.get(program.index())?.protection.as_ref()
-    }
-
-    /// What is left of the state of a program, where it is lost.
-    pub fn lost_state(&self, program: ProgramId) -> Option<&LostState> {
-        self.programs.get(program.index())?.lost.as_ref()
-    }
-
-    /// The process of a remote I/O begins or ends: what it reported is not known any more.
-    pub(super) fn forget_protection(&mut self, program: ProgramId) {
-        if let Some(track) = self.programs.get_mut(program.index()) {
-            track.protection = None;
-            track.lost = None;
-            let name = self.members.name(Member::RemoteIo(program)).to_owned();
-            self.alarms.over(&(name, STATE_LOST), self.cycles.of(None));
-        }
+    /// The process of a remote I/O begins or ends: the alarms about its reports and its commands are over.
+    pub(super) fn remote_io_is_new(&mut self, program: ProgramId) {
+        let name = self.members.name(Member::RemoteIo(program)).to_owned();
+        let over = [STATE_LOST, "forced"];
+        self.alarms.all_over(&name, &over, self.cycles.of(None));
     }
 
     pub(super) fn protection_changed(
@@ -42,12 +30,13 @@ impl Model {
         let subject = |alarm| (record.name.clone(), alarm);
         match event {
             RemoteIoEvent::Protected { .. } => {
-                self.programs[program.index()].protection = Some(Protection {
+                let protection = Protection {
                     protected: true,
                     since: cycle,
                     lacking: Vec::new(),
-                });
+                };
                 self.alarms.over(&subject(UNPROTECTED), cycle);
+                self.protection_is(program, cycle, protection);
             }
             RemoteIoEvent::Unprotected { since, lacking, .. } => {
                 let since = self.cycles.of_known(*since).unwrap_or(cycle);
@@ -59,7 +48,7 @@ impl Model {
                 };
                 let text = protection.text();
                 self.alarms.raise(subject(UNPROTECTED), cycle, text);
-                self.programs[program.index()].protection = Some(protection);
+                self.protection_is(program, cycle, protection);
             }
             RemoteIoEvent::StateLost {
                 applied,
@@ -81,30 +70,48 @@ impl Model {
                     asks: *asks,
                 };
                 self.alarms.raise(subject(STATE_LOST), cycle, lost.text());
-                self.programs[program.index()].lost = Some(lost);
+                self.lost_is(program, cycle, Some(lost));
             }
             // A newer state has become available since.
             RemoteIoEvent::ChoiceRefused {
                 newest: Some(newest),
                 ..
             } => {
-                if let Some(lost) = &mut self.programs[program.index()].lost {
+                let standing = self.changes.now().program(program);
+                if let Some(mut lost) = standing.and_then(|own| own.lost.clone()) {
                     let newer = newest.cycle.0.saturating_sub(lost.newest);
                     lost.age_cycles = lost.age_cycles.map(|age| age.saturating_sub(newer));
                     lost.newest = newest.cycle.0;
+                    self.lost_is(program, cycle, Some(lost));
                 }
             }
             RemoteIoEvent::StateRecovered { .. }
             | RemoteIoEvent::AdoptedLineage { .. }
             | RemoteIoEvent::StartedCold { .. } => {
-                self.programs[program.index()].lost = None;
+                let standing = self.changes.now().program(program);
+                if standing.is_some_and(|own| own.lost.is_some()) {
+                    self.lost_is(program, cycle, None);
+                }
                 self.alarms.over(&subject(STATE_LOST), cycle);
             }
             _ => {}
         }
     }
 
-    /// Why a station cannot stand in for a program: itself, or a link, as far as others say how it is.
+    fn protection_is(&mut self, program: ProgramId, cycle: i64, protection: Protection) {
+        let change = ProgramChange::Protection(Box::new(protection));
+        let change = Change::Program(program, change);
+        self.changes
+            .reported(Member::RemoteIo(program), cycle, change);
+    }
+
+    fn lost_is(&mut self, program: ProgramId, cycle: i64, lost: Option<LostState>) {
+        let change = Change::Program(program, ProgramChange::Lost(lost.map(Box::new)));
+        self.changes
+            .reported(Member::RemoteIo(program), cycle, change);
+    }
+
+    /// Why a station cannot prove the outputs of a program: the station itself, or a link, as far as others report it.
     fn lacking(&self, program: ProgramId, lacking: &Lacking) -> LackingStation {
         let station = lacking.station;
         let name = self.members.name(Member::Station(station));
@@ -118,20 +125,21 @@ impl Model {
                     .any(|(other, track)| other != program && track.hears().contains(station));
                 let text = match state {
                     Some(
-                        state
-                        @ (StationState::Killed | StationState::Stopped | StationState::Ended),
-                    ) => format!("{name} is {}", state.word()),
+                        state @ (StationState::Killed
+                        | StationState::Suspended
+                        | StationState::Ended),
+                    ) => format!("{name} is {}", state.text()),
                     _ if is_heard => {
                         link = Some(format!("{name} → {remote_io}"));
                         format!("the link {name} → {remote_io} is broken")
                     }
                     _ => format!(
-                        "{name} is not received: it is down, or the link {name} → {remote_io}"
+                        "{name} is not received: it or the link {name} → {remote_io} has failed"
                     ),
                 };
                 ("not-received", text)
             }
-            LackingReason::Joining => ("joining", format!("{name} asks for the state")),
+            LackingReason::Joining => ("joining", format!("{name} requests the state")),
             LackingReason::Behind { stepped } => {
                 link = Some(format!("{remote_io} → {name}"));
                 let last = self.cycles.of_known(stepped).map_or_else(
@@ -149,7 +157,7 @@ impl Model {
             ),
             LackingReason::Failed => (
                 "failed",
-                format!("{name} has failed, and the paper's mode masks one failure"),
+                format!("{name} has failed, and mode `paper` masks one failure only"),
             ),
         };
         LackingStation {

@@ -1,4 +1,4 @@
-//! What the stations said, and whether it is what the samples lead to.
+//! Turns of the stations, compared with the outputs that the samples yield.
 
 use std::collections::{BTreeSet, HashMap, VecDeque};
 
@@ -8,12 +8,12 @@ use understudy_wire::{Image, Member, Moment, StationId, Word};
 use super::Model;
 use crate::event::{Event, Level};
 
-/// What a station said in a cycle.
+/// Turn of a station in a cycle.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SentTurn {
-    /// Who.
+    /// The station.
     pub station: StationId,
-    /// Its words.
+    /// Its parity words.
     pub words: SmallVec<[Word; 2]>,
     checked: bool,
 }
@@ -24,7 +24,7 @@ pub(super) struct Turns {
     by_moment: HashMap<Moment, Vec<SentTurn>>,
     order: VecDeque<Moment>,
     most: usize,
-    /// Stations that said something else than the samples lead to, and have not agreed since.
+    /// Stations whose parity words differ from what the samples yield, and have not agreed since.
     differing: BTreeSet<StationId>,
 }
 
@@ -63,7 +63,7 @@ impl Turns {
 }
 
 impl Model {
-    /// Compares the words of a cycle with what the samples lead to, as soon as both are there.
+    /// Compares the parity words of a cycle with what the samples yield, as soon as both are there.
     pub(super) fn check_words(&mut self, moment: Moment) {
         let Some(mut turns) = self.turns.by_moment.remove(&moment) else {
             return;
@@ -79,7 +79,7 @@ impl Model {
             };
             let wrong = compared.into_iter().find(|(word, sum)| word.sum != *sum);
             let text = wrong
-                .map(|(word, sum)| format!("says {}, where the samples lead to {sum}", word.sum));
+                .map(|(word, sum)| format!("publishes {}, but the samples yield {sum}", word.sum));
             turn.checked = true;
             self.compared(turn.station, moment, text);
         }

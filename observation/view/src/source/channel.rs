@@ -1,4 +1,4 @@
-//! Records handed over in one process. Whoever hands them over never waits.
+//! Records passed on within one process. The sender never waits.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -21,7 +21,7 @@ pub struct Feed {
 }
 
 impl Feed {
-    /// Hands a record over; one that does not fit is lost, and said to be. False where nobody reads any more.
+    /// Passes a record on; one that does not fit is lost, and the loss is reported. False after the end of the reader.
     pub fn give(&self, record: Record) -> bool {
         match self.sender.try_send(record) {
             Ok(()) => true,

@@ -1,4 +1,4 @@
-//! What stands at the bottom: events, alarms, or the failures that could come.
+//! The list at the bottom: events, alarms, or further failures.
 
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -24,7 +24,7 @@ pub(super) fn draw(
     let tabs = [
         (Bottom::Events, format!("events {}", snapshot.events)),
         (Bottom::Alarms, format!("alarms {open}")),
-        (Bottom::Failures, "failures to come".to_owned()),
+        (Bottom::Failures, "further failures".to_owned()),
     ];
     let spans = tabs.into_iter().flat_map(|(tab, text)| {
         let style = if tab == bottom {
@@ -71,10 +71,10 @@ fn event(event: &Event) -> Line<'static> {
 
 fn alarm(alarm: &Alarm) -> Line<'static> {
     let state = match (&alarm.over, &alarm.acknowledged_by) {
-        (None, None) => "lasts, not seen".to_owned(),
-        (None, Some(by)) => format!("lasts, seen by {by}"),
-        (Some(over), None) => format!("over in {over}, not seen"),
-        (Some(over), Some(by)) => format!("over in {over}, seen by {by}"),
+        (None, None) => "lasts, not acknowledged".to_owned(),
+        (None, Some(by)) => format!("lasts, acknowledged by {by}"),
+        (Some(over), None) => format!("over in {over}, not acknowledged"),
+        (Some(over), Some(by)) => format!("over in {over}, acknowledged by {by}"),
     };
     let text = format!(
         "{:>7} {:12} {:12} {} ({state})",
@@ -96,7 +96,7 @@ fn failures(snapshot: &Snapshot) -> Vec<Line<'static>> {
         if outcome.masked {
             Line::from(format!(" {failed:28} masked"))
         } else {
-            let text = format!(" {failed:28} takes {}", outcome.lost.join(", "));
+            let text = format!(" {failed:28} not masked: {}", outcome.lost.join(", "));
             Line::styled(text, colour(Level::Warning))
         }
     });

@@ -1,4 +1,4 @@
-//! The tables of stations and programs, and the margin of survival.
+//! The tables of stations and programs, and the remaining redundancy.
 
 use ratatui::layout::Constraint;
 use ratatui::style::{Color, Modifier, Style};
@@ -30,11 +30,11 @@ pub(super) fn stations(snapshot: &Snapshot, above: usize) -> Table<'static> {
         .skip(clamped(above, snapshot.stations.len()));
     let rows = rows.map(|station| {
         let colour = match station.state {
-            StationState::Speaking => GOOD,
-            StationState::Joining | StationState::Shadow | StationState::NotStarted => MIDDLING,
+            StationState::Publishing => GOOD,
+            StationState::Joining | StationState::ShadowMode | StationState::NotStarted => MIDDLING,
             _ => BAD,
         };
-        let mut state = station.state.word().to_owned();
+        let mut state = station.state.text().to_owned();
         if station.flagged && station.state != StationState::Flagged {
             state += ", flagged";
         }
@@ -44,7 +44,7 @@ pub(super) fn stations(snapshot: &Snapshot, above: usize) -> Table<'static> {
         Row::new([
             Cell::from(format!(" {}", station.name)),
             Cell::from(state).style(Style::new().fg(colour)),
-            Cell::from(station.speaks_for.join(" ")),
+            Cell::from(station.publishes_for.join(" ")),
             Cell::from(station.done.clone().unwrap_or_default()),
         ])
     });
@@ -57,8 +57,8 @@ pub(super) fn stations(snapshot: &Snapshot, above: usize) -> Table<'static> {
     Table::new(rows.collect::<Vec<_>>(), widths).header(head(&[
         " station",
         "state",
-        "speaks for",
-        "last done",
+        "publishes for",
+        "last action",
     ]))
 }
 
@@ -71,11 +71,15 @@ pub(super) fn programs(snapshot: &Snapshot, model: &Model, above: usize) -> Tabl
             Some("reconstructed") | None => MIDDLING,
             _ => BAD,
         };
-        let source = found.source.unwrap_or("nothing yet");
+        let source = found.source.unwrap_or("not known");
         Row::new([
             Cell::from(format!(" {}", found.program)),
             Cell::from(source).style(Style::new().fg(colour)),
-            Cell::from(found.since.to_string()),
+            Cell::from(
+                found
+                    .since
+                    .map_or("-".to_owned(), |since| since.to_string()),
+            ),
             Cell::from(found.direct.to_string()),
             Cell::from(found.reconstructed.to_string()),
             Cell::from(found.held.to_string()),
@@ -98,7 +102,7 @@ pub(super) fn programs(snapshot: &Snapshot, model: &Model, above: usize) -> Tabl
         "outputs",
         "since",
         "direct",
-        "restored",
+        "reconst.",
         "held",
         "safe",
         "last cycles",
@@ -109,7 +113,7 @@ fn clamped(above: usize, count: usize) -> usize {
     above.min(count.saturating_sub(1))
 }
 
-/// A letter for each of the last cycles: | direct, + reconstructed, _ held, ! fail-safe, a gap for nothing.
+/// A character for each of the last cycles: | direct, + reconstructed, _ held, ! fail-safe, a space for none.
 fn last_sources(model: &Model, program: ProgramId, cycle: Option<i64>) -> String {
     let (Some(sources), Some(last)) = (model.series().sources(program), cycle) else {
         return String::new();
@@ -144,14 +148,14 @@ pub(super) fn protection(snapshot: &Snapshot) -> Vec<Line<'static>> {
         let text = if programs.all(|program| program.protection.is_some()) {
             "all programs"
         } else {
-            "not known of all programs yet"
+            "not reported by all remote I/Os yet"
         };
         lines.push(Line::from(vec![label("protected"), text.into()]));
     }
     lines
 }
 
-/// The margin of survival in a sentence.
+/// The remaining redundancy in a sentence.
 pub(super) fn survives(snapshot: &Snapshot) -> Paragraph<'static> {
     let margin = &snapshot.margin;
     let programs = snapshot.programs.iter().map(|program| &program.program);
@@ -162,18 +166,18 @@ pub(super) fn survives(snapshot: &Snapshot) -> Paragraph<'static> {
     let sentence = match (margin.served.is_empty(), lost.is_empty()) {
         (true, _) | (_, true) => sentence(margin),
         _ => format!(
-            "{} has no true outputs; of the others: {}",
+            "{} has no provable outputs; of the others: {}",
             lost.join(" and "),
             sentence(margin)
         ),
     };
-    let line = Line::from(vec![label("survives"), sentence.into()]);
+    let line = Line::from(vec![label("redundancy"), sentence.into()]);
     Paragraph::new(line).wrap(Wrap { trim: false })
 }
 
 fn sentence(margin: &MarginSnapshot) -> String {
     if margin.served.is_empty() {
-        return "nothing true is driven now".to_owned();
+        return "no program has provable outputs".to_owned();
     }
     let stations = |outcomes: &[crate::snapshot::OutcomeSnapshot], count: usize| -> Vec<String> {
         let fatal = outcomes
@@ -194,11 +198,11 @@ fn sentence(margin: &MarginSnapshot) -> String {
     match margin.survives {
         0 => {
             let singles = margin.singles.iter().filter(|single| {
-                // A remote I/O has no second: that goes without saying.
+                // A remote I/O is never redundant.
                 !single.masked && !is_remote_io(single, margin)
             });
             let fatal = singles.map(|single| single.failed.join("+")).collect();
-            format!("NOT the failure of {}", most(fatal))
+            format!("NOT masked: {}", most(fatal))
         }
         1 => format!("any one station; not {}", most(stations(&margin.pairs, 2))),
         _ => "any two stations".to_owned(),

@@ -1,6 +1,6 @@
 //! Follows a signal back: through the rungs above, through blocks, and through the cycles before.
 //!
-//! Bounded by [`DEEPEST`] and [`MOST`]; where that ends it, the reason says so.
+//! Bounded by [`DEEPEST`] and [`MOST`]; the last reason states it.
 
 mod blocks;
 
@@ -112,22 +112,22 @@ impl<'m> Explainer<'m> {
         }
         self.count += 1;
         if depth > DEEPEST || self.count > MOST {
-            return self.leaf(name, value, place, "and so on");
+            return self.leaf(name, value, place, "further causes omitted");
         }
         if !self.told.insert((name.to_owned(), place, below)) {
-            return self.leaf(name, value, place, "as said already");
+            return self.leaf(name, value, place, "explained above");
         }
         let Some(evaluation) = self.evaluation(place) else {
-            return self.leaf(name, value, place, "the state before is not known");
+            return self.leaf(name, value, place, "the earlier state is not known");
         };
         if let Some(decision) = self.decision(name, &evaluation, below) {
             return self.decided(name, value, [place, place], &decision, &evaluation, depth);
         }
         if !value {
-            // A latch that is off: what does not set it says more than what once reset it.
+            // For a latch that is off, the missing set condition explains more than the last reset.
             let because = self.not_set(name, &evaluation, below, place, depth);
             if !because.is_empty() {
-                let reason = self.leaf(name, value, place, "nothing sets it");
+                let reason = self.leaf(name, value, place, "no rung writes it");
                 return Reason { because, ..reason };
             }
         }
@@ -136,7 +136,7 @@ impl<'m> Explainer<'m> {
             Err(end) => return self.leaf(name, value, place, self.end_of_history(end)),
         };
         let Some(evaluation) = self.evaluation(at) else {
-            return self.leaf(name, value, place, "the state before is not known");
+            return self.leaf(name, value, place, "the earlier state is not known");
         };
         match self.decision(name, &evaluation, self.program.rungs.len()) {
             Some(decision) => self.decided(name, value, [place, at], &decision, &evaluation, depth),
@@ -166,7 +166,7 @@ impl<'m> Explainer<'m> {
     /// Why there is nothing before the step at `place`.
     fn end_of_history(&self, place: usize) -> &'static str {
         if place == 0 && self.history.is_cut() {
-            "kept since before what is remembered of the run"
+            "unchanged since before the oldest cycle that is remembered"
         } else {
             "its initial value"
         }
@@ -306,10 +306,10 @@ impl<'m> Explainer<'m> {
                 let value = node.flow.reading == Reading::Bit(true);
                 let mut reason = self.operand(&contact.operand, value, rung, place, depth);
                 let edge = match (contact.kind, node.flow.passes) {
-                    (ContactKind::Rising, true) => "has just come; ",
-                    (ContactKind::Rising, false) => "has not just come; ",
-                    (ContactKind::Falling, true) => "has just gone; ",
-                    (ContactKind::Falling, false) => "has not just gone; ",
+                    (ContactKind::Rising, true) => "has a rising edge; ",
+                    (ContactKind::Rising, false) => "has no rising edge; ",
+                    (ContactKind::Falling, true) => "has a falling edge; ",
+                    (ContactKind::Falling, false) => "has no falling edge; ",
                     _ => "",
                 };
                 reason.text.insert_str(0, edge);

@@ -21,28 +21,32 @@ impl Why {
             let _ = writeln!(text, "  {} drives it, {source}{why}", self.remote_io);
         }
         if let Some(scanned) = self.scanned {
-            let _ = writeln!(text, "  the scan of this cycle says {}", u8::from(scanned));
-        }
-        if let Some(restored) = &self.restored {
-            let silent = if restored.silent.is_empty() {
-                "nobody".to_owned()
-            } else {
-                restored.silent.join(", ")
-            };
-            let _ = writeln!(text, "  silent: {silent}");
-            let members = restored.members.join(" + ");
             let _ = writeln!(
                 text,
-                "  word of {} over {members}: {}",
+                "  the scan of this cycle yields {}",
+                u8::from(scanned)
+            );
+        }
+        if let Some(restored) = &self.reconstructed {
+            let not_received = if restored.not_received.is_empty() {
+                "no station".to_owned()
+            } else {
+                restored.not_received.join(", ")
+            };
+            let _ = writeln!(text, "  not received: {not_received}");
+            let mask = restored.mask.join(" + ");
+            let _ = writeln!(
+                text,
+                "  parity word of {} over {mask}: {}",
                 restored.word_of, restored.word
             );
             for other in &restored.others {
-                let _ = writeln!(text, "  + {} of {}", other.outputs, other.said_by);
+                let _ = writeln!(text, "  + {} of {}", other.outputs, other.published_by);
             }
             let proof = if restored.proved {
-                "what the samples lead to"
+                "the outputs that the samples yield"
             } else {
-                "NOT what the samples lead to"
+                "NOT the outputs that the samples yield"
             };
             let _ = writeln!(
                 text,

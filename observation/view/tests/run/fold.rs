@@ -55,7 +55,7 @@ fn each_station_is_seen_to_be_killed_and_repaired() {
     assert!(
         stations
             .iter()
-            .all(|station| station.state == StationState::Speaking)
+            .all(|station| station.state == StationState::Publishing)
     );
     // Each kill cost the protection of programs, and each return brought it back.
     assert_eq!(alarms.len(), 4, "{alarms:?}");
@@ -124,7 +124,10 @@ fn a_loss_is_an_alarm_with_its_cause() {
     let alarm = model.alarms().find(|alarm| alarm.alarm == "fail-safe");
     let alarm = alarm.expect("an alarm");
     assert_eq!((alarm.name.as_str(), alarm.over), ("press-io", None));
-    assert_eq!(alarm.text, "press is silent: press is killed in cycle 30");
+    assert_eq!(
+        alarm.text,
+        "press is not received: press is killed in cycle 30"
+    );
     let snapshot = model.snapshot();
     assert_eq!(snapshot.margin.survives, 0);
     assert_eq!(snapshot.margin.served, ["robot"]);
@@ -133,7 +136,7 @@ fn a_loss_is_an_alarm_with_its_cause() {
         .iter()
         .map(|station| station.state.word())
         .collect();
-    assert_eq!(states, ["speaking", "killed", "killed"]);
+    assert_eq!(states, ["publishing", "killed", "killed"]);
     let lost = model.why("press.move_down", Some(50)).expect("it is known");
     assert_eq!((lost.source, lost.because), (Some("fail-safe"), None));
 }
@@ -153,9 +156,9 @@ fn an_unexpected_end_is_an_alarm_until_the_member_is_started_again() {
             how: "signal: 9 (SIGKILL)".to_owned(),
             said: vec!["killed".to_owned()],
         };
-        model.note(&Record::of_run(model.at_ns(), event));
+        model.note(&Record::of_run(0, event));
     }
-    assert_eq!(model.station_state(StationId(0)), Some(StationState::Ended));
+    assert_eq!(model.snapshot().stations[0].state, StationState::Ended);
     let open = |model: &Model| -> Vec<String> {
         let lasting = model.alarms().filter(|alarm| alarm.over.is_none());
         lasting.map(|alarm| alarm.text.clone()).collect()
@@ -168,10 +171,10 @@ fn an_unexpected_end_is_an_alarm_until_the_member_is_started_again() {
         ]
     );
     for member in [robot, press_io] {
-        model.note(&Record::of_run(model.at_ns(), RunEvent::Started { member }));
+        model.note(&Record::of_run(0, RunEvent::Started { member }));
     }
     assert_eq!(open(&model), [""; 0]);
-    assert_ne!(model.station_state(StationId(0)), Some(StationState::Ended));
+    assert_ne!(model.snapshot().stations[0].state, StationState::Ended);
 }
 
 /// A run that nobody disturbs has no event of note and a quiet margin; its times are those of the schedule.

@@ -1,4 +1,4 @@
-//! The margin of survival against the simulator: what is said to be masked is masked, what is said to be lost is lost.
+//! The remaining redundancy against the simulator: failures that are foreseen as masked are masked, and the others are not.
 
 use understudy_cycle::Mode;
 use understudy_scenarios::{Action, Fault, Network, Scenario};

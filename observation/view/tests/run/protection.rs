@@ -19,9 +19,9 @@ fn changes(records: &[Record]) -> Vec<String> {
         if !model.has_origin() {
             continue;
         }
-        let robot = ProgramId(0);
-        let protection = model.protection(robot).map(Protection::text);
-        let lost = model.lost_state(robot).map(LostState::text);
+        let robot = &model.snapshot().programs[0];
+        let protection = robot.protection.as_ref().map(Protection::text);
+        let lost = robot.lost.as_ref().map(LostState::text);
         let alarms = model.alarms().filter(|alarm| {
             let of_protection = ["unprotected", "state-lost"].contains(&alarm.alarm);
             of_protection && alarm.over.is_none() && alarm.name == "robot-io"
@@ -43,6 +43,14 @@ fn a_loss_of_protection_and_of_a_state_are_alarms_with_their_causes() {
     insta::assert_snapshot!("protection", changes(&records).join("\n"));
 }
 
+fn lost(model: &Model) -> Option<LostState> {
+    model.snapshot().programs[0].lost.clone()
+}
+
+fn protection(model: &Model) -> Option<Protection> {
+    model.snapshot().programs[0].protection.clone()
+}
+
 /// A remote I/O that is killed reports nothing: neither the lamp nor the question stays as it was.
 #[test]
 fn of_a_dead_remote_io_nothing_is_known() {
@@ -50,27 +58,23 @@ fn of_a_dead_remote_io_nothing_is_known() {
     let mut model = Model::new(Arc::new(cell.clone()), Bounds::default());
     for record in records(&cell, &scenario(&cell, LOST_STATE), 1) {
         model.note(&record);
-        if model.lost_state(ProgramId(0)).is_some() {
+        if lost(&model).is_some() {
             break;
         }
     }
-    assert!(
-        model
-            .protection(ProgramId(0))
-            .is_some_and(|of| !of.protected)
-    );
+    assert!(protection(&model).is_some_and(|of| !of.protected));
     let ended = |member| RunEvent::Ended {
         member,
         how: "signal: 9 (SIGKILL)".to_owned(),
         said: Vec::new(),
     };
     let note = |model: &mut Model, member| {
-        let record = Record::of_run(model.at_ns(), ended(member));
+        let record = Record::of_run(0, ended(member));
         model.note(&record);
     };
     note(&mut model, Member::Station(StationId(2)));
-    assert!(model.lost_state(ProgramId(0)).is_some(), "another member");
+    assert!(lost(&model).is_some(), "another member");
     note(&mut model, Member::RemoteIo(ProgramId(0)));
-    assert_eq!(model.lost_state(ProgramId(0)), None);
-    assert_eq!(model.protection(ProgramId(0)), None);
+    assert_eq!(lost(&model), None);
+    assert_eq!(protection(&model), None);
 }

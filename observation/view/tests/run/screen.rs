@@ -31,7 +31,7 @@ fn a_run_fits_a_terminal_of_eighty_columns() {
     assert!(screen.is_paused());
     let help = shown(&mut screen, &model, 80, 24);
     assert!(
-        help.contains("paused") && help.contains("all alarms have been seen"),
+        help.contains("paused") && help.contains("acknowledge all alarms"),
         "{help}"
     );
 }

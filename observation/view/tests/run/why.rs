@@ -5,17 +5,17 @@ use understudy_view::Reason;
 use crate::support::{KILL_EACH, cell, model, scenario};
 
 #[test]
-fn a_restored_output_says_word_members_and_lineage() {
+fn a_reconstructed_output_names_parity_word_mask_and_lineage() {
     let cell = cell();
     let model = model(&cell, &scenario(&cell, KILL_EACH), 1);
     let why = model
         .why("press.move_down", Some(140))
         .expect("it is known");
     insta::assert_snapshot!(why.to_text());
-    let restored = why.restored.expect("the press is killed");
-    assert!(restored.proved);
-    assert_eq!(restored.word_of, "understudy");
-    assert_eq!(restored.silent, ["press"]);
+    let reconstructed = why.reconstructed.expect("the press is killed");
+    assert!(reconstructed.proved);
+    assert_eq!(reconstructed.word_of, "understudy");
+    assert_eq!(reconstructed.not_received, ["press"]);
 }
 
 /// In every cycle, for every output: the chain begins with what was driven, and every contact in it reads what the samples, the
@@ -63,7 +63,7 @@ fn what_is_not_there_is_said() {
         "%QX0.0",
         None,
         "U0574",
-        "robot and press have an output `%QX0.0`; say which, as in `robot.%QX0.0`",
+        "robot and press have an output `%QX0.0`; name the program too, for example `robot.%QX0.0`",
     );
     assert!(model.why("press.%QX0.0", None).is_ok());
     let error = model

@@ -1,4 +1,4 @@
-//! Somebody has seen an alarm.
+//! Acknowledgement of an alarm.
 
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -35,7 +35,7 @@ pub(super) async fn acknowledge(
         .alarm(number)?
         .ok_or_else(|| Problem::unknown(format!("the run has no alarm {number}")))?;
     let seen = alarm.acknowledgement(owner, unix_seconds());
-    // It is shown as seen when it has been read in the journal.
+    // It is shown as acknowledged once the journal contains it.
     let done = app.commanding.commander.acknowledge(seen).await;
     done.map_err(|refusal| Problem::refused(&refusal.to_string()))?;
     Ok(Json(json!({})))

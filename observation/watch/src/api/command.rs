@@ -27,7 +27,7 @@ pub(super) struct Asked {
     reason: String,
 }
 
-/// As [`Command`], with the owner and the reason of a force said once for all.
+/// As [`Command`]; owner and reason of a force are those of the request.
 #[derive(Deserialize)]
 #[serde(tag = "command", rename_all = "kebab-case", deny_unknown_fields)]
 enum AskedCommand {
@@ -94,10 +94,10 @@ pub(super) async fn command(
     Ok(Json(json!({})))
 }
 
-/// Who is logged in, or else who somebody says to be.
+/// The person who is logged in; otherwise the name in the request.
 pub(super) fn named(person: &Person, said: String) -> Answered<String> {
     if person.name.is_empty() {
-        readable(said, MAXIMUM_OWNER_LENGTH, "the name of who commands")
+        readable(said, MAXIMUM_OWNER_LENGTH, "the name of the operator")
     } else {
         Ok(person.name.clone())
     }
@@ -110,7 +110,7 @@ fn readable(text: String, most: usize, what: &str) -> Answered<String> {
         Ok(text)
     } else {
         Err(Problem::bad(format!(
-            "{what} is 1 to {most} readable characters"
+            "{what} needs 1 to {most} printable characters"
         )))
     }
 }

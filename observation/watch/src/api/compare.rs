@@ -1,4 +1,4 @@
-//! This run beside another one that lies in the same directory of runs.
+//! Comparison with another run of the same directory.
 
 use std::fs;
 use std::path::Path;
@@ -15,7 +15,7 @@ use super::facts::known;
 use crate::app::App;
 use crate::error::Problem;
 
-/// Runs that are offered, at most: the newest.
+/// Runs that are listed, at most: the newest.
 const MAXIMUM_OTHERS: usize = 50;
 
 /// Differences in one answer, at most.
@@ -63,15 +63,15 @@ pub(super) async fn compare(
     with: Result<Query<With>, QueryRejection>,
 ) -> Answered<Json<Compared>> {
     let Query(With { with }) = with?;
-    // Only what was offered: a name is no path.
+    // Only listed names are accepted: a name is not a path.
     if !others(&app.run).contains(&with) {
         return Err(Problem::unknown(format!(
-            "there is no run {with:.80} beside this one"
+            "the directory of this run has no other run {with:.80}"
         )));
     }
     let Ok(_turn) = app.reader.try_acquire() else {
         return Err(Problem::too_many(
-            "another run is being read already: ask again in a moment",
+            "another comparison is in progress: try again later",
         ));
     };
     tokio::task::block_in_place(|| read_and_compare(&app, &with)).map(Json)
@@ -80,7 +80,9 @@ pub(super) async fn compare(
 fn read_and_compare(app: &App, with: &str) -> Answered<Compared> {
     let unread = |error: &dyn std::fmt::Display| Problem::unrecorded(format!("{with}: {error}"));
     let here = fs::canonicalize(&app.run).map_err(|error| unread(&error))?;
-    let runs = here.parent().ok_or_else(|| unread(&"it has no place"))?;
+    let runs = here
+        .parent()
+        .ok_or_else(|| unread(&"it has no parent directory"))?;
     let other = Run::open(&runs.join(with)).map_err(|error| unread(&error))?;
     let other = other
         .read(Bounds::default())
@@ -120,11 +122,11 @@ fn in_words(found: &RunDiff) -> String {
     let programs = if found.same_configuration {
         "the same configuration"
     } else {
-        "another configuration"
+        "a different configuration"
     };
     let first = match found.differences.first() {
-        Some(first) => format!("they differ first in cycle {}", first.cycle),
-        None => "nothing differs".to_owned(),
+        Some(first) => format!("first difference in cycle {}", first.cycle),
+        None => "no differences".to_owned(),
     };
     format!("{programs}; {} cycles compared; {first}", found.compared)
 }

@@ -1,4 +1,4 @@
-//! What is run, how it stands in a cycle, and what happened.
+//! Facts of the run, its state in a cycle, and its events.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -34,9 +34,9 @@ pub(super) struct RunFacts {
     stations: Vec<StationFacts>,
     programs: Vec<ProgramFacts>,
     commands: CommandFacts,
-    /// Who is logged in.
+    /// Name of the person who is logged in.
     person: Option<String>,
-    /// Other runs beside this one.
+    /// Other runs of the same directory.
     others: Vec<String>,
 }
 
@@ -67,9 +67,9 @@ struct SignalFacts {
 
 #[derive(Debug, Serialize)]
 struct CommandFacts {
-    /// Why nothing can be commanded.
+    /// Reason why no command can be given.
     why: Option<String>,
-    /// Commands that cannot be given in this run, each with the reason.
+    /// Commands that are impossible in this run, each with the reason.
     impossible: BTreeMap<&'static str, String>,
 }
 
@@ -78,15 +78,15 @@ pub(super) async fn run(
     Extension(person): Extension<Person>,
 ) -> Answered<Json<RunFacts>> {
     let model = app.model();
-    // What runs is known before it is known how it is now.
+    // The cluster is known before the present state.
     let known = model.known().ok_or_else(|| not_begun(&model))?;
     let run = &known.run;
     let cluster = run.cluster();
     let schedule = &cluster.agreement().schedule;
     let microseconds = |time: std::time::Duration| u64::try_from(time.as_micros()).unwrap_or(0);
-    let stations = known.stations().map(|station| StationFacts {
+    let stations = run.station_ids().map(|station| StationFacts {
         rank: station.index(),
-        name: shown::name(known, Member::Station(station)),
+        name: run.members().name(Member::Station(station)).to_owned(),
         role: if schedule.is_understudy(station) {
             "understudy"
         } else {
@@ -94,8 +94,8 @@ pub(super) async fn run(
         },
         program: (!schedule.is_understudy(station)).then_some(station.index()),
     });
-    let programs = known
-        .programs()
+    let programs = run
+        .program_ids()
         .map(|program| program_facts(known, program));
     Ok(Json(RunFacts {
         title: format!("{} · {}", cluster.name(), model.name()),
@@ -117,11 +117,12 @@ fn program_facts(known: &Known, program: ProgramId) -> ProgramFacts {
     let cluster = known.run.cluster();
     let plant = Member::Plant(program);
     let ladder = cluster.controllers().get(program.index());
+    let name = |member| known.run.members().name(member).to_owned();
     let signals = |signals: &[Signal]| signals.iter().map(signal_facts).collect();
     ProgramFacts {
         index: program.index(),
-        name: shown::program_name(known, program),
-        remote_io: shown::name(known, Member::RemoteIo(program)),
+        name: shown::program_name(&known.run, program),
+        remote_io: name(Member::RemoteIo(program)),
         plant: cluster.member_name(plant).map(str::to_owned),
         inputs: ladder.map_or_else(Vec::new, |own| signals(&own.program.inputs)),
         outputs: ladder.map_or_else(Vec::new, |own| signals(&own.program.outputs)),
@@ -136,7 +137,7 @@ fn signal_facts(signal: &Signal) -> SignalFacts {
     }
 }
 
-/// Which cycle is meant; the newest where none is said.
+/// A cycle; by default the newest.
 #[derive(Debug, Deserialize)]
 pub(super) struct When {
     pub(super) cycle: Option<i64>,
@@ -150,17 +151,18 @@ pub(super) async fn state(
     let newest = app.newest.borrow().clone();
     let is_current = newest.progress.current(Instant::now()).is_ok();
     if when.cycle.is_none() && is_current && &*newest.state != NOTHING {
-        // Written once for everybody who asks, as for the viewers who are told.
+        // Written once for all clients.
         let json = [(CONTENT_TYPE, "application/json")];
         return Ok((json, newest.state.to_string()).into_response());
     }
     let state = at_cycle(&app, when.cycle, |known, cycle| {
-        shown::state(known, cycle).ok_or_else(|| not_remembered(cycle))
+        let state = shown::state(&known.run, cycle, known.has_ended());
+        state.ok_or_else(|| not_remembered(cycle))
     });
     Ok(Json(state?).into_response())
 }
 
-/// Answers from what is remembered of a cycle; of one that is older, from the journal.
+/// Answers from the model; for a cycle that it does not remember, from the journal.
 pub(super) fn at_cycle<T>(
     app: &App,
     cycle: Option<i64>,
@@ -170,15 +172,16 @@ pub(super) fn at_cycle<T>(
         let model = app.model();
         let known = known(&model)?;
         let newest = known
+            .run
             .newest()
-            .ok_or_else(|| Problem::unrecorded("no cycle has been decided yet"))?;
+            .ok_or_else(|| Problem::unrecorded("the run has no cycle yet"))?;
         let cycle = cycle.unwrap_or(newest);
         if cycle > newest {
             return Err(Problem::unrecorded(format!(
-                "cycle {cycle} is still to come: the newest is {newest}"
+                "cycle {cycle} is in the future: the newest is {newest}"
             )));
         }
-        if known.oldest().is_some_and(|oldest| oldest <= cycle) {
+        if known.run.oldest().is_some_and(|oldest| oldest <= cycle) {
             return answer(known, cycle);
         }
         cycle
@@ -188,10 +191,10 @@ pub(super) fn at_cycle<T>(
 }
 
 pub(crate) fn not_remembered(cycle: i64) -> Problem {
-    Problem::unrecorded(format!("the journal does not reach back to cycle {cycle}"))
+    Problem::unrecorded(format!("the journal does not contain cycle {cycle}"))
 }
 
-/// How the run is now.
+/// The run, if its present state is known.
 pub(super) fn known(model: &Model) -> Answered<&Known> {
     model.present()?.ok_or_else(|| not_begun(model))
 }

@@ -1,4 +1,4 @@
-//! A program as a picture with the power flow of one scan, and where its signals are written and read.
+//! A program as a picture with the power flow of one scan, and its cross-reference.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -18,7 +18,7 @@ use crate::model::Known;
 use crate::renamed::by_address;
 use crate::shown;
 
-/// Rungs in one picture, at most: a reader of more looks for a signal.
+/// Rungs in one picture, at most.
 const MAXIMUM_RUNGS: usize = 60;
 
 #[derive(Debug, Deserialize)]
@@ -41,7 +41,7 @@ enum Names {
 #[derive(Debug, Serialize)]
 pub(super) struct Picture {
     cycle: i64,
-    /// Which cycle and lineage the picture is of, and how much of the program it shows.
+    /// Cycle and lineage of the picture, and the share of the program that it shows.
     words: String,
     svg: String,
 }
@@ -64,7 +64,7 @@ fn ladder_of(known: &Known, program: ProgramId) -> Answered<&Program> {
     let controller = controllers.get(program.index());
     let controller = controller.ok_or_else(|| {
         Problem::unknown(format!(
-            "the cluster has {} programs, and no number {}",
+            "the cluster has {} programs, not program {}",
             controllers.len(),
             program.0
         ))
@@ -82,13 +82,16 @@ fn draw(known: &Known, program: ProgramId, cycle: i64, wanted: &Wanted) -> Answe
         Names::Symbols => draw_svg_rungs(ladder, shown, flow),
         Names::Addresses => draw_svg_rungs(&by_address(ladder), shown, flow),
     };
-    let mut words = format!("{}, cycle {cycle}", shown::program_name(known, program));
+    let mut words = format!(
+        "{}, cycle {cycle}",
+        shown::program_name(&known.run, program)
+    );
     let step = known.run.history(program).and_then(|steps| steps.at(cycle));
     match (&evaluation, step.and_then(|step| step.sampled.as_ref())) {
         (Ok(_), Some(sampled)) => {
             words += &format!(": as evaluated, lineage {}", sampled.before);
         }
-        (Err(error), _) => words += &format!(": without power flow, for {}", error.words()),
+        (Err(error), _) => words += &format!(": without power flow: {}", error.words()),
         (Ok(_), None) => {}
     }
     if shown.len() < ladder.rungs.len() {
@@ -101,7 +104,7 @@ fn draw(known: &Known, program: ProgramId, cycle: i64, wanted: &Wanted) -> Answe
     })
 }
 
-/// The page has the styles, so that its own theme and palette count.
+/// The page has the styles of its own theme and palette.
 fn without_style(svg: &str) -> String {
     match (svg.find("<style>"), svg.find("</style>")) {
         (Some(from), Some(to)) if from < to => {

@@ -62,7 +62,7 @@ pub(super) async fn live(
 ) -> Answered<Sse<impl Stream<Item = Result<Event, Infallible>>>> {
     let place = Arc::clone(&app.viewers).try_acquire_owned().map_err(|_| {
         Problem::too_many(format!(
-            "{MAXIMUM_VIEWERS} viewers are there already: close another page"
+            "the limit of {MAXIMUM_VIEWERS} viewers is reached: close another page"
         ))
     })?;
     let mut newest = app.newest.clone();

@@ -27,20 +27,20 @@ pub(super) async fn log_in(
 ) -> Answered<Response> {
     let Json(Login { token }) = body?;
     let Some(logins) = &app.logins else {
-        return Err(Problem::bad("nobody logs in here"));
+        return Err(Problem::bad("this page has no logins"));
     };
     let person = logins.admit(&token).await;
-    let person = person.ok_or_else(|| Problem::log_in("nobody has this token"))?;
+    let person = person.ok_or_else(|| Problem::log_in("unknown token"))?;
     let name = person.name.clone();
     let cookie = logins
         .open(person, Instant::now())
-        .ok_or_else(|| Problem::too_many("the system gives no random numbers"))?;
+        .ok_or_else(|| Problem::too_many("the system provides no random numbers"))?;
     Ok(([(SET_COOKIE, cookie)], Json(json!({ "person": name }))).into_response())
 }
 
 pub(super) async fn log_out(State(app): State<Arc<App>>, headers: HeaderMap) -> Answered<Response> {
     let Some(logins) = &app.logins else {
-        return Err(Problem::bad("nobody logs in here"));
+        return Err(Problem::bad("this page has no logins"));
     };
     let cookie = logins.close(&headers);
     Ok(([(SET_COOKIE, cookie)], Json(json!({}))).into_response())

@@ -93,7 +93,8 @@ pub(super) async fn trends(
             .ok_or_else(|| Problem::unknown(format!("the run has no signal {name:.60}")))
     });
     let sources = known
-        .programs()
+        .run
+        .program_ids()
         .map(|program| band(known, program, from, to));
     let faults = known.run.events().filter(|event| {
         let done = matches!(event.event, "fault" | "ended" | "forced" | "unforced");
@@ -161,7 +162,7 @@ fn band(known: &Known, program: ProgramId, from: i64, to: i64) -> Band {
         .into_iter()
         .flat_map(|sources| sources.spans(from, to + 1));
     Band {
-        name: shown::program_name(known, program),
+        name: shown::program_name(&known.run, program),
         runs: spans
             .map(|span| (span.from, span.to - 1, source_word(*span.value)))
             .collect(),

@@ -1,4 +1,4 @@
-//! What a state and a source look like: a sign, a colour and dashes, as on the page of a run. Nothing is told by colour alone.
+//! Signs, colours and dashes of states and sources, as on the page of a run. No state is shown by colour alone.
 
 use understudy_wire::Source;
 
@@ -26,15 +26,15 @@ const fn sign(sign: &'static str, colour: &'static str, dashes: &'static str) ->
 
 pub(super) const fn of_state(state: StationState) -> Sign {
     match state {
-        StationState::Speaking => sign("●", GREEN, "none"),
+        StationState::Publishing => sign("●", GREEN, "none"),
         StationState::Killed | StationState::Ended => sign("✕", RED, "6 4"),
         StationState::Refused => sign("✗", RED, "6 4"),
-        StationState::Silent => sign("○", AMBER, "2 3"),
+        StationState::NotReceived => sign("○", AMBER, "2 3"),
         StationState::Flagged => sign("⚑", AMBER, "2 3"),
-        StationState::Stopped => sign("‖", AMBER, "2 3"),
+        StationState::Suspended => sign("‖", AMBER, "2 3"),
         StationState::NotStarted => sign("…", BLUE, "10 3"),
         StationState::Joining => sign("↻", BLUE, "10 3"),
-        StationState::Shadow => sign("◐", BLUE, "10 3"),
+        StationState::ShadowMode => sign("◐", BLUE, "10 3"),
     }
 }
 

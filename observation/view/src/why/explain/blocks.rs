@@ -7,7 +7,7 @@ use super::super::power::{AtBlock, at_block, nodes};
 use super::{DEEPEST, Explainer, FARTHEST, MOST};
 
 impl Explainer<'_> {
-    /// A block as the rung `below` sees it: of this scan where it stands above, of the one before otherwise.
+    /// A block as the rung `below` sees it: of this scan where it is above, of the one before otherwise.
     pub(super) fn block(
         &mut self,
         name: &str,
@@ -54,7 +54,7 @@ impl Explainer<'_> {
             return Some(reason);
         }
         if !self.told.insert((name.to_owned(), place, usize::MAX)) {
-            reason.text = "as said already".to_owned();
+            reason.text = "explained above".to_owned();
             return Some(reason);
         }
         let word = kind.word();

@@ -1,0 +1,193 @@
+//! The values of the metrics, from the model and the snapshot of a run.
+
+use std::sync::PoisonError;
+use std::sync::atomic::Ordering;
+
+use prometheus_client::metrics::counter::Counter;
+use understudy_view::{Counters, Model, ProgramSnapshot, Snapshot, StationState};
+use understudy_wire::{Member, ProgramId};
+
+use super::Metrics;
+use crate::labels::{OfLacking, OfMember, OfProgram, OfSource, OfState, OfTurn};
+
+impl Metrics {
+    /// Sets every metric but the times of cycles.
+    pub fn show(&self, model: &Model, snapshot: &Snapshot) {
+        self.cycle.set(snapshot.cycle.unwrap_or_default());
+        self.survives.set(i64::from(snapshot.margin.survives));
+        self.open_alarms.set(whole(snapshot.alarms.len() as u64));
+        self.records.set(whole(snapshot.records));
+        self.left_out.set(whole(snapshot.left_out));
+        self.station_states(snapshot);
+        self.members(model.counters());
+        self.turns(model.counters());
+        self.protection(snapshot);
+        for (program, counted) in model.program_ids().zip(&snapshot.programs) {
+            self.deadlines(counted);
+            self.program_counters(model.counters(), program, counted);
+            self.program(counted);
+        }
+    }
+
+    fn station_states(&self, snapshot: &Snapshot) {
+        for station in &snapshot.stations {
+            for state in StationState::ALL {
+                let of_state = OfState {
+                    station: station.name.clone(),
+                    state: state.word(),
+                };
+                self.station_states
+                    .get_or_create(&of_state)
+                    .set(i64::from(state == station.state));
+            }
+        }
+    }
+
+    fn members(&self, counters: &Counters) {
+        for (member, name) in self.members.iter() {
+            let of_member = OfMember {
+                member: name.to_owned(),
+            };
+            let counted = counters.member(member);
+            let seconds = counted.stalled.as_secs_f64();
+            let stalled = self.stall_seconds.get_or_create(&of_member);
+            stalled.inner().store(seconds.to_bits(), Ordering::Relaxed);
+            drop(stalled);
+            set(&self.stalls.get_or_create(&of_member), counted.stalls);
+            let refused = self.refused_frames.get_or_create(&of_member);
+            set(&refused, counted.refused_frames);
+            drop(refused);
+            let lost = self.records_lost.get_or_create(&of_member);
+            set(&lost, counted.records_lost);
+            drop(lost);
+            if !matches!(member, Member::Plant(_)) {
+                let differences = self.digest_differences.get_or_create(&of_member);
+                set(&differences, counted.digest_differences);
+                drop(differences);
+                set(&self.flagged.get_or_create(&of_member), counted.flagged);
+            }
+        }
+    }
+
+    fn turns(&self, counters: &Counters) {
+        for (station, program, count) in counters.turns_not_received() {
+            let name = |member| self.members.name(member).to_owned();
+            let turn = OfTurn {
+                station: name(Member::Station(station)),
+                remote_io: name(Member::RemoteIo(program)),
+            };
+            set(&self.silent_turns.get_or_create(&turn), count);
+        }
+    }
+
+    fn deadlines(&self, program: &ProgramSnapshot) {
+        let counts = [
+            ("direct", program.direct),
+            ("reconstructed", program.reconstructed),
+            ("held", program.held),
+            ("fail-safe", program.fail_safe),
+        ];
+        for (source, count) in counts {
+            let of_source = OfSource {
+                program: program.program.clone(),
+                source,
+            };
+            set(&self.deadlines.get_or_create(&of_source), count);
+        }
+    }
+
+    fn program_counters(&self, counters: &Counters, id: ProgramId, program: &ProgramSnapshot) {
+        let of_program = of(program);
+        let counted = counters.program(id);
+        for (family, count) in [
+            (&self.voided_samples, counted.voided_samples),
+            (&self.substituted_inputs, counted.substituted_inputs),
+            (&self.value_faults, counted.value_faults),
+            (&self.protection_losses, counted.protection_losses),
+            (&self.state_losses, counted.state_losses),
+        ] {
+            set(&family.get_or_create(&of_program), count);
+        }
+    }
+
+    fn program(&self, program: &ProgramSnapshot) {
+        let of_program = of(program);
+        self.awaits_release
+            .get_or_create(&of_program)
+            .set(i64::from(program.awaits_release));
+        self.forced
+            .get_or_create(&of_program)
+            .set(whole(program.forced.len() as u64));
+        if let Some(finished) = program.finished {
+            self.finished
+                .get_or_create(&of_program)
+                .set(whole(finished));
+        }
+        if let Some(plant_faults) = program.plant_faults {
+            self.plant_faults
+                .get_or_create(&of_program)
+                .set(whole(plant_faults));
+        }
+    }
+
+    /// Metrics that do not apply any more are not exposed.
+    fn protection(&self, snapshot: &Snapshot) {
+        // No exposition is written meanwhile.
+        let _registry = self.registry.lock().unwrap_or_else(PoisonError::into_inner);
+        self.protected.clear();
+        self.unprotected_since.clear();
+        self.lacking.clear();
+        self.lost_state_age.clear();
+        for program in &snapshot.programs {
+            self.protection_of(program);
+        }
+    }
+
+    fn protection_of(&self, program: &ProgramSnapshot) {
+        let of_program = of(program);
+        let lost = program.lost.as_ref();
+        self.state_lost
+            .get_or_create(&of_program)
+            .set(i64::from(lost.is_some()));
+        if let Some(age) = lost.and_then(|lost| lost.age_cycles) {
+            self.lost_state_age
+                .get_or_create(&of_program)
+                .set(whole(age));
+        }
+        let Some(protection) = &program.protection else {
+            return;
+        };
+        self.protected
+            .get_or_create(&of_program)
+            .set(i64::from(protection.protected));
+        if !protection.protected {
+            self.unprotected_since
+                .get_or_create(&of_program)
+                .set(protection.since);
+        }
+        for lacking in &protection.lacking {
+            let of_lacking = OfLacking {
+                program: program.program.clone(),
+                station: lacking.station.clone(),
+                reason: lacking.reason,
+                link: lacking.link.clone().unwrap_or_default(),
+            };
+            self.lacking.get_or_create(&of_lacking).set(1);
+        }
+    }
+}
+
+fn of(program: &ProgramSnapshot) -> OfProgram {
+    OfProgram {
+        program: program.program.clone(),
+    }
+}
+
+/// The model counts; the metric shows the count.
+fn set(counter: &Counter, count: u64) {
+    counter.inner().store(count, Ordering::Relaxed);
+}
+
+fn whole(count: u64) -> i64 {
+    i64::try_from(count).unwrap_or(i64::MAX)
+}

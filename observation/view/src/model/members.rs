@@ -1,0 +1,203 @@
+//! What stations report, and the processes that carry members.
+
+use understudy_bus::HostEvent;
+use understudy_journal::{Process, Record, moment};
+use understudy_node::Event as StationEvent;
+use understudy_wire::{Member, ProgramId, StationId, StationSet};
+
+use super::Model;
+use super::standing::{Change, ProgramChange, StationChange};
+use crate::describe::describe;
+
+impl Model {
+    pub(super) fn station(&mut self, record: &Record, station: StationId, event: &StationEvent) {
+        if station.index() >= self.cluster.agreement().schedule.stations() {
+            return;
+        }
+        let cycle = self.cycles.of(moment(&record.event));
+        match event {
+            StationEvent::Published { moment, words } => {
+                self.published(station, cycle);
+                self.timings.published(*moment, record.at_ns);
+                self.turns.published(*moment, station, words);
+                self.check_words(*moment);
+                return;
+            }
+            StationEvent::Holds {
+                moment,
+                program,
+                lineage,
+                state,
+            } => {
+                if let Some(history) = self.histories.get_mut(program.index()) {
+                    history.holds(*moment, *lineage, state);
+                }
+                return;
+            }
+            StationEvent::Refused { member, .. } => self.refused(*member, cycle),
+            _ => {}
+        }
+        let own = |change| Some(Change::Station(station, change));
+        let change = match event {
+            StationEvent::Joins { .. } => own(StationChange::Joins),
+            StationEvent::Adopted {
+                program,
+                from: Some(_),
+                ..
+            } => own(StationChange::Adopted(*program)),
+            StationEvent::BecameCycleMaster { .. } => Some(Change::BecameCycleMaster(station)),
+            StationEvent::Excluded { program, .. } => {
+                let excluded = ProgramChange::Excluded(StationSet::only(station));
+                Some(Change::Program(*program, excluded))
+            }
+            StationEvent::Readmitted { program, .. } => {
+                let readmitted = ProgramChange::Readmitted(station);
+                Some(Change::Program(*program, readmitted))
+            }
+            _ => None,
+        };
+        self.is_alive(Member::Station(station), cycle);
+        if let Some(change) = change {
+            self.changes
+                .reported(Member::Station(station), cycle, change);
+        }
+        self.exclusion_alarm(record, station, cycle, event);
+        let cause = match event {
+            StationEvent::Flagged { station, .. } => self.cause_of_silence(*station),
+            StationEvent::Joins { .. } => self.cause_of_silence(station),
+            _ => None,
+        };
+        self.happened(record, cycle, cause);
+    }
+
+    fn exclusion_alarm(
+        &mut self,
+        record: &Record,
+        station: StationId,
+        cycle: i64,
+        event: &StationEvent,
+    ) {
+        let subject = (record.name.clone(), "excluded");
+        match event {
+            StationEvent::Excluded { .. } => {
+                let text = describe(record, &self.members).text;
+                self.alarms.raise(subject, cycle, text);
+            }
+            StationEvent::Readmitted { .. } => {
+                if self.changes.now().excluded_from(station).is_empty() {
+                    self.alarms.over(&subject, cycle);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// A turn. It is a change only for a station that was joining or in shadow mode, which it is until its first turn.
+    fn published(&mut self, station: StationId, cycle: i64) {
+        let member = Member::Station(station);
+        self.is_alive(member, cycle);
+        let own = self.changes.now().station(station);
+        if own.is_some_and(|own| own.joining || !own.shadow.is_empty()) {
+            let change = Change::Station(station, StationChange::Published);
+            self.changes.reported(member, cycle, change);
+        }
+    }
+
+    /// A member that reports something has a process, if nothing else is known.
+    fn is_alive(&mut self, member: Member, cycle: i64) {
+        if self.changes.now().process(member).is_none() {
+            self.changes.push(cycle, Change::Alive(member));
+        }
+    }
+
+    /// A remote I/O received these stations at a deadline.
+    pub(super) fn received_at(&mut self, cycle: i64, heard: StationSet) {
+        self.received.note(cycle, heard);
+        for station in heard.iter() {
+            let own = self.changes.now().station(station);
+            if own.is_some_and(|own| !own.was_received || own.refused) {
+                let change = Change::Station(station, StationChange::Received);
+                self.changes.push(cycle, change);
+            }
+        }
+    }
+
+    pub(super) fn refused(&mut self, member: Member, cycle: i64) {
+        if let Member::Station(station) = member {
+            let change = Change::Station(station, StationChange::Refused);
+            self.changes.push(cycle, change);
+        }
+    }
+
+    pub(super) fn host(&mut self, record: &Record, member: Member, event: &HostEvent) {
+        let cycle = self.cycles.of(None);
+        match event {
+            HostEvent::Ready { .. } => self.ready(member, cycle),
+            HostEvent::JournalLost { .. } => {
+                if let Member::RemoteIo(program) = member {
+                    self.misses_records(program);
+                }
+            }
+            HostEvent::Exchange(_) => return,
+            _ => {}
+        }
+        self.host_alarm(record, member, cycle, event);
+        self.happened(record, cycle, None);
+    }
+
+    /// A process begins, unless it is known to have ended: its records may be read afterwards.
+    fn ready(&mut self, member: Member, cycle: i64) {
+        if !self.changes.now().is_down(member) {
+            let change = Change::Process(member, Process::Running);
+            self.changes.process(member, cycle, change);
+            if let Member::RemoteIo(program) = member {
+                self.remote_io_is_new(program);
+            }
+        }
+    }
+
+    fn host_alarm(&mut self, record: &Record, member: Member, cycle: i64, event: &HostEvent) {
+        let own = |alarm| (record.name.clone(), alarm);
+        let is_remote_io = matches!(member, Member::RemoteIo(_));
+        match event {
+            HostEvent::FieldLost { .. } | HostEvent::FieldContested if is_remote_io => {
+                let described = describe(record, &self.members);
+                self.alarms
+                    .raise(own(described.event), cycle, described.text);
+            }
+            HostEvent::FieldRegained if is_remote_io => {
+                self.alarms.over(&own("field-lost"), cycle);
+            }
+            HostEvent::FieldUncontested if is_remote_io => {
+                self.alarms.over(&own("field-contested"), cycle);
+            }
+            HostEvent::DuplicateFound { member } => {
+                let text = describe(record, &self.members).text;
+                let subject = (self.members.name(*member).to_owned(), "duplicate");
+                self.alarms.raise(subject, cycle, text);
+            }
+            HostEvent::DuplicateGone { member } => {
+                let subject = (self.members.name(*member).to_owned(), "duplicate");
+                self.alarms.over(&subject, cycle);
+            }
+            HostEvent::LinkFailed { reason, .. } => {
+                self.alarms.raise(own("link-failed"), cycle, reason.clone());
+            }
+            HostEvent::LinkReopened { .. } => self.alarms.over(&own("link-failed"), cycle),
+            _ => {}
+        }
+    }
+
+    pub(super) fn misses_records(&mut self, program: ProgramId) {
+        if let Some(history) = self.histories.get_mut(program.index()) {
+            history.misses_records();
+        }
+    }
+
+    /// The last action on a station, in words.
+    pub(super) fn cause_of_silence(&self, station: StationId) -> Option<String> {
+        let own = self.changes.now().station(station)?;
+        let (what, cycle) = own.done.as_ref()?;
+        Some(format!("{what} in cycle {cycle}"))
+    }
+}

@@ -1,0 +1,89 @@
+//! What the laboratory does, and what it sees of the processes that it runs.
+
+use understudy_journal::{Action, Process, Record, RunEvent};
+use understudy_wire::Member;
+
+use super::Model;
+use super::standing::{Change, StationChange};
+use crate::describe::fault_text;
+
+impl Model {
+    pub(super) fn run(&mut self, record: &Record, event: &RunEvent) {
+        // An action takes effect in the next cycle.
+        let cycle = match event {
+            RunEvent::Origin { moment, .. } => self.cycles.of(Some(*moment)),
+            RunEvent::Finished | RunEvent::Acknowledged(_) => self.cycles.of(None),
+            _ => self
+                .cycles
+                .of(None)
+                .saturating_add(i64::from(self.cycles.latest().is_some())),
+        };
+        match event {
+            RunEvent::Started { member } => {
+                let name = self.members.name(*member).to_owned();
+                self.process_is(*member, Process::Running, cycle);
+                self.done(*member, format!("{name} is started"), cycle);
+                self.alarms.over(&(name, "ended"), cycle);
+            }
+            RunEvent::Fault { action, member, .. } => self.fault(*action, *member, cycle),
+            RunEvent::Ended { member, how, .. } => {
+                let name = self.members.name(*member).to_owned();
+                let text = format!("{name} ended unexpectedly: {how}");
+                self.process_is(*member, Process::Ended, cycle);
+                self.done(*member, text.clone(), cycle);
+                self.alarms.raise((name, "ended"), cycle, text);
+            }
+            RunEvent::Origin { moment, cycle } => {
+                let cycle = i64::try_from(*cycle).unwrap_or(i64::MAX / 2);
+                self.cycles.origin_is(*moment, cycle);
+            }
+            RunEvent::ScenarioOver { verdict } => {
+                self.changes
+                    .push(cycle, Change::ScenarioOver(verdict.clone()));
+            }
+            RunEvent::Interrupted => self.interrupted = true,
+            RunEvent::Finished => self.finished = true,
+            RunEvent::Acknowledged(seen) => self.alarms.acknowledged(seen, cycle),
+            RunEvent::Attached { member } => {
+                self.changes.push(cycle, Change::Attached(*member));
+                // Its records from before are not in this journal.
+                if let Member::RemoteIo(program) = member {
+                    self.misses_records(*program);
+                }
+            }
+            RunEvent::Detached { member, .. } => {
+                self.changes.push(cycle, Change::Detached(*member));
+            }
+            RunEvent::Commanded { .. } => {}
+        }
+        self.happened(record, cycle, None);
+    }
+
+    fn fault(&mut self, action: Action, member: Member, cycle: i64) {
+        match (action, Process::after(action)) {
+            (Action::Continue, _) => {
+                self.changes.push(cycle, Change::Resumed(member));
+            }
+            (_, Some(process)) => self.process_is(member, process, cycle),
+            (Action::Cut { to }, _) => self.changes.push(cycle, Change::Cut(member, to)),
+            (Action::Heal { to }, _) => self.changes.push(cycle, Change::Healed(member, to)),
+            _ => {}
+        }
+        self.done(member, fault_text(action, member, &self.members), cycle);
+    }
+
+    fn process_is(&mut self, member: Member, process: Process, cycle: i64) {
+        let change = Change::Process(member, process);
+        self.changes.process(member, cycle, change);
+        if let (Member::RemoteIo(program), false) = (member, process == Process::Suspended) {
+            self.remote_io_is_new(program);
+        }
+    }
+
+    fn done(&mut self, member: Member, text: String, cycle: i64) {
+        if let Member::Station(station) = member {
+            let change = Change::Station(station, StationChange::Done(text));
+            self.changes.push(cycle, change);
+        }
+    }
+}

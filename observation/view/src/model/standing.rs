@@ -1,0 +1,277 @@
+//! What was done to the members and what they reported, as of one cycle: processes, cuts, forces, exclusions, protection.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use understudy_journal::Process;
+use understudy_wire::{Force, Member, ProgramId, ProgramSet, SignalPlace, StationId, StationSet};
+
+use crate::protection::{LostState, Protection};
+use crate::station::StationStanding;
+
+/// Standing of a program at its remote I/O, from the records up to a cycle.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct ProgramStanding {
+    pub(crate) awaits_release: bool,
+    pub(crate) forced: Vec<Force>,
+    /// Stations whose state of it its remote I/O has found faulty.
+    pub(crate) excluded: StationSet,
+    pub(crate) protection: Option<Protection>,
+    pub(crate) lost: Option<LostState>,
+    /// Parts that its simulated plant has finished, and its plant faults.
+    pub(crate) plant: Option<(u64, u64)>,
+}
+
+/// The standing of all members in a cycle.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Standing {
+    processes: BTreeMap<Member, Process>,
+    cuts: BTreeSet<(Member, Member)>,
+    /// Stations that have started cycles since their process began.
+    cycle_masters: BTreeSet<StationId>,
+    /// Members of a cluster elsewhere whose journal is not received here.
+    detached: BTreeSet<Member>,
+    stations: Vec<StationStanding>,
+    programs: Vec<ProgramStanding>,
+    /// What the scenario came to, where it is over and the cluster stays up.
+    pub(crate) scenario_over: Option<String>,
+}
+
+impl Standing {
+    pub(crate) fn new(stations: usize, programs: usize) -> Self {
+        Self {
+            stations: vec![StationStanding::default(); stations],
+            programs: vec![ProgramStanding::default(); programs],
+            ..Self::default()
+        }
+    }
+
+    /// The process of a member; nothing without a record of it.
+    pub(crate) fn process(&self, member: Member) -> Option<Process> {
+        self.processes.get(&member).copied()
+    }
+
+    pub(crate) fn is_down(&self, member: Member) -> bool {
+        self.process(member).is_some_and(Process::is_down)
+    }
+
+    /// The members that the frames of a member do not reach.
+    pub(crate) fn cut_from(&self, member: Member) -> impl Iterator<Item = Member> {
+        let cuts = self.cuts.iter();
+        cuts.filter(move |(from, _)| *from == member)
+            .map(|(_, to)| *to)
+    }
+
+    /// The stations that have started cycles, by rank. A host stall makes another station start a cycle now and then, and the first
+    /// living station continues without a record.
+    pub(crate) fn cycle_masters(&self) -> impl Iterator<Item = StationId> {
+        self.cycle_masters.iter().copied()
+    }
+
+    /// Whether the journal of a member is not received.
+    pub(crate) fn is_detached(&self, member: Member) -> bool {
+        self.detached.contains(&member)
+    }
+
+    pub(crate) fn station(&self, station: StationId) -> Option<&StationStanding> {
+        self.stations.get(station.index())
+    }
+
+    pub(crate) fn program(&self, program: ProgramId) -> Option<&ProgramStanding> {
+        self.programs.get(program.index())
+    }
+
+    /// The programs whose remote I/O has excluded a station.
+    pub(crate) fn excluded_from(&self, station: StationId) -> ProgramSet {
+        let programs = (0..).map(ProgramId).zip(&self.programs);
+        programs
+            .filter(|(_, program)| program.excluded.contains(station))
+            .map(|(program, _)| program)
+            .collect()
+    }
+
+    pub(super) fn apply(&mut self, change: &Change, cycle: i64) {
+        match change {
+            Change::Process(member, process) => self.process_changed(*member, *process),
+            Change::Resumed(member) => {
+                self.processes.insert(*member, Process::Running);
+            }
+            Change::Alive(member) => {
+                self.processes.entry(*member).or_insert(Process::Running);
+            }
+            Change::Cut(from, to) => {
+                self.cuts.insert((*from, *to));
+            }
+            Change::Healed(from, to) => {
+                self.cuts.remove(&(*from, *to));
+            }
+            Change::Attached(member) => {
+                self.detached.remove(member);
+            }
+            Change::Detached(member) => {
+                self.detached.insert(*member);
+            }
+            Change::BecameCycleMaster(station) => {
+                self.cycle_masters.insert(*station);
+            }
+            Change::ScenarioOver(verdict) => self.scenario_over = Some(verdict.clone()),
+            Change::Station(station, change) => {
+                if let Some(own) = self.stations.get_mut(station.index()) {
+                    change.apply(own, cycle);
+                }
+            }
+            Change::Program(program, change) => {
+                if let Some(own) = self.programs.get_mut(program.index()) {
+                    change.apply(own);
+                }
+            }
+        }
+    }
+
+    /// The process of a member begins or ends: its reports and the commands to it are void.
+    fn process_changed(&mut self, member: Member, process: Process) {
+        self.processes.insert(member, process);
+        match member {
+            Member::Station(station) => {
+                self.cycle_masters.remove(&station);
+                if let Some(own) = self.stations.get_mut(station.index())
+                    && process == Process::Running
+                {
+                    own.begin();
+                }
+            }
+            Member::RemoteIo(program) if process != Process::Suspended => {
+                if let Some(own) = self.programs.get_mut(program.index()) {
+                    *own = ProgramStanding {
+                        plant: own.plant,
+                        ..ProgramStanding::default()
+                    };
+                }
+                for station in &mut self.stations {
+                    station.flagged_by.remove(program);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    pub(super) fn shift(&mut self, by: i64) {
+        for station in &mut self.stations {
+            if let Some((_, cycle)) = &mut station.done {
+                *cycle = cycle.saturating_add(by);
+            }
+        }
+        for program in &mut self.programs {
+            shift(program.protection.as_mut().map(|of| &mut of.since), by);
+            shift(program.lost.as_mut().map(|of| &mut of.since), by);
+        }
+    }
+}
+
+fn shift(since: Option<&mut i64>, by: i64) {
+    if let Some(since) = since {
+        *since = since.saturating_add(by);
+    }
+}
+
+/// A change of the standing.
+#[derive(Debug, Clone)]
+pub(super) enum Change {
+    /// The process begins anew, ends or is suspended.
+    Process(Member, Process),
+    /// A suspended process continues.
+    Resumed(Member),
+    /// A record of the member itself.
+    Alive(Member),
+    Cut(Member, Member),
+    Healed(Member, Member),
+    Attached(Member),
+    Detached(Member),
+    BecameCycleMaster(StationId),
+    ScenarioOver(String),
+    Station(StationId, StationChange),
+    Program(ProgramId, ProgramChange),
+}
+
+/// A change of a station.
+#[derive(Debug, Clone)]
+pub(super) enum StationChange {
+    Joins,
+    Adopted(ProgramId),
+    Published,
+    Received,
+    Refused,
+    Flagged(ProgramId),
+    Cleared(ProgramId),
+    Done(String),
+}
+
+impl StationChange {
+    fn apply(&self, own: &mut StationStanding, cycle: i64) {
+        match self {
+            Self::Joins => own.joining = true,
+            Self::Adopted(program) => own.shadow.insert(*program),
+            Self::Published => {
+                own.joining = false;
+                own.shadow = ProgramSet::EMPTY;
+            }
+            Self::Received => {
+                own.was_received = true;
+                own.refused = false;
+            }
+            Self::Refused => own.refused = true,
+            Self::Flagged(by) => own.flagged_by.insert(*by),
+            Self::Cleared(by) => own.flagged_by.remove(*by),
+            Self::Done(text) => own.done = Some((text.clone(), cycle)),
+        }
+    }
+}
+
+/// A change of a program at its remote I/O.
+#[derive(Debug, Clone)]
+pub(super) enum ProgramChange {
+    StartedCold { awaits_release: bool },
+    Released,
+    Excluded(StationSet),
+    Readmitted(StationId),
+    Forced(Force),
+    Unforced(SignalPlace),
+    Protection(Box<Protection>),
+    Lost(Option<Box<LostState>>),
+    Plant { finished: u64, plant_faults: u64 },
+}
+
+impl ProgramChange {
+    fn apply(&self, own: &mut ProgramStanding) {
+        match self {
+            Self::StartedCold { awaits_release } => {
+                own.awaits_release = *awaits_release;
+                own.excluded = StationSet::EMPTY;
+            }
+            Self::Released => {
+                own.awaits_release = false;
+                own.excluded = StationSet::EMPTY;
+            }
+            Self::Excluded(stations) => own.excluded = own.excluded.or(*stations),
+            Self::Readmitted(station) => own.excluded.remove(*station),
+            Self::Forced(force) => {
+                own.forced.retain(|other| other.signal != force.signal);
+                own.forced.push(force.clone());
+            }
+            Self::Unforced(signal) => own.forced.retain(|other| other.signal != *signal),
+            Self::Protection(protection) => own.protection = Some(protection.as_ref().clone()),
+            Self::Lost(lost) => own.lost = lost.as_deref().cloned(),
+            Self::Plant {
+                finished,
+                plant_faults,
+            } => own.plant = Some((*finished, *plant_faults)),
+        }
+    }
+
+    pub(super) fn shift(&mut self, by: i64) {
+        match self {
+            Self::Protection(protection) => shift(Some(&mut protection.since), by),
+            Self::Lost(lost) => shift(lost.as_mut().map(|lost| &mut lost.since), by),
+            _ => {}
+        }
+    }
+}

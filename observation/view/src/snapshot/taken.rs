@@ -1,0 +1,318 @@
+//! How a snapshot is taken from the model of a run.
+
+use understudy_journal::{Process, SourceCounts, source_word};
+use understudy_remote_io::Missing;
+use understudy_cycle::Mode;
+use understudy_wire::{Member, ProgramId, ProgramSet, SignalPlace, StationId};
+
+use super::{
+    LinkSnapshot, MarginSnapshot, OutcomeSnapshot, PlantSnapshot, PlantState, ProgramSnapshot,
+    RemoteIoSnapshot, RemoteIoState, RunState, Snapshot, StationSnapshot, TimingSnapshot,
+    WordSnapshot,
+};
+use crate::alarm::Alarm;
+use crate::describe::missing_text;
+use crate::history::Driven;
+use crate::margin::{Margin, Outcome};
+use crate::model::{Model, Standing};
+use crate::station::StationState;
+
+impl Model {
+    /// The present: the newest cycle of which every living remote I/O has reported, with every change that was read since.
+    pub fn snapshot(&self) -> Snapshot {
+        let cycle = self.newest();
+        let standing = self.standing(cycle.unwrap_or(i64::MAX));
+        Picture {
+            model: self,
+            standing: &standing,
+            cycle,
+        }
+        .taken()
+    }
+
+    /// The state of a cycle; nothing where it is not remembered. The newest cycle is the present.
+    pub fn snapshot_at(&self, cycle: i64) -> Option<Snapshot> {
+        let (oldest, newest) = (self.oldest()?, self.newest()?);
+        if !(oldest.min(newest)..=newest).contains(&cycle) {
+            return None;
+        }
+        let picture = Picture {
+            model: self,
+            standing: &self.standing(cycle),
+            cycle: Some(cycle),
+        };
+        Some(picture.taken())
+    }
+
+    /// The alarms as they were in a cycle, oldest first; all of them in the newest.
+    pub fn alarms_at(&self, cycle: i64) -> impl DoubleEndedIterator<Item = Alarm> {
+        let is_present = self.newest().is_none_or(|newest| newest <= cycle);
+        let until = if is_present { i64::MAX } else { cycle };
+        self.alarms().filter_map(move |alarm| alarm.at(until))
+    }
+}
+
+/// A cycle that a snapshot is taken of.
+struct Picture<'m> {
+    model: &'m Model,
+    standing: &'m Standing,
+    cycle: Option<i64>,
+}
+
+impl Picture<'_> {
+    fn taken(&self) -> Snapshot {
+        let model = self.model;
+        let agreement = model.cluster().agreement();
+        let (records, left_out) = model.records();
+        let cycle = self.cycle.unwrap_or(i64::MAX);
+        let margin = model.margin_in(self.standing, self.cycle.unwrap_or(0));
+        let master = self
+            .cycle
+            .and_then(|cycle| model.cycle_master(self.standing, cycle));
+        let timing = model
+            .timings()
+            .filter(|timing| timing.cycle <= cycle)
+            .next_back();
+        Snapshot {
+            cluster: model.cluster().name().to_owned(),
+            run: self.run(),
+            cycle: self.cycle,
+            from_origin: model.has_origin(),
+            mode: match agreement.mode {
+                Mode::Full => "full",
+                Mode::Paper => "paper",
+            },
+            period_us: u64::try_from(agreement.schedule.period().as_micros()).unwrap_or(u64::MAX),
+            cycle_master: master.map(|station| self.name(Member::Station(station))),
+            scenario_over: self.standing.scenario_over.clone(),
+            stations: model.station_ids().map(|id| self.station(id)).collect(),
+            programs: model.program_ids().map(|id| self.program(id)).collect(),
+            remote_ios: model.program_ids().map(|id| self.remote_io(id)).collect(),
+            plants: model
+                .program_ids()
+                .filter_map(|id| self.plant(id))
+                .collect(),
+            margin: self.margin(&margin),
+            timing: timing.map(|timing| TimingSnapshot {
+                cycle: timing.cycle,
+                token_us: timing.token_ns as f64 / 1e3,
+                margin_us: timing.margin_ns as f64 / 1e3,
+                cycle_us: timing.cycle_ns.map(|cycle| cycle as f64 / 1e3),
+            }),
+            host_stalls: self.host_stalls(),
+            alarms: model.alarms_at(cycle).filter(Alarm::is_open).collect(),
+            events: model.event_count(),
+            records,
+            left_out,
+        }
+    }
+
+    fn run(&self) -> RunState {
+        match (self.model.finished, self.model.interrupted, self.cycle) {
+            (true, true, _) => RunState::Interrupted,
+            (true, false, _) => RunState::Finished,
+            (false, _, None) => RunState::Starting,
+            (false, _, Some(_)) => RunState::Running,
+        }
+    }
+
+    /// Of a cycle of the past those are left out that came later.
+    fn host_stalls(&self) -> u64 {
+        let is_later = |cycle: i64| self.cycle.is_some_and(|own| own < cycle);
+        let is_present = self.cycle >= self.model.newest();
+        let events = self.model.events();
+        let later = events.filter(|event| event.event == "stalled" && is_later(event.cycle));
+        let later = if is_present { 0 } else { later.count() as u64 };
+        self.model.counters().stalls().saturating_sub(later)
+    }
+
+    fn name(&self, member: Member) -> String {
+        self.model.members().name(member).to_owned()
+    }
+
+    fn program_names(&self, programs: ProgramSet) -> Vec<String> {
+        let programs = programs.iter();
+        let names = programs.map(|program| self.model.program_name(program).to_owned());
+        names.collect()
+    }
+
+    fn link(&self, member: Member) -> LinkSnapshot {
+        let cut_from = self.standing.cut_from(member);
+        let cut_from: Vec<String> = cut_from.map(|other| self.name(other)).collect();
+        LinkSnapshot {
+            isolated: !cut_from.is_empty() && self.model.is_isolated(self.standing, member),
+            cut_from,
+            detached: self.standing.is_detached(member),
+        }
+    }
+
+    fn station(&self, station: StationId) -> StationSnapshot {
+        let model = self.model;
+        let own = self.standing.station(station).cloned().unwrap_or_default();
+        let state = model.station_state_in(self.standing, station, self.cycle);
+        let schedule = &model.cluster().agreement().schedule;
+        let covers = match (state, self.cycle) {
+            (StationState::Publishing, Some(cycle)) => model.covers(station, cycle),
+            _ => ProgramSet::EMPTY,
+        };
+        let cycle = self.cycle.into_iter();
+        let words = cycle.flat_map(|cycle| model.words(station, cycle));
+        StationSnapshot {
+            name: self.name(Member::Station(station)),
+            rank: station.0,
+            understudy: schedule.is_understudy(station),
+            state,
+            flagged: own.is_flagged(),
+            publishes_for: self.program_names(covers),
+            excluded_from: self.program_names(self.standing.excluded_from(station)),
+            done: own
+                .done
+                .map(|(what, cycle)| format!("{what} in cycle {cycle}")),
+            words: words
+                .map(|word| WordSnapshot {
+                    mask: self.program_names(word.mask),
+                    sum: word.sum.to_string(),
+                })
+                .collect(),
+            link: self.link(Member::Station(station)),
+        }
+    }
+
+    /// The deadline of the cycle, as its remote I/O reported it. A remote I/O without a process drives nothing.
+    fn driven(&self, program: ProgramId) -> Option<&Driven> {
+        if self.standing.is_down(Member::RemoteIo(program)) {
+            return None;
+        }
+        let step = self.model.deadline(program, self.cycle?)?;
+        step.driven.as_ref()
+    }
+
+    fn program(&self, program: ProgramId) -> ProgramSnapshot {
+        let model = self.model;
+        let driven = self.driven(program);
+        let own = self.standing.program(program).cloned().unwrap_or_default();
+        let plant = Member::Plant(program);
+        let has_plant = model.cluster().member_name(plant).is_some();
+        let SourceCounts {
+            direct,
+            reconstructed,
+            held,
+            fail_safe,
+        } = model.source_counts(program, self.cycle);
+        let source = driven.map(|driven| driven.source);
+        let since = self.cycle.and_then(|cycle| model.since(program, cycle));
+        ProgramSnapshot {
+            program: model.program_name(program).to_owned(),
+            remote_io: self.name(Member::RemoteIo(program)),
+            plant: has_plant.then(|| self.name(plant)),
+            source: source.map(source_word),
+            since: source.and(since),
+            word_of: driven
+                .and_then(|driven| driven.word_of)
+                .map(|station| self.name(Member::Station(station))),
+            missing: driven.and_then(|driven| driven.missing).map(missing_text),
+            inputs: driven
+                .and_then(|driven| driven.inputs.as_ref())
+                .map(ToString::to_string),
+            outputs: driven.map(|driven| driven.outputs.to_string()),
+            direct,
+            reconstructed,
+            held,
+            fail_safe,
+            awaits_release: own.awaits_release,
+            forced: self.forced(program),
+            forces: own.forced,
+            protection: own.protection,
+            lost: own.lost,
+            finished: own.plant.map(|(finished, _)| finished),
+            plant_faults: own.plant.map(|(_, plant_faults)| plant_faults),
+        }
+    }
+
+    fn forced(&self, program: ProgramId) -> Vec<String> {
+        let own = self.standing.program(program);
+        let forced = own.into_iter().flat_map(|own| &own.forced);
+        let texts = forced.map(|force| {
+            let name = self.signal_name(program, force.signal);
+            let value = u8::from(force.value);
+            format!("{name} = {value} by {}: {}", force.owner, force.reason)
+        });
+        texts.collect()
+    }
+
+    fn signal_name(&self, program: ProgramId, signal: SignalPlace) -> String {
+        let circuit = &self.model.cluster().controllers()[program.index()].circuit;
+        let name = match signal {
+            SignalPlace::Input(place) => circuit.inputs().get(usize::from(place)).cloned(),
+            SignalPlace::Output(place) => {
+                let output = circuit.outputs().get(usize::from(place));
+                output.map(|output| output.name.clone())
+            }
+        };
+        name.unwrap_or_else(|| "an unknown signal".to_owned())
+    }
+
+    fn remote_io(&self, program: ProgramId) -> RemoteIoSnapshot {
+        let member = Member::RemoteIo(program);
+        let driven = self.driven(program);
+        let missing = driven.and_then(|driven| driven.missing);
+        let state = match (self.standing.process(member), missing) {
+            (Some(Process::Killed), _) => RemoteIoState::Killed,
+            (Some(Process::Ended), _) => RemoteIoState::Ended,
+            (Some(Process::Suspended), _) => RemoteIoState::Suspended,
+            (_, Some(Missing::NotReleased)) => RemoteIoState::AwaitsRelease,
+            (_, Some(Missing::StateLost)) => RemoteIoState::StateLost,
+            (_, Some(Missing::NoHistory)) => RemoteIoState::Listening,
+            _ if driven.is_none() => RemoteIoState::Listening,
+            _ => RemoteIoState::Serving,
+        };
+        RemoteIoSnapshot {
+            name: self.name(member),
+            state,
+            link: self.link(member),
+        }
+    }
+
+    fn plant(&self, program: ProgramId) -> Option<PlantSnapshot> {
+        let member = Member::Plant(program);
+        self.model.cluster().member_name(member)?;
+        Some(PlantSnapshot {
+            name: self.name(member),
+            program: self.model.program_name(program).to_owned(),
+            state: match self.standing.process(member) {
+                Some(Process::Killed) => PlantState::Killed,
+                Some(Process::Ended) => PlantState::Ended,
+                Some(Process::Suspended) => PlantState::Suspended,
+                Some(Process::Running) | None => PlantState::Moving,
+            },
+            link: self.link(member),
+        })
+    }
+
+    fn margin(&self, margin: &Margin) -> MarginSnapshot {
+        MarginSnapshot {
+            survives: margin.survives,
+            served: self.program_names(margin.served),
+            singles: margin.singles.iter().map(|of| self.outcome(of)).collect(),
+            pairs: margin.pairs.iter().map(|of| self.outcome(of)).collect(),
+        }
+    }
+
+    fn outcome(&self, outcome: &Outcome) -> OutcomeSnapshot {
+        let name = |program| self.model.program_name(program).to_owned();
+        let lost = outcome.lost.iter();
+        let why = lost.clone().map(|loss| {
+            let program = name(loss.program);
+            match loss.missing {
+                Some(missing) => format!("{program} loses its outputs ({})", missing_text(missing)),
+                None => format!("{program} loses its outputs"),
+            }
+        });
+        OutcomeSnapshot {
+            failed: outcome.failed.iter().map(|of| self.name(*of)).collect(),
+            masked: outcome.is_masked(),
+            lost: lost.clone().map(|loss| name(loss.program)).collect(),
+            why: why.collect::<Vec<_>>().join("; "),
+        }
+    }
+}
