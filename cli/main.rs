@@ -5,62 +5,27 @@
     reason = "the command line names runs by the time, and measures speed"
 )]
 
-mod allocate;
-mod animate;
 mod answer;
-mod attach;
-mod automata;
 mod bench;
-mod campaign;
-mod catalogue;
-mod check;
 mod console;
-mod convert;
-mod demo;
-mod des;
-mod diff;
-mod doctor;
-mod draw;
+mod deployment;
 mod endurance;
 mod excerpt;
-mod explain;
 mod failover;
 mod field;
 mod files;
-mod gateway;
 mod help;
-mod init;
-mod journal;
-mod keys;
+mod inspect;
 mod kind;
-mod lab;
-mod measure;
 mod member;
 mod memory;
-mod model_check;
-mod operate;
-mod outlook;
 mod overrides;
-mod parity;
-mod petri;
-mod proxy;
-mod reconfigure;
-mod reduction;
+mod programs;
 mod reliability;
-mod resources;
 mod run;
 mod scan;
-mod schema;
-mod shell;
-mod simulate;
-mod supervisor_to_ladder;
-mod synth;
-mod top;
-mod verify;
-mod view;
-mod wakefulness;
-mod watch;
-mod why;
+mod supervisors;
+mod tools;
 
 use std::process::ExitCode;
 
@@ -69,6 +34,13 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use answer::{Answer, Status};
 use console::Console;
+use deployment::{allocate, catalogue, doctor, gateway, keys, operate, resources};
+use inspect::{animate, diff, journal, top, watch, why};
+use programs::{check, convert, draw, init, parity, verify};
+use reliability::{measure, outlook, prediction};
+use run::{campaign, demo, lab, model_check, simulate};
+use supervisors::{des, petri, reconfigure, supervisor_to_ladder, synth};
+use tools::{explain, proxy, schema, shell};
 
 /// A redundant array of independent controllers: RAID for PLCs.
 #[derive(Debug, Parser)]
@@ -108,7 +80,7 @@ enum Command {
     SupervisorToLadder(supervisor_to_ladder::Arguments),
     Petri(petri::Arguments),
     Reconfigure(reconfigure::Arguments),
-    Reliability(reliability::Arguments),
+    Reliability(prediction::Arguments),
     Resources(resources::Arguments),
     Allocate(Box<allocate::Arguments>),
     Catalogue(catalogue::Arguments),
@@ -200,7 +172,7 @@ impl Command {
             Self::SupervisorToLadder(arguments) => supervisor_to_ladder::run(&arguments),
             Self::Petri(arguments) => petri::run(&arguments),
             Self::Reconfigure(arguments) => reconfigure::run(&arguments),
-            Self::Reliability(arguments) => reliability::run(&arguments),
+            Self::Reliability(arguments) => prediction::run(&arguments),
             Self::Resources(arguments) => resources::run(&arguments),
             Self::Allocate(arguments) => allocate::run(&arguments, console),
             Self::Catalogue(arguments) => catalogue::run(&arguments),

@@ -1,0 +1,277 @@
+//! `understudy allocate`: controllers for the programs of a plant.
+
+pub(crate) mod programs;
+mod verified;
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+use understudy_allocation::{
+    Allocation, FamilyQuantity, Item, MOST_RESERVE_PERCENT, Options, Preference, Provenance,
+    Requirement, Stock, Terms, allocate, csv, html, text,
+};
+use understudy_scenarios::time_name;
+
+use crate::answer::{Answer, Status};
+use crate::console::Console;
+use crate::deployment::catalogue;
+use crate::files;
+use crate::programs::verify::patience::Patience;
+use crate::run::outcome::command_line;
+use programs::{Programs, period};
+
+/// Choose controllers for programs, their understudy and their remote I/O
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy allocate examples/press-cell/cluster.toml
+  understudy allocate examples/press-cell/cluster.toml --reserve 20% --prefer speed --report plan
+  understudy allocate a.ladder b.ladder c.ladder --io local --stock \"CPU 224=2\" --assume program_bytes_per_instruction=8
+  understudy allocate examples/boiler/complete.ladder --budget 20s
+  understudy allocate pump.ladder --require \"vendor=Siemens\" --require \"inputs>=12\"
+
+A controller fits, does not fit, or is not known: a figure that the catalogue does not have never counts as enough. Nothing is placed whose
+program has not passed verification. How needs are counted and boxes packed: docs/allocation.md.
+
+Exit status: 0 when every box has its controller, 1 when one has not, 2 for bad input.")]
+pub(crate) struct Arguments {
+    /// Ladder programs, or cluster files
+    #[arg(value_name = "PROGRAM", required = true)]
+    programs: Vec<PathBuf>,
+    /// Who has the terminals; remote for a cluster and for several programs, local for one
+    #[arg(long, value_enum)]
+    io: Option<Io>,
+    /// Understudies of the programs, where no cluster says it
+    #[arg(long, value_name = "NUMBER", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=8))]
+    understudies: u8,
+    /// From one scan to the next, where no cluster says it
+    #[arg(long, value_name = "TIME", default_value = "10ms", value_parser = period)]
+    period: Duration,
+    /// Such as inputs>=24, languages~ladder, vendor=Siemens, remote-io:ethernet; may be given more than once
+    #[arg(long, value_name = "WHAT")]
+    require: Vec<String>,
+    /// What is best among what fits
+    #[arg(long, value_enum, default_value = "cost")]
+    prefer: Prefer,
+    /// Part of every capacity that stays free
+    #[arg(long, value_name = "PERCENT", default_value = "0%", value_parser = reserve)]
+    reserve: u8,
+    /// Name expansion modules where terminals on board are not enough
+    #[arg(long)]
+    expansion: bool,
+    /// For families of which it is not known, such as program_bytes_per_instruction=8; may be given more than once
+    #[arg(long, value_name = "FIGURE=NUMBER", value_parser = assumption)]
+    assume: Vec<(FamilyQuantity, u64)>,
+    /// Let programs of one group share a box, though one failure then takes several
+    #[arg(long)]
+    share_members: bool,
+    /// The only boxes that there are; may be given more than once
+    #[arg(long, value_name = "MODEL=COUNT", value_parser = stock)]
+    stock: Vec<Stock>,
+    /// What a program is to keep, to be proved before it is placed; may be given more than once
+    #[arg(long, value_name = "PROGRAM=FILE", value_parser = properties)]
+    properties: Vec<(String, PathBuf)>,
+    /// For proving; a program of which not everything was decided by then is not placed
+    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = period)]
+    budget: Duration,
+    /// Place programs that have not passed verification
+    #[arg(long)]
+    unverified: bool,
+    /// A catalogue of your own, in place of the one that comes with the program
+    #[arg(long, value_name = "FILE")]
+    catalogue: Option<PathBuf>,
+    /// Show every controller
+    #[arg(long)]
+    all: bool,
+    /// A folder for allocation.html and allocation.csv
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Io {
+    /// The controllers themselves; no understudy
+    Local,
+    /// Remote I/Os, which restore what is lost
+    Remote,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Prefer {
+    /// The least price; where prices are not known, the smallest that suffices
+    Cost,
+    /// The smallest program memory that suffices
+    Memory,
+    /// The shortest time of an instruction
+    Speed,
+    /// The largest smallest margin
+    Reserve,
+}
+
+fn reserve(text: &str) -> Result<u8, String> {
+    let number = text.strip_suffix('%').unwrap_or(text).trim();
+    let percent = number.parse().ok();
+    percent
+        .filter(|percent| *percent <= MOST_RESERVE_PERCENT)
+        .ok_or_else(|| format!("{text:?} is no part from 0% to {MOST_RESERVE_PERCENT}%"))
+}
+
+fn assumption(text: &str) -> Result<(FamilyQuantity, u64), String> {
+    let (name, value) = text.split_once('=').unwrap_or((text, ""));
+    let known = FamilyQuantity::ALL.into_iter();
+    let Some(quantity) = known
+        .into_iter()
+        .find(|known| known.name() == name.trim().replace('-', "_"))
+    else {
+        let names = FamilyQuantity::ALL.map(FamilyQuantity::name).join(", ");
+        return Err(format!(
+            "`{name}` is no figure of a family; known are {names}"
+        ));
+    };
+    let value = FamilyQuantity::parse(value.trim());
+    value
+        .map(|value| (quantity, value))
+        .ok_or_else(|| format!("{quantity}=NUMBER is meant"))
+}
+
+fn stock(text: &str) -> Result<Stock, String> {
+    let (name, count) = text.rsplit_once('=').ok_or("MODEL=COUNT is meant")?;
+    let count = count.trim().parse().ok().filter(|count| *count <= 1000);
+    Ok(Stock {
+        name: name.trim().to_owned(),
+        count: count.ok_or("a number of boxes up to 1000 is meant behind the =")?,
+    })
+}
+
+fn properties(text: &str) -> Result<(String, PathBuf), String> {
+    let (name, file) = text.split_once('=').ok_or("PROGRAM=FILE is meant")?;
+    Ok((name.trim().to_owned(), PathBuf::from(file.trim())))
+}
+
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
+    match plan(arguments, console) {
+        Ok(answer) | Err(answer) => answer,
+    }
+}
+
+fn plan(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
+    let options = options(arguments)?;
+    let programs = Programs::read(&arguments.programs, arguments.period)?;
+    let (catalogue, about) = catalogue::read(arguments.catalogue.as_deref())?;
+    let patience = Patience::new(Some(arguments.budget), console);
+    let items = items(arguments, &programs, &patience)?;
+    let found = allocate(&catalogue, &items, &options).map_err(|errors| {
+        errors
+            .iter()
+            .fold(Answer::done("", Value::Null), |answer, error| {
+                answer.and_failure(Status::BadInput, error.code(), message(error))
+            })
+    })?;
+    let mut answer_text = text(&found, arguments.all);
+    if let Some(folder) = &arguments.report {
+        let page = write_report(folder, &found, &options.terms, &programs.title(), about)?;
+        answer_text.push_str(&format!("report: {page}\n"));
+    }
+    let status = if found.is_complete() {
+        Status::Done
+    } else {
+        Status::Failed
+    };
+    let answer = Answer::done(answer_text, json!(found)).with_status(status);
+    Ok(answer.with_used(programs.reports))
+}
+
+/// The text of an error behind its code.
+pub(crate) fn message(error: &impl std::fmt::Display) -> String {
+    let text = error.to_string();
+    let message = text.split_once(": ").map(|(_, message)| message.to_owned());
+    message.unwrap_or(text)
+}
+
+fn options(arguments: &Arguments) -> Result<Options, Answer> {
+    let mut wrong = Answer::done("", Value::Null);
+    let mut requirements = Vec::new();
+    for text in &arguments.require {
+        match Requirement::parse(text) {
+            Ok(requirement) => requirements.push(requirement),
+            Err(error) => {
+                wrong = wrong.and_failure(Status::BadInput, "U1130", message(&error));
+            }
+        }
+    }
+    if !wrong.failures.is_empty() {
+        return Err(wrong);
+    }
+    Ok(Options {
+        terms: Terms {
+            reserve_percent: arguments.reserve,
+            expansion: arguments.expansion,
+            requirements,
+            assumptions: arguments.assume.iter().copied().collect(),
+        },
+        preference: match arguments.prefer {
+            Prefer::Cost => Preference::Cost,
+            Prefer::Memory => Preference::Memory,
+            Prefer::Speed => Preference::Speed,
+            Prefer::Reserve => Preference::Reserve,
+        },
+        share_members: arguments.share_members,
+        unverified: arguments.unverified,
+        stock: arguments.stock.clone(),
+    })
+}
+
+/// The boxes that the programs want, with what was proved about each.
+fn items(
+    arguments: &Arguments,
+    programs: &Programs,
+    patience: &Patience<'_>,
+) -> Result<Vec<Item>, Answer> {
+    let alone = programs.groups.len() == 1
+        && programs.groups[0].cluster.is_none()
+        && programs.groups[0].members.len() == 1;
+    let io = arguments
+        .io
+        .unwrap_or(if alone { Io::Local } else { Io::Remote });
+    let asked = verified::asked(&arguments.properties, programs)?;
+    let mut items = Vec::new();
+    for (number, group) in programs.groups.iter().enumerate() {
+        let members = verified::members(group, &asked, patience)?;
+        if io == Io::Local {
+            items.extend(members.iter().map(understudy_allocation::alone));
+        } else {
+            let group = verified::group(group, members, arguments.understudies, patience)?;
+            items.extend(group.items(number));
+        }
+    }
+    Ok(items)
+}
+
+/// Writes the page and the table, both or none; answers with the page's name.
+fn write_report(
+    folder: &Path,
+    found: &Allocation,
+    terms: &Terms,
+    title: &str,
+    catalogue: String,
+) -> Result<String, Answer> {
+    let about = Provenance {
+        title: title.to_owned(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        date: time_name(SystemTime::now()),
+        repeat: command_line(),
+        catalogue,
+    };
+    let page = html(found, terms, &about);
+    let page = page.map_err(|error| Answer::failed(Status::Failed, "U1141", message(&error)))?;
+    std::fs::create_dir_all(folder).map_err(|error| {
+        let message = format!("{} cannot be written: {error}", folder.display());
+        Answer::failed(Status::Failed, "U0602", message)
+    })?;
+    let place = folder.join("allocation.html");
+    files::write(&folder.join("allocation.csv"), &csv(found))?;
+    files::write(&place, &page)?;
+    Ok(place.display().to_string())
+}

@@ -1,0 +1,320 @@
+//! `understudy reliability`: how long it works until a program is lost, calculated.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use clap::{Args, ValueEnum};
+use serde_json::{Map, Value, json};
+use understudy_cluster::{Cluster, Overrides};
+use understudy_diagnostic::Report;
+use understudy_reliability::{
+    Answer as Calculated, Assessment, CommonCauseConvention, Hours, Options, Provenance,
+    ReliabilityError, SharedPart, UnequalBoxes, answer_chain, calculate, read_chain, report,
+    report_data,
+};
+use understudy_scenarios::{options_of, set_unequal, time_name};
+
+use crate::answer::{Answer, Status};
+use crate::files;
+use crate::run::outcome::command_line;
+
+/// Calculate how long a cluster works, beside what else could be bought
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy reliability --controllers 20 --mtbf 10000h --mttr 24h --mission 1000h
+  understudy reliability examples/press-cell/cluster.toml --mtbf 10000h --mttr 24h --report reliability
+  understudy reliability --controllers 20 --mtbf 10000h --mttr 24h --box old*3=4000h,48h --shared power=200000h
+  understudy reliability --chain plant.chain --mission 1y
+
+Times carry their unit: us, ms, s, min, h, d, y. What the numbers rest on: docs/reliability.md.")]
+pub(crate) struct Arguments {
+    /// The cluster file; controllers and spares are counted in it
+    #[arg(value_name = "CLUSTER.toml", conflicts_with_all = ["controllers", "spares", "chain"])]
+    cluster: Option<PathBuf>,
+    /// Controllers that are not redundant, N
+    #[arg(long, value_name = "N", required_unless_present_any = ["cluster", "chain"])]
+    controllers: Option<u32>,
+    /// Understudies of each group
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    spares: u32,
+    /// Mean time between failures of a box
+    #[arg(
+        long,
+        value_name = "TIME",
+        required_unless_present = "chain",
+        allow_hyphen_values = true
+    )]
+    mtbf: Option<String>,
+    /// Mean time to repair a box
+    #[arg(
+        long,
+        value_name = "TIME",
+        required_unless_present = "chain",
+        allow_hyphen_values = true
+    )]
+    mttr: Option<String>,
+    /// Boxes with times of their own: NAME=MTBF,MTTR, a station of the cluster file; without one NAME*COUNT=..., and understudies=...
+    #[arg(long = "box", value_name = "BOX")]
+    boxes: Vec<String>,
+    /// A part whose first failure fails the system, such as power=200000h
+    #[arg(long, value_name = "NAME=MTBF")]
+    shared: Vec<String>,
+    /// Boxes that are repaired at the same time, at most; by default a crew for each
+    #[arg(long, value_name = "R")]
+    crews: Option<u32>,
+    /// Probability that a failure is masked
+    #[arg(
+        long,
+        value_name = "C",
+        default_value_t = 1.0,
+        allow_hyphen_values = true
+    )]
+    coverage: f64,
+    /// Equal groups of controllers that share no understudy
+    #[arg(long, value_name = "G", default_value_t = 1)]
+    groups: u32,
+    /// Mean time until a failure is detected; repair starts then
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
+    detection: Option<String>,
+    /// Share of failures that take all boxes at once
+    #[arg(
+        long,
+        value_name = "BETA",
+        default_value_t = 0.0,
+        allow_hyphen_values = true
+    )]
+    beta: f64,
+    /// How that share is counted
+    #[arg(long, value_enum, default_value = "additive")]
+    convention: ConventionWord,
+    /// The time over which it has to work
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
+    mission: Option<String>,
+    /// Answer about a Markov chain of your own in place of a cluster
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["controllers", "mtbf", "mttr", "report"])]
+    chain: Option<PathBuf>,
+    /// A folder for reliability.html, .json and .csv
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ConventionWord {
+    /// Besides the failures of each box
+    Additive,
+    /// Taken from the failures of each box
+    Split,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Answer {
+    let answer = match &arguments.chain {
+        Some(path) => of_chain(path, arguments.mission.as_deref()),
+        None => of_cluster(arguments),
+    };
+    answer.unwrap_or_else(|answer| answer)
+}
+
+fn of_chain(path: &Path, mission: Option<&str>) -> Result<Answer, Answer> {
+    let mut times = Times::default();
+    let mission = times.optional("mission", mission);
+    times.finish(Vec::new())?;
+    let read = read_chain(&path.display().to_string(), &files::text(path)?);
+    let Some(chain) = read.chain else {
+        return Err(Answer::bad_files(vec![read.report]));
+    };
+    let found = answer_chain(&chain, mission).map_err(|error| refused(&[error]))?;
+    Ok(Answer::done(found.to_text(), &found).with_reports(vec![read.report]))
+}
+
+fn of_cluster(arguments: &Arguments) -> Result<Answer, Answer> {
+    let mut times = Times::default();
+    let mtbf = times.required("mtbf", arguments.mtbf.as_deref());
+    let mttr = times.required("mttr", arguments.mttr.as_deref());
+    let detection = times.optional("detection", arguments.detection.as_deref());
+    let mission = times.optional("mission", arguments.mission.as_deref());
+    let boxes: Vec<UnequalBoxes> = times.parsed("box", &arguments.boxes);
+    let shared: Vec<SharedPart> = times.parsed("shared", &arguments.shared);
+    let cluster = match &arguments.cluster {
+        Some(path) => Some(files::cluster(path, Overrides::default())?),
+        None => None,
+    };
+    let options = |mtbf, mttr| {
+        let mut options = match &cluster {
+            Some((cluster, _)) => options_of(cluster, mtbf, mttr),
+            None => {
+                let mut options =
+                    Options::new(arguments.controllers.unwrap_or_default(), mtbf, mttr);
+                options.spares = arguments.spares;
+                options
+            }
+        };
+        options.groups = arguments.groups;
+        options.crews = arguments.crews;
+        options.coverage = arguments.coverage;
+        options.detection = detection;
+        options.beta = arguments.beta;
+        options.convention = match arguments.convention {
+            ConventionWord::Additive => CommonCauseConvention::Additive,
+            ConventionWord::Split => CommonCauseConvention::Split,
+        };
+        options.mission = mission;
+        options.shared.clone_from(&shared);
+        options
+    };
+    // What is wrong with the other options is said in the same run as what is wrong with a time.
+    let any = Hours::new("any", 1.0).map_err(|error| refused(&[error]))?;
+    let mut options = options(mtbf.unwrap_or(any), mttr.unwrap_or(any));
+    let mut wrong = set_unequal(&mut options, cluster.as_ref().map(|read| &read.0), boxes);
+    wrong.extend(options.system().err().unwrap_or_default());
+    times.finish(wrong)?;
+    let found = calculate(&options).map_err(|errors| refused(&errors))?;
+    let (cluster, reports) = cluster.map_or((None, Vec::new()), |(cluster, reports)| {
+        (Some(cluster), reports)
+    });
+    let mut text = found.to_text();
+    if let Some(folder) = &arguments.report {
+        text.push_str(&write_report(folder, &options, cluster.as_ref(), None)?);
+    }
+    let answer = calculated(text, &found, reports);
+    Ok(match &arguments.cluster {
+        Some(cluster) => answer.and_next(&[&"allocate", cluster]),
+        None => answer,
+    })
+}
+
+/// The answer; its numbers stand at the top of the document too.
+fn calculated(text: String, found: &Calculated, reports: Vec<Report>) -> Answer {
+    let answer = Answer::done(text, found).with_reports(reports);
+    let numbers: Map<String, Value> = answer
+        .result
+        .as_object()
+        .into_iter()
+        .flatten()
+        .filter(|(_, value)| value.is_number())
+        .map(|(name, value)| (name.clone(), value.clone()))
+        .collect();
+    answer.with_numbers(numbers)
+}
+
+/// Everything that is wrong with a question.
+pub(crate) fn refused(errors: &[ReliabilityError]) -> Answer {
+    errors.iter().fold(
+        Answer::done("", json!(null)).with_status(Status::BadInput),
+        |answer, error| answer.and_failure(Status::BadInput, error.code(), error.to_string()),
+    )
+}
+
+/// Times as they are given, and what is wrong with any of them.
+#[derive(Debug, Default)]
+pub(crate) struct Times {
+    wrong: Vec<(&'static str, String)>,
+}
+
+impl Times {
+    pub(crate) fn required(&mut self, name: &str, text: Option<&str>) -> Option<Hours> {
+        self.optional(name, Some(text.unwrap_or_default()))
+    }
+
+    pub(crate) fn optional(&mut self, name: &str, text: Option<&str>) -> Option<Hours> {
+        match text?.parse::<Hours>() {
+            Ok(hours) => Some(hours),
+            Err(error) => {
+                self.note(name, &error);
+                None
+            }
+        }
+    }
+
+    /// The texts of an option that may be given several times.
+    pub(crate) fn parsed<T>(&mut self, name: &str, texts: &[String]) -> Vec<T>
+    where
+        T: std::str::FromStr<Err = ReliabilityError>,
+    {
+        let mut found = Vec::new();
+        for text in texts {
+            match text.parse() {
+                Ok(value) => found.push(value),
+                Err(error) => self.note(name, &error),
+            }
+        }
+        found
+    }
+
+    fn note(&mut self, name: &str, error: &ReliabilityError) {
+        let (code, message) = (error.code(), error.to_string());
+        let message = message.strip_prefix(code).unwrap_or(&message);
+        self.wrong.push((code, format!("--{name}{message}")));
+    }
+
+    /// # Errors
+    /// Where any time, or anything of `others`, is wrong.
+    pub(crate) fn finish(self, others: Vec<ReliabilityError>) -> Result<(), Answer> {
+        if self.wrong.is_empty() && others.is_empty() {
+            return Ok(());
+        }
+        let answer = Answer::done("", json!(null)).with_status(Status::BadInput);
+        let answer = self
+            .wrong
+            .into_iter()
+            .fold(answer, |answer, (code, message)| {
+                answer.and_failure(Status::BadInput, code, message)
+            });
+        Err(others.iter().fold(answer, |answer, error| {
+            answer.and_failure(Status::BadInput, error.code(), error.to_string())
+        }))
+    }
+}
+
+/// Writes the report into `folder`, all files or none; says where it lies.
+pub(crate) fn write_report(
+    folder: &Path,
+    options: &Options,
+    cluster: Option<&Cluster>,
+    measured: Option<Assessment>,
+) -> Result<String, Answer> {
+    let title = cluster.map_or_else(
+        || format!("{} controllers", options.controllers),
+        |cluster| cluster.name().to_owned(),
+    );
+    let provenance = Provenance {
+        title,
+        configuration: cluster.map(|cluster| cluster.agreement().configuration.to_string()),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        date: time_name(SystemTime::now()),
+        repeat: command_line(),
+    };
+    let data = report_data(options, provenance, measured).map_err(|errors| refused(&errors))?;
+    let made = report(&data).map_err(|error| refused(&[error]))?;
+    let failed = |path: &Path, error: std::io::Error| {
+        let message = format!("{} cannot be written: {error}", path.display());
+        Answer::failed(Status::Failed, "U0602", message)
+    };
+    fs::create_dir_all(folder).map_err(|error| failed(folder, error))?;
+    let texts = [
+        ("reliability.html", &made.html),
+        ("reliability.json", &made.json),
+        ("reliability.csv", &made.csv),
+    ];
+    // Beside their places first: a full disk leaves no half of a report, and no mixture of two.
+    let staged = |name: &str| folder.join(format!(".{name}.new"));
+    let written = texts.iter().try_for_each(|(name, text)| {
+        let path = staged(name);
+        fs::write(&path, text).map_err(|error| failed(&path, error))
+    });
+    let moved = written.and_then(|()| {
+        texts.iter().try_for_each(|(name, _)| {
+            let path = folder.join(name);
+            fs::rename(staged(name), &path).map_err(|error| failed(&path, error))
+        })
+    });
+    if let Err(answer) = moved {
+        for (name, _) in texts {
+            let _ = fs::remove_file(staged(name));
+        }
+        return Err(answer);
+    }
+    let page = folder.join("reliability.html");
+    Ok(format!("report: {}\n", page.display()))
+}
