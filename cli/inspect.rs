@@ -1,10 +1,29 @@
 //! Commands that show a run, live or finished.
 
-pub(crate) mod animate;
+mod animate;
 pub(crate) mod attach;
-pub(crate) mod diff;
-pub(crate) mod journal;
+mod diff;
+mod journal;
 pub(crate) mod top;
-pub(crate) mod view;
+mod view;
 pub(crate) mod watch;
-pub(crate) mod why;
+mod why;
+
+use crate::commands::{Group, command};
+
+pub(crate) fn group() -> Group {
+    Group {
+        name: "inspect",
+        title: "Inspect runs",
+        entries: vec![
+            command("watch", |it, console| watch::run(&it, console)),
+            command("top", |it, console| top::run(&it, console)),
+            command("why", |it, _| why::run(&it)),
+            command("journal", |it, console| {
+                journal::run(&it, console.is_json())
+            }),
+            command("diff", |it, _| diff::run(&it)),
+            command("animate", |it, _| animate::run(&it)),
+        ],
+    }
+}

@@ -1,5 +1,19 @@
 //! Commands that predict and measure the reliability of a cluster.
 
-pub(crate) mod measure;
-pub(crate) mod outlook;
-pub(crate) mod prediction;
+mod measure;
+mod outlook;
+mod prediction;
+
+use crate::commands::{Group, command};
+
+pub(crate) fn group() -> Group {
+    Group {
+        name: "reliability",
+        title: "Predict and measure reliability",
+        entries: vec![
+            command("reliability", |it, _| prediction::run(&it)),
+            command("measure", |it, console| measure::run(&it, console)),
+            command("outlook", |it, _| outlook::run(&it)),
+        ],
+    }
+}

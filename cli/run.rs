@@ -7,3 +7,19 @@ pub(crate) mod model_check;
 pub(crate) mod outcome;
 pub(crate) mod simulate;
 pub(crate) mod wakefulness;
+
+use crate::commands::{Group, command};
+
+pub(crate) fn group() -> Group {
+    Group {
+        name: "run",
+        title: "Run and test clusters",
+        entries: vec![
+            command("demo", |it, console| demo::run(&it, console)),
+            command("lab", |it, console| lab::run(&it, console)),
+            command("simulate", |it, _| simulate::run(&it)),
+            command("campaign", |it, console| campaign::run(&it, console)),
+            command("model-check", |it, _| model_check::run(&it)),
+        ],
+    }
+}

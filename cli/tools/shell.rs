@@ -1,18 +1,22 @@
-//! What a shell and a reader of manuals want to know of the command line.
+//! `understudy completions` and `understudy man`.
 
-use clap::{Args, CommandFactory};
+use std::io;
+
+use clap::{Args, Command};
 use clap_complete::Shell;
+use clap_mangen::Man;
 use serde_json::json;
 
 use crate::answer::{Answer, Status};
+use crate::commands::{Group, groups, parser};
 
-/// Print a script that completes commands in a shell
+/// Print the completion script for a shell
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy completions bash > ~/.local/share/bash-completion/completions/understudy")]
 pub(crate) struct CompletionsArguments {
-    /// For which shell
+    /// Shell to complete commands in
     #[arg(value_enum)]
     shell: Shell,
 }
@@ -24,19 +28,55 @@ Example:
   understudy man | man -l -")]
 pub(crate) struct ManArguments {}
 
+/// Shells list the commands with their groups.
 pub(crate) fn completions(arguments: &CompletionsArguments) -> Answer {
+    let groups = groups();
+    let mut parser = parser(&groups);
+    for group in &groups {
+        for command in group.parsers() {
+            parser = parser.mut_subcommand(command.get_name(), |command| {
+                let about = command.get_about().map(ToString::to_string);
+                let about = about.unwrap_or_default();
+                command.about(format!("{}: {about}", group.name))
+            });
+        }
+    }
     let mut script = Vec::new();
-    let mut command = crate::Arguments::command();
-    clap_complete::generate(arguments.shell, &mut command, "understudy", &mut script);
+    clap_complete::generate(arguments.shell, &mut parser, "understudy", &mut script);
     answer(script)
 }
 
 pub(crate) fn man(_: &ManArguments) -> Answer {
-    let mut page = Vec::new();
-    match clap_mangen::Man::new(crate::Arguments::command()).render(&mut page) {
-        Ok(()) => answer(page),
+    match page() {
+        Ok(page) => answer(page),
         Err(error) => Answer::failed(Status::Failed, "U0602", error.to_string()),
     }
+}
+
+/// The manual page, with a section for each group of commands.
+fn page() -> io::Result<Vec<u8>> {
+    let groups = groups();
+    let mut page = Vec::new();
+    let whole = Man::new(parser(&groups));
+    whole.render_title(&mut page)?;
+    whole.render_name_section(&mut page)?;
+    whole.render_synopsis_section(&mut page)?;
+    whole.render_description_section(&mut page)?;
+    whole.render_options_section(&mut page)?;
+    for group in &groups {
+        of_group(group).render_subcommands_section(&mut page)?;
+    }
+    whole.render_extra_section(&mut page)?;
+    whole.render_version_section(&mut page)?;
+    Ok(page)
+}
+
+fn of_group(group: &Group) -> Man {
+    let parser = Command::new("understudy")
+        .subcommand_help_heading(group.title)
+        .disable_help_subcommand(true)
+        .subcommands(group.parsers());
+    Man::new(parser)
 }
 
 fn answer(bytes: Vec<u8>) -> Answer {
