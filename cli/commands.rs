@@ -192,4 +192,16 @@ mod tests {
     fn the_table_is_a_valid_command_line() {
         parser(&groups()).debug_assert();
     }
+    #[test]
+    fn every_summary_fits_on_one_line() {
+        for entry in groups().iter().flat_map(|group| &group.entries) {
+            let about = entry.parser.get_about().map(ToString::to_string);
+            let length = about.map_or(0, |about| about.chars().count());
+            assert!(
+                (10..=70).contains(&length),
+                "{}: {length} characters",
+                entry.name
+            );
+        }
+    }
 }

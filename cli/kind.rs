@@ -1,4 +1,4 @@
-//! What a file is, so that one in the wrong place is told from one that is wrong.
+//! Recognises the kind of a file, to report a file of the wrong kind as such.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use understudy_supervisor::FileKind;
 
 use crate::answer::{Answer, Status};
 
-/// The files that people write.
+/// Kind of an input file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     Cluster,
@@ -20,13 +20,13 @@ pub(crate) enum Kind {
     Map,
     Ads,
     Ladder,
-    /// Neither the name nor the contents tell it.
+    /// Neither the name nor the content determines the kind.
     Unknown,
 }
 
 impl Kind {
-    /// By the ending, for TOML by keys that only one kind has, and for programs by what they begin with. TOML that could be anything is
-    /// taken for a cluster file.
+    /// Determines the kind by file extension, for TOML by characteristic keys, for programs by their first lines. Other TOML is
+    /// considered a cluster file.
     pub(crate) fn of(path: &Path, text: &str) -> Self {
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
         if ending == "ads" {
@@ -48,7 +48,7 @@ impl Kind {
         }
     }
 
-    /// As `check` and its answers for machines call it.
+    /// Name in the answers of `check`.
     pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Cluster => "cluster",
@@ -78,7 +78,7 @@ impl Kind {
     }
 }
 
-/// A failure where a file is of another kind than `wanted`. Files of unknown form pass: their own reader says what is wrong.
+/// Fails if a file is not of the `wanted` kind. Unrecognised files pass; their reader reports the errors.
 pub(crate) fn expect(wanted: Kind, path: &Path, text: &str) -> Result<(), Answer> {
     let found = Kind::of(path, text);
     let is_sure = match found {

@@ -1,4 +1,4 @@
-//! `understudy allocate`: controllers for the programs of a plant.
+//! `understudy allocate`: selection of controllers for programs.
 
 pub(crate) mod programs;
 mod verified;
@@ -22,7 +22,7 @@ use crate::programs::verify::patience::Patience;
 use crate::run::outcome::command_line;
 use programs::{Programs, period};
 
-/// Choose controllers for programs, their understudy and their remote I/O
+/// Select controllers for programs, understudies and remote I/Os
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -32,81 +32,81 @@ Example:
   understudy allocate examples/boiler/complete.ladder --budget 20s
   understudy allocate pump.ladder --require \"vendor=Siemens\" --require \"inputs>=12\"
 
-A controller fits, does not fit, or is not known: a figure that the catalogue does not have never counts as enough. Nothing is placed whose
-program has not passed verification. How needs are counted and boxes packed: docs/allocation.md.
+A controller is suitable, unsuitable or unknown: an unknown figure never counts as sufficient. Programs are placed only after they have been
+verified. Calculation of requirements and placement: docs/allocation.md.
 
-Exit status: 0 when every box has its controller, 1 when one has not, 2 for bad input.")]
+Exit status: 0 if every program has a controller, 1 if one has none, 2 for invalid input.")]
 pub(crate) struct Arguments {
-    /// Ladder programs, or cluster files
+    /// Ladder programs or cluster files
     #[arg(value_name = "PROGRAM", required = true)]
     programs: Vec<PathBuf>,
-    /// Who has the terminals; remote for a cluster and for several programs, local for one
+    /// Location of the I/O terminals; default: remote for a cluster or several programs, local for one program
     #[arg(long, value_enum)]
     io: Option<Io>,
-    /// Understudies of the programs, where no cluster says it
+    /// Number of understudies, without a cluster file
     #[arg(long, value_name = "NUMBER", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=8))]
     understudies: u8,
-    /// From one scan to the next, where no cluster says it
+    /// Scan period, without a cluster file
     #[arg(long, value_name = "TIME", default_value = "10ms", value_parser = period)]
     period: Duration,
-    /// Such as inputs>=24, languages~ladder, vendor=Siemens, remote-io:ethernet; may be given more than once
+    /// Requirement, such as inputs>=24, languages~ladder, vendor=Siemens, remote-io:ethernet; repeatable
     #[arg(long, value_name = "WHAT")]
     require: Vec<String>,
-    /// What is best among what fits
+    /// Selection criterion among suitable controllers
     #[arg(long, value_enum, default_value = "cost")]
     prefer: Prefer,
-    /// Part of every capacity that stays free
+    /// Reserve of every capacity
     #[arg(long, value_name = "PERCENT", default_value = "0%", value_parser = reserve)]
     reserve: u8,
-    /// Name expansion modules where terminals on board are not enough
+    /// Add expansion modules where on-board terminals are insufficient
     #[arg(long)]
     expansion: bool,
-    /// For families of which it is not known, such as program_bytes_per_instruction=8; may be given more than once
+    /// Assumed value of a figure unknown for a family, such as program_bytes_per_instruction=8; repeatable
     #[arg(long, value_name = "FIGURE=NUMBER", value_parser = assumption)]
     assume: Vec<(FamilyQuantity, u64)>,
-    /// Let programs of one group share a box, though one failure then takes several
+    /// Allow programs of one group on one controller; its failure then affects several programs
     #[arg(long)]
     share_members: bool,
-    /// The only boxes that there are; may be given more than once
+    /// Restrict the selection to this stock; repeatable
     #[arg(long, value_name = "MODEL=COUNT", value_parser = stock)]
     stock: Vec<Stock>,
-    /// What a program is to keep, to be proved before it is placed; may be given more than once
+    /// Properties to prove about a program before it is placed; repeatable
     #[arg(long, value_name = "PROGRAM=FILE", value_parser = properties)]
     properties: Vec<(String, PathBuf)>,
-    /// For proving; a program of which not everything was decided by then is not placed
+    /// Time limit for proofs; a program with undecided properties is not placed
     #[arg(long, value_name = "TIME", default_value = "60s", value_parser = period)]
     budget: Duration,
-    /// Place programs that have not passed verification
+    /// Place programs without verification
     #[arg(long)]
     unverified: bool,
-    /// A catalogue of your own, in place of the one that comes with the program
+    /// Catalogue file; default: the built-in catalogue
     #[arg(long, value_name = "FILE")]
     catalogue: Option<PathBuf>,
-    /// Show every controller
+    /// List every controller
     #[arg(long)]
     all: bool,
-    /// A folder for allocation.html and allocation.csv
+    /// Output folder for allocation.html and allocation.csv
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Io {
-    /// The controllers themselves; no understudy
+    /// At the controllers, without an understudy
     Local,
-    /// Remote I/Os, which restore what is lost
+    /// At remote I/Os, which reconstruct lost outputs
     Remote,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Prefer {
-    /// The least price; where prices are not known, the smallest that suffices
+    /// Lowest price; without known prices, the smallest sufficient controller
     Cost,
-    /// The smallest program memory that suffices
+    /// Smallest sufficient program memory
     Memory,
-    /// The shortest time of an instruction
+    /// Shortest instruction time
     Speed,
-    /// The largest smallest margin
+    /// Largest minimum margin
     Reserve,
 }
 
@@ -183,7 +183,7 @@ fn plan(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> 
     Ok(answer.with_used(programs.reports))
 }
 
-/// The text of an error behind its code.
+/// Text of an error without its code.
 pub(crate) fn message(error: &impl std::fmt::Display) -> String {
     let text = error.to_string();
     let message = text.split_once(": ").map(|(_, message)| message.to_owned());
@@ -223,7 +223,7 @@ fn options(arguments: &Arguments) -> Result<Options, Answer> {
     })
 }
 
-/// The boxes that the programs want, with what was proved about each.
+/// Controllers required by the programs, with the results of the proofs.
 fn items(
     arguments: &Arguments,
     programs: &Programs,
@@ -249,7 +249,7 @@ fn items(
     Ok(items)
 }
 
-/// Writes the page and the table, both or none; answers with the page's name.
+/// Writes the page and the table; returns the name of the page.
 fn write_report(
     folder: &Path,
     found: &Allocation,

@@ -1,4 +1,4 @@
-//! `understudy catalogue`: controllers that can be bought, and who says what of them.
+//! `understudy catalogue`: commercially available controllers with sourced figures.
 
 use std::fmt::Write as _;
 use std::fs::File;
@@ -17,7 +17,7 @@ use crate::answer::{Answer, Status};
 use crate::deployment::allocate::message;
 use crate::files;
 
-/// List, show, add, import and export controllers that can be bought
+/// List, add, import and export commercially available controllers
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -27,9 +27,8 @@ Example:
   understudy catalogue import prices.csv --catalogue ours.csv --update
   understudy catalogue export --output controllers.csv
 
-Without --catalogue it is the one that comes with the program, which is only read. With it, it is a file in one of the forms of
-docs/catalogue.md; `add` and `import` make it where there is none, with everything that comes with the program in it. A figure that is not
-there is unknown, and never 0.")]
+The default is the built-in catalogue, which is read-only. --catalogue names a file in a format of docs/catalogue.md; `add` and `import`
+create it with the contents of the built-in catalogue if it is missing. A missing figure is unknown, never 0.")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     what: What,
@@ -37,20 +36,20 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum What {
-    /// A line for every controller
+    /// List controllers
     List {
-        /// Only of this maker
+        /// Show only this vendor
         #[arg(long, value_name = "NAME")]
         vendor: Option<String>,
-        /// Only of this family
+        /// Show only this family
         #[arg(long, value_name = "NAME")]
         family: Option<String>,
         #[command(flatten)]
         file: FileArgument,
     },
-    /// Every figure of a controller with its source, and what is not known
+    /// Show all figures of a controller with their sources, and the unknown figures
     Show {
-        /// A model, or maker and model
+        /// Model, or vendor and model
         #[arg(value_name = "MODEL")]
         model: String,
         #[command(flatten)]
@@ -63,23 +62,23 @@ enum What {
         #[command(flatten)]
         file: WrittenFile,
     },
-    /// Add the controllers of a file
+    /// Import the controllers of a file
     Import {
-        /// In one of the forms of docs/catalogue.md
+        /// Input file (formats: docs/catalogue.md)
         #[arg(value_name = "FILE.csv")]
         from: PathBuf,
-        /// Take over new figures for controllers that are there
+        /// Update the figures of existing controllers
         #[arg(long)]
         update: bool,
-        /// Where the catalogue is made, make it without what comes with the program
+        /// Create a new catalogue without the built-in controllers
         #[arg(long)]
         empty: bool,
         #[command(flatten)]
         file: WrittenFile,
     },
-    /// Write every figure with its source, a line each
+    /// Export all figures with their sources, one line each
     Export {
-        /// A file to write to, in place of standard output
+        /// Output file; default: standard output
         #[arg(long, short, value_name = "FILE.csv")]
         output: Option<PathBuf>,
         #[command(flatten)]
@@ -89,42 +88,42 @@ enum What {
 
 #[derive(Debug, Args)]
 struct FileArgument {
-    /// A catalogue of your own
+    /// Catalogue file; default: the built-in catalogue
     #[arg(long, value_name = "FILE")]
     catalogue: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
 struct WrittenFile {
-    /// The catalogue; made where it is not there
+    /// Catalogue file; created if missing
     #[arg(long, value_name = "FILE")]
     catalogue: PathBuf,
 }
 
 #[derive(Debug, Args)]
 struct Entry {
-    /// Who makes it
+    /// Vendor
     #[arg(long, value_name = "NAME")]
     vendor: String,
-    /// Its model
+    /// Model
     #[arg(long, value_name = "NAME")]
     model: String,
-    /// Models that store programs in the same way
+    /// Family of models with the same program storage
     #[arg(long, value_name = "NAME")]
     family: String,
-    /// `plc` or `embedded`
+    /// Kind: `plc` or `embedded`
     #[arg(long, value_name = "KIND", default_value = "plc", value_parser = kind)]
     kind: Kind,
-    /// Who says the figures: an address, a document, a quotation
+    /// Source of the figures: a URL, a document, a quotation
     #[arg(long, value_name = "TEXT")]
     source: String,
-    /// What a reader of its figures has to know
+    /// Note on the figures
     #[arg(long, value_name = "TEXT", default_value = "")]
     notes: String,
-    /// Such as digital_inputs=8, or comm_ports="1x Ethernet"
+    /// Figures, such as digital_inputs=8 or comm_ports="1x Ethernet"
     #[arg(value_name = "FIGURE=VALUE")]
     figures: Vec<String>,
-    /// Take over new figures for a controller that is there
+    /// Update the figures of an existing controller
     #[arg(long)]
     update: bool,
 }
@@ -161,7 +160,7 @@ fn refused(errors: &[AdditionError]) -> Answer {
         })
 }
 
-/// The catalogue at `path`, or the one that comes with the program; and what it is called.
+/// Catalogue at `path`, or the built-in one, with its name.
 pub(crate) fn read(path: Option<&Path>) -> Result<(Catalogue, String), Answer> {
     let (catalogue, name) = match path {
         Some(path) => (read_file(path)?.0, path.display().to_string()),
@@ -175,7 +174,7 @@ pub(crate) fn read(path: Option<&Path>) -> Result<(Catalogue, String), Answer> {
     Ok((catalogue, about))
 }
 
-/// What a catalogue file says, and the remarks on it.
+/// Entries of a catalogue file, with remarks.
 fn read_file(path: &Path) -> Result<(Catalogue, Report), Answer> {
     if begins_as_sqlite(path) {
         let message = format!(
@@ -290,7 +289,7 @@ fn push_family(text: &mut String, name: &str, family: &Family) {
     }
 }
 
-/// The entry as a file with one line, so that it is checked as any file is.
+/// The entry as a file of one line, which is checked like any file.
 fn add(file: &WrittenFile, entry: &Entry) -> Result<Answer, Answer> {
     let mut wrong = Answer::done("", Value::Null);
     let mut bad = |message: String| {
@@ -336,7 +335,7 @@ fn add(file: &WrittenFile, entry: &Entry) -> Result<Answer, Answer> {
     }
     let mut part = Catalogue::default();
     part.put(controller);
-    // What a file may not say, an entry may not either.
+    // Entries are checked like files.
     let loaded = file::read("the entry", &file::write(&part));
     let Some(part) = loaded.catalogue else {
         return Err(Answer::bad_files(vec![loaded.report]));

@@ -1,4 +1,4 @@
-//! `understudy doctor`: whether a machine is ready for a member, and what to do where it is not.
+//! `understudy doctor`: readiness of a machine for a member.
 
 mod fix;
 
@@ -20,7 +20,7 @@ use crate::files;
 use crate::overrides::{OverrideArguments, link_kind};
 use fix::Fixed;
 
-/// Look whether this machine is ready for a member of a cluster
+/// Check whether this machine is ready for a member of a cluster
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -28,46 +28,47 @@ Example:
   understudy doctor cell/cluster.toml --name robot --keys /etc/understudy/keys/robot
   sudo understudy doctor cell/cluster.toml --fix
 
-With --fix it shows the commands that repair the machine, asks before each one on a terminal, runs it where it is root, and looks again.
-Without --name it looks at the machine alone; with it also at ports, keys, and at the members that this one is to hear. Exit status 1
-where something keeps the member from its work; what only could be better is a warning.")]
+Without --name only the machine is checked; with --name also ports, keys and the connections to other members. --fix shows the commands that
+repair the machine, asks for confirmation on a terminal, runs them as root and checks again.
+
+Exit status: 1 if a finding prevents the member from working. Possible improvements are warnings.")]
 pub(crate) struct Arguments {
-    /// The cluster file
+    /// Cluster file
     #[arg(value_name = "CLUSTER.toml")]
     cluster: PathBuf,
-    /// Which member of the cluster is to run here, by its name
+    /// Member to run on this machine
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
-    /// The folder of this member's keys
+    /// Folder of this member's keys
     #[arg(long, value_name = "DIR", requires = "name")]
     keys: Option<PathBuf>,
-    /// A JSON list of members, names and addresses, in place of the addresses of the cluster file
+    /// JSON list of member names and addresses, overrides the addresses of the cluster file
     #[arg(long, value_name = "FILE", requires = "name")]
     endpoints: Option<PathBuf>,
-    /// For how many cycles the other members are listened for
+    /// Number of cycles to listen for the other members
     #[arg(long, value_name = "CYCLES", default_value_t = 100)]
     listen: u32,
-    /// Repair the machine: show each command, ask, run it as root, and look again
+    /// Repair the machine: show, confirm and run each command as root, then check again
     #[arg(long)]
     fix: bool,
-    /// Run the commands of --fix without asking
+    /// Run the commands of --fix without confirmation
     #[arg(long, requires = "fix")]
     yes: bool,
     #[command(flatten)]
     overrides: OverrideArguments,
 }
 
-/// Certificates that end sooner are worth a word.
+/// Certificates with fewer days left cause a warning.
 const SOON_DAYS: i64 = 30;
 
-/// However short the cycles are, sessions need their time.
+/// Minimum time to establish sessions.
 const LEAST_PATIENCE: Duration = Duration::from_secs(2);
 
 #[derive(Serialize)]
 struct Examined<'a> {
     configuration: String,
     findings: &'a [Finding],
-    /// What was done about them, where that was asked for.
+    /// Repairs, with --fix.
     #[serde(skip_serializing_if = "Option::is_none")]
     fixed: Option<&'a Fixed>,
 }
@@ -126,7 +127,7 @@ fn examined(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answ
     })
 }
 
-/// The command that runs a member.
+/// Command that runs a member.
 fn command_of(cluster: &Cluster, name: &str) -> Result<&'static str, Answer> {
     Ok(match crate::member::find(cluster, name)? {
         Member::Station(_) => "node",
@@ -165,7 +166,7 @@ fn of_member(
             "peer",
             "not looked for: where this member runs already, its journal names whom it hears",
         )),
-        // What is wrong with the address was said with the ports.
+        // Errors of the address are reported with the ports.
         Err(BusError::Listen { .. }) => {}
         Err(error) => findings.push(Finding::trouble(
             "peer",
@@ -177,7 +178,7 @@ fn of_member(
     Ok(findings)
 }
 
-/// What is found about the keys, and what opens frames where they are good.
+/// Findings about the keys, with the guard if the keys are valid.
 fn keys(arguments: &Arguments, cluster: &Cluster, member: Member) -> (Option<Guard>, Vec<Finding>) {
     let folder = match (cluster.security(), &arguments.keys) {
         (Security::Off, _) => {

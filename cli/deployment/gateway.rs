@@ -1,4 +1,4 @@
-//! `understudy gateway`: a run for other systems, read-only.
+//! `understudy gateway`: read-only interfaces of a run.
 
 use std::fmt::Write as _;
 use std::net::SocketAddr;
@@ -14,7 +14,7 @@ use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::overrides::parse_address;
 
-/// Show a run to other systems: Prometheus, Modbus TCP, JSON over Zenoh; nothing can be written
+/// Publish a run, read-only, by Prometheus, Modbus TCP or Zenoh
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -23,8 +23,8 @@ Example:
   understudy gateway registers runs/latest
   understudy gateway zenoh runs/latest --listen 127.0.0.1:7447 --mirror 5/s
 
-It reads the journal of the run, finished or not, and ends with SIGINT or SIGTERM. It serves in the clear and asks nobody who he is:
-bind it to loopback, or to a network of its own (docs/monitoring.md).")]
+The gateway reads the journal of a run, live or finished, and ends with SIGINT or SIGTERM. Connections are neither encrypted nor
+authenticated: bind the gateway to loopback or to a separate network (docs/monitoring.md).")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     what: What,
@@ -32,38 +32,38 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum What {
-    /// Metrics for Prometheus, at http://ADDRESS/metrics
+    /// Prometheus metrics at http://ADDRESS/metrics
     Metrics {
         #[command(flatten)]
         run: RunArgument,
-        /// Where it listens; port 0 for any that is free
+        /// Listening address; port 0 selects a free port
         #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:9464", value_parser = parse_address)]
         listen: SocketAddr,
-        /// Print the metrics of what is in the journal now, and end
+        /// Print the current metrics and exit
         #[arg(long)]
         once: bool,
     },
-    /// The process image as a Modbus TCP server that can only be read
+    /// Process image as a read-only Modbus TCP server
     Modbus {
         #[command(flatten)]
         run: RunArgument,
-        /// Where it listens; port 0 for any that is free
+        /// Listening address; port 0 selects a free port
         #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:1502", value_parser = parse_address)]
         listen: SocketAddr,
     },
-    /// Print which bit and which register of that server says what
+    /// Print the register map of the Modbus TCP server
     Registers {
         #[command(flatten)]
         run: RunArgument,
     },
-    /// States, values, margin and events as JSON under keys of Zenoh
+    /// States, values, remaining redundancy and events as JSON under Zenoh keys
     Zenoh {
         #[command(flatten)]
         run: RunArgument,
-        /// Where it listens, over TCP
+        /// Listening address (TCP)
         #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:7447", value_parser = parse_address)]
         listen: SocketAddr,
-        /// How often each document is said, at most, if it changed: 1/s to 50/s
+        /// Maximum rate of each changed document: 1/s to 50/s
         #[arg(long = "mirror", value_name = "RATE", default_value = "5/s")]
         rate: Rate,
     },
@@ -71,7 +71,7 @@ enum What {
 
 #[derive(Debug, Args)]
 struct RunArgument {
-    /// The directory of a run
+    /// Directory of a run
     #[arg(value_name = "RUN", default_value = "runs/latest")]
     run: PathBuf,
 }

@@ -1,4 +1,4 @@
-//! `understudy keys`: the keys and certificates of a cluster.
+//! `understudy keys`: keys and certificates of a cluster.
 
 use std::fmt::Write as _;
 use std::net::IpAddr;
@@ -15,7 +15,7 @@ use understudy_keys::{
 use crate::answer::{Answer, Status};
 use crate::files;
 
-/// Make, issue, revoke and list the keys of a cluster
+/// Create, issue, revoke and list the keys of a cluster
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -24,8 +24,8 @@ Example:
   understudy keys revoke tank --folder cell/keys
   understudy keys issue cell/cluster.toml tank --folder cell/keys
 
-`init` issues keys to every member and to one operator. The folder members/NAME goes to the machine of NAME, and to nobody else
-(docs/deployment.md); the folder authority stays where keys are made.")]
+`init` issues keys to all members and to one operator. Copy the folder members/NAME only to the machine of NAME (docs/deployment.md). Keep
+the folder authority where keys are issued.")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     what: What,
@@ -33,9 +33,9 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum What {
-    /// Make an authority, and keys for every member and for an operator
+    /// Create the authority, and keys for all members and one operator
     Init {
-        /// The cluster file
+        /// Cluster file
         #[arg(value_name = "CLUSTER.toml")]
         cluster: PathBuf,
         #[command(flatten)]
@@ -43,18 +43,18 @@ enum What {
         #[command(flatten)]
         days: DaysArgument,
     },
-    /// Make new keys in place of those that expire or were revoked, or for members that are new
+    /// Issue keys to new members, or instead of expired or revoked ones
     Issue {
-        /// The cluster file
+        /// Cluster file
         #[arg(value_name = "CLUSTER.toml")]
         cluster: PathBuf,
-        /// Members of the cluster
+        /// Members
         #[arg(value_name = "NAME")]
         names: Vec<String>,
-        /// An operator, who is no member and may command them; may be given more than once
+        /// Operator who may command the members; repeatable
         #[arg(long, value_name = "NAME")]
         operator: Vec<String>,
-        /// Where these operators are called, such as the router of a site
+        /// Address at which members reach these operators, such as the router of a site
         #[arg(long, value_name = "IP", requires = "operator")]
         address: Option<IpAddr>,
         #[command(flatten)]
@@ -62,12 +62,12 @@ enum What {
         #[command(flatten)]
         days: DaysArgument,
     },
-    /// What was issued to whom, until when it holds, and what was revoked
+    /// List issued keys, their expiry and revoked keys
     List {
         #[command(flatten)]
         folder: FolderArgument,
     },
-    /// Keys that no longer count; those who run obey as soon as their revoked.toml is replaced
+    /// Revoke keys; running members apply it when their revoked.toml is replaced
     Revoke {
         /// Members or operators
         #[arg(value_name = "NAME", required = true)]
@@ -79,14 +79,14 @@ enum What {
 
 #[derive(Debug, Args)]
 struct FolderArgument {
-    /// Where the keys are kept
+    /// Folder of the keys
     #[arg(long, value_name = "DIR", default_value = "keys")]
     folder: PathBuf,
 }
 
 #[derive(Debug, Args)]
 struct DaysArgument {
-    /// Days for which the certificates hold
+    /// Validity of the certificates in days
     #[arg(long, value_name = "N", default_value_t = 730, value_parser = clap::value_parser!(u32).range(1..=7300))]
     days: u32,
 }
@@ -154,7 +154,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     }
 }
 
-/// What is run on the machine of the first member.
+/// Command for the machine of the first member.
 fn with_doctor(answer: Answer, cluster: &Path, folder: &Path, issued: &Issued) -> Answer {
     let Some(member) = issued.holders.iter().find(|it| it.role == Role::Member) else {
         return answer;
@@ -178,7 +178,7 @@ fn open(folder: &FolderArgument) -> Result<Authority, Answer> {
     Authority::open(&folder.folder).map_err(|errors| failed(&errors))
 }
 
-/// All of them; where something could not be written a run has failed, and otherwise an input was wrong.
+/// Answer with all errors: a failed run if writing failed, otherwise invalid input.
 pub(crate) fn failed(errors: &[KeysError]) -> Answer {
     let writing = |error: &KeysError| {
         matches!(
@@ -213,9 +213,9 @@ struct Shown<'a> {
 #[derive(Serialize)]
 struct List<'a> {
     holders: Vec<Shown<'a>>,
-    /// Those that changed.
+    /// Changed holders.
     folders: Vec<String>,
-    /// Members whose certificates are for 127.0.0.1.
+    /// Members with certificates for 127.0.0.1.
     without_address: Vec<String>,
 }
 
@@ -274,7 +274,7 @@ fn listed(holders: &[Holder], now: Date) -> Answer {
     Answer::done(table(holders, now), list)
 }
 
-/// Members that the cluster file gives no address, and whose certificates are therefore for 127.0.0.1.
+/// Members without an address in the cluster file; their certificates are for 127.0.0.1.
 fn without_address(cluster: &Cluster, names: &[String]) -> Vec<String> {
     let lacks = |name: &&String| {
         let member = cluster.member(name);

@@ -1,4 +1,4 @@
-//! `understudy operate`: what an operator asks of a member: of one in a laboratory by the socket of its run, of one elsewhere by mutual TLS.
+//! `understudy operate`: operator commands, by the socket of a laboratory or by mutual TLS.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use understudy_wire::{Cycle, StateChoice};
 use crate::answer::{Answer, Status};
 use crate::files;
 
-/// Command a member of a laboratory, or ask something of a member on another machine
+/// Command or query a member
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -27,36 +27,36 @@ Example:
   understudy operate cell/cluster.toml --keys keys/members/operator --name robot-io accept-state --cycle 4711
   understudy operate cell/cluster.toml --keys keys/members/operator --name robot journal --lines 100
 
-Without --keys the member is one of a laboratory that runs on this machine: in the directory of a run, or of the cluster below --out.")]
+Without --keys the member belongs to a laboratory on this machine: that of the given run, or the running one of the cluster below --out.")]
 pub(crate) struct Arguments {
-    /// The cluster file, or the directory of a run that is being written
+    /// Cluster file, or directory of a running laboratory
     #[arg(value_name = "CLUSTER.toml|RUN")]
     target: PathBuf,
-    /// The folder of the operator's keys, for a member on another machine
+    /// Folder of the operator's keys, for a remote member
     #[arg(long, value_name = "DIR")]
     keys: Option<PathBuf>,
-    /// Which member of the cluster, by its name
+    /// Member
     #[arg(long, value_name = "NAME")]
     name: String,
-    /// What is asked of it
+    /// Command or query
     #[arg(value_enum)]
     what: What,
-    /// For accept-state: the cycle of the state, as the event `state-lost` names it; another newest state is refused
+    /// For accept-state: cycle of the state as in the event `state-lost`; the command is refused if the newest state is of another cycle
     #[arg(long, value_name = "CYCLE", required_if_eq("what", "accept-state"))]
     cycle: Option<u64>,
-    /// Lines of the journal, then it ends
+    /// Number of journal lines to print
     #[arg(long, value_name = "N", default_value_t = u64::MAX, hide_default_value = true)]
     lines: u64,
-    /// Why, for the journal of the laboratory
+    /// Reason, recorded in the journal of the laboratory
     #[arg(long, value_name = "TEXT", default_value = "from the command line")]
     reason: String,
-    /// Where laboratories keep their runs
+    /// Directory of runs
     #[arg(long, value_name = "DIR", default_value = "runs")]
     out: PathBuf,
 }
 
 impl Arguments {
-    /// Of `cold-start` or `accept-state`.
+    /// Reply to `cold-start` or `accept-state`.
     fn choice(&self) -> StateChoice {
         match self.what {
             What::AcceptState => StateChoice::Newest {
@@ -69,27 +69,27 @@ impl Arguments {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum What {
-    /// What it said when it was ready
+    /// Print the status of the member
     Status,
-    /// The canonical text of its configuration
+    /// Print the canonical configuration of the member
     Configuration,
-    /// Release the outputs of a program that was started cold
+    /// Release the outputs of a cold-started program
     Release,
-    /// Start a program whose state is lost from its initial state
+    /// Restart a program with lost state from its initial state
     ColdStart,
-    /// Continue a program whose state is lost from the newest available state, which is from the cycle --cycle
+    /// Continue a program with lost state from the newest available state, of cycle --cycle
     AcceptState,
-    /// End
+    /// Stop the member
     Stop,
-    /// Each line of its journal from now on
+    /// Print new journal records
     Journal,
-    /// End its process as `kill -9` does; in a laboratory
+    /// Kill its process (kill -9); laboratory only
     Kill,
-    /// Start its process again; in a laboratory
+    /// Restart its process; laboratory only
     Restart,
 }
 
-/// A member says something in every cycle.
+/// Timeout; a member sends in every cycle.
 const SILENCE: Duration = Duration::from_secs(60);
 
 pub(crate) fn run(arguments: &Arguments) -> Answer {
@@ -102,7 +102,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     }
 }
 
-/// The laboratory that writes a run is told.
+/// Sends the command to the laboratory that writes the run.
 fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
     let word = arguments.what.to_possible_value();
     let word = word.as_ref().map_or("", |value| value.get_name());
@@ -134,7 +134,7 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
     Ok(Answer::done(text, result).and_next(&[&"top", &run.path()]))
 }
 
-/// The run that is meant: a directory of it, or the newest of a cluster that is being written.
+/// The named run, or the newest running one of the cluster.
 fn written(arguments: &Arguments) -> Result<Run, Answer> {
     let target = &arguments.target;
     if target.is_dir() {
@@ -154,12 +154,12 @@ fn written(arguments: &Arguments) -> Result<Run, Answer> {
 
 fn refused(refusal: &Refusal) -> Answer {
     let message = refusal.to_string();
-    // Its words begin with their code, also those that another process said.
+    // Messages of other processes begin with a code.
     let code = message.split(':').next().unwrap_or_default().to_owned();
     Answer::failed(Status::Failed, &code, message)
 }
 
-/// A member on another machine is called.
+/// Sends the command to a remote member.
 fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
     let (cluster, _) = files::cluster(&arguments.target, Overrides::default())?;
     let keys = OperatorKeys::load(keys, &cluster, Date::of(SystemTime::now()));
@@ -192,7 +192,7 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
         let mut left = arguments.lines;
         let take = |line: &str| {
             left = left.saturating_sub(1);
-            // A reader that is gone wants no more.
+            // The reader closed the pipe.
             writeln!(std::io::stdout(), "{line}").is_ok() && left > 0
         };
         call.follow(SILENCE, take).map_err(failed)?;
@@ -203,7 +203,7 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
     Ok(Answer::done(text, result))
 }
 
-/// Where the files lie, for the link.
+/// Paths of the key files.
 pub(crate) fn tls_keys(tls: &TlsFiles) -> TlsKeys {
     TlsKeys {
         authority: tls.authority.clone(),

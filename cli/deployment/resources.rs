@@ -1,4 +1,4 @@
-//! `understudy resources`: what programs consist of, counted.
+//! `understudy resources`: resource requirements of programs.
 
 use std::ffi::OsStr;
 use std::path::PathBuf;
@@ -12,22 +12,22 @@ use understudy_ladder::{Program, from_circuit};
 use crate::answer::Answer;
 use crate::deployment::allocate::programs::{Programs, period};
 
-/// Count what programs need of a controller
+/// Calculate the controller resources that programs require
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy resources examples/press-cell/cluster.toml
   understudy resources examples/press-cell/press.ladder --instructions
 
-Of several programs, and of a cluster, the generated understudy is counted too. What is counted how: docs/allocation.md.")]
+For several programs, and for a cluster, the generated understudy is included. Method of calculation: docs/allocation.md.")]
 pub(crate) struct Arguments {
-    /// Ladder programs, or cluster files
+    /// Ladder programs or cluster files
     #[arg(value_name = "PROGRAM", required = true)]
     programs: Vec<PathBuf>,
-    /// Print the Instruction List of each
+    /// Print the Instruction List of each program
     #[arg(long)]
     instructions: bool,
-    /// From one scan to the next, where no cluster says it
+    /// Scan period, without a cluster file
     #[arg(long, value_name = "TIME", default_value = "10ms", value_parser = period)]
     period: Duration,
 }
@@ -74,7 +74,7 @@ fn counted(programs: &Programs, with_instructions: bool) -> Answer {
     Answer::done(text, result).with_used(programs.reports.clone())
 }
 
-/// A column a program, a line a count.
+/// Table of counts with one column per program.
 fn table(counted: &[(String, Program)]) -> String {
     let resources: Vec<Resources> = counted
         .iter()

@@ -1,4 +1,4 @@
-//! `understudy animate`: a part of a run as a moving picture.
+//! `understudy animate`: an animated picture of a part of a run.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use crate::answer::Answer;
 use crate::files;
 use crate::inspect::view::{RUN, refused};
 
-/// Draw a part of a run as a moving picture (SVG): outputs, their source and the stations
+/// Draw part of a run as an animated SVG picture
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -18,22 +18,22 @@ Example:
   understudy animate runs/latest --output kill.svg
   understudy animate runs/latest --program press --from 390 --to 560 --output press.svg
 
-Without cycles it shows the first kill of a controller, until its outputs are direct again. The picture is drawn from the journal of the
-run; browsers and GitHub play it.")]
+Without a range of cycles the picture shows the first kill of a controller, until its outputs are direct again. Browsers and GitHub play
+the animation.")]
 pub(crate) struct Arguments {
-    /// The directory of a run
+    /// Directory of a run
     #[arg(value_name = "RUN", default_value = RUN)]
     run: PathBuf,
-    /// The controller whose outputs are shown
+    /// Controller whose outputs are shown
     #[arg(long, value_name = "CONTROLLER")]
     program: Option<String>,
-    /// The first cycle
+    /// First cycle
     #[arg(long, value_name = "CYCLE", allow_hyphen_values = true)]
     from: Option<i64>,
-    /// The last cycle
+    /// Last cycle
     #[arg(long, value_name = "CYCLE", allow_hyphen_values = true)]
     to: Option<i64>,
-    /// The file to write
+    /// Output file
     #[arg(long, short, value_name = "FILE", default_value = "animation.svg")]
     output: PathBuf,
 }

@@ -1,4 +1,4 @@
-//! Looking at a cluster that runs already: a laboratory of this machine, or members elsewhere, called with an operator's keys.
+//! Attaches to a running cluster: a laboratory of this machine, or remote members with an operator's keys.
 
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
@@ -15,22 +15,22 @@ use crate::console::Console;
 use crate::deployment::operate::tls_keys;
 use crate::member::peers;
 
-/// Which cluster that runs is meant.
+/// Access to a running cluster.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "A cluster that runs elsewhere")]
 pub(crate) struct AttachArguments {
-    /// The folder of an operator's keys: its members are called at their addresses, and what they say is looked at
+    /// Folder of an operator's keys; connects to the members at their addresses and shows their journals
     #[arg(long, value_name = "DIR")]
     keys: Option<PathBuf>,
-    /// A JSON list of members, names and addresses, in place of the addresses of the cluster file
+    /// JSON list of member names and addresses, overrides the addresses of the cluster file
     #[arg(long, value_name = "FILE", requires = "keys")]
     endpoints: Option<PathBuf>,
 }
 
-/// A machine of this network says within this time that somebody listens there.
+/// Connection timeout for a machine in the same network.
 const REACH: Duration = Duration::from_millis(300);
 
-/// Members that are looked for before a laboratory starts, at most: where they are on other machines, each may take its time.
+/// Maximum number of members called before a laboratory starts.
 const ASKED: usize = 8;
 
 impl AttachArguments {
@@ -38,7 +38,7 @@ impl AttachArguments {
         self.keys.is_some()
     }
 
-    /// Calls the members, and writes what they say to a run below `out`.
+    /// Connects to the members and writes their journals to a run below `out`.
     pub(crate) fn attach(
         &self,
         cluster_file: &Path,
@@ -79,7 +79,7 @@ impl AttachArguments {
     }
 }
 
-/// A member of the cluster file that takes calls at its own address now: the cluster runs already.
+/// A member of the cluster file that accepts connections at its address: the cluster is running.
 pub(crate) fn who_runs_already(cluster: &Cluster) -> Option<String> {
     cluster.members().take(ASKED).find_map(|member| {
         let address = cluster.address(member)?;

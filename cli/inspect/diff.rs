@@ -1,4 +1,4 @@
-//! `understudy diff`: where two runs part.
+//! `understudy diff`: the first difference between two runs.
 
 use std::path::{Path, PathBuf};
 
@@ -8,23 +8,24 @@ use understudy_view::{Bounds, Model, Run, ViewError, diff};
 use crate::answer::Answer;
 use crate::inspect::view::several;
 
-/// Compare two runs: the first cycle in which inputs, outputs, sources or events differ
+/// Compare two runs and show the first difference
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy diff runs/2026-11-21T20-00-00Z runs/latest
 
-Cycles are compared from the origin of each run on, as far as both go. Exit status 0 also where they differ: that is an answer.")]
+Cycles are counted from the origin of each run and compared up to the end of the shorter run. The exit status is 0 for different runs
+too.")]
 pub(crate) struct Arguments {
-    /// The directory of a run
+    /// Directory of a run
     #[arg(value_name = "RUN")]
     left: PathBuf,
-    /// The directory of another one
+    /// Directory of another run
     #[arg(value_name = "OTHER")]
     right: PathBuf,
 }
 
-/// Signals of a run may change a million times before the oldest changes are forgotten; states are not compared.
+/// Bounds of the comparison: a million changes of signals; states are not compared.
 const BOUNDS: Bounds = Bounds {
     cycles: 64,
     events: 100_000,

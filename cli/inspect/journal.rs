@@ -1,4 +1,4 @@
-//! `understudy journal`: what happened in a run, in words.
+//! `understudy journal`: the events of a run as text.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -12,7 +12,7 @@ use understudy_view::{Filter, JournalLine, Listing, Run, Trouble};
 use crate::answer::{Answer, Status};
 use crate::inspect::view::{RUN, refused, several};
 
-/// Show the journal of a run in words, or follow it
+/// Print or follow the journal of a run
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -20,36 +20,36 @@ Example:
   understudy journal runs/latest --member robot --member robot-io --from 195 --to 230
   understudy journal --follow --event flagged --event source --event value-fault
 
-Without filters everything is shown but what every member says in every cycle. Cycles are counted from the origin of the run, as its
-report counts them. With --follow and --json each line is a JSON object.")]
+Without filters all records are shown except the periodic ones of every cycle. Cycles are counted from the origin of the run, as in its
+report. With --follow and --json each line is a JSON object.")]
 pub(crate) struct Arguments {
-    /// The directory of a run
+    /// Directory of a run
     #[arg(value_name = "RUN", default_value = RUN)]
     run: PathBuf,
-    /// Go on with what is written, until the run is over
+    /// Print new records until the run ends
     #[arg(long)]
     follow: bool,
-    /// Only what this member says; may be given again
+    /// Show only records of this member; repeatable
     #[arg(long, value_name = "NAME")]
     member: Vec<String>,
-    /// Only this kind of record, such as flagged; may be given again
+    /// Show only this kind of record, such as flagged; repeatable
     #[arg(long, value_name = "EVENT")]
     event: Vec<String>,
-    /// Only the controller of this name, its remote I/O and its plant; may be given again
+    /// Show only this controller, its remote I/O and its plant; repeatable
     #[arg(long, value_name = "CONTROLLER")]
     program: Vec<String>,
-    /// The first cycle
+    /// First cycle
     #[arg(long, value_name = "CYCLE", allow_hyphen_values = true)]
     from: Option<i64>,
-    /// The last cycle
+    /// Last cycle
     #[arg(long, value_name = "CYCLE", allow_hyphen_values = true)]
     to: Option<i64>,
-    /// Also what every member says in every cycle
+    /// Include the periodic records of every cycle
     #[arg(long)]
     all: bool,
 }
 
-/// How often a journal that grows is looked at.
+/// Polling interval of a growing journal.
 const LOOK: Duration = Duration::from_millis(100);
 
 pub(crate) fn run(arguments: &Arguments, json: bool) -> Answer {
@@ -95,7 +95,7 @@ fn answered(arguments: &Arguments, json: bool) -> Result<Answer, Answer> {
     ))
 }
 
-/// What there is; answers with what stood between.
+/// The present records, and the errors between them.
 fn read(run: &Run, mut listing: Listing, take: &mut dyn FnMut(JournalLine)) -> Vec<Trouble> {
     let mut source = run.follow();
     let mut troubles = Vec::new();
@@ -111,7 +111,7 @@ fn read(run: &Run, mut listing: Listing, take: &mut dyn FnMut(JournalLine)) -> V
     }
 }
 
-/// Prints each line as it comes, until the run is over or nobody reads any more.
+/// Prints each new line until the run ends or the reader closes the pipe.
 fn followed(run: &Run, mut listing: Listing, json: bool) -> Answer {
     let mut source = run.follow();
     let mut output = std::io::stdout();

@@ -1,4 +1,4 @@
-//! `understudy top`: a run on a terminal, live.
+//! `understudy top`: a live view of a run on the terminal.
 
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ use crate::files;
 use crate::inspect::attach::AttachArguments;
 use crate::inspect::view::{RUN, refused};
 
-/// Show a run on the terminal as a table that lives: who works, what could fail now, what happens
+/// Show a live view of a run on the terminal
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -27,33 +27,33 @@ Example:
   understudy top examples/press-cell/cluster.toml
   understudy top cell/cluster.toml --keys keys/members/operator          what runs on other machines
 
-A cluster file stands for its newest run below --out. Keys: q quit, space stand still, tab events, alarms, failures to come, a
-acknowledge, arrows scroll, h help. With --once or --json it says how the run is now, and ends.")]
+For a cluster file the newest run below --out is shown. Keys: q quit, space pause, tab events, alarms and remaining redundancy,
+a acknowledge, arrows scroll, h help. With --once or --json the current state is printed.")]
 pub(crate) struct Arguments {
-    /// The directory of a run, or a cluster file
+    /// Directory of a run, or cluster file
     #[arg(value_name = "RUN|CLUSTER.toml", default_value = RUN)]
     run: PathBuf,
-    /// Print how it is now, and end
+    /// Print the current state and exit
     #[arg(long)]
     once: bool,
-    /// Where runs are kept
+    /// Directory of runs
     #[arg(long, value_name = "DIR", default_value = "runs")]
     out: PathBuf,
     #[command(flatten)]
     elsewhere: AttachArguments,
 }
 
-/// How often it is drawn where no key is pressed.
+/// Refresh interval without key strokes.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// What is printed where there is no terminal.
+/// Size of the printed screen.
 const WIDTH: u16 = 100;
 const HEIGHT: u16 = 30;
 
-/// A cluster elsewhere that says nothing of a cycle for so long is printed as it is.
+/// Maximum wait for the first cycle of a remote cluster.
 const HEARD_FOR: Duration = Duration::from_secs(20);
 
-/// What its members say in so long, all of them have begun to say something.
+/// Time in which all members of a remote cluster have reported.
 const ALL_SAY: Duration = Duration::from_secs(1);
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
@@ -88,7 +88,7 @@ fn answered(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answ
     Ok(Answer::done("", ()))
 }
 
-/// Until members elsewhere have begun to tell of their cycles.
+/// Waits until remote members have reported cycles.
 fn wait_for_a_cycle(run: &Run) {
     let mut source = run.follow();
     let mut model = run.model(Bounds::default());
@@ -127,19 +127,19 @@ fn open(arguments: &Arguments, console: &mut Console) -> Result<Opened, Answer> 
     Ok((run, None))
 }
 
-/// Writes into the journal that somebody has seen these alarms. They are shown as seen when they are read there.
+/// Records the acknowledgement of these alarms in the journal. They are shown as acknowledged once they are read there.
 fn acknowledge(seen: &[Alarm], commander: &Commander) {
     let owner = owner();
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     let now = since.map_or(0, |since| since.as_secs());
     for alarm in seen {
         let seen = alarm.acknowledgement(owner.clone(), now);
-        // One that cannot be written stays unseen, and is shown so.
+        // An acknowledgement that cannot be written leaves the alarm unacknowledged.
         let _ = commander.acknowledge_and_wait(seen);
     }
 }
 
-/// Who acts at this terminal.
+/// User of this terminal.
 pub(crate) fn owner() -> String {
     std::env::var("USER").unwrap_or_else(|_| "terminal".to_owned())
 }
@@ -165,7 +165,7 @@ fn printed(screen: &mut Screen, model: &Model) -> Result<String, Answer> {
     Ok(text.trim_end().to_owned() + "\n")
 }
 
-/// Until somebody quits.
+/// Shows the run until the user quits.
 fn show(
     terminal: &mut ratatui::DefaultTerminal,
     run: &Run,
@@ -184,7 +184,7 @@ fn show(
             if taken == 0 && run.is_finished() {
                 model.end();
             }
-            // Of a long journal it is shown how much was read.
+            // Draws the progress of reading a long journal.
             if taken == 0 || drawn.elapsed() >= LOOK || event::poll(Duration::ZERO)? {
                 break;
             }

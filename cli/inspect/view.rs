@@ -1,18 +1,18 @@
-//! What the commands that look at a run have in common.
+//! Shared by the commands that inspect a run.
 
 use understudy_view::ViewError;
 
 use crate::answer::{Answer, Status};
 
-/// The newest run, where nobody names one.
+/// The newest run, the default.
 pub(crate) const RUN: &str = "runs/latest";
 
-/// A question that has no answer.
+/// Failure of an inspection.
 pub(crate) fn refused(error: &ViewError) -> Answer {
     several(std::slice::from_ref(error))
 }
 
-/// All that is wrong with it.
+/// Failure with several errors.
 pub(crate) fn several(errors: &[ViewError]) -> Answer {
     let mut answer = Answer::done("", ()).with_status(Status::BadInput);
     for error in errors {

@@ -1,4 +1,4 @@
-//! `understudy watch`: the live view of a run, and the page beside a laboratory.
+//! `understudy watch`: the web page of a run, also served by `lab` and `demo`.
 
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
@@ -21,11 +21,11 @@ use crate::overrides::parse_address;
 use crate::run::lab::{RunArguments, judged};
 use crate::run::wakefulness;
 
-/// Where the page is served where nobody says otherwise.
+/// Default address of the page.
 pub(crate) const ADDRESS: SocketAddr =
     SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 7480);
 
-/// See a run in a browser: who works, what is driven and why, what could fail now
+/// Show a run in a browser, live or finished
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -34,19 +34,20 @@ Example:
   understudy watch runs/latest --address 0.0.0.0:7480 --logins logins.txt
   understudy watch cell/cluster.toml --keys keys/members/operator        what runs on other machines
 
-A cluster file whose laboratory runs already below --out is looked at, and no other one is started. The page looks only, unless it is told --allow-commands. Where other machines can reach its address, it is served over TLS, and only to
-those that the file of --logins names (docs/watch.md).")]
+If a laboratory of the cluster is already running below --out, the page shows that run. The page is read-only by default;
+--allow-commands enables commands. At an address that other machines can reach, the page is served over TLS to the users of the --logins
+file (docs/watch.md).")]
 pub(crate) struct Arguments {
-    /// A cluster file, whose laboratory is run or looked at; or the directory of a run
+    /// Cluster file to run or attach to, or directory of a run
     #[arg(value_name = "CLUSTER.toml|RUN")]
     target: PathBuf,
-    /// Where the page is served
+    /// Address of the page
     #[arg(long, value_name = "ADDRESS", default_value_t = ADDRESS, value_parser = parse_address)]
     address: SocketAddr,
-    /// Only look at what runs already, and start nothing
+    /// Attach to a running laboratory; start none
     #[arg(long)]
     attach: bool,
-    /// Start a laboratory, also where one of this cluster runs already
+    /// Start a laboratory even if the cluster is already running
     #[arg(long, conflicts_with_all = ["attach", "keys"])]
     start: bool,
     #[command(flatten)]
@@ -57,32 +58,32 @@ pub(crate) struct Arguments {
     run: RunArguments,
 }
 
-/// What a page is told besides its address.
+/// Settings of the page other than its address.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Page")]
 pub(crate) struct PageArguments {
-    /// Let the page kill, stop, cut and force; every command is in the journal
+    /// Allow the page to kill, stop, cut and force; every command is recorded in the journal
     #[arg(long)]
     allow_commands: bool,
-    /// Who may log in, one `viewer|operator NAME TOKEN` a line; made with one operator where there is none
+    /// File of users, one line `viewer|operator NAME TOKEN` each; created with one operator if missing
     #[arg(long, value_name = "FILE")]
     logins: Option<PathBuf>,
-    /// The certificate chain of the page, in PEM; without one it makes its own
+    /// Certificate chain of the page (PEM); default: self-signed
     #[arg(long, value_name = "FILE", requires = "private_key")]
     certificate: Option<PathBuf>,
-    /// The key of the certificate, in PEM
+    /// Private key of the certificate (PEM)
     #[arg(long, value_name = "FILE", requires = "certificate")]
     private_key: Option<PathBuf>,
-    /// A name under which browsers reach the page, besides its addresses
+    /// Additional host name of the page
     #[arg(long, value_name = "NAME")]
     known_as: Vec<String>,
 }
 
-/// The page beside a laboratory, from the command line of `lab` and `demo`.
+/// The page of a laboratory, for `lab` and `demo`.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Page")]
 pub(crate) struct BesideArguments {
-    /// Show the run in a browser while it lasts
+    /// Show the run in a browser while it is running
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:7480", value_parser = parse_address)]
     watch: Option<SocketAddr>,
     #[command(flatten)]
@@ -99,7 +100,7 @@ impl BesideArguments {
     }
 }
 
-/// A page that is to be served.
+/// A page to serve.
 #[derive(Debug, Clone)]
 pub(crate) struct Page {
     address: SocketAddr,
@@ -108,7 +109,7 @@ pub(crate) struct Page {
 }
 
 impl Page {
-    /// The same, of a cluster that stays up when its scenario is over, and then takes commands.
+    /// The page of a cluster that keeps running after its scenario and then accepts commands.
     pub(crate) fn staying(self) -> Self {
         Self {
             stays: true,
@@ -124,7 +125,7 @@ impl Page {
         self.arguments.allow_commands
     }
 
-    /// Serves it beside the laboratory that writes `run`, which takes its commands where it may give any.
+    /// Serves the page of the laboratory that writes `run` and forwards permitted commands to it.
     pub(crate) fn beside(
         &self,
         run: &Path,
@@ -208,7 +209,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
     }
 }
 
-/// The cluster of a file: elsewhere, in a laboratory that runs already, or in one that is started.
+/// Shows a cluster: on other machines, in a running laboratory, or in a new one.
 fn watch_cluster(arguments: &Arguments, page: &Page, console: &mut Console) -> Answer {
     let (target, run) = (&arguments.target, &arguments.run);
     let (cluster, reports) = match files::cluster(target, run.overrides.overrides()) {
@@ -264,7 +265,7 @@ fn watch_elsewhere(
 }
 
 fn watch_run(target: &Path, page: &Page, console: &mut Console) -> Answer {
-    // What is wrong with it is said here, and not on a page that nobody sees.
+    // Errors are reported here, before a page is served.
     let run = match Run::open(target) {
         Ok(run) => run,
         Err(error) => return Answer::failed(Status::BadInput, error.code(), error.to_string()),
@@ -299,7 +300,7 @@ fn watched(run: &Path) -> Answer {
     Answer::done(text, Watched { run: name }).and_next(&[&"journal", &run])
 }
 
-/// Runs the laboratory of a cluster until it is asked to end.
+/// Runs the laboratory of a cluster until it is interrupted.
 fn run_and_watch(
     cluster: &Cluster,
     arguments: &Arguments,

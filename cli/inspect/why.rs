@@ -1,4 +1,4 @@
-//! `understudy why`: the chain of contacts that made an output what it is.
+//! `understudy why`: the contacts that determined an output.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use understudy_view::{Bounds, Run};
 use crate::answer::Answer;
 use crate::inspect::view::{RUN, refused};
 
-/// Say why an output was as it was in a cycle of a run
+/// Explain the value of an output in a cycle of a run
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -16,17 +16,17 @@ Example:
   understudy why grip --run runs/latest
   understudy why robot.%QX0.0 --at 250 --json
 
-The program is run again from the samples in the journal, and its rungs are looked at as its station evaluated them: the contacts that
-let the power through or held it back, what set the memory bits that they read, and in which cycle. Where the output was
-restored, the word, its members and the lineage that proves it are named.")]
+The program is evaluated again with the samples of the journal. The explanation names the contacts that determined the output, and the
+rungs and cycles that set the memory bits they read. For a reconstructed output it names the parity word, its members and the lineage
+that proves it.")]
 pub(crate) struct Arguments {
-    /// An output or a memory bit by its name or address, with its controller's name before it where several have one
+    /// Output or memory bit by name or address, prefixed with its controller if the name is ambiguous
     #[arg(value_name = "OUTPUT")]
     output: String,
-    /// The cycle, counted from the origin of the run; by default the newest
+    /// Cycle, counted from the origin of the run; default: the newest
     #[arg(long, value_name = "CYCLE", allow_hyphen_values = true)]
     at: Option<i64>,
-    /// The directory of a run
+    /// Directory of a run
     #[arg(long, value_name = "DIR", default_value = RUN)]
     run: PathBuf,
 }

@@ -1,4 +1,4 @@
-//! `understudy check`: everything that is wrong with files of the project, in one run.
+//! `understudy check`: all errors and warnings of project files.
 
 mod next;
 mod remarks;
@@ -25,7 +25,7 @@ use crate::supervisors::automata;
 use crate::supervisors::reconfigure::read_project;
 use remarks::Looking;
 
-/// Read ladders, clusters, scenarios, models, nets, maps of signals and projects, and report everything that is wrong with them
+/// Check files and report all errors and warnings
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -33,14 +33,14 @@ Example:
   understudy check --json robot.ladder
   understudy check model.toml net.toml map.toml SUPER.ADS
 
-The ladders that a cluster names are checked with it. The names in a scenario are checked against the cluster file that is
-given with it, or else against the cluster.toml beside it. Ladders are also looked at for rungs without effect, coils that want different
-values in one scan, and steps that are run through in one; `understudy verify` shows the runs. Warnings do not change the exit status.")]
+The programs of a cluster are checked with it. Names in a scenario are checked against the cluster file given with it, otherwise against the
+cluster.toml in its folder. Ladder programs are also checked for rungs without effect, coils with conflicting values in one scan, and
+sequence steps that are passed in one scan; `understudy verify` shows example runs. Warnings do not change the exit status.")]
 pub(crate) struct Arguments {
-    /// Ladder programs (.ladder), automata of TCT (.ADS), and clusters, scenarios, models, nets and maps of signals (.toml)
+    /// Ladder programs (.ladder), TCT automata (.ADS), and clusters, scenarios, models, nets, signal maps and projects (.toml)
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
-    /// For what nobody asked about large ladders; small ones take none of it
+    /// Time limit for the optional checks of large programs
     #[arg(long, value_name = "TIME", default_value = "1s", value_parser = time)]
     budget: Duration,
 }
@@ -49,7 +49,7 @@ fn time(text: &str) -> std::result::Result<Duration, String> {
     parse_time(text).ok_or_else(|| format!("{text:?} is no time such as 1s"))
 }
 
-/// Timers of a ladder by itself last so many scans, as they do for `verify`.
+/// Scan period of a ladder without a cluster, as for `verify`.
 const PERIOD: Duration = Duration::from_millis(10);
 
 #[derive(Serialize)]
@@ -62,17 +62,17 @@ struct Result {
 #[derive(Serialize)]
 struct CheckedFile {
     name: String,
-    /// `ladder`, `cluster`, `scenario`, `model`, `net`, `map`, `project`, `ADS` or `unknown`; nothing for a file that cannot be read.
+    /// `ladder`, `cluster`, `scenario`, `model`, `net`, `map`, `project`, `ADS` or `unknown`; null for an unreadable file.
     kind: Option<&'static str>,
     errors: usize,
     warnings: usize,
-    /// The budget was over before everything that nobody asked had been looked at.
+    /// Whether the time limit ended the optional checks early.
     cut_short: bool,
 }
 
 #[derive(Default)]
 struct Found<'a> {
-    /// What was named, in its order.
+    /// The named files, in their order.
     given: Vec<(Kind, &'a Path)>,
     cut_short: Vec<String>,
     reports: Vec<(Kind, Report)>,
@@ -145,7 +145,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     next::after_check(found.answer(), &given)
 }
 
-/// Of the `cluster.toml` in the folder of a scenario, where there is a right one.
+/// Members of the `cluster.toml` in the folder of a scenario, if it is valid.
 fn members_beside(scenario: &Path) -> Option<Members> {
     let path = scenario.with_file_name("cluster.toml");
     let text = files::text(&path).ok()?;
@@ -154,7 +154,7 @@ fn members_beside(scenario: &Path) -> Option<Members> {
 }
 
 impl Found<'_> {
-    /// Looks at the rungs of the programs of a cluster, and at its understudy.
+    /// Checks the rungs of the programs of a cluster and its understudy.
     fn look(&mut self, looking: &Looking, cluster: &Cluster, reports: &mut [Report]) {
         let period = cluster.agreement().schedule.period();
         let mut seen = Vec::new();
@@ -197,7 +197,7 @@ impl Found<'_> {
         self.add(kind, report);
     }
 
-    /// A model, and the nets and automata that it names.
+    /// Reads a model with its nets and automata.
     fn add_model(&mut self, path: &Path) {
         let reports = match automata::model(path) {
             Ok(sources) => sources.reports,
@@ -213,14 +213,14 @@ impl Found<'_> {
         }
     }
 
-    /// A file, and the ladders that it names.
+    /// Reports on a file and the ladders that it names.
     fn add_with_ladders(&mut self, kind: Kind, reports: Vec<Report>) {
         for (index, report) in reports.into_iter().enumerate() {
             self.add(if index == 0 { kind } else { Kind::Ladder }, report);
         }
     }
 
-    /// A ladder that two clusters name, or that is also given by itself, is reported once.
+    /// Reports each ladder once, also if several files name it.
     fn add(&mut self, kind: Kind, report: Report) {
         if !self
             .reports

@@ -1,4 +1,4 @@
-//! `understudy convert`: a program from one form into another, with what was kept and what was not.
+//! `understudy convert`: program formats and a report on unsupported elements.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -17,51 +17,50 @@ use crate::answer::{Answer, Status};
 use crate::files;
 use crate::kind::Kind;
 
-/// Convert a program from one form into another
+/// Convert a program between formats
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The forms are told by the files: .ladder, .xml (PLCopen XML, or the paper's digraphs), .st
-(Structured Text), .ld (LDmicro).
-
 Example:
   understudy convert examples/plcopen/pump.xml pump.ladder --fidelity
   understudy convert examples/press-cell/robot.ladder robot.xml
-  understudy convert robot.xml robot.st --period 20ms")]
+  understudy convert robot.xml robot.st --period 20ms
+
+The file extension determines the format: .ladder, .xml (PLCopen XML or digraph XML), .st (Structured Text), .ld (LDmicro).")]
 pub(crate) struct Arguments {
-    /// The program
+    /// Input file
     #[arg(value_name = "IN")]
     from_file: PathBuf,
-    /// Where it goes; without it the program goes to standard output
+    /// Output file; default: standard output
     #[arg(value_name = "OUT")]
     to_file: Option<PathBuf>,
-    /// The form of IN
+    /// Format of IN
     #[arg(long, value_enum)]
     from: Option<Form>,
-    /// The form of OUT
+    /// Format of OUT
     #[arg(long, value_enum)]
     to: Option<Form>,
-    /// The program that is meant, where IN has several
+    /// Program to convert, if IN contains several
     #[arg(long, value_name = "NAME")]
     unit: Option<String>,
-    /// From one scan to the next; as IN says, or 10ms
+    /// Scan period; default: as in IN, otherwise 10ms
     #[arg(long, value_name = "TIME", value_parser = time)]
     period: Option<Duration>,
-    /// Say what was kept and what was not
+    /// Report which elements were converted and which are unsupported
     #[arg(long)]
     fidelity: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Form {
-    /// The text format of ladders
+    /// Ladder text
     Ladder,
-    /// PLCopen TC6 XML 2.01 (2.0 too is read)
+    /// PLCopen TC6 XML 2.01 (also reads 2.0)
     Plcopen,
-    /// Structured Text of IEC 61131-3
+    /// IEC 61131-3 Structured Text
     St,
-    /// The paper's digraphs as XML
+    /// Digraph XML of the paper
     Digraph,
-    /// LDmicro's files, which are read only
+    /// LDmicro (input only)
     Ldmicro,
 }
 
@@ -151,7 +150,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     answer.with_reports(vec![report])
 }
 
-/// The code of a program that was not written.
+/// Code of the error that prevented the conversion.
 pub(crate) fn code(error: &WriteError) -> &'static str {
     match error {
         WriteError::ReadOnly | WriteError::Program(_) => "U1014",
@@ -167,7 +166,7 @@ fn form_of_output(arguments: &Arguments) -> Result<Form, (&'static str, String)>
     }
 }
 
-/// By the ending of the file.
+/// Format by file extension.
 fn form_of(path: &Path) -> Result<Form, String> {
     match Format::of_ending(&path.to_string_lossy()) {
         Some(Format::Ladder) => Ok(Form::Ladder),
@@ -181,7 +180,7 @@ fn form_of(path: &Path) -> Result<Form, String> {
     }
 }
 
-/// The longest note that is shown, in characters.
+/// Maximum length of a printed note, in characters.
 const MAXIMUM_NOTE: usize = 300;
 
 fn fidelity_text(fidelity: &Fidelity, report: &Report) -> String {
@@ -208,7 +207,7 @@ fn fidelity_text(fidelity: &Fidelity, report: &Report) -> String {
     text
 }
 
-/// What was found when the written text was read back.
+/// Findings from reading the written text back.
 fn written_text(written: &Written) -> String {
     let Compared {
         signals,

@@ -1,4 +1,4 @@
-//! `understudy draw`: a ladder program as a picture.
+//! `understudy draw`: diagrams of ladder programs.
 
 use std::path::PathBuf;
 
@@ -12,7 +12,7 @@ use crate::answer::Answer;
 use crate::files;
 use crate::kind::Kind;
 
-/// Draw a ladder program as text or SVG
+/// Draw a ladder diagram as text or SVG
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -20,13 +20,13 @@ Example:
   understudy draw robot.ladder --as svg --output robot.svg
   understudy draw robot.ladder --as digraph --output robot.svg")]
 pub(crate) struct Arguments {
-    /// The ladder program
+    /// Ladder program
     #[arg(value_name = "FILE.ladder")]
     ladder: PathBuf,
-    /// In which form
+    /// Output format
     #[arg(long = "as", value_enum, default_value = "text")]
     form: Form,
-    /// A file to write to, in place of standard output
+    /// Output file; default: standard output
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
 }
@@ -35,9 +35,9 @@ pub(crate) struct Arguments {
 enum Form {
     /// Box-drawing characters
     Text,
-    /// A picture for pages and print
+    /// SVG picture
     Svg,
-    /// A picture of its digraphs: elements are edges, connections are vertices
+    /// SVG picture of the digraphs: elements are edges, connections are vertices
     Digraph,
 }
 

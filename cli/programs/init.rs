@@ -1,4 +1,4 @@
-//! `understudy init`: a cluster that runs, from a template or from programs that exist.
+//! `understudy init`: a new cluster from a template or from existing programs.
 
 mod from;
 
@@ -11,7 +11,7 @@ use understudy_cluster::{TemplateFile, minimal, modbus_cell, template};
 use crate::answer::Answer;
 use crate::files;
 
-/// Write a cluster that runs: a template, or one made from programs that exist
+/// Write a new cluster from a template or from existing programs
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -20,16 +20,16 @@ Example:
   understudy init cell --from plc.xml tank.st conveyor.ladder
   understudy init cell --from north=north/plc.xml south=south/plc.xml
 
---from takes programs in every form that `understudy convert` reads. Each program gets a controller, a remote I/O and a stand-in for its
-plant; a file with several programs gives one controller for each. NAME= names the controller where the name of the program does not do.")]
+--from reads programs in all formats of `understudy convert`. Each program gets a controller, a remote I/O and a placeholder for its plant;
+a file with several programs gives one controller per program. NAME= sets the name of the controller.")]
 pub(crate) struct Arguments {
-    /// A folder; files that exist are not overwritten
+    /// Folder to create; existing files are not overwritten
     #[arg(value_name = "DIR")]
     folder: PathBuf,
-    /// What to begin with
+    /// Template
     #[arg(long, value_enum, default_value_t)]
     template: Template,
-    /// Programs of your own, in place of a template
+    /// Existing programs, instead of a template
     #[arg(long, value_name = "[NAME=]FILE", num_args = 1.., conflicts_with = "template")]
     from: Vec<PathBuf>,
 }
@@ -38,10 +38,10 @@ pub(crate) struct Arguments {
 enum Template {
     /// One program and one understudy
     Minimal,
-    /// A tank that fills boxes and a conveyor, with simulated plants
+    /// A filling tank and a conveyor with simulated plants
     #[default]
     Cell,
-    /// A tank behind a Modbus TCP device, with a script that simulates the device, and a simulated press
+    /// A tank with a Modbus TCP device and a script that simulates it, and a simulated press
     Modbus,
 }
 
@@ -73,7 +73,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     }
 }
 
-/// The answer that names the files, and what to do with them.
+/// Answer that lists the files and the next steps.
 fn written(folder: &Path, paths: &[PathBuf], more: &str) -> Answer {
     let names = paths.iter().map(|path| path.display().to_string());
     let names: Vec<String> = names.collect();
@@ -84,7 +84,7 @@ fn written(folder: &Path, paths: &[PathBuf], more: &str) -> Answer {
         .and_next(&[&"lab", &cluster, &"--scenario", &scenario])
 }
 
-/// How the simulated device is started, which is no command of this program.
+/// Adds the instructions to start the simulated device.
 fn with_device(mut answer: Answer, device: &Path) -> Answer {
     answer.text.push_str(&format!(
         "\nStart the simulated device in a terminal of its own before the laboratory:\n  pip install pymodbus==3.16.1\n  python3 {}\n",

@@ -1,4 +1,4 @@
-//! `understudy parity`: the generated controller, in the forms in which people and PLCs take it.
+//! `understudy parity`: the generated parity controller as equations, ladder or Structured Text.
 
 use std::path::PathBuf;
 
@@ -11,33 +11,33 @@ use understudy_parity::{Equations, Style};
 use crate::answer::Answer;
 use crate::files;
 
-/// Print the understudy that is generated from the programs of a cluster
+/// Print the generated understudy of a cluster
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy parity examples/press-cell/cluster.toml
   understudy parity examples/press-cell/cluster.toml --as st --output understudy.st")]
 pub(crate) struct Arguments {
-    /// The cluster file
+    /// Cluster file
     #[arg(value_name = "CLUSTER.toml")]
     cluster: PathBuf,
-    /// In which form
+    /// Output format
     #[arg(long = "as", value_enum, default_value = "equations")]
     form: Form,
-    /// A file to write to, in place of standard output
+    /// Output file; default: standard output
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Form {
-    /// Polynomials over GF(2), as (30)-(35), and Boolean functions, as (37)-(40)
+    /// Polynomials over GF(2), as in (30)-(35), and Boolean functions, as in (37)-(40)
     Equations,
-    /// A ladder of this project's format
+    /// Ladder text
     Ladder,
     /// IEC 61131-3 Structured Text
     St,
-    /// The equations for machines
+    /// Equations as JSON
     Json,
 }
 
@@ -61,13 +61,13 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     answer.with_used(reports)
 }
 
-/// For people, and for machines.
+/// Text and JSON of the controller.
 fn made(cluster: &Cluster, form: Form) -> (String, Value) {
     let parity = cluster.parity();
     let circuit = parity.circuit();
     let text = match form {
         Form::Ladder => print(&from_circuit(circuit)),
-        // The members' addresses are places of other PLCs, and would collide in this one.
+        // Addresses of the members belong to other PLCs and would collide here.
         Form::St => circuit_as_structured_text(circuit, cluster.agreement().schedule.period()),
         Form::Equations | Form::Json => {
             let equations = Equations::of(parity);

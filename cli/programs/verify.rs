@@ -1,4 +1,4 @@
-//! `understudy verify`: ladders against their properties, and against what everybody wants of a ladder.
+//! `understudy verify`: proofs of properties of ladder programs.
 
 mod answer;
 pub(crate) mod patience;
@@ -25,7 +25,7 @@ use crate::kind::Kind;
 use answer::{Finding, ProgramAnswer};
 use patience::Patience;
 
-/// Prove properties of a ladder, or show a run that breaks them
+/// Prove properties of ladder programs or show counterexamples
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -37,52 +37,52 @@ Example:
   understudy verify examples/press-cell/cluster.toml
   understudy verify examples/boiler/complete.ladder --period 100ms --budget 60s
 
-Without a property it asks what is asked of every ladder: can each output be switched on and off, again and again? It also remarks on rungs
-without effect, on coils that want different values in one scan, and on steps that are run through in one. Of a cluster also whether the
-understudy equals the sum of its members. docs/properties.md describes formulas, sentences and files of them.
+Without a property the command proves the standard property of every ladder program: each output can always be switched on and off again. It
+also remarks on rungs without effect, coils with conflicting values in one scan, and sequence steps that are passed in one scan. For a
+cluster it proves that the understudy equals the sum of its members. Formulas, sentences and property files: docs/properties.md.
 
-Exit status: 0 when everything was proved, 1 when something does not hold or is undecided, 2 for bad input.")]
+Exit status: 0 if everything is proved, 1 if a property fails or is undecided, 2 for invalid input.")]
 pub(crate) struct Arguments {
-    /// A ladder program, or a cluster file
+    /// Ladder program or cluster file
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// A file of properties, a line each
+    /// File with one property per line
     #[arg(long, value_name = "FILE")]
     properties: Option<PathBuf>,
-    /// A property, as a formula of CTL or a sentence; may be given more than once
+    /// Property, as a CTL formula or a sentence; repeatable
     #[arg(long, value_name = "TEXT")]
     property: Vec<String>,
-    /// What comes again and again in every run that is looked at; may be given more than once
+    /// Fairness condition, true infinitely often in every run considered; repeatable
     #[arg(long, value_name = "TEXT")]
     fair: Vec<String>,
-    /// From one scan to the next; timers are so many scans long
+    /// Scan period; determines the length of timers in scans
     #[arg(long, value_name = "TIME", default_value = "10ms", value_parser = time)]
     period: Duration,
-    /// Nodes of decision diagrams alive at once
+    /// Maximum number of live nodes of decision diagrams
     #[arg(long, value_name = "NUMBER", default_value_t = 4_000_000)]
     nodes: usize,
-    /// Time after which what is not decided stays undecided; without it, as long as the bounds let it take
+    /// Time limit; the remaining properties stay undecided. Default: none
     #[arg(long, value_name = "TIME", value_parser = time)]
     budget: Option<Duration>,
-    /// For what stays undecided: induction over at most so many scans
+    /// Maximum depth of the induction, in scans, for undecided properties
     #[arg(long, value_name = "SCANS", default_value_t = 20)]
     induction: u32,
-    /// A page in HTML with every run that shows something, drawn into the ladder scan by scan
+    /// HTML page with all counterexamples and witnesses, drawn into the ladder scan by scan
     #[arg(long, value_name = "FILE.html", conflicts_with = "smv")]
     draw: Option<PathBuf>,
-    /// Write the program and its properties for NuSMV, and prove nothing
+    /// Write the program and its properties for NuSMV instead of proving them
     #[arg(long, value_enum)]
     smv: Option<Smv>,
-    /// A file for --smv, in place of standard output
+    /// Output file for --smv; default: standard output
     #[arg(long, short, value_name = "FILE", requires = "smv")]
     output: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Smv {
-    /// One step a scan, as the program runs
+    /// One step per scan
     Scan,
-    /// One module a rung, as in the paper on the deployment of controllers
+    /// One module per rung, as in the paper on the deployment of controllers
     Rungs,
 }
 
@@ -159,7 +159,7 @@ fn bounds<'a>(arguments: &Arguments, go_on: GoOn<'a>) -> Bounds<'a> {
     }
 }
 
-/// Properties and conditions that were asked for, over the program's signals.
+/// The requested properties and fairness conditions over the signals of the program.
 #[derive(Default)]
 struct Asked {
     properties: Vec<(Property, Resolved)>,
@@ -287,7 +287,7 @@ fn proved(
     answer::of_programs(vec![program], None, page)
 }
 
-/// Writes the page of runs; answers with its name.
+/// Writes the page of runs and returns its name.
 fn draw(
     path: &Path,
     period: Duration,
@@ -302,7 +302,7 @@ fn draw(
     Ok(path.display().to_string())
 }
 
-/// Every program of a cluster against what is asked of all, and the understudy against its members.
+/// Proves the standard properties of all programs of a cluster, and that the understudy is the sum of its members.
 fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Answer {
     let of_a_ladder = !arguments.property.is_empty()
         || arguments.properties.is_some()
@@ -337,7 +337,7 @@ fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Answer {
         .and_next(&[&"simulate", &arguments.file])
 }
 
-/// What the proof of the understudy says.
+/// Result of the proof of the understudy.
 fn parity(cluster: &Cluster) -> Result<String, String> {
     let members: Vec<Circuit> = cluster
         .controllers()

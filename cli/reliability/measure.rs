@@ -1,4 +1,4 @@
-//! `understudy measure`: how long it works until a program is lost, measured on the real protocol, beside what is calculated.
+//! `understudy measure`: MTTF measured with the real protocol, compared with the model.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -20,41 +20,42 @@ use crate::reliability::prediction::{Times, refused, write_report};
 use crate::run::lab::{NetworkArguments, laboratory_settings};
 use crate::run::simulate::seed_of_the_clock;
 
-/// Of a campaign on processes: no clock holds all of a time that can be written.
+/// Maximum time limit of a campaign on processes.
 const LONGEST_LIMIT: Duration = Duration::from_secs(365 * 24 * 3600);
 
-/// Let stations fail and be repaired by chance, in the simulator or on processes, until the system fails, and hold the MTTF against the model
+/// Measure the MTTF by random failures and compare it with the model
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy measure examples/press-cell/cluster.toml --mtbf 25h --mttr 30min --failures 200 --seed 1
   understudy measure examples/press-cell/cluster.toml --real --mtbf 3s --mttr 200ms --failures 5
 
-The protocol is the real one and its own time is not accelerated: what it needs to detect a failure and to take over states is
-measured, added to the repair in the model, and the bias of it is printed. The system fails where a remote I/O comes to its
-fail-safe because nobody holds its program's state; in the paper's mode, at the second failure. Equal arguments and seeds give
-equal campaigns in the simulator. Exit status 1 when the model lies outside of the 95 % interval, which one campaign in twenty
-does by chance.")]
+Stations fail and are repaired at random until the system fails. The protocol itself is not accelerated: its time to detect a failure and to
+transfer states is measured and added to the repair time of the model, and the resulting bias is printed. The system fails when a remote
+I/O becomes fail-safe because no station holds the state of its program; in paper mode, at the second failure. Equal arguments and seeds
+give equal simulated campaigns.
+
+Exit status: 1 if the model is outside of the 95 % confidence interval, which happens by chance in one of twenty campaigns.")]
 pub(crate) struct Arguments {
-    /// The cluster file
+    /// Cluster file
     #[arg(value_name = "CLUSTER.toml")]
     cluster: PathBuf,
-    /// Mean time between failures of a station
+    /// MTBF of a station
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     mtbf: String,
-    /// Mean time to repair a station, from the detection on
+    /// MTTR of a station, from the detection of the failure
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     mttr: String,
-    /// Stations that are repaired at the same time, at most; by default a crew for each
+    /// Number of repair crews; default: one per station
     #[arg(long, value_name = "R")]
     crews: Option<u32>,
-    /// Failures of the system to wait for
+    /// Number of system failures to measure
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(2..=1_000_000))]
     failures: u64,
-    /// What all chance comes from; by default taken from the clock, and printed
+    /// Seed of all random numbers; the default is taken from the clock and printed
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// How many times faster than the plant; by default so that a mean repair takes 50 cycles, but 10,000 at most
+    /// Acceleration of failures and repairs; default: a mean repair takes 50 cycles, maximum 10,000
     #[arg(
         long,
         value_name = "FACTOR",
@@ -62,13 +63,13 @@ pub(crate) struct Arguments {
         allow_hyphen_values = true
     )]
     acceleration: Option<f64>,
-    /// The same, said by the cycles that a mean repair takes
+    /// Acceleration, as the number of cycles of a mean repair
     #[arg(long, value_name = "CYCLES", allow_hyphen_values = true)]
     cycles_per_mttr: Option<f64>,
-    /// Kill and restart processes of this machine (kill -9) in place of the simulator's stations; Ctrl-C ends it with what there is
+    /// Kill (kill -9) and restart processes of this machine instead of simulated stations; Ctrl-C ends the measurement with partial results
     #[arg(long)]
     real: bool,
-    /// Until when the processes run at most
+    /// Maximum run time
     #[arg(
         long,
         value_name = "TIME",
@@ -77,15 +78,15 @@ pub(crate) struct Arguments {
         allow_hyphen_values = true
     )]
     limit: String,
-    /// Where the journals of the processes are kept
+    /// Directory for the journals of the processes
     #[arg(long, value_name = "DIR", default_value = "runs", requires = "real")]
     out: PathBuf,
-    /// Accelerate more than 10,000 times, and run for hours
+    /// Allow an acceleration of more than 10,000 and run times of hours
     #[arg(long)]
     force: bool,
     #[command(flatten)]
     overrides: OverrideArguments,
-    /// A folder for reliability.html, .json and .csv
+    /// Output folder for reliability.html, .json and .csv
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
 }
@@ -100,7 +101,7 @@ fn measured(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answ
     let mttr = times.required("mttr", Some(&arguments.mttr));
     let limit = times.required("limit", Some(&arguments.limit));
     let (cluster, reports) = files::cluster(&arguments.cluster, arguments.overrides.overrides())?;
-    // What is wrong with the crews is said in the same run as what is wrong with a time.
+    // Invalid crews and invalid times are reported together.
     let any = Hours::new("any", 1.0).map_err(|error| refused(&[error]))?;
     let mut crewed = Options::new(1, any, any);
     crewed.crews = arguments.crews;
@@ -186,7 +187,7 @@ fn in_the_simulator(
     measured.map_err(|error| Answer::failed(Status::Failed, "U0530", error.to_string()))
 }
 
-/// Where the journals of a campaign on processes lie, and why it ended early.
+/// Directory of the journals of a campaign on processes, and the reason of an early end.
 type OnProcesses = (PathBuf, Option<LaboratoryError>);
 
 fn on_processes(

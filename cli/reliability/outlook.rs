@@ -1,4 +1,4 @@
-//! `understudy outlook`: the hours to come, by the journal of a cluster.
+//! `understudy outlook`: predicted reliability of a running cluster.
 
 use std::fs::{self, File};
 use std::io::BufReader;
@@ -12,19 +12,19 @@ use understudy_wire::Mode;
 use crate::answer::{Answer, Status};
 use crate::reliability::prediction::{Times, refused};
 
-/// Say how likely a cluster works over the hours to come, by what its journal shows
+/// Predict the reliability of a running cluster from its journal
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy outlook runs/latest --ahead 8h
 
-The journal gives the rates of failure, detection and repair and the share of failures that were masked, each with a 95 %
-credible interval, and R over the time ahead with all stations working now. A journal that is still written may be read.")]
+The rates of failure, detection and repair and the coverage are estimated from the journal, each with a 95 % credible interval. R over the
+prediction period assumes that all stations are working now. The run may still be in progress.")]
 pub(crate) struct Arguments {
-    /// The directory of a run, or a journal
+    /// Directory of a run, or journal file
     #[arg(value_name = "RUN")]
     run: PathBuf,
-    /// How far to look ahead
+    /// Prediction period
     #[arg(
         long,
         value_name = "TIME",
@@ -32,7 +32,7 @@ pub(crate) struct Arguments {
         allow_hyphen_values = true
     )]
     ahead: String,
-    /// Mean time to repair, for a journal that shows no repair
+    /// MTTR, for a journal without repairs
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     mttr: Option<String>,
 }
@@ -82,7 +82,7 @@ fn answered(arguments: &Arguments) -> Result<Answer, Answer> {
     Ok(Answer::done(found.to_text(), &found))
 }
 
-/// As the summary of a run says it; one that still runs has none, and counts as full.
+/// Mode from the summary of a run; a run in progress counts as full.
 fn mode_of(run: &Path) -> Mode {
     let summary = fs::read(run.join("summary.json")).unwrap_or_default();
     let summary: Value = serde_json::from_slice(&summary).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! `understudy reliability`: how long it works until a program is lost, calculated.
+//! `understudy reliability`: MTTF, reliability and availability from Markov models.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ use crate::answer::{Answer, Status};
 use crate::files;
 use crate::run::outcome::command_line;
 
-/// Calculate how long a cluster works, beside what else could be bought
+/// Calculate the MTTF of a cluster and compare other redundancy
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -28,18 +28,18 @@ Example:
   understudy reliability --controllers 20 --mtbf 10000h --mttr 24h --box old*3=4000h,48h --shared power=200000h
   understudy reliability --chain plant.chain --mission 1y
 
-Times carry their unit: us, ms, s, min, h, d, y. What the numbers rest on: docs/reliability.md.")]
+Units of time: us, ms, s, min, h, d, y. Models and assumptions: docs/reliability.md.")]
 pub(crate) struct Arguments {
-    /// The cluster file; controllers and spares are counted in it
+    /// Cluster file; supplies the numbers of controllers and understudies
     #[arg(value_name = "CLUSTER.toml", conflicts_with_all = ["controllers", "spares", "chain"])]
     cluster: Option<PathBuf>,
-    /// Controllers that are not redundant, N
+    /// Number of controllers, N
     #[arg(long, value_name = "N", required_unless_present_any = ["cluster", "chain"])]
     controllers: Option<u32>,
-    /// Understudies of each group
+    /// Number of understudies per group
     #[arg(long, value_name = "S", default_value_t = 1)]
     spares: u32,
-    /// Mean time between failures of a box
+    /// MTBF of a controller or understudy
     #[arg(
         long,
         value_name = "TIME",
@@ -47,7 +47,7 @@ pub(crate) struct Arguments {
         allow_hyphen_values = true
     )]
     mtbf: Option<String>,
-    /// Mean time to repair a box
+    /// MTTR of a controller or understudy
     #[arg(
         long,
         value_name = "TIME",
@@ -55,16 +55,16 @@ pub(crate) struct Arguments {
         allow_hyphen_values = true
     )]
     mttr: Option<String>,
-    /// Boxes with times of their own: NAME=MTBF,MTTR, a station of the cluster file; without one NAME*COUNT=..., and understudies=...
+    /// Individual times: NAME=MTBF,MTTR for a station of the cluster file; without a file NAME*COUNT=... and understudies=...
     #[arg(long = "box", value_name = "BOX")]
     boxes: Vec<String>,
-    /// A part whose first failure fails the system, such as power=200000h
+    /// Shared part whose failure fails the system, such as power=200000h
     #[arg(long, value_name = "NAME=MTBF")]
     shared: Vec<String>,
-    /// Boxes that are repaired at the same time, at most; by default a crew for each
+    /// Number of repair crews; default: one per station
     #[arg(long, value_name = "R")]
     crews: Option<u32>,
-    /// Probability that a failure is masked
+    /// Coverage c: probability that a failure is masked
     #[arg(
         long,
         value_name = "C",
@@ -72,13 +72,13 @@ pub(crate) struct Arguments {
         allow_hyphen_values = true
     )]
     coverage: f64,
-    /// Equal groups of controllers that share no understudy
+    /// Number of equal groups without a shared understudy
     #[arg(long, value_name = "G", default_value_t = 1)]
     groups: u32,
-    /// Mean time until a failure is detected; repair starts then
+    /// Mean time to detect a failure, before the repair starts
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     detection: Option<String>,
-    /// Share of failures that take all boxes at once
+    /// Common-cause factor beta: share of failures that affect all stations
     #[arg(
         long,
         value_name = "BETA",
@@ -86,25 +86,25 @@ pub(crate) struct Arguments {
         allow_hyphen_values = true
     )]
     beta: f64,
-    /// How that share is counted
+    /// Convention for beta
     #[arg(long, value_enum, default_value = "additive")]
     convention: ConventionWord,
-    /// The time over which it has to work
+    /// Mission time
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     mission: Option<String>,
-    /// Answer about a Markov chain of your own in place of a cluster
+    /// Analyse the Markov chain in this file instead of a cluster
     #[arg(long, value_name = "FILE", conflicts_with_all = ["controllers", "mtbf", "mttr", "report"])]
     chain: Option<PathBuf>,
-    /// A folder for reliability.html, .json and .csv
+    /// Output folder for reliability.html, .json and .csv
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum ConventionWord {
-    /// Besides the failures of each box
+    /// Common-cause failures add to the failures of each station
     Additive,
-    /// Taken from the failures of each box
+    /// Common-cause failures are a share of the failures of each station
     Split,
 }
 
@@ -163,7 +163,7 @@ fn of_cluster(arguments: &Arguments) -> Result<Answer, Answer> {
         options.shared.clone_from(&shared);
         options
     };
-    // What is wrong with the other options is said in the same run as what is wrong with a time.
+    // Other invalid options and invalid times are reported together.
     let any = Hours::new("any", 1.0).map_err(|error| refused(&[error]))?;
     let mut options = options(mtbf.unwrap_or(any), mttr.unwrap_or(any));
     let mut wrong = set_unequal(&mut options, cluster.as_ref().map(|read| &read.0), boxes);
@@ -184,7 +184,7 @@ fn of_cluster(arguments: &Arguments) -> Result<Answer, Answer> {
     })
 }
 
-/// The answer; its numbers stand at the top of the document too.
+/// Answer whose numbers are also top-level keys of the document.
 fn calculated(text: String, found: &Calculated, reports: Vec<Report>) -> Answer {
     let answer = Answer::done(text, found).with_reports(reports);
     let numbers: Map<String, Value> = answer
@@ -198,7 +198,7 @@ fn calculated(text: String, found: &Calculated, reports: Vec<Report>) -> Answer 
     answer.with_numbers(numbers)
 }
 
-/// Everything that is wrong with a question.
+/// Answer with all errors of a question.
 pub(crate) fn refused(errors: &[ReliabilityError]) -> Answer {
     errors.iter().fold(
         Answer::done("", json!(null)).with_status(Status::BadInput),
@@ -206,7 +206,7 @@ pub(crate) fn refused(errors: &[ReliabilityError]) -> Answer {
     )
 }
 
-/// Times as they are given, and what is wrong with any of them.
+/// Collects the errors of several times.
 #[derive(Debug, Default)]
 pub(crate) struct Times {
     wrong: Vec<(&'static str, String)>,
@@ -227,7 +227,7 @@ impl Times {
         }
     }
 
-    /// The texts of an option that may be given several times.
+    /// Parses a repeatable option.
     pub(crate) fn parsed<T>(&mut self, name: &str, texts: &[String]) -> Vec<T>
     where
         T: std::str::FromStr<Err = ReliabilityError>,
@@ -249,7 +249,7 @@ impl Times {
     }
 
     /// # Errors
-    /// Where any time, or anything of `others`, is wrong.
+    /// If a time is invalid or `others` is not empty.
     pub(crate) fn finish(self, others: Vec<ReliabilityError>) -> Result<(), Answer> {
         if self.wrong.is_empty() && others.is_empty() {
             return Ok(());
@@ -267,7 +267,7 @@ impl Times {
     }
 }
 
-/// Writes the report into `folder`, all files or none; says where it lies.
+/// Writes all files of the report to `folder`, or none; returns a line with its location.
 pub(crate) fn write_report(
     folder: &Path,
     options: &Options,
@@ -297,7 +297,7 @@ pub(crate) fn write_report(
         ("reliability.json", &made.json),
         ("reliability.csv", &made.csv),
     ];
-    // Beside their places first: a full disk leaves no half of a report, and no mixture of two.
+    // Temporary files first: a full disk leaves neither a partial nor a mixed report.
     let staged = |name: &str| folder.join(format!(".{name}.new"));
     let written = texts.iter().try_for_each(|(name, text)| {
         let path = staged(name);

@@ -1,4 +1,4 @@
-//! `understudy campaign`: runs with faults by chance, over all kinds of faults, and each failure made small.
+//! `understudy campaign`: random fault injection in simulation; failing runs are shrunk to minimal ones.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ use crate::files;
 use crate::overrides::OverrideArguments;
 use crate::run::simulate::seed_of_the_clock;
 
-/// Inject faults by chance in many simulated runs, and make every failure a small scenario
+/// Inject random faults in simulation and shrink failing runs
 #[derive(Debug, Args)]
 #[command(
     args_conflicts_with_subcommands = true,
@@ -30,56 +30,57 @@ Example:
   understudy campaign examples/press-cell/cluster.toml --runs 1000000 --seed 1 --shard 3/8 --out shard-3
   understudy campaign merge shard-* --out campaign
 
-The same seed and runs give the same findings on any number of processors and shards. DIR gets campaign.json, campaign.html and
-a scenario for each failure, which `understudy simulate` repeats. Exit status 1 when a run failed, or not all were made; Ctrl-C
-keeps what was found so far."
+Equal seeds and numbers of runs give equal findings on any number of processors and shards. DIR receives campaign.json, campaign.html and
+a scenario for each failure, which `understudy simulate` replays. Ctrl-C ends the campaign with partial findings.
+
+Exit status: 1 if a run failed or the campaign is incomplete."
 )]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     merge: Option<Merge>,
-    /// The cluster file
+    /// Cluster file
     #[arg(value_name = "CLUSTER.toml", required = true)]
     cluster: Option<PathBuf>,
-    /// Runs of the whole campaign
+    /// Number of runs of the whole campaign
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000_000))]
     runs: u64,
-    /// What all chance comes from; by default taken from the clock, and printed
+    /// Seed of all random numbers; the default is taken from the clock and printed
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     seed: Option<u64>,
-    /// Cycles of each run
+    /// Number of cycles of each run
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u64).range(MINIMUM_RUN_CYCLES..=MAXIMUM_RUN_CYCLES))]
     cycles: u64,
-    /// What is hunted for
+    /// Property that fails a run
     #[arg(long, value_enum, default_value_t = PropertyArgument::Wrong)]
     property: PropertyArgument,
-    /// Kinds of faults, by default all; flipped bits only where there is an understudy
+    /// Kinds of faults; default: all, flipped bits only in a cluster with an understudy
     #[arg(long, value_name = "KIND,...", value_delimiter = ',', value_parser = parse_kinds)]
     faults: Vec<Vec<Kind>>,
-    /// No run is begun after this time, such as 10min; the findings say how many were made
+    /// Time limit for starting runs, such as 10min; the findings state the number of runs completed
     #[arg(long, value_name = "TIME", value_parser = parse_budget)]
     budget: Option<Duration>,
-    /// Processors to use, by default all
+    /// Number of processors; default: all
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
-    /// Run only the K-th of N parts of this seed; `merge` makes one of them
+    /// Run only part K of N of this seed; `merge` combines the parts
     #[arg(long, value_name = "K/N", default_value = "1/1", requires = "seed")]
     shard: Shard,
     #[command(flatten)]
     overrides: OverrideArguments,
-    /// Where to keep the findings; without it only the answer remains
+    /// Directory for the findings; without it they are only printed
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]
 enum Merge {
-    /// Make one of the shards of a campaign
+    /// Combine the shards of a campaign
     #[command(after_help = "Example:\n  understudy campaign merge shard-* --out campaign")]
     Merge {
-        /// Where the shards are kept
+        /// Directories of the shards
         #[arg(value_name = "DIR", required = true)]
         shards: Vec<PathBuf>,
-        /// Where to keep the findings; without it only the answer remains
+        /// Directory for the findings; without it they are only printed
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
     },
@@ -87,21 +88,21 @@ enum Merge {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum PropertyArgument {
-    /// An output that is neither true, nor held in its time, nor fail-safe
+    /// An applied output is wrong: not proved, not held within its time, not fail-safe
     Wrong,
-    /// A cycle with held outputs
+    /// Outputs are held in a cycle
     Held,
-    /// A cycle with fail-safe outputs
+    /// Outputs are fail-safe in a cycle
     FailSafe,
-    /// Somebody who is not synchronised again 100 cycles after the last fault
+    /// A member is not synchronised 100 cycles after the last fault
     Unprotected,
 }
 
 #[derive(Debug, Serialize)]
 struct Found<'a> {
-    /// Where the findings are kept.
+    /// Directory of the findings.
     directory: Option<String>,
-    /// The scenario of each failure, in the order of the findings.
+    /// Scenario file of each failure, in the order of the findings.
     scenarios: Vec<String>,
     findings: &'a Findings,
 }
@@ -110,7 +111,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
     let answer = match (&arguments.merge, &arguments.cluster) {
         (Some(Merge::Merge { shards, out }), _) => merged(shards, out.as_deref()),
         (None, Some(cluster)) => campaign(arguments, cluster, console),
-        // The parser asks for one of both.
+        // The parser requires one of the two.
         (None, None) => Ok(Answer::done("", ())),
     };
     answer.unwrap_or_else(|failed| failed)
@@ -212,7 +213,7 @@ fn merged(shards: &[PathBuf], out: Option<&Path>) -> Result<Answer, Answer> {
     kept(&findings, out)
 }
 
-/// Writes the findings where they are to be kept, and answers with them.
+/// Writes the findings to their directory and prints them.
 fn kept(findings: &Findings, out: Option<&Path>) -> Result<Answer, Answer> {
     let mut scenarios = Vec::new();
     let mut text = findings.to_string();

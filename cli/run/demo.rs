@@ -1,4 +1,4 @@
-//! `understudy demo`: the experiment of section V.B on real processes.
+//! `understudy demo`: the experiment of section V.B on processes.
 
 use std::path::PathBuf;
 use std::time::SystemTime;
@@ -14,7 +14,7 @@ use crate::inspect::watch::{BesideArguments, Page};
 use crate::run::lab::{Judged, RunArguments, in_laboratory, judged};
 use crate::run::wakefulness;
 
-/// Run the robot and the press of the paper on real processes, and kill each station once
+/// Run the press cell of the paper and kill each station once
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -23,10 +23,11 @@ Example:
   understudy demo --link zenoh
   understudy demo --watch
 
-Without --period it measures for a second how late this host wakes it, and takes the shortest of 10, 20, 50 and 100 ms that the host keeps.
-Station 1 is killed at cycle 200 and started again at 327, station 2 at 400 and 527, station 3 at 600 and 727 (Table II).
-With --watch the cluster stays up when the scenario is over: kill a station yourself on the page. Ctrl-C ends it.
-Exit status 0 when every plant stayed functional and nothing wrong was applied; 3 where the host woke the members too late to tell.")]
+Without --period the command measures the wake-up latency of this host for one second and selects the shortest of 10, 20, 50 and 100 ms
+that the host keeps. The scenario is that of Table II: station 1 is killed at cycle 200 and restarted at 327, station 2 at 400 and 527,
+station 3 at 600 and 727. With --watch the cluster keeps running after the scenario and accepts commands from the page until Ctrl-C.
+
+Exit status: 0 if every plant stayed functional and no wrong output was applied; 3 if the host was too slow for a verdict.")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     run: RunArguments,
@@ -50,7 +51,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
     answer.and_next(&[&"init", &"cell"])
 }
 
-/// The cluster of section V, written into the directory of its run.
+/// The press cell of section V, written to the directory of its run.
 pub(crate) struct PressCell {
     pub(crate) cluster: Cluster,
     directory: RunDirectory,
@@ -72,12 +73,12 @@ impl PressCell {
         })
     }
 
-    /// Where its run is kept.
+    /// Directory of the run.
     pub(crate) fn path(&self) -> &std::path::Path {
         self.directory.path()
     }
 
-    /// As [`Self::run`], with what came of it in place of an answer.
+    /// Same as [`Self::run`], returning the summary.
     pub(crate) fn judged(
         &self,
         scenario: &Scenario,

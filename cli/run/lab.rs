@@ -1,4 +1,4 @@
-//! `understudy lab`: a cluster and a scenario on real processes.
+//! `understudy lab`: a cluster and a scenario on processes of this machine.
 
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ use crate::run::outcome::{answer, circumstances, command_line, machine, verdict}
 use crate::run::wakefulness;
 use crate::tools::proxy::ImpairmentArguments;
 
-/// Run a cluster on real processes of this machine, and break it as a scenario says
+/// Run a cluster and a scenario on processes of this machine
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -30,12 +30,12 @@ Example:
   understudy lab examples/press-cell/cluster.toml --hosts netns --loss 1%
   understudy lab examples/press-cell/cluster.toml --watch")]
 pub(crate) struct Arguments {
-    /// The cluster file
+    /// Cluster file
     #[arg(value_name = "CLUSTER.toml")]
     cluster: PathBuf,
     #[command(flatten)]
     pub(crate) run: RunArguments,
-    /// The scenario file; without one the cluster runs undisturbed
+    /// Scenario file; without it the cluster runs undisturbed
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
     #[command(flatten)]
@@ -44,49 +44,49 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct RunArguments {
-    /// Cycles in place of the scenario's; steps and expectations past them are left out
+    /// Number of cycles, overrides the scenario; later steps and expectations are ignored
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=understudy_scenarios::MAXIMUM_CYCLES))]
     pub(crate) cycles: Option<u64>,
-    /// Start a member again that ended unexpectedly: after 0.5 s, and after up to 8 s where it ends again and again
+    /// Restart members that end unexpectedly: after 0.5 s, after up to 8 s if they end repeatedly
     #[arg(long)]
     pub(crate) restart: bool,
     #[command(flatten)]
     pub(crate) overrides: OverrideArguments,
     #[command(flatten)]
     pub(crate) network: NetworkArguments,
-    /// Where runs are kept, each in a directory of its own
+    /// Directory for runs; each run gets a subdirectory
     #[arg(long, value_name = "DIR", default_value = "runs")]
     pub(crate) out: PathBuf,
-    /// What the journal may take of the disk, such as 200MB; its oldest records go when it is full
+    /// Size limit of the journal, such as 200MB; the oldest records are removed first
     #[arg(long, value_name = "SIZE", default_value = "1GB", value_parser = parse_size)]
     pub(crate) journal_limit: u64,
 }
 
-/// What lies between the processes.
+/// The network between the processes.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Network")]
 pub(crate) struct NetworkArguments {
-    /// Where the processes run
+    /// Hosts of the processes
     #[arg(long, value_enum, default_value_t)]
     hosts: HostArgument,
     #[command(flatten)]
     impairment: ImpairmentArguments,
-    /// What the fates of datagrams come from
+    /// Seed of the random network faults
     #[arg(long, value_name = "SEED", default_value_t)]
     network_seed: u64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 enum HostArgument {
-    /// All on the loopback interface
+    /// Loopback interface
     #[default]
     Loopback,
-    /// One host for each station, and one for each remote I/O with its plant: network namespaces joined by a bridge. Needs root
+    /// Network namespaces joined by a bridge: one per station, one per remote I/O with its plant; requires root
     Netns,
 }
 
 impl NetworkArguments {
-    /// The same, losing a share of what is sent where it loses nothing.
+    /// The same arguments with a loss of `share`, unless a loss was given.
     pub(crate) fn losing(&self, share: Share) -> Self {
         Self {
             impairment: self.impairment.losing(share),
@@ -94,7 +94,7 @@ impl NetworkArguments {
         }
     }
 
-    /// The same, with fates from another seed.
+    /// The same arguments with another seed.
     pub(crate) fn seeded(&self, seed: u64) -> Self {
         Self {
             network_seed: seed,
@@ -114,7 +114,7 @@ impl NetworkArguments {
     }
 }
 
-/// Cycles of a run without a scenario.
+/// Number of cycles of a run without a scenario.
 const UNDISTURBED_CYCLES: u64 = 1000;
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
@@ -159,7 +159,7 @@ pub(crate) fn scenario_or_undisturbed(
     }
 }
 
-/// How the members of a cluster are started: by this program, from its file.
+/// Settings that start the members of a cluster as processes of this program.
 pub(crate) fn laboratory_settings(
     cluster: &Cluster,
     cluster_file: PathBuf,
@@ -181,7 +181,7 @@ pub(crate) fn laboratory_settings(
     })
 }
 
-/// Runs, writes the results and answers.
+/// Runs the laboratory, writes the results and returns the answer.
 pub(crate) fn in_laboratory(
     cluster: &Cluster,
     scenario: &Scenario,
@@ -220,7 +220,7 @@ pub(crate) fn in_laboratory(
     }
 }
 
-/// An output of the first controller that the scenario kills, and a cycle in which it was reconstructed.
+/// First output of the first controller that the scenario kills, with a cycle in which it was reconstructed.
 fn first_reconstructed(cluster: &Cluster, summary: &Summary) -> Option<(String, String)> {
     let controllers = cluster.controllers();
     summary.steps.iter().find_map(|step| {
@@ -231,7 +231,7 @@ fn first_reconstructed(cluster: &Cluster, summary: &Summary) -> Option<(String, 
     })
 }
 
-/// What is said when the scenario is over and the cluster stays up.
+/// Message at the end of a scenario whose cluster keeps running.
 fn invitation(verdict: &str, url: &str) -> String {
     format!(
         "the scenario is over: {verdict}\n\
@@ -239,13 +239,13 @@ fn invitation(verdict: &str, url: &str) -> String {
     )
 }
 
-/// What a run left besides its summary.
+/// Results of a run other than its summary.
 pub(crate) struct Judged {
     pub(crate) written: Result<(), RunDirectoryError>,
     pub(crate) failure: Option<LaboratoryError>,
 }
 
-/// Runs, and writes the results.
+/// Runs the laboratory and writes the results.
 pub(crate) fn judged(
     cluster: &Cluster,
     scenario: &Scenario,

@@ -1,4 +1,4 @@
-//! `understudy model-check`: every schedule of a few faults over a few cycles.
+//! `understudy model-check`: all schedules of few faults over few cycles.
 
 use std::path::PathBuf;
 use std::thread::available_parallelism;
@@ -14,7 +14,7 @@ use crate::answer::{Answer, Status};
 use crate::files;
 use crate::overrides::OverrideArguments;
 
-/// Try every schedule of a few faults over a few cycles
+/// Check all schedules of few faults over few cycles
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -23,37 +23,37 @@ Example:
   understudy model-check examples/press-cell/cluster.toml --behind robot --restarted press-io
   understudy model-check examples/press-cell/cluster.toml --broken robot-io:understudy --kinds crash
 
-The very state machines of stations and remote I/Os run in virtual time, with a slot of the schedule as its grain. What breaks a
-property is written as a scenario that `understudy simulate` replays. States grow with the power of the faults: 2 faults in 2 cycles of the
-press cell are about a million.
+The state machines of stations and remote I/Os run in virtual time; faults begin and end at the slots of the schedule. A run that violates a
+property is written as a scenario, which `understudy simulate` replays. The number of states grows exponentially with the number of
+faults: 2 faults in 2 cycles of the press cell take about a million states.
 
-Exit status: 0 when every property holds, 1 when one does not, 2 for bad input.")]
+Exit status: 0 if every property holds, 1 if one is violated, 2 for invalid input.")]
 pub(crate) struct Arguments {
-    /// The cluster file
+    /// Cluster file
     #[arg(value_name = "CLUSTER.toml")]
     cluster: PathBuf,
-    /// Faults in one run, at most
+    /// Maximum number of faults per run
     #[arg(long, value_name = "N", default_value_t = 1)]
     faults: u8,
-    /// Cycles in which they may begin
+    /// Number of cycles in which faults may begin
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u64).range(1..=1000))]
     cycles: u64,
-    /// Who has just started again where a run begins; `all` for all stations and remote I/Os. Without it a run begins synchronised
+    /// Members that have just restarted when a run begins; `all`: all stations and remote I/Os. Default: all synchronised
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     restarted: Vec<String>,
-    /// Who stood still for the cycle before
+    /// Members that were suspended in the previous cycle
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     behind: Vec<String>,
-    /// Links that were broken until the run begins, for longer than the history of a sample: sender and receiver
+    /// Links, sender and receiver, that were interrupted before the run for longer than the history of a sample
     #[arg(long, value_name = "FROM:TO", value_delimiter = ',')]
     broken: Vec<String>,
-    /// Which faults; all of them where none are named
+    /// Kinds of faults; default: all
     #[arg(long, value_name = "KIND", value_enum, value_delimiter = ',')]
     kinds: Vec<Kind>,
-    /// Processors to use; all of them by default
+    /// Number of processors; default: all
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
-    /// Where to write the scenario of the first broken property
+    /// Write the scenario of the first violated property to this file
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
     #[command(flatten)]
@@ -62,15 +62,15 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Kind {
-    /// A link, or all links of a sender, lose the frames of a slot
+    /// A link, or all links of a sender, loses the frames of a slot
     Loss,
-    /// A link is late with the frames of a slot
+    /// A link delays the frames of a slot
     Delay,
-    /// The last frame of a sender comes twice
+    /// The last frame of a sender is received twice
     Duplicate,
-    /// A member crashes, and starts again at any later slot
+    /// A member crashes and restarts in any later slot
     Crash,
-    /// A member stands still, and goes on at any later slot
+    /// A member is suspended and resumes in any later slot
     Stop,
 }
 
@@ -85,7 +85,7 @@ struct Found {
 struct Property {
     name: &'static str,
     holds: bool,
-    /// A run that breaks it, as a scenario file.
+    /// Run that violates the property, as a scenario file.
     scenario: Option<String>,
 }
 
@@ -142,7 +142,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     answer
 }
 
-/// The members that are named, or every name that is none of a station or of a remote I/O.
+/// The named members, or all names that belong to neither a station nor a remote I/O.
 fn start(arguments: &Arguments, cluster: &Cluster) -> Result<Start, Answer> {
     let plays = |member: &Member| !matches!(member, Member::Plant(_));
     let mut unknown = Vec::new();

@@ -1,4 +1,4 @@
-//! What `demo`, `lab` and `simulate` have in common: circumstances, results and the verdict.
+//! Circumstances, results and verdict of `demo`, `lab` and `simulate`.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -40,7 +40,7 @@ pub(crate) fn circumstances(
     }
 }
 
-/// The machine in words.
+/// Description of this machine.
 pub(crate) fn machine() -> Vec<String> {
     let read = |path| {
         std::fs::read_to_string(path)
@@ -56,7 +56,7 @@ pub(crate) fn machine() -> Vec<String> {
     )]
 }
 
-/// How this command was called, to be called again.
+/// Command line that repeats this command.
 pub(crate) fn command_line() -> String {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     shell_line(arguments.iter().map(String::as_str))
@@ -64,12 +64,12 @@ pub(crate) fn command_line() -> String {
 
 #[derive(Serialize)]
 struct Result<'a> {
-    /// Where the results lie.
+    /// Directory of the results.
     directory: Option<String>,
     summary: &'a Summary,
 }
 
-/// Table II, a verdict for each plant, and what was expected and did not come.
+/// Table II, the verdict on each plant, and the expectations that were not met.
 pub(crate) fn answer(summary: &Summary, directory: Option<&Path>) -> Answer {
     let status = match (summary.passed, &summary.inconclusive) {
         (true, _) => Status::Done,
@@ -85,7 +85,7 @@ pub(crate) fn answer(summary: &Summary, directory: Option<&Path>) -> Answer {
 
 fn text(summary: &Summary, directory: Option<&Path>) -> String {
     let mut text = format!("{}\n\n", summary.title);
-    // Where no cycle was run there is nothing to be told of any.
+    // Without cycles the tables are empty.
     if summary.cycles_run > 0 {
         push_cycles(&mut text, summary);
     }
@@ -142,7 +142,7 @@ fn text(summary: &Summary, directory: Option<&Path>) -> String {
     text
 }
 
-/// What the run came to, in one line.
+/// Verdict of the run in one line.
 pub(crate) fn verdict(summary: &Summary) -> String {
     match (&summary.inconclusive, summary.passed, summary.interrupted) {
         (_, true, _) => "passed: every expectation was met".to_owned(),
@@ -161,7 +161,7 @@ pub(crate) fn verdict(summary: &Summary) -> String {
     }
 }
 
-/// Table II, and a line for each plant and each remote I/O.
+/// Table II with a line for each plant and each remote I/O.
 fn push_cycles(text: &mut String, summary: &Summary) {
     let _ = writeln!(text, "{}", Table::new(summary));
     let names = summary.remote_ios.iter().map(|remote_io| &remote_io.name);
@@ -214,7 +214,7 @@ fn push_cycles(text: &mut String, summary: &Summary) {
     text.push('\n');
 }
 
-/// Whether real processes lacked time: cycles went without true outputs, and nothing wrong was driven.
+/// Whether processes were late: cycles had no provable outputs, and no applied output was wrong.
 fn may_have_been_late(summary: &Summary) -> bool {
     let counts = || summary.remote_ios.iter().map(|remote_io| &remote_io.counts);
     let lacking = counts().map(|counts| counts.held + counts.fail_safe + counts.missed);

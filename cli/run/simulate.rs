@@ -1,4 +1,4 @@
-//! `understudy simulate`: the same in virtual time, from a seed.
+//! `understudy simulate`: a cluster and a scenario in virtual time.
 
 use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -15,29 +15,29 @@ use crate::overrides::OverrideArguments;
 use crate::run::lab::scenario_or_undisturbed;
 use crate::run::outcome::{answer, circumstances, machine};
 
-/// Run a cluster and a scenario in virtual time, from a seed
+/// Run a cluster and a scenario in virtual time
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy simulate examples/press-cell/cluster.toml --scenario scenarios/lossy.toml --seed 7
 
-Equal files and seeds give equal runs. A run that fails prints the command that repeats it.")]
+Equal files and seeds give equal runs. A failed run prints the command that repeats it.")]
 pub(crate) struct Arguments {
-    /// The cluster file
+    /// Cluster file
     #[arg(value_name = "CLUSTER.toml")]
     cluster: PathBuf,
-    /// The scenario file; without one the cluster runs undisturbed
+    /// Scenario file; without it the cluster runs undisturbed
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
-    /// What all chance in the run comes from; by default the scenario's, or else taken from the clock, and printed
+    /// Seed of all random numbers; default: the scenario's, otherwise taken from the clock and printed
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Cycles in place of the scenario's; steps and expectations past them are left out
+    /// Number of cycles, overrides the scenario; later steps and expectations are ignored
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=understudy_scenarios::MAXIMUM_CYCLES))]
     cycles: Option<u64>,
     #[command(flatten)]
     overrides: OverrideArguments,
-    /// Where to keep the run; without it only the answer remains
+    /// Directory for the run; without it the run is not stored
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -114,7 +114,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     }
 }
 
-/// The command that repeats this run, whether or not it named its seed.
+/// Command line that repeats this run, including its seed.
 fn repeat(arguments: &Arguments, seed: u64) -> String {
     let line = crate::run::outcome::command_line();
     match arguments.seed {

@@ -1,4 +1,4 @@
-//! The period that this host can keep, before processes are started on it.
+//! Measures which period this host keeps.
 
 use std::time::Duration;
 
@@ -8,12 +8,12 @@ use understudy_cluster::Cluster;
 use crate::console::Console;
 use crate::run::lab::RunArguments;
 
-/// For so long a demonstration measures the host.
+/// Measuring time of `demo`.
 const LONG: Duration = Duration::from_secs(1);
-/// For so long a laboratory does.
+/// Measuring time of `lab` and `watch`.
 const SHORT: Duration = Duration::from_millis(300);
 
-/// The arguments of a demonstration with the period that this host can keep, where they say none.
+/// The arguments with the shortest period that this host keeps, unless a period was given.
 pub(crate) fn with_period(arguments: &RunArguments, console: &mut Console) -> RunArguments {
     if arguments.overrides.has_period() {
         return arguments.clone();
@@ -32,7 +32,7 @@ pub(crate) fn with_period(arguments: &RunArguments, console: &mut Console) -> Ru
     }
 }
 
-/// Says where this host cannot keep the period of a cluster.
+/// Warns if this host cannot keep the period of a cluster.
 pub(crate) fn warn(cluster: &Cluster, console: &mut Console) {
     let period = cluster.agreement().schedule.period();
     let measured = Wakefulness::measure(SHORT, true);

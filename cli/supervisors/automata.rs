@@ -1,4 +1,4 @@
-//! Automata as commands read, write and describe them.
+//! Reads, writes and describes automata for the commands.
 
 use std::path::{Path, PathBuf};
 
@@ -13,13 +13,13 @@ use crate::answer::{Answer, Status};
 use crate::files;
 use crate::kind::Kind;
 
-/// What was read, with the warnings about it.
+/// Automata with the findings of their files.
 pub(crate) struct Sources<T> {
     pub(crate) read: T,
     pub(crate) reports: Vec<Report>,
 }
 
-/// The one automaton of each file. All are read, so that everything that is wrong with any is shown at once.
+/// Reads files of one automaton each. All files are read, so that all errors are shown at once.
 pub(crate) fn one_each(paths: &[&PathBuf]) -> Result<Sources<Vec<Automaton>>, Answer> {
     gather(paths, |path| {
         let Sources { mut read, reports } = all_of(path)?;
@@ -37,7 +37,7 @@ pub(crate) fn one_each(paths: &[&PathBuf]) -> Result<Sources<Vec<Automaton>>, An
     })
 }
 
-/// All automata of all files, likewise.
+/// Reads all automata of all files.
 pub(crate) fn all(paths: &[&PathBuf]) -> Result<Sources<Vec<Automaton>>, Answer> {
     gather(paths, all_of)
 }
@@ -73,7 +73,7 @@ fn gather(
     Err(answer)
 }
 
-/// The automata of a file: .toml is a model, everything else is of TCT.
+/// Reads the automata of a file: a model (.toml), otherwise a TCT file.
 fn all_of(path: &Path) -> Result<Sources<Vec<Automaton>>, Answer> {
     if is_model(path) {
         let Sources { read, reports } = model(path)?;
@@ -115,7 +115,7 @@ pub(crate) fn is_model(path: &Path) -> bool {
         .is_some_and(|extension| extension == "toml")
 }
 
-/// A model, and the files that it names, which stand beside it.
+/// Reads a model and the files that it names, relative to its folder.
 pub(crate) fn model(path: &Path) -> Result<Sources<Model>, Answer> {
     let text = files::text_of(Kind::Model, path)?;
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
@@ -136,7 +136,7 @@ pub(crate) fn model(path: &Path) -> Result<Sources<Model>, Answer> {
     }
 }
 
-/// Writes an automaton in the form that the ending of the file's name says.
+/// Writes an automaton in the format of the file extension.
 pub(crate) fn write(path: &Path, automaton: &Automaton) -> Result<(), Answer> {
     let failed = |code: &str, message: String| Answer::failed(Status::Failed, code, message);
     let ending = path
@@ -168,7 +168,7 @@ pub(crate) fn write(path: &Path, automaton: &Automaton) -> Result<(), Answer> {
     files::write(path, &text)
 }
 
-/// For people.
+/// Text of the automaton.
 pub(crate) fn summary(automaton: &Automaton) -> String {
     if automaton.is_empty() {
         return format!("{}: EMPTY", automaton.name());
@@ -194,7 +194,7 @@ pub(crate) fn summary(automaton: &Automaton) -> String {
     text
 }
 
-/// For machines.
+/// JSON of the automaton.
 pub(crate) fn description(automaton: &Automaton) -> Value {
     let marked: Vec<u32> = automaton.marked().map(|state| state.number()).collect();
     let blocked = automaton.blocked_events();

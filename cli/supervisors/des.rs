@@ -1,4 +1,4 @@
-//! `understudy des`: the operations of TCT on automata in files.
+//! `understudy des`: the operations of TCT.
 
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ use crate::console::Console;
 use crate::supervisors::automata::{self, Sources, description, summary};
 use crate::supervisors::reduction::reduced;
 
-/// Work with automata: the operations of TCT, under its names and with its meanings
+/// Apply the operations of TCT to automata
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -26,88 +26,88 @@ Example:
   understudy des supcon PLANT.ADS SPEC.ADS --lift -o SUPER.ADS
   understudy des condat PLANT.ADS SUPER.ADS --json
 
-Files are TCT's .ADS or models of one automaton (.toml). A result is written as .ADS, .toml, .dot or .svg.
-supcon takes the meet with the specification: events that it does not know are forbidden unless it is lifted.
-supreduce ends after 30 s, or at Ctrl-C, with the smallest supervisor so far.")]
+Files are TCT automata (.ADS) or models of one automaton (.toml). Results are written as .ADS, .toml, .dot or .svg. supcon uses the meet
+with the specification: without --lift, events outside of its alphabet are forbidden. supreduce ends after 30 s, or at Ctrl-C, with the
+smallest supervisor found.")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     operation: Operation,
-    /// A file to write the resulting automaton to: .ADS, .toml, .dot or .svg
+    /// Output file for the resulting automaton: .ADS, .toml, .dot or .svg
     #[arg(long, short, value_name = "FILE", global = true)]
     output: Option<PathBuf>,
-    /// The most that a product may take in memory
+    /// Memory limit of a product
     #[arg(long, value_name = "MEGABYTES", default_value_t = 2000, global = true)]
     memory: usize,
 }
 
 #[derive(Debug, Subcommand)]
 enum Operation {
-    /// Everything that is wrong with files, and what is to be known about each automaton in them
+    /// Check files and describe the automata in them
     Check {
         #[arg(value_name = "FILE", required = true)]
         files: Vec<PathBuf>,
     },
-    /// The synchronous product: events that one does not know pass it by
+    /// Synchronous product: an automaton ignores events outside of its alphabet
     Sync {
         #[arg(value_name = "FILE", required = true)]
         files: Vec<PathBuf>,
     },
-    /// The product in which events that one does not know are forbidden
+    /// Product that forbids events outside of either alphabet
     Meet {
         #[arg(value_name = "FILE", required = true)]
         files: Vec<PathBuf>,
     },
-    /// What is reachable and from where a marked state can be reached
+    /// Reachable and coreachable part
     Trim { file: PathBuf },
-    /// The supremal controllable and nonblocking supervisor
+    /// Supremal controllable and nonblocking supervisor
     Supcon {
         plant: PathBuf,
         specification: PathBuf,
-        /// Let events of the plant that the specification does not know pass it by
+        /// Extend the specification to the alphabet of the plant by self-loops
         #[arg(long)]
         lift: bool,
     },
-    /// Which controllable events a supervisor disables in which of its states
+    /// Controllable events that a supervisor disables in each state
     Condat { plant: PathBuf, supervisor: PathBuf },
-    /// A smaller supervisor with the same effect on the plant
+    /// Reduced supervisor with the same effect on the plant
     Supreduce { plant: PathBuf, supervisor: PathBuf },
-    /// The fewest states with the same languages
+    /// Minimal automaton with the same languages
     Minstate { file: PathBuf },
-    /// Whether two automata are one but for the numbers of their states
+    /// Whether two automata are isomorphic
     Isomorph { left: PathBuf, right: PathBuf },
-    /// One state that allows all events of an automaton
+    /// Automaton of one state that allows all events
     Allevents { file: PathBuf },
-    /// Events that pass an automaton by
+    /// Self-loops for events in every state
     Selfloop {
         file: PathBuf,
-        /// Labels of the events
+        /// Event labels
         #[arg(long, value_name = "LABEL", value_delimiter = ',', required = true)]
         events: Vec<u32>,
     },
-    /// The synchronous product of two automata without pairs of states
+    /// Synchronous product without mutually exclusive pairs of states
     Mutex {
         left: PathBuf,
         right: PathBuf,
-        /// Pairs of states that must not be at once, such as 1:1,2:2
+        /// Mutually exclusive pairs of states, such as 1:1,2:2
         #[arg(long, value_name = "STATE:STATE", value_delimiter = ',', required = true, value_parser = pair)]
         exclude: Vec<(State, State)>,
     },
-    /// Whether automata can always come to their marked states together
+    /// Whether automata can always reach marked states together
     Nonconflict {
         #[arg(value_name = "FILE", required = true)]
         files: Vec<PathBuf>,
     },
-    /// What is seen when some events are not seen
+    /// Natural projection that hides events
     Project {
         file: PathBuf,
-        /// Labels of the events that are not seen
+        /// Labels of the hidden events
         #[arg(long, value_name = "LABEL", value_delimiter = ',', required = true)]
         hide: Vec<u32>,
     },
-    /// The automaton of a file, to be written in another form
+    /// Convert an automaton file to another format
     #[command(visible_alias = "create")]
     Convert { file: PathBuf },
-    /// The events that cause the avalanche effect in a ladder
+    /// Events that cause the avalanche effect in a ladder
     Avalanche { file: PathBuf },
 }
 
@@ -143,7 +143,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
     answer.with_reports(reports)
 }
 
-/// Adds the automaton to what the operation answered, and writes it where that is wanted.
+/// Adds the automaton to the answer, and writes it to the output file if one is given.
 fn made(arguments: &Arguments, automaton: &Automaton, mut answer: Answer) -> Answer {
     answer.text = format!("{}{}", answer.text, summary(automaton));
     let mut result = description(automaton);
@@ -199,7 +199,7 @@ impl Operation {
         }
     }
 
-    /// `parts` are the automata of [`Self::files`], in their order.
+    /// Applies the operation. `parts` are the automata of [`Self::files`], in their order.
     fn answer(
         &self,
         parts: &[&Automaton],
@@ -262,7 +262,7 @@ impl Operation {
     }
 }
 
-/// A pair with a state that its automaton does not have.
+/// First pair with an unknown state.
 fn no_such_state(parts: &[&Automaton], pairs: &[(State, State)]) -> Option<AutomatonError> {
     let sides = pairs
         .iter()
@@ -348,7 +348,7 @@ fn supervisor(
             })).collect::<Vec<_>>(),
         }),
     );
-    // EMPTY is a legal result of an operation.
+    // EMPTY is a valid result of an operation.
     Ok(Outcome::Automaton(result.supervisor, answer))
 }
 
@@ -389,7 +389,7 @@ fn control_data(
     ))
 }
 
-/// Adds where a supervisor forbids what it cannot.
+/// Adds the states in which a supervisor disables uncontrollable events.
 fn refusing(
     mut answer: Answer,
     plant: &Automaton,
@@ -407,7 +407,7 @@ fn refusing(
     answer
 }
 
-/// A supervisor of this plant with fewer states.
+/// Reduces a supervisor of this plant.
 fn reduce(
     plant: &Automaton,
     supervisor: &Automaton,

@@ -1,4 +1,4 @@
-//! `understudy petri`: automation Petri nets, and the ladders of nets with their supervisors.
+//! `understudy petri`: automation Petri nets and their ladder programs.
 
 use std::path::{Path, PathBuf};
 
@@ -21,7 +21,7 @@ use crate::kind::Kind;
 use crate::supervisors::automata::{self, Sources, description, summary};
 use crate::supervisors::supervisor_to_ladder::{listed, notes, withheld};
 
-/// Work with automation Petri nets: their bounds, automata and drawings, and proved ladders of nets with supervisors
+/// Analyse automation Petri nets and convert them to ladder
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -29,15 +29,15 @@ Example:
   understudy synth examples/assembly-cell/model.toml --reduce --name keeper -o keeper.toml
   understudy petri ladder examples/assembly-cell/net.toml --supervisor keeper.toml -o cell.ladder
 
-A model takes the places of a net as its plant: [[plant]] net = \"net.toml\". A ladder is written only when it is proved to do
-what the net does and the supervisors allow.")]
+A model uses a net as its plant by [[plant]] net = \"net.toml\". A ladder program is written only if it is proved to behave as the net under
+its supervisors.")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     operation: Operation,
-    /// A file to write the result to
+    /// Output file
     #[arg(long, short, value_name = "FILE", global = true)]
     output: Option<PathBuf>,
-    /// The most markings that are looked at
+    /// Maximum number of markings
     #[arg(
         long,
         value_name = "NUMBER",
@@ -49,34 +49,34 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Operation {
-    /// The most tokens that each place ever holds, or a run that shows that there is no most
+    /// Bound of each place, or a run that shows that a place is unbounded
     Bounds {
         #[arg(value_name = "NET.toml")]
         net: PathBuf,
     },
-    /// Its markings as an automaton, to .ADS, .toml, .dot or .svg
+    /// Reachability graph as an automaton: .ADS, .toml, .dot or .svg
     Automaton {
         #[arg(value_name = "NET.toml")]
         net: PathBuf,
     },
-    /// A smaller net that does the same, to .toml
+    /// Smaller equivalent net (.toml)
     Reduce {
         #[arg(value_name = "NET.toml")]
         net: PathBuf,
     },
-    /// Its ladder, with supervisors that follow it and inhibit it, proved
+    /// Proved ladder program of the net with its supervisors
     Ladder {
         #[arg(value_name = "NET.toml")]
         net: PathBuf,
-        /// Supervisors: of TCT (.ADS), or models with supervisors (.toml)
+        /// Supervisors: TCT automata (.ADS) or models with supervisors (.toml)
         #[arg(long = "supervisor", value_name = "FILE", num_args = 1..)]
         supervisors: Vec<PathBuf>,
     },
-    /// Its drawing
+    /// Drawing of the net
     Draw {
         #[arg(value_name = "NET.toml")]
         net: PathBuf,
-        /// In which form
+        /// Output format
         #[arg(long = "as", value_enum, default_value = "svg")]
         form: Form,
     },
@@ -84,9 +84,9 @@ enum Operation {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Form {
-    /// A picture
+    /// SVG picture
     Svg,
-    /// For Graphviz
+    /// Graphviz
     Dot,
 }
 
@@ -192,7 +192,7 @@ fn automaton(file: &NetFile, limit: usize, output: Option<&Path>) -> Result<Answ
     let mut result = description(&made);
     if let Some(path) = output {
         if automata::is_model(path) {
-            // A model calls it a plant, so that specifications can be put beside it.
+            // The automaton is a plant of a model, so that specifications can be added.
             let model = Model {
                 name: made.name().to_owned(),
                 alphabet: made.alphabet().clone(),
@@ -268,7 +268,7 @@ fn ladder(
     let made = to_ladder(&file.net, &named, limit);
     let mut made = match made {
         Ok(made) => made,
-        // The names of the ladder's signals have their places in the net.
+        // Names of ladder signals have positions in the net file.
         Err(HybridError::Invalid(found)) => {
             report.diagnostics.extend(found);
             return Answer::bad_files(vec![report]);
@@ -279,7 +279,7 @@ fn ladder(
         report.diagnostics.extend(found);
         return Answer::bad_files(vec![report]);
     }
-    // What cannot be looked at beforehand is proved all the same.
+    // Nets that cannot be explored in advance are still proved.
     let found = hybrid_findings(&file.net, &named, limit).map_err(|error| error.to_string());
     let answer = match prove_hybrid(&file.net, &named, &made, ProofSettings::default()) {
         Err(error) => failed(error.code(), error),

@@ -1,4 +1,4 @@
-//! `understudy reconfigure`: what a ladder can still do while input channels are failed, and the rungs that do it.
+//! `understudy reconfigure`: operation of a ladder program with failed input channels.
 
 use std::path::{Path, PathBuf};
 
@@ -15,26 +15,26 @@ use crate::answer::{Answer, Status};
 use crate::files;
 use crate::kind::Kind;
 
-/// Find out what a ladder can still do while input channels are failed, and write the second module that does it
+/// Generate the ladder module that operates with failed input channels
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy reconfigure examples/filling-line/reconfiguration.toml --channels Ready,Filling_done -o filling-line
 
-In DIR: report.md for a person, the automaton of the ladder, its feedback tables, the mega-controller (also as pictures), the
-integer programs with their solutions, module 2, the combined ladder, and all of it as result.json. Nothing is written unless the
-combined ladder is proved. The project file is described in docs/reconfiguration.md.")]
+DIR receives report.md, result.json, the automaton of the ladder, its feedback tables, the mega-controller with pictures, the integer
+programs with their solutions, module 2 and the combined ladder. Files are written only if the combined ladder is proved. Project file:
+docs/reconfiguration.md.")]
 pub(crate) struct Arguments {
-    /// The project
+    /// Project file
     #[arg(value_name = "PROJECT.toml")]
     project: PathBuf,
-    /// Inputs that may fail, in place of those of the project
+    /// Inputs that may fail, overrides the project
     #[arg(long, value_name = "INPUT", value_delimiter = ',')]
     channels: Vec<String>,
-    /// How many of them at once, in place of the project's number
+    /// Maximum number of simultaneously failed inputs, overrides the project
     #[arg(long, value_name = "COUNT")]
     simultaneous: Option<usize>,
-    /// A folder to write to; without it the report is printed
+    /// Output folder; default: print the report
     #[arg(long, short, value_name = "DIR")]
     output: Option<PathBuf>,
 }
@@ -92,7 +92,7 @@ fn read(path: &Path) -> Result<(Project, Vec<Report>), Answer> {
     }
 }
 
-/// Reads a project and the ladders that it names, which stand beside it.
+/// Reads a project and the ladder programs that it names, relative to its folder.
 pub(crate) fn read_project(path: &Path, text: &str) -> Loaded {
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
     let mut loaded = project::read(&path.display().to_string(), text, &mut |name| {
@@ -104,7 +104,7 @@ pub(crate) fn read_project(path: &Path, text: &str) -> Loaded {
     loaded
 }
 
-/// What the command line says instead of the project.
+/// Applies the overrides of the command line.
 fn narrow(arguments: &Arguments, project: &mut Project) -> Result<(), Answer> {
     if !arguments.channels.is_empty() {
         project
@@ -129,7 +129,7 @@ fn failed(failure: &Failure) -> Answer {
     Answer::failed(status, failure.code(), message)
 }
 
-/// Every file with its text, before any is written.
+/// Renders all files before the first is written.
 fn written(
     outcome: &Outcome,
     report: String,
@@ -153,7 +153,7 @@ fn written(
     if let Some(diagnosis) = &outcome.diagnosis {
         files.push(("diagnosis.ladder", print(diagnosis)));
     }
-    // What is too large to be read as a picture is left as DOT.
+    // Large graphs are written as DOT only.
     if let Ok(picture) = draw_automaton_svg(&controller) {
         files.push(("automaton.svg", picture));
     }

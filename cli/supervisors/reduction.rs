@@ -1,4 +1,4 @@
-//! The reduction of a supervisor: what is said while it takes time, and when it ends before every pair of states was tried.
+//! Reduces a supervisor with progress messages and a time limit.
 
 use std::time::{Duration, Instant};
 
@@ -9,23 +9,23 @@ use understudy_supervisor::{Automaton, Bounds};
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 
-/// After this time the smallest supervisor so far is the answer.
+/// Time limit: the smallest supervisor so far is the result.
 const LIMIT: Duration = Duration::from_secs(30);
 
-/// From one line about the progress to the next.
+/// Interval of the progress messages.
 const BETWEEN: Duration = Duration::from_secs(3);
 
-/// A reduced supervisor; with a warning where the reduction was stopped by the limit, or by SIGINT or SIGTERM.
+/// Reduced supervisor, with a warning if the time limit, SIGINT or SIGTERM stopped the reduction.
 ///
 /// # Errors
-/// The answer where the product of the two passes the bounds.
+/// If the product of the two exceeds the bounds.
 pub(crate) fn reduced(
     plant: &Automaton,
     supervisor: &Automaton,
     bounds: Bounds,
     console: &mut Console,
 ) -> Result<(Automaton, Option<String>), Answer> {
-    // Without it an interruption ends the command, as it ends any other.
+    // Without the flag an interruption ends the command.
     let interruption = Interruption::expected().ok();
     let begin = Instant::now();
     let mut told = begin;

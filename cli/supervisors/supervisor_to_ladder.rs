@@ -1,4 +1,4 @@
-//! `understudy supervisor-to-ladder`: a supervisor as a ladder that is proved to keep it.
+//! `understudy supervisor-to-ladder`: a proved ladder program of a supervisor.
 
 use std::path::{Path, PathBuf};
 
@@ -18,45 +18,45 @@ use crate::answer::{Answer, Status};
 use crate::files;
 use crate::supervisors::automata::{self, Sources};
 
-/// Turn a supervisor into a ladder, and prove that the ladder does what the supervisor allows and nothing else
+/// Convert a supervisor to a proved ladder program
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy supervisor-to-ladder examples/motivating-example/supervisor.ADS \\
       --io examples/motivating-example/map.toml --mode manual -o motivating.ladder
 
-The supervisor is a file of TCT (.ADS) or a model (.toml) with supervisors. A reduced supervisor does not know the state of
-its plant; give it its plants with --plant. Findings about the supervisor are warnings, except those that no ladder can fix:
-these are errors. The ladder is written only when it is proved and no finding is an error.")]
+The supervisor is a TCT automaton (.ADS) or a model (.toml) with supervisors. A reduced supervisor does not track the state of its plant;
+supply the plants by --plant. Findings about the supervisor are warnings, unless no ladder program can implement it. The ladder is written
+only if it is proved to do what the supervisor allows and nothing else, and no finding is an error.")]
 pub(crate) struct Arguments {
-    /// The supervisor
+    /// Supervisor: a TCT automaton (.ADS) or a model (.toml)
     #[arg(value_name = "SUPERVISOR")]
     supervisor: PathBuf,
-    /// By which signals events are seen and made, before what the model says about that; an event without any has a signal of
-    /// its own that is 1 for one scan
+    /// Signal map from events to signals, overrides the model; an event without an entry gets a signal of its own that is 1 for
+    /// one scan
     #[arg(long, value_name = "MAP.toml")]
     io: Option<PathBuf>,
-    /// Who chooses among commands
+    /// Selection among enabled commands
     #[arg(long, value_enum, default_value = "automatic")]
     mode: ModeWord,
-    /// Plants that the ladder follows beside the supervisor
+    /// Plants that the ladder tracks in addition to the supervisor
     #[arg(long = "plant", value_name = "FILE", num_args = 1..)]
     plants: Vec<PathBuf>,
-    /// A file to write to, in place of standard output
+    /// Output file; default: standard output
     #[arg(long, short, value_name = "FILE.ladder")]
     output: Option<PathBuf>,
-    /// Print the rows of the function Omega in place of the ladder
+    /// Print the rows of the function Omega instead of the ladder
     #[arg(long)]
     table: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum ModeWord {
-    /// The PLC
+    /// By the PLC
     Automatic,
-    /// The operator, where there is a choice
+    /// By the operator, if several are enabled
     Manual,
-    /// The operator, always
+    /// By the operator, always
     Requested,
 }
 
@@ -122,7 +122,7 @@ fn convert_and_prove(arguments: &Arguments) -> Result<Answer, Answer> {
     Ok(answer(arguments, &modules, &conversion, &found, verdict))
 }
 
-/// A file that was read: a model, or an automaton of TCT in each of its roles.
+/// An input file: a model, or a TCT automaton in each of its roles.
 struct Source {
     model: Model,
     report: Report,
@@ -156,7 +156,7 @@ fn some(path: &Path, automata: Vec<Automaton>, what: &str) -> Result<Vec<Automat
     Ok(automata)
 }
 
-/// The map, from its file and from the signals that the models name, and the file to which its places belong.
+/// Signal map of the map file and the models, with the file of its positions.
 fn read_signals(
     arguments: &Arguments,
     supervisors: &[Automaton],
@@ -186,7 +186,7 @@ fn read_signals(
     let Some(map) = read.map else {
         return Err(Answer::bad_files(vec![report]));
     };
-    // Places in the model would be looked for in the map.
+    // Positions in the model do not belong to the map file.
     let signals: Vec<Signal> = signals.into_iter().map(Signal::without_place).collect();
     let located: Vec<Located> = addresses.into_iter().map(Located::without_place).collect();
     let map = map.with_signals(&signals, &alphabet);
@@ -208,7 +208,7 @@ fn severity(finding: &Finding) -> &'static str {
     }
 }
 
-/// Findings for people, a line each.
+/// Findings as text, one line each.
 pub(crate) fn notes(found: &[Finding]) -> String {
     let lines = found.iter().map(|finding| {
         let (code, message) = (finding.code(), &finding.message);
@@ -217,7 +217,7 @@ pub(crate) fn notes(found: &[Finding]) -> String {
     lines.collect()
 }
 
-/// Findings for machines.
+/// Findings as JSON.
 pub(crate) fn listed(found: &[Finding]) -> Value {
     let numbers = |labels: &[Label]| {
         labels
@@ -238,7 +238,7 @@ pub(crate) fn listed(found: &[Finding]) -> Value {
     listed.collect()
 }
 
-/// The answer where findings are errors: each is a failure, and no ladder is printed or written.
+/// Answer with findings that are errors: each is a failure, and the ladder is withheld.
 pub(crate) fn withheld(found: &[Finding], result: &Value) -> Option<Answer> {
     let (errors, warnings): (Vec<&Finding>, Vec<&Finding>) = found
         .iter()

@@ -1,4 +1,4 @@
-//! `understudy synth`: a supervisor for a model.
+//! `understudy synth`: supervisor synthesis.
 
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ use crate::files;
 use crate::supervisors::automata::{self, Sources, description, summary};
 use crate::supervisors::reduction;
 
-/// Synthesise the least restrictive nonblocking supervisor of a model
+/// Synthesise the least restrictive supervisor of a model
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -29,42 +29,42 @@ Example:
   understudy supervisor-to-ladder supervisors.toml --io examples/boiler/complete-map.toml \\
       --plant examples/boiler/complete.toml -o complete.ladder
 
-Specifications restrain only the events that they know. What is wrong with a model is said with the shortest sequence of
-events that shows it. The symbolic engine counts and decides without listing states; the modular one makes a supervisor for
-each specification and says whether they conflict. `specified` takes the specifications themselves, where they are supervisors.")]
+The supervisor is nonblocking. Specifications restrict only the events of their alphabets. Errors of a model are reported with the shortest
+sequence of events that shows them. The symbolic engine counts and decides without listing states. The modular engine synthesises one
+supervisor for each specification and reports conflicts. The engine `specified` takes the specifications themselves as supervisors.")]
 pub(crate) struct Arguments {
-    /// The model: plants and specifications
+    /// Model of plants and specifications
     #[arg(value_name = "MODEL.toml")]
     model: PathBuf,
-    /// How
+    /// Method of synthesis
     #[arg(long, value_enum, default_value = "explicit")]
     engine: Engine,
-    /// Reduce each supervisor: fewer states, the same effect on the plant
+    /// Reduce each supervisor: fewer states with the same effect on the plant
     #[arg(long)]
     reduce: bool,
-    /// Merge the states of each supervisor after which the same can happen
+    /// Minimise each supervisor: merge equivalent states
     #[arg(long, conflicts_with = "reduce")]
     minstate: bool,
-    /// The supervisor's name, in place of SUPER; of several the beginning of their names
+    /// Name of the supervisor, or prefix of the names of several; default: SUPER
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
-    /// A file to write to: .toml is the model with its supervisors; .ADS, .dot and .svg take a single supervisor
+    /// Output file: .toml for the model with its supervisors; .ADS, .dot or .svg for a single supervisor
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// The most that a product may take in memory
+    /// Memory limit of a product
     #[arg(long, value_name = "MEGABYTES", default_value_t = 2000)]
     memory: usize,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Engine {
-    /// State by state
+    /// Enumerate states
     Explicit,
-    /// Sets of states as decision diagrams
+    /// Represent sets of states by decision diagrams
     Symbolic,
-    /// A supervisor for each specification
+    /// Synthesise one supervisor for each specification
     Modular,
-    /// The specifications as they are, where nothing has to be forbidden beyond them
+    /// Use the specifications themselves, if they are supervisors
     Specified,
 }
 
@@ -235,7 +235,7 @@ fn symbolic(
         .transition_count()
         .map_err(|error| failed(error.code(), error.to_string()))?;
     let count = |count: Option<u128>| count.map_or("more than 2^128".to_owned(), |n| n.to_string());
-    // JSON has no numbers of that size; a machine gets a text where a double would round.
+    // Counts that a double would round are strings in JSON.
     let number = |value: Option<u128>| match value.map(u64::try_from) {
         Some(Ok(small)) if small < 1 << 53 => json!(small),
         _ => json!(count(value)),
@@ -275,7 +275,7 @@ fn symbolic(
     written(arguments, model.clone(), vec![supervisor], answer)
 }
 
-/// The supervisor under the name that was asked for.
+/// Renames the supervisor as requested.
 fn named(arguments: &Arguments, supervisor: Automaton) -> Automaton {
     match &arguments.name {
         Some(name) => supervisor.with_name(name.clone()),
@@ -283,7 +283,7 @@ fn named(arguments: &Arguments, supervisor: Automaton) -> Automaton {
     }
 }
 
-/// The supervisor with fewer states where that was asked for, and a warning or nothing.
+/// Reduces the supervisor as requested, with a possible warning.
 fn reduced(
     arguments: &Arguments,
     plants: &[&Automaton],
@@ -302,7 +302,7 @@ fn reduced(
     Ok((supervisor, warning.unwrap_or_default()))
 }
 
-/// Errors are failures of the answer; warnings stand before its text.
+/// Adds errors as failures and warnings in front of the text.
 fn with_findings(mut answer: Answer, findings: &[Finding], status: Status) -> Answer {
     let mut warnings = String::new();
     for finding in findings {

@@ -1,4 +1,4 @@
-//! `understudy explain`: what a code means, with an example and the way out.
+//! `understudy explain`: descriptions of error and warning codes.
 
 use std::fmt::Write as _;
 
@@ -8,14 +8,14 @@ use understudy_diagnostic::pages::{page, pages};
 
 use crate::answer::{Answer, Status};
 
-/// Say what the code of an error or a warning means, with an example and the way out
+/// Describe an error or warning code, with an example and the fix
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy explain U0104
   understudy explain                 all codes with their titles")]
 pub(crate) struct Arguments {
-    /// The code, such as U0104; without one all are listed
+    /// Code, such as U0104; default: list all codes
     #[arg(value_name = "CODE")]
     code: Option<String>,
 }

@@ -1,4 +1,4 @@
-//! `understudy proxy`: a link that misbehaves, between any two programs.
+//! `understudy proxy`: an impaired link between two programs.
 
 use std::net::SocketAddr;
 
@@ -10,70 +10,70 @@ use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::overrides::parse_address;
 
-/// Pass datagrams or streams on, and lose, delay, double, reorder, change or slow down what passes
+/// Forward datagrams or streams with loss, delay and corruption
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy proxy --listen 127.0.0.1:7500 --to 192.168.1.11:7450 --loss 1% --delay 1ms --jitter 500us
 
-It runs until SIGINT or SIGTERM, and says then what passed. Answers find back to whom they are for. Over TCP a loss delays by
-200 ms, as the system's own repetition does; `--duplicate` and `--reorder` mean nothing there.")]
+The proxy runs until SIGINT or SIGTERM and then prints its counters. Replies are returned to their clients. Over TCP a loss delays the stream
+by 200 ms, like a retransmission; --duplicate and --reorder have no effect.")]
 pub(crate) struct Arguments {
-    /// Where it listens; port 0 for any that is free
+    /// Listening address; port 0 selects a free port
     #[arg(long, value_name = "ADDRESS", value_parser = parse_address)]
     listen: SocketAddr,
-    /// Where it passes on to
+    /// Destination address
     #[arg(long, value_name = "ADDRESS", value_parser = parse_address)]
     to: SocketAddr,
-    /// What it carries
+    /// Transport protocol
     #[arg(long, value_enum, default_value_t = TransportArgument::Udp)]
     transport: TransportArgument,
     #[command(flatten)]
     impairment: ImpairmentArguments,
-    /// Spare the way back
+    /// Impair only the forward direction
     #[arg(long)]
     one_way: bool,
-    /// What the fates of datagrams come from
+    /// Seed of the random network faults
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum TransportArgument {
-    /// Datagrams
+    /// UDP datagrams
     Udp,
-    /// Streams
+    /// TCP streams
     Tcp,
 }
 
-/// What a link does to what passes, in each direction.
+/// Impairments of a link, in each direction.
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct ImpairmentArguments {
-    /// Share that is lost, such as 1%
+    /// Loss, such as 1%
     #[arg(long, value_name = "SHARE")]
     loss: Option<Share>,
-    /// Everything arrives so much later, such as 1ms
+    /// Delay, such as 1ms
     #[arg(long, value_name = "TIME", value_parser = Impairment::parse_delay)]
     delay: Option<std::time::Duration>,
-    /// By up to so much earlier or later than the delay
+    /// Jitter: maximum deviation from the delay
     #[arg(long, value_name = "TIME", value_parser = Impairment::parse_delay)]
     jitter: Option<std::time::Duration>,
-    /// Share that arrives twice
+    /// Share of duplicated datagrams
     #[arg(long, value_name = "SHARE")]
     duplicate: Option<Share>,
-    /// Share that is overtaken by what comes behind it
+    /// Share of reordered datagrams
     #[arg(long, value_name = "SHARE")]
     reorder: Option<Share>,
-    /// Share that arrives with one bit turned over
+    /// Share of datagrams with one inverted bit
     #[arg(long, value_name = "SHARE")]
     corrupt: Option<Share>,
-    /// What the link carries at most, such as 10mbit
+    /// Bandwidth, such as 10mbit
     #[arg(long, value_name = "RATE")]
     rate: Option<Rate>,
 }
 
 impl ImpairmentArguments {
-    /// The same, losing a share where it loses nothing.
+    /// The same arguments with a loss of `share`, unless a loss was given.
     pub(crate) fn losing(&self, share: Share) -> Self {
         Self {
             loss: Some(self.loss.unwrap_or(share)),

@@ -1,4 +1,4 @@
-//! `understudy schema`: the shapes of what this program reads and writes, for editors and other programs.
+//! `understudy schema`: JSON schemas of files and answers.
 
 use clap::{Args, ValueEnum};
 use schemars::schema_for;
@@ -7,32 +7,32 @@ use understudy_supervisor::{map_schema, model_schema, net_schema};
 
 use crate::answer::{Answer, Envelope};
 
-/// Print a JSON schema
+/// Print the JSON schema of a file or an answer
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy schema cluster > cluster.schema.json")]
 pub(crate) struct Arguments {
-    /// Of what
+    /// File or answer
     #[arg(value_enum)]
     of: Shape,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Shape {
-    /// The answer of every command under --json
+    /// Answer of every command with --json
     Answer,
-    /// A cluster file
+    /// Cluster file
     Cluster,
-    /// A model of plants and specifications
+    /// Model of plants and specifications
     Model,
-    /// An automation Petri net
+    /// Automation Petri net
     Net,
-    /// A scenario file
+    /// Scenario file
     Scenario,
-    /// A map of signals, for supervisor-to-ladder --io
+    /// Signal map of supervisor-to-ladder --io
     SignalMap,
-    /// The summary.json of a run
+    /// summary.json of a run
     Summary,
 }
 

@@ -1,4 +1,4 @@
-//! The programs that a command is given: ladders, and clusters of them.
+//! Reads ladder programs and clusters from the command line.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -14,28 +14,28 @@ use crate::answer::{Answer, Status};
 use crate::files;
 use crate::kind::Kind;
 
-/// A period that is longer than nothing.
+/// A positive period.
 pub(crate) fn period(text: &str) -> Result<Duration, String> {
     let time = parse_time(text).filter(|time| !time.is_zero());
     time.ok_or_else(|| format!("{text:?} is no time such as 10ms"))
 }
 
-/// All that was read.
+/// Programs of the command line.
 pub(crate) struct Programs {
-    /// The ladders together, if there are any, and each cluster.
+    /// One group for all ladder programs, one for each cluster.
     pub(crate) groups: Vec<Group>,
-    /// The files, with what was found in them.
+    /// Files with their findings.
     pub(crate) reports: Vec<Report>,
 }
 
-/// Programs of one understudy.
+/// Programs with a common understudy.
 pub(crate) struct Group {
     pub(crate) cluster: Option<Box<Cluster>>,
     pub(crate) members: Vec<Member>,
-    /// The generated controller; nothing where a single ladder stands alone.
+    /// Generated parity controller; none for a single ladder program.
     pub(crate) parity: Option<ParityController>,
     pub(crate) period: Duration,
-    /// In front of its names, where there are several groups.
+    /// Prefix of its names, if there are several groups.
     prefix: String,
 }
 
@@ -47,14 +47,14 @@ pub(crate) struct Member {
 }
 
 impl Group {
-    /// A name that no other group has.
+    /// Name, unique among all groups.
     pub(crate) fn name(&self, name: &str) -> String {
         format!("{}{name}", self.prefix)
     }
 }
 
 impl Programs {
-    /// Reads all of them; what is wrong with any is said in one run.
+    /// Reads all files and reports all errors.
     pub(crate) fn read(paths: &[PathBuf], period: Duration) -> Result<Self, Answer> {
         let mut reports = Vec::new();
         let mut wrong = Answer::done("", serde_json::Value::Null);
@@ -103,7 +103,7 @@ impl Programs {
         Ok(Self { groups, reports })
     }
 
-    /// What a person calls all of them.
+    /// Title of all programs.
     pub(crate) fn title(&self) -> String {
         let names = self.groups.iter().map(|group| match &group.cluster {
             Some(cluster) => cluster.name().to_owned(),

@@ -1,4 +1,4 @@
-//! What is proved of programs before anything is recommended for them.
+//! Proofs about programs before their allocation.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -18,10 +18,10 @@ use crate::answer::{Answer, Status};
 use crate::files;
 use crate::programs::verify::patience::Patience;
 
-/// Properties by the name of their program, with the file that they came from.
+/// Properties by program, with their file.
 pub(super) type Asked = BTreeMap<String, Vec<(Report, Properties)>>;
 
-/// Reads the files of properties.
+/// Reads property files.
 pub(super) fn asked(files: &[(String, PathBuf)], programs: &Programs) -> Result<Asked, Answer> {
     let names: Vec<String> = programs
         .groups
@@ -52,7 +52,7 @@ pub(super) fn asked(files: &[(String, PathBuf)], programs: &Programs) -> Result<
     Ok(asked)
 }
 
-/// The programs of a group, each with what was proved about it.
+/// Programs of a group with the results of their proofs.
 pub(super) fn members(
     group: &Group,
     asked: &Asked,
@@ -156,11 +156,11 @@ fn verification(
     })
 }
 
-/// What was not decided, together where it is for one reason.
+/// Undecided properties, grouped by reason.
 #[derive(Default)]
 struct Undecided(Vec<(String, Vec<String>)>);
 
-/// Names of one reason that are told.
+/// Maximum number of names per reason.
 const TOLD: usize = 3;
 
 impl Undecided {
@@ -184,7 +184,7 @@ impl Undecided {
     }
 }
 
-/// The group with its understudy, which is proved to be the sum of its members.
+/// The group with its understudy, proved to be the sum of its members.
 pub(super) fn group(
     group: &Group,
     members: Vec<Member>,

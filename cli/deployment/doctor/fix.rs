@@ -1,4 +1,4 @@
-//! `understudy doctor --fix`: the commands that repair a machine are shown, then run where that is allowed, and the machine is examined again.
+//! `understudy doctor --fix`: shows and runs the commands that repair a machine, then checks it again.
 
 use std::fmt::Write as _;
 use std::io::{self, IsTerminal, Write as _};
@@ -9,18 +9,18 @@ use understudy_bus::doctor::{Finding, Health, Repair, may_repair};
 
 use crate::console::Console;
 
-/// What became of the repairs.
+/// Results of the repairs.
 #[derive(Debug, Serialize)]
 pub(super) struct Fixed {
     repairs: Vec<Done>,
-    /// Findings that are to be improved, and that no command repairs.
+    /// Findings without a repair command.
     not_repairable: Vec<String>,
-    /// The machine after the commands; nothing where none was run.
+    /// Findings after the commands; none if no command was run.
     #[serde(skip)]
     again: Option<Vec<Finding>>,
 }
 
-/// One command.
+/// A repair command.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 struct Done {
     command: String,
@@ -28,31 +28,31 @@ struct Done {
     outcome: Outcome,
 }
 
-/// What became of it.
+/// Result of the command.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(tag = "outcome", rename_all = "kebab-case")]
 enum Outcome {
-    /// It was run, and succeeded.
+    /// The command succeeded.
     Ran,
-    /// It was run, and failed.
+    /// The command failed.
     Failed {
-        /// Its last line, or its exit status.
+        /// Last line of its output, or its exit status.
         reason: String,
     },
-    /// It was shown only.
+    /// The command was not run.
     Shown {
-        /// Why it was not run.
+        /// Reason.
         reason: &'static str,
     },
 }
 
-/// Whether a command is run.
+/// Permission to run a command.
 enum Consent {
     Given,
     Refused(&'static str),
 }
 
-/// As this process, or the user, gives the command.
+/// Command line for this process, or for the user with sudo.
 pub(super) fn shown(repair: &Repair) -> String {
     if may_repair() {
         repair.command.clone()
@@ -61,7 +61,7 @@ pub(super) fn shown(repair: &Repair) -> String {
     }
 }
 
-/// Shows every command, runs those that may be run, and then looks again.
+/// Shows all commands, runs the permitted ones and checks again.
 pub(super) fn fix(
     findings: &[Finding],
     look_again: &dyn Fn() -> Vec<Finding>,
@@ -103,7 +103,7 @@ pub(super) fn fix(
     }
 }
 
-/// Each command once, in the order of the findings.
+/// Distinct commands, in the order of the findings.
 fn to_do(findings: &[Finding]) -> Vec<&Repair> {
     let mut repairs: Vec<&Repair> = Vec::new();
     for repair in findings
@@ -129,7 +129,7 @@ fn not_repairable(findings: &[Finding]) -> Vec<String> {
 
 fn asked(repair: &Repair) -> Consent {
     let mut errors = io::stderr();
-    // Who cannot be asked has not agreed.
+    // A prompt that cannot be written counts as refused.
     let _ = write!(
         errors,
         "{}\n  ({})\nRun it? [y/N] ",
@@ -164,7 +164,7 @@ fn run(command: &str) -> Outcome {
 }
 
 impl Fixed {
-    /// The findings as they are now: those of the machine are replaced where it was examined again.
+    /// Current findings: those of the machine are replaced if it was checked again.
     pub(super) fn applied_to(&self, findings: Vec<Finding>) -> Vec<Finding> {
         let Some(again) = &self.again else {
             return findings;
@@ -174,7 +174,7 @@ impl Fixed {
         again.iter().cloned().chain(others).collect()
     }
 
-    /// What was done, what is better, and what remains; `before` are the findings before that.
+    /// Text on repairs, improvements and remaining findings; `before` are the findings before the repairs.
     pub(super) fn text(&self, before: &[Finding]) -> String {
         let mut text = String::new();
         if self.repairs.is_empty() && self.not_repairable.is_empty() {
@@ -199,7 +199,7 @@ impl Fixed {
         text
     }
 
-    /// Whether what was found is better now; nothing where nobody looked again.
+    /// Whether the finding is repaired; none without a second check.
     fn now(&self, before: &Finding) -> Option<&'static str> {
         let again = self.again.as_ref()?;
         let still = again

@@ -1,4 +1,4 @@
-//! What is useful after files were found to be right.
+//! Next steps after a successful check.
 
 use std::ffi::OsStr;
 use std::path::Path;

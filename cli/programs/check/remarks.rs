@@ -1,5 +1,5 @@
-//! What nobody asked about a ladder or a cluster, within a budget of time: what is suspicious about its rungs, and whether its understudy is the sum of its
-//! members. What takes next to nothing is done whatever the budget.
+//! Optional checks within a time limit: suspicious rungs, and whether the understudy is the sum of its
+//! members. Fast checks ignore the limit.
 
 use std::time::{Duration, Instant};
 
@@ -10,13 +10,13 @@ use understudy_logic::Circuit;
 use understudy_verification::program::{Bounds, Subject};
 use understudy_verification::{Refutation, Work, prove_parity_while};
 
-/// States, with inputs, that are listed at most; more take longer than a check should.
+/// Maximum number of listed states with inputs.
 const STATES: usize = 1 << 22;
 
-/// Nodes for the proof of the understudy.
+/// Maximum number of nodes for the proof of the understudy.
 const NODES: usize = 100_000;
 
-/// The budget of a check.
+/// Time limit of a check.
 pub(super) struct Looking {
     end: Instant,
 }
@@ -28,7 +28,7 @@ impl Looking {
         }
     }
 
-    /// Adds what is suspicious about the rungs of the program; true where the time was over before all was looked at.
+    /// Reports suspicious rungs of the program; true if the time limit ended the search.
     pub(super) fn at_rungs(
         &self,
         program: &Program,
@@ -41,7 +41,7 @@ impl Looking {
             go_on: &go_on,
             ..Bounds::default()
         };
-        // A program that does not become a circuit with this period is no matter of a check without one.
+        // A check without a period ignores programs that cannot be lowered with the default one.
         let remarks = Subject::new(program, period)
             .and_then(|subject| subject.remarks(program, period, bounds));
         let Ok(remarks) = remarks else {
@@ -53,7 +53,7 @@ impl Looking {
         remarks.undecided > 0
     }
 
-    /// Adds it where the understudy is not the sum of its members; true where that was not decided.
+    /// Reports an understudy that is not the sum of its members; true if undecided.
     pub(super) fn at_understudy(&self, cluster: &Cluster, report: &mut Report) -> bool {
         let controllers = cluster.controllers().iter();
         let members: Vec<Circuit> = controllers

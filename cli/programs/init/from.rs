@@ -1,6 +1,6 @@
-//! A cluster made from programs that exist.
+//! A cluster from existing programs.
 //!
-//! Invariant: nothing is written before every program was read and the drafted cluster was checked.
+//! Invariant: files are written only after every program was read and the drafted cluster was checked.
 
 use std::collections::HashMap;
 use std::fs;
@@ -41,7 +41,7 @@ pub(super) fn run(folder: &Path, arguments: &[PathBuf]) -> Answer {
         name,
         bytes: text.into_bytes(),
     });
-    // A program that is in the folder under its own name already is used where it is.
+    // A program that is already in the folder is used in place.
     let copies = found.copies.into_iter().filter(|copy| {
         let place = fs::canonicalize(folder.join(&copy.file.name));
         !place.is_ok_and(|place| fs::canonicalize(&copy.source).is_ok_and(|source| source == place))
@@ -56,14 +56,14 @@ pub(super) fn run(folder: &Path, arguments: &[PathBuf]) -> Answer {
     }
 }
 
-/// A file as the command line names it.
+/// A file named on the command line.
 struct Source<'a> {
     name: Option<&'a str>,
     path: PathBuf,
 }
 
 impl<'a> Source<'a> {
-    /// `NAME=FILE`, or a file; a file whose own name has such a sign is one.
+    /// `NAME=FILE` or a file. An existing file whose name contains `=` is a file.
     fn new(argument: &'a Path) -> Self {
         let split = argument.to_str().and_then(|text| text.split_once('='));
         match split {
@@ -78,7 +78,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// The name of the controller for one of the programs of the file.
+    /// Controller name for one program of the file.
     fn controller(&self, program: &str, is_only: bool) -> String {
         match self.name {
             None => program.to_owned(),
@@ -88,7 +88,7 @@ impl<'a> Source<'a> {
     }
 }
 
-/// A program that goes into the folder.
+/// A program to write to the folder.
 struct Copied {
     source: PathBuf,
     file: NewFile,
@@ -98,7 +98,7 @@ struct Copied {
 struct Found {
     programs: Vec<DraftProgram>,
     copies: Vec<Copied>,
-    /// Of each program, its file as it was given.
+    /// Given file of each program.
     sources: Vec<PathBuf>,
     periods: Vec<Duration>,
     reports: Vec<Report>,
@@ -145,7 +145,7 @@ impl Found {
         self.reports.push(report);
     }
 
-    /// A program of a file: the file as it is where it is the only one, or else a ladder of its own.
+    /// A program of a file: a copy of the file if it is the only program, otherwise a ladder file.
     fn add(
         &mut self,
         source: &Source<'_>,
@@ -159,7 +159,7 @@ impl Found {
             return;
         };
         let unit = program.name.to_string();
-        // Digraphs have no name.
+        // Digraphs are unnamed.
         let own = match format {
             Format::Digraph => source
                 .path
@@ -208,7 +208,7 @@ impl Found {
         });
     }
 
-    /// Names and number of the programs.
+    /// Number and names of the programs.
     fn check(&mut self) {
         let mut failures = Vec::new();
         let mut taken: HashMap<String, &Path> = HashMap::new();
@@ -262,7 +262,7 @@ impl Found {
         )
     }
 
-    /// Reads the drafted cluster as it will be on the disk: what cannot run there is a failure here.
+    /// Reads the drafted cluster as it will be on disk and reports all errors.
     fn check_draft(&mut self, texts: &[(String, String)]) {
         let (file, text) = &texts[0];
         let copies = &self.copies;
@@ -301,7 +301,7 @@ impl Found {
     }
 }
 
-/// The ending of a copy, by which it is read as the file was.
+/// File extension of a copy, with the format of the original.
 fn ending(path: &Path, format: Format) -> String {
     let name = path.to_string_lossy();
     match (Format::of_ending(&name), path.extension()) {
@@ -310,7 +310,7 @@ fn ending(path: &Path, format: Format) -> String {
     }
 }
 
-/// The name of the cluster: that of its folder, as far as it is legal.
+/// Cluster name: the legal characters of the folder name.
 fn cluster_name(folder: &Path) -> String {
     let absolute = std::path::absolute(folder).unwrap_or_default();
     let name = absolute.file_name().unwrap_or_default().to_string_lossy();

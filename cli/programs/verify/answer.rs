@@ -1,4 +1,4 @@
-//! What was proved, for people and for machines.
+//! Results of `verify` as text and JSON.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -15,81 +15,81 @@ use understudy_verification::{Shown, scan_table};
 
 use crate::answer::{Answer, Status};
 
-/// What `verify` answers.
+/// Result of `verify`.
 #[derive(Debug, Serialize, JsonSchema)]
 pub(crate) struct Verification {
-    /// One for each ladder.
+    /// One entry for each ladder program.
     programs: Vec<ProgramAnswer>,
-    /// Of a cluster: what the proof of the understudy says.
+    /// Result of the proof of a cluster's understudy.
     understudy: Option<String>,
     /// Whether everything was proved.
     proved: bool,
-    /// The page of runs that was written.
+    /// Page of runs.
     page: Option<String>,
 }
 
-/// One ladder.
+/// Results for one ladder program.
 #[derive(Debug, Serialize, JsonSchema)]
 pub(crate) struct ProgramAnswer {
     name: String,
-    /// State bits.
+    /// Number of state bits.
     registers: usize,
-    /// For each output whether it can be switched on and off for ever.
+    /// For each output, whether it can always be switched on and off again.
     switches: Vec<Switch>,
-    /// What is suspicious about the order and the effect of its rungs; nobody asked, and nothing fails by it.
+    /// Remarks on the order and the effect of its rungs; they do not affect the verdict.
     remarks: Vec<RemarkAnswer>,
-    /// Questions for remarks that were not decided within the bounds.
+    /// Number of questions left undecided within the bounds.
     undecided_remarks: usize,
-    /// In the order in which they were asked.
+    /// Requested properties, in their order.
     pub(super) properties: Vec<Finding>,
 }
 
-/// Something suspicious.
+/// Remark on suspicious rungs.
 #[derive(Debug, Serialize, JsonSchema)]
 pub(crate) struct RemarkAnswer {
     /// Stable code, such as `U0445`.
     code: &'static str,
-    /// What an engineer reads.
+    /// Description.
     message: String,
-    /// A run at whose end it happens.
+    /// Run that ends with it.
     scans: Option<Scans>,
 }
 
-/// One output.
+/// Result for one output.
 #[derive(Debug, Serialize, JsonSchema)]
 pub(crate) struct Switch {
     output: String,
     /// `free`, `never-on`, `never-off`, `stuck-on`, `stuck-off` or `undecided`.
     verdict: &'static str,
-    /// What an engineer reads.
+    /// Description.
     message: String,
     scans: Option<Scans>,
 }
 
-/// One property.
+/// Result for one property.
 #[derive(Debug, Serialize, JsonSchema)]
 pub(crate) struct Finding {
     name: Option<String>,
-    /// As it was written.
+    /// The property as written.
     property: String,
-    /// As a formula of CTL.
+    /// The property as a CTL formula.
     formula: String,
     /// `holds`, `fails` or `undecided`.
     verdict: &'static str,
-    /// Why it is undecided.
+    /// Reason why it is undecided.
     message: Option<String>,
-    /// A run that shows it.
+    /// Counterexample or witness.
     scans: Option<Scans>,
 }
 
-/// A run from the first scan on.
+/// Run from the first scan on.
 #[derive(Debug, Serialize, JsonSchema)]
 pub(crate) struct Scans {
-    /// How many.
+    /// Number of scans.
     count: usize,
-    /// For each signal that matters its value in each scan.
+    /// Values of each relevant signal by scan.
     signals: BTreeMap<String, Vec<u8>>,
-    /// After the last scan all goes on as from this one.
+    /// Scan to which the run returns after the last one.
     again_from: Option<usize>,
     #[serde(skip)]
     table: String,
@@ -114,7 +114,7 @@ impl Scans {
 }
 
 impl ProgramAnswer {
-    /// With what is asked of every ladder, and no property yet.
+    /// Results of the standard questions, without properties.
     pub(super) fn of(subject: &Subject, bounds: Bounds<'_>, remarks: &Remarks) -> Self {
         let circuit = subject.circuit();
         let switches = subject.switches(bounds).into_iter();
@@ -135,7 +135,7 @@ impl ProgramAnswer {
         }
     }
 
-    /// Every run that shows something, with what it shows.
+    /// All counterexamples and witnesses with their titles.
     pub(super) fn runs(&self) -> Vec<Shown<'_>> {
         let switches = self
             .switches

@@ -1,4 +1,4 @@
-//! How long a proof may take, and what is said while it does.
+//! Time limit and progress messages of a proof.
 
 use std::cell::{Cell, RefCell};
 use std::time::{Duration, Instant};
@@ -7,10 +7,10 @@ use understudy_verification::Work;
 
 use crate::console::Console;
 
-/// From one line about what is being done to the next.
+/// Interval of the progress messages.
 const BETWEEN: Duration = Duration::from_secs(3);
 
-/// The budget of a command.
+/// Time limit of a command.
 pub(crate) struct Patience<'c> {
     begin: Instant,
     told: Cell<Instant>,
@@ -20,7 +20,7 @@ pub(crate) struct Patience<'c> {
 }
 
 impl<'c> Patience<'c> {
-    /// From now on, for `budget`, or as long as it takes.
+    /// Starts now and ends after `budget`, if given.
     pub(crate) fn new(budget: Option<Duration>, console: &'c mut Console) -> Self {
         let now = Instant::now();
         Self {
@@ -32,12 +32,12 @@ impl<'c> Patience<'c> {
         }
     }
 
-    /// What the work is about from here on.
+    /// Sets the subject of the progress messages.
     pub(crate) fn turn_to(&self, about: String) {
         self.about.replace(about);
     }
 
-    /// Whether there is time left; says what is being done, every few seconds.
+    /// Whether time is left; prints the progress every few seconds.
     pub(crate) fn goes_on(&self, work: Work) -> bool {
         let now = Instant::now();
         if now - self.told.get() >= BETWEEN {
@@ -49,7 +49,7 @@ impl<'c> Patience<'c> {
         self.budget.is_none_or(|budget| now - self.begin < budget)
     }
 
-    /// Whether the budget is used up.
+    /// Whether the time limit has passed.
     pub(crate) fn is_over(&self) -> bool {
         self.budget
             .is_some_and(|budget| self.begin.elapsed() >= budget)
