@@ -157,7 +157,7 @@ impl Answer {
         if left > 0 {
             self.failures.push(Failure {
                 code: "U0617".to_owned(),
-                message: format!("{left} more failures are not shown"),
+                message: format!("{left} more failures omitted"),
             });
         }
     }

@@ -85,7 +85,9 @@ impl Console {
             Progress::Starting { members, .. } => {
                 self.say(&format!("starting {members} processes"));
             }
-            Progress::ComingIntoStep { .. } => self.say("waiting until everybody is synchronised"),
+            Progress::ComingIntoStep { .. } => {
+                self.say("waiting until all members are synchronised")
+            }
             Progress::Step { cycle, what } => self.say(&format!("cycle {cycle:>5}: {what}")),
             Progress::Ending => {
                 if let Some(bar) = self.progress.take() {
@@ -170,7 +172,7 @@ fn print_text(answer: &Answer) -> io::Result<()> {
     if let Some(failure) = answer.failures.first()
         && errors.is_terminal()
     {
-        writeln!(errors, "`understudy explain {}` says more", failure.code)?;
+        writeln!(errors, "`understudy explain {}` describes it", failure.code)?;
     }
     Ok(())
 }
@@ -209,7 +211,7 @@ fn print_count(reports: &[Report]) -> io::Result<()> {
     let files = files.join(" ");
     writeln!(
         io::stderr(),
-        "{warnings}; `understudy check {files}` shows {them}"
+        "{warnings}; `understudy check {files}` lists {them}"
     )
 }
 

@@ -168,7 +168,7 @@ pub(crate) fn write_new(folder: &Path, files: &[NewFile]) -> Result<Vec<PathBuf>
         .collect();
     if !existing.is_empty() {
         let message = format!(
-            "nothing is overwritten, and these files exist already: {}; name another folder, or move them away",
+            "these files already exist and are not overwritten: {}; choose another folder or move them",
             existing.join(", ")
         );
         return Err(Answer::failed(Status::BadInput, "U0603", message));

@@ -67,13 +67,13 @@ impl Kind {
         match self {
             Self::Cluster => "a cluster file",
             Self::Scenario => "a scenario",
-            Self::Project => "a project of reconfiguration",
+            Self::Project => "a reconfiguration project",
             Self::Model => "a model of plants and specifications",
             Self::Net => "a Petri net",
-            Self::Map => "a map of signals",
-            Self::Ads => "an automaton of TCT",
+            Self::Map => "a signal map",
+            Self::Ads => "a TCT automaton",
             Self::Ladder => "a ladder",
-            Self::Unknown => "a file of unknown form",
+            Self::Unknown => "a file of unknown format",
         }
     }
 }
@@ -91,17 +91,17 @@ pub(crate) fn expect(wanted: Kind, path: &Path, text: &str) -> Result<(), Answer
     }
     let way_out = match (wanted, found) {
         (Kind::Cluster, Kind::Scenario) => {
-            "`lab` and `simulate` take a scenario by --scenario, behind its cluster file"
+            "give a scenario to `lab` and `simulate` by --scenario, after the cluster file"
         }
         (Kind::Cluster, Kind::Ladder) => {
-            "a cluster file names ladders as `ladder = \"FILE\"`, and `understudy init` writes one to begin with"
+            "a cluster file names programs by `ladder = \"FILE\"`; `understudy init` writes a first one"
         }
-        (Kind::Ladder, Kind::Cluster) => "name one of the ladders that stand in it",
-        (Kind::Cluster, _) => "`understudy init` writes one to begin with",
-        _ => "`understudy check` says what a file is, and what is wrong with it",
+        (Kind::Ladder, Kind::Cluster) => "name one of its ladder programs",
+        (Kind::Cluster, _) => "`understudy init` writes a first one",
+        _ => "`understudy check` reports the kind of a file and its errors",
     };
     let message = format!(
-        "{} is {}, and {} is wanted here: {way_out}",
+        "{} is {}; expected {}: {way_out}",
         path.display(),
         found.in_a_sentence(),
         wanted.in_a_sentence()

@@ -148,7 +148,7 @@ pub(crate) fn parse_size(text: &str) -> Result<u64, String> {
     match parsed {
         Some(size) if (1e5..1e16).contains(&size) => Ok(size as u64),
         _ => Err(format!(
-            "{text:?} is no size of at least 100kB with its unit, such as 200MB or 1GB"
+            "{text:?} is not a size: expected at least 100kB with a unit, such as 200MB or 1GB"
         )),
     }
 }
@@ -157,7 +157,7 @@ pub(crate) fn parse_size(text: &str) -> Result<u64, String> {
 pub(crate) fn parse_address(text: &str) -> Result<SocketAddr, String> {
     text.parse().map_err(|_| {
         format!(
-            "{text:?} is no address with its port, the host as a number, such as 127.0.0.1:7480"
+            "{text:?} is not an address: expected a numeric host and a port, such as 127.0.0.1:7480"
         )
     })
 }

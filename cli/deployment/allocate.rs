@@ -115,7 +115,9 @@ fn reserve(text: &str) -> Result<u8, String> {
     let percent = number.parse().ok();
     percent
         .filter(|percent| *percent <= MOST_RESERVE_PERCENT)
-        .ok_or_else(|| format!("{text:?} is no part from 0% to {MOST_RESERVE_PERCENT}%"))
+        .ok_or_else(|| {
+            format!("{text:?} is not a percentage: expected 0% to {MOST_RESERVE_PERCENT}%")
+        })
 }
 
 fn assumption(text: &str) -> Result<(FamilyQuantity, u64), String> {
@@ -127,26 +129,26 @@ fn assumption(text: &str) -> Result<(FamilyQuantity, u64), String> {
     else {
         let names = FamilyQuantity::ALL.map(FamilyQuantity::name).join(", ");
         return Err(format!(
-            "`{name}` is no figure of a family; known are {names}"
+            "`{name}` is not a figure of a family; known figures: {names}"
         ));
     };
     let value = FamilyQuantity::parse(value.trim());
     value
         .map(|value| (quantity, value))
-        .ok_or_else(|| format!("{quantity}=NUMBER is meant"))
+        .ok_or_else(|| format!("expected {quantity}=NUMBER"))
 }
 
 fn stock(text: &str) -> Result<Stock, String> {
-    let (name, count) = text.rsplit_once('=').ok_or("MODEL=COUNT is meant")?;
+    let (name, count) = text.rsplit_once('=').ok_or("expected MODEL=COUNT")?;
     let count = count.trim().parse().ok().filter(|count| *count <= 1000);
     Ok(Stock {
         name: name.trim().to_owned(),
-        count: count.ok_or("a number of boxes up to 1000 is meant behind the =")?,
+        count: count.ok_or("expected a number of controllers up to 1000 after the =")?,
     })
 }
 
 fn properties(text: &str) -> Result<(String, PathBuf), String> {
-    let (name, file) = text.split_once('=').ok_or("PROGRAM=FILE is meant")?;
+    let (name, file) = text.split_once('=').ok_or("expected PROGRAM=FILE")?;
     Ok((name.trim().to_owned(), PathBuf::from(file.trim())))
 }
 

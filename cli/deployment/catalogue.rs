@@ -129,7 +129,7 @@ struct Entry {
 }
 
 fn kind(text: &str) -> Result<Kind, String> {
-    Kind::of(text).ok_or_else(|| "kinds are plc and embedded".to_owned())
+    Kind::of(text).ok_or_else(|| "expected plc or embedded".to_owned())
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Answer {
@@ -166,7 +166,7 @@ pub(crate) fn read(path: Option<&Path>) -> Result<(Catalogue, String), Answer> {
         Some(path) => (read_file(path)?.0, path.display().to_string()),
         None => {
             let catalogue = Catalogue::built_in().map_err(Answer::bad_files)?;
-            let name = "the catalogue that comes with the program".to_owned();
+            let name = "the built-in catalogue".to_owned();
             (catalogue, name)
         }
     };
@@ -226,7 +226,7 @@ fn list(file: &FileArgument, vendor: Option<&str>, family: Option<&str>) -> Resu
             number(Quantity::BoolInstructionNs),
         );
     }
-    let _ = writeln!(text, "{} of {about}; ? is not known", found.len());
+    let _ = writeln!(text, "{} of {about}; ?: unknown", found.len());
     Ok(Answer::done(text, json!({ "controllers": found })))
 }
 
@@ -238,7 +238,7 @@ fn show(file: &FileArgument, name: &str) -> Result<Answer, Answer> {
         let hint = if like.is_empty() {
             String::new()
         } else {
-            format!("; there is {}", like.join(", "))
+            format!("; similar: {}", like.join(", "))
         };
         let message = format!("the catalogue has no `{name}`{hint}");
         return Err(Answer::failed(Status::BadInput, "U1131", message));
@@ -275,7 +275,7 @@ fn push_shown(text: &mut String, controller: &Controller) {
     if !controller.notes.is_empty() {
         let _ = writeln!(text, "  note: {}", controller.notes);
     }
-    let _ = writeln!(text, "  not known: {}", controller.unknown().join(", "));
+    let _ = writeln!(text, "  unknown: {}", controller.unknown().join(", "));
 }
 
 fn push_family(text: &mut String, name: &str, family: &Family) {
@@ -313,7 +313,7 @@ fn add(file: &WrittenFile, entry: &Entry) -> Result<Answer, Answer> {
                         .numbers
                         .insert(quantity, Figure { value, source });
                 }
-                None => bad(format!("`{value}` is no {quantity}")),
+                None => bad(format!("`{value}` is not a valid {quantity}")),
             }
         } else if let (Some(statement), false) = (words, value.is_empty()) {
             let value = value.to_owned();
@@ -325,7 +325,7 @@ fn add(file: &WrittenFile, entry: &Entry) -> Result<Answer, Answer> {
                 .chain(Statement::ALL.map(Statement::name))
                 .collect();
             bad(format!(
-                "`{text}` is no figure; known are {}",
+                "`{text}` is not a figure; known figures: {}",
                 known.join(", ")
             ));
         }

@@ -86,7 +86,7 @@ fn examined(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answ
     let hash = agreement.configuration;
     findings.push(Finding::good(
         "configuration",
-        format!("{hash}; it has to be the same on every machine"),
+        format!("{hash}; must be equal on all machines"),
     ));
     if let Some(name) = &arguments.name {
         let member = crate::member::find(&cluster, name)?;
@@ -164,7 +164,7 @@ fn of_member(
         Ok(heard) => findings.extend(heard),
         Err(BusError::PortInUse { .. }) => findings.push(Finding::good(
             "peer",
-            "not looked for: where this member runs already, its journal names whom it hears",
+            "not checked: the member is already running; see its journal for the members it receives",
         )),
         // Errors of the address are reported with the ports.
         Err(BusError::Listen { .. }) => {}
@@ -172,7 +172,7 @@ fn of_member(
             "peer",
             Health::Bad,
             error.to_string(),
-            "try again with `--link udp`, which needs nothing but the address",
+            "try again with `--link udp`, which requires only the address",
         )),
     }
     Ok(findings)
@@ -185,8 +185,8 @@ fn keys(arguments: &Arguments, cluster: &Cluster, member: Member) -> (Option<Gua
             let finding = Finding::trouble(
                 "keys",
                 Health::Warning,
-                "the cluster file says `security = \"off\"`: whoever is on the network can drive the plant",
-                "leave `security` out, and `understudy keys init`",
+                "the cluster file says `security = \"off\"`: any device on the network can control the plant",
+                "remove `security` and run `understudy keys init`",
             );
             return (Some(Guard::Off), vec![finding]);
         }
@@ -194,8 +194,8 @@ fn keys(arguments: &Arguments, cluster: &Cluster, member: Member) -> (Option<Gua
             let finding = Finding::trouble(
                 "keys",
                 Health::Bad,
-                "no keys were named, and the member does not start without them",
-                "`--keys DIR`; `understudy keys init` makes them",
+                "no keys given; the member does not start without keys",
+                "give `--keys DIR`; `understudy keys init` creates them",
             );
             return (None, vec![finding]);
         }
@@ -206,7 +206,7 @@ fn keys(arguments: &Arguments, cluster: &Cluster, member: Member) -> (Option<Gua
         let text = error.to_string();
         let (found, remedy) = text.split_once("; ").unwrap_or((
             &text,
-            "copy the folder of this member anew from where keys are issued",
+            "copy the folder of this member again from the machine that issues keys",
         ));
         Finding::trouble("keys", Health::Bad, found, remedy)
     };
@@ -215,9 +215,9 @@ fn keys(arguments: &Arguments, cluster: &Cluster, member: Member) -> (Option<Gua
         Err(errors) => return (None, errors.iter().map(bad).collect()),
     };
     let days = now.days_until(keys.expires());
-    let found = format!("they hold until {}, {days} days", keys.expires());
+    let found = format!("valid until {}, {days} days", keys.expires());
     let finding = if days < SOON_DAYS {
-        let remedy = "`understudy keys issue` makes new ones; then copy the changed folders";
+        let remedy = "run `understudy keys issue`, then copy the changed folders";
         Finding::trouble("keys", Health::Warning, found, remedy)
     } else {
         Finding::good("keys", found)

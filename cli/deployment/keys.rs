@@ -295,9 +295,7 @@ fn changed(issued: &Issued, without_address: Vec<String>, now: Date) -> Answer {
         );
     }
     text.push_str(&table(&issued.holders, now));
-    text.push_str(
-        "\nthese folders changed; copy each to the machine of its member, and to nobody else:\n",
-    );
+    text.push_str("\nchanged folders; copy each only to the machine of its member:\n");
     for folder in &folders {
         let _ = writeln!(text, "  {folder}");
     }

@@ -115,7 +115,7 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
         },
         What::Status | What::Configuration | What::Stop | What::Journal => {
             let message = format!(
-                "`{word}` is for a member on another machine: name the folder of the operator's keys with --keys; a laboratory takes kill, restart, release, cold-start and accept-state"
+                "`{word}` requires a remote member: give the folder of the operator's keys by --keys; a laboratory accepts kill, restart, release, cold-start and accept-state"
             );
             return Err(Answer::failed(Status::BadInput, "U0621", message));
         }
@@ -144,7 +144,7 @@ fn written(arguments: &Arguments) -> Result<Run, Answer> {
     let (cluster, _) = files::cluster(target, Overrides::default())?;
     find_running_of(&arguments.out, &cluster).ok_or_else(|| {
         let message = format!(
-            "no laboratory of `{}` runs below {}; members on other machines are called with the keys of an operator (--keys DIR)",
+            "no laboratory of `{}` runs below {}; remote members require the keys of an operator (--keys DIR)",
             cluster.name(),
             arguments.out.display()
         );
@@ -175,7 +175,7 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
         What::Kill | What::Restart => {
             return Err(refused(&Refusal::Elsewhere {
                 name: arguments.name.clone(),
-                reason: "its process runs on another machine: end it or start it there".to_owned(),
+                reason: "its process runs on another machine: stop or start it there".to_owned(),
             }));
         }
     };

@@ -17,7 +17,7 @@ use crate::member::peers;
 
 /// Access to a running cluster.
 #[derive(Debug, Clone, Default, Args)]
-#[command(next_help_heading = "A cluster that runs elsewhere")]
+#[command(next_help_heading = "Remote cluster")]
 pub(crate) struct AttachArguments {
     /// Folder of an operator's keys; connects to the members at their addresses and shows their journals
     #[arg(long, value_name = "DIR")]
@@ -65,7 +65,7 @@ impl AttachArguments {
         console.note(&format!("attached to {}", heard.join(", ")));
         if !unheard.is_empty() {
             let unheard = unheard.join(", ");
-            console.note(&format!("not heard, and called again and again: {unheard}"));
+            console.note(&format!("not received, retrying: {unheard}"));
         }
         let written = |error: understudy_scenarios::RunDirectoryError| {
             Answer::failed(Status::Failed, "U0602", error.to_string())

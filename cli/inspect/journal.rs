@@ -80,11 +80,11 @@ fn answered(arguments: &Arguments, json: bool) -> Result<Answer, Answer> {
         }
     }
     if more > 0 {
-        troubles.push(format!("{more} more lines of the journal cannot be read"));
+        troubles.push(format!("{more} more unreadable lines of the journal"));
     }
     let mut text: String = lines.iter().map(|line| line.to_text() + "\n").collect();
     if lines.is_empty() {
-        text += "Nothing else happened there than what every member says in every cycle, which --all shows.\n";
+        text += "Only periodic records of every cycle; show them with --all.\n";
     }
     for trouble in &troubles {
         text += &format!("       -  {trouble}\n");

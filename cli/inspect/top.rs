@@ -74,7 +74,7 @@ fn answered(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answ
         return Ok(Answer::done(printed(&mut screen, &model)?, &snapshot));
     }
     if !io::stdout().is_terminal() || !io::stdin().is_terminal() {
-        let message = "standard input and output are no terminal; --once prints how the run is now";
+        let message = "not a terminal: use --once to print the current state";
         return Err(Answer::failed(Status::BadInput, "U0578", message));
     }
     let mut terminal = ratatui::try_init().map_err(failed)?;
@@ -145,7 +145,7 @@ pub(crate) fn owner() -> String {
 }
 
 fn failed(error: io::Error) -> Answer {
-    let message = format!("the terminal cannot be written to: {error}");
+    let message = format!("cannot write to the terminal: {error}");
     Answer::failed(Status::Failed, "U0602", message)
 }
 

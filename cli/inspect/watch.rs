@@ -142,7 +142,7 @@ impl Page {
         impossible: Vec<(&'static str, String)>,
     ) -> Commanding {
         let takes = self.may_command() || self.stays;
-        let forbidden = (!takes).then_some("the page was not told --allow-commands");
+        let forbidden = (!takes).then_some("the page was started without --allow-commands");
         Commanding {
             commander,
             forbidden: forbidden.map(str::to_owned),
@@ -172,9 +172,9 @@ impl Page {
             })
         });
         let served = served.map_err(|error| failed(&error))?;
-        console.note(&format!("the run can be seen at {}", served.url()));
+        console.note(&format!("page of the run: {}", served.url()));
         if let Some(fingerprint) = served.fingerprint() {
-            console.note(&format!("SHA-256 of its certificate: {fingerprint}"));
+            console.note(&format!("SHA-256 of the certificate: {fingerprint}"));
         }
         Ok(served)
     }
@@ -222,23 +222,20 @@ fn watch_cluster(arguments: &Arguments, page: &Page, console: &mut Console) -> A
     let running = (!arguments.start).then(|| find_running(&run.out, &cluster));
     if let Some(running) = running.flatten() {
         let path = running.path().to_owned();
-        console.note(&format!(
-            "it runs already, and is looked at: {}",
-            path.display()
-        ));
+        console.note(&format!("already running, showing {}", path.display()));
         return watch_run(&path, page, console).with_used(reports);
     }
     if arguments.attach {
         let out = run.out.display();
         let message = format!(
-            "no laboratory of `{}` runs below {out}; members on other machines are called with the keys of an operator (--keys DIR)",
+            "no laboratory of `{}` runs below {out}; remote members require the keys of an operator (--keys DIR)",
             cluster.name()
         );
         return Answer::failed(Status::BadInput, "U0614", message);
     }
     if let Some(who) = who_runs_already(&cluster).filter(|_| !arguments.start) {
         let message = format!(
-            "the cluster runs already, for something takes calls at the address of {who}: look at it with the keys of an operator (--keys DIR)"
+            "the cluster is already running: {who} accepts connections; attach to it with the keys of an operator (--keys DIR)"
         );
         return Answer::failed(Status::BadInput, "U0615", message);
     }

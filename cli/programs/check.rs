@@ -276,7 +276,7 @@ impl Found<'_> {
             };
             let kind = file.kind.unwrap_or("");
             let more = if file.cut_short {
-                "; not looked at from all sides: a larger --budget, or `understudy verify`, tells more"
+                "; optional checks incomplete: increase --budget or use `understudy verify`"
             } else {
                 ""
             };

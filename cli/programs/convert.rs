@@ -174,7 +174,7 @@ fn form_of(path: &Path) -> Result<Form, String> {
         Some(Format::StructuredText) => Ok(Form::St),
         Some(Format::LdMicro) => Ok(Form::Ldmicro),
         None => Err(format!(
-            "{}: a program is written as .ladder, .xml or .st; --to says the form of a file with another ending",
+            "{}: output formats are .ladder, .xml and .st; give --to for another file extension",
             path.display()
         )),
     }
@@ -217,9 +217,9 @@ fn written_text(written: &Written) -> String {
         proved,
     } = written.compared;
     let lost = match written.losses.len() {
-        0 => "nothing was lost in writing".to_owned(),
-        1 => "not all of it is in the text: see the warning".to_owned(),
-        count => format!("not all of it is in the text: see the {count} warnings"),
+        0 => "written completely".to_owned(),
+        1 => "not written completely: see the warning".to_owned(),
+        count => format!("not written completely: see the {count} warnings"),
     };
     let behaviour = if proved {
         "proved equal in every scan".to_owned()

@@ -258,7 +258,7 @@ fn proved(
     patience: &Patience<'_>,
     bounds: Bounds<'_>,
 ) -> Answer {
-    patience.turn_to("what every output can do".to_owned());
+    patience.turn_to("the states of every output".to_owned());
     let mut program = ProgramAnswer::of(subject, bounds, remarks);
     let formulas: Vec<Resolved> = asked
         .properties
@@ -309,7 +309,7 @@ fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Answer {
         || arguments.smv.is_some()
         || arguments.draw.is_some();
     if of_a_ladder {
-        let message = "properties, --draw and --smv are of one ladder; name the ladder of the cluster's program instead of the cluster";
+        let message = "properties, --draw and --smv apply to one program; name a ladder file instead of the cluster";
         return Answer::failed(Status::BadInput, "U0437", message);
     }
     let (cluster, reports) = match files::cluster(&arguments.file, Overrides::default()) {

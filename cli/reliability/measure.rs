@@ -217,7 +217,7 @@ fn on_processes(
         (None, Some(failure)) => Err(failed(failure.code(), failure.to_string())),
         (None, None) => Err(failed(
             "U0531",
-            "it ended before everybody was synchronised: nothing was measured".to_owned(),
+            "ended before all members were synchronised: nothing was measured".to_owned(),
         )),
     }
 }

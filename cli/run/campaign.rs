@@ -163,7 +163,7 @@ fn campaign(arguments: &Arguments, path: &Path, console: &mut Console) -> Result
         .and_next(&[&"model-check", &path, &"--faults", &"1", &"--cycles", &"2"]);
     if interrupted.load(Ordering::Relaxed) {
         answer.text.push_str(&format!(
-            "interrupted: these are partial findings, of {} of {} runs\n",
+            "interrupted: partial findings of {} of {} runs\n",
             findings.runs_made, findings.runs_asked
         ));
     }
@@ -233,7 +233,7 @@ fn kept(findings: &Findings, out: Option<&Path>) -> Result<Answer, Answer> {
         }
         text.push_str(&format!("kept in {}\n", out.display()));
     } else if let Some(failure) = findings.failures.first() {
-        text.push_str(&format!("\nThe first of them:\n\n{}", failure.scenario));
+        text.push_str(&format!("\nFirst failure:\n\n{}", failure.scenario));
     }
     let status = if findings.is_good() {
         Status::Done
@@ -255,10 +255,7 @@ fn parse_kinds(text: &str) -> Result<Vec<Kind>, String> {
     let kind = Kind::ALL.into_iter().find(|kind| kind.word() == text);
     kind.map(|kind| vec![kind]).ok_or_else(|| {
         let known: Vec<&str> = Kind::ALL.into_iter().map(Kind::word).collect();
-        format!(
-            "there is no fault {text:?}; known are all, {}",
-            known.join(", ")
-        )
+        format!("unknown fault {text:?}; known: all, {}", known.join(", "))
     })
 }
 

@@ -167,7 +167,7 @@ pub(crate) fn laboratory_settings(
     network: NetworkSettings,
 ) -> Result<LaboratorySettings, Answer> {
     let program = std::env::current_exe().map_err(|error| {
-        let message = format!("this program does not know where it lies: {error}");
+        let message = format!("cannot find the executable of this program: {error}");
         Answer::failed(Status::Failed, "U0604", message)
     })?;
     Ok(LaboratorySettings {
@@ -234,7 +234,7 @@ fn first_reconstructed(cluster: &Cluster, summary: &Summary) -> Option<(String, 
 /// Message at the end of a scenario whose cluster keeps running.
 fn invitation(verdict: &str, url: &str) -> String {
     format!(
-        "the scenario is over: {verdict}\n\
+        "end of the scenario: {verdict}\n\
          Kill a station yourself: open {url}, click a station, then Kill. The cluster stays up until Ctrl-C."
     )
 }

@@ -117,14 +117,11 @@ fn text(summary: &Summary, directory: Option<&Path>) -> String {
     }
     if let Some(reason) = &summary.journal.stopped_by {
         let lost = summary.journal.lost;
-        let _ = writeln!(
-            text,
-            "the journal stopped ({reason}): {lost} records are lost"
-        );
+        let _ = writeln!(text, "the journal stopped ({reason}): {lost} records lost");
     }
     let _ = writeln!(text, "{}", verdict(summary));
     if !summary.passed && summary.circumstances.seed.is_some() {
-        let _ = writeln!(text, "repeat it with: {}", summary.circumstances.repeat);
+        let _ = writeln!(text, "repeat with: {}", summary.circumstances.repeat);
     }
     if may_have_been_late(summary) {
         let lighter = match summary.circumstances.link.as_str() {
@@ -133,7 +130,7 @@ fn text(summary: &Summary, directory: Option<&Path>) -> String {
         };
         let _ = writeln!(
             text,
-            "nothing wrong was driven; a machine that is busy leaves cycles late, and a longer --period, such as 50ms{lighter} gives it more room"
+            "no wrong output was applied; on a busy machine cycles are late: use a longer --period, such as 50ms{lighter}"
         );
     }
     if let Some(directory) = directory {
@@ -145,7 +142,7 @@ fn text(summary: &Summary, directory: Option<&Path>) -> String {
 /// Verdict of the run in one line.
 pub(crate) fn verdict(summary: &Summary) -> String {
     match (&summary.inconclusive, summary.passed, summary.interrupted) {
-        (_, true, _) => "passed: every expectation was met".to_owned(),
+        (_, true, _) => "passed: all expectations were met".to_owned(),
         (Some(why), false, _) => format!("INCONCLUSIVE: {why}; neither passed nor failed"),
         (None, false, true) => format!(
             "interrupted after {} of {} cycles",
@@ -153,7 +150,7 @@ pub(crate) fn verdict(summary: &Summary) -> String {
         ),
         (None, false, false) if summary.cycles_run < summary.cycles_asked => {
             format!(
-                "FAILED: only {} of {} cycles were run",
+                "FAILED: only {} of {} cycles were completed",
                 summary.cycles_run, summary.cycles_asked
             )
         }
@@ -189,12 +186,9 @@ fn push_cycles(text: &mut String, summary: &Summary) {
             (counts.direct, "direct"),
             (counts.reconstructed, "reconstructed"),
             (counts.held, "held"),
-            (counts.held_by_stall, "held while the host stood still"),
+            (counts.held_by_stall, "held in host stalls"),
             (counts.fail_safe, "fail-safe"),
-            (
-                counts.fail_safe_by_stall,
-                "fail-safe while the host stood still",
-            ),
+            (counts.fail_safe_by_stall, "fail-safe in host stalls"),
             (counts.missed, "missed"),
         ];
         let shown = numbers

@@ -85,7 +85,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     let account = match account {
         Ok(account) => account,
         Err(error) => {
-            let message = format!("{error}; repeat it with: {}", repeat(arguments, seed));
+            let message = format!("{error}; repeat with: {}", repeat(arguments, seed));
             return Answer::failed(Status::Failed, "U0530", message).with_used(reports);
         }
     };

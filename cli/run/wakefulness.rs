@@ -40,7 +40,7 @@ pub(crate) fn warn(cluster: &Cluster, console: &mut Console) {
         return;
     }
     console.note(&format!(
-        "warning: {}, too late for a period of {} ms: outputs will be held; use --period {}ms{}",
+        "warning: {}, too long for a period of {} ms: outputs will be held; use --period {}ms{}",
         late(measured),
         period.as_secs_f64() * 1e3,
         measured.period().as_millis(),
@@ -50,13 +50,13 @@ pub(crate) fn warn(cluster: &Cluster, console: &mut Console) {
 
 fn late(measured: Wakefulness) -> String {
     let late = measured.latest.as_secs_f64() * 1e3;
-    format!("this host wakes up to {late:.1} ms late")
+    format!("wake-up latency of this host: up to {late:.1} ms")
 }
 
 fn rights(measured: Wakefulness) -> &'static str {
     if measured.real_time || measured.keeps(Duration::from_millis(10)) {
         ""
     } else {
-        "; as root or with CAP_SYS_NICE a shorter one may do"
+        "; root or CAP_SYS_NICE may allow a shorter period"
     }
 }

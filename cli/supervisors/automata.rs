@@ -30,7 +30,7 @@ pub(crate) fn one_each(paths: &[&PathBuf]) -> Result<Sources<Vec<Automaton>>, An
             });
         }
         let message = format!(
-            "{} has several automata; an operation takes files of one each (`understudy synth` takes a model)",
+            "{} has several automata; operations require files of one automaton each (`understudy synth` reads models)",
             path.display()
         );
         Err(Answer::failed(Status::BadInput, "U0652", message).with_reports(reports))
@@ -159,7 +159,7 @@ pub(crate) fn write(path: &Path, automaton: &Automaton) -> Result<(), Answer> {
             .map_err(|error| failed(error.code(), error.to_string()))?,
         _ => {
             let message = format!(
-                "{}: an automaton is written as .ADS, .toml, .dot or .svg",
+                "{}: output formats of automata are .ADS, .toml, .dot and .svg",
                 path.display()
             );
             return Err(Answer::failed(Status::BadInput, "U0653", message));
@@ -187,7 +187,7 @@ pub(crate) fn summary(automaton: &Automaton) -> String {
             .map(|&label| automaton.alphabet().name(label))
             .collect();
         text.push_str(&format!(
-            "; never possible: {} (an .ADS file forgets that)",
+            "; events without a transition: {} (not stored in .ADS files)",
             names.join(" ")
         ));
     }

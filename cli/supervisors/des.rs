@@ -118,7 +118,7 @@ fn pair(text: &str) -> Result<(State, State), String> {
             State::new(right.parse().ok()?),
         ))
     });
-    numbers.ok_or_else(|| "a pair of states is written as 1:2".to_owned())
+    numbers.ok_or_else(|| "expected a pair of states such as 1:2".to_owned())
 }
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
@@ -297,7 +297,7 @@ fn check(parts: &[&Automaton], bounds: Bounds) -> Result<Answer, TooLarge> {
         let blocking = nonconflict(&[part], bounds)?;
         let mut line = summary(part);
         if unreachable > 0 {
-            line.push_str(&format!("; {unreachable} states are not reached"));
+            line.push_str(&format!("; {unreachable} unreachable states"));
         }
         if let Some(conflict) = &blocking {
             line.push_str(&format!(
@@ -367,7 +367,7 @@ fn control_data(
         )
     });
     let text = format!(
-        "{}{} states disable something, {} pairs",
+        "{}{} states disable events, {} pairs",
         lines.collect::<String>(),
         data.states_with_disablement(),
         data.pairs()
@@ -398,7 +398,7 @@ fn refusing(
 ) -> Answer {
     for disabled in &data.uncontrollable {
         let message = format!(
-            "in state {} the supervisor forbids {}, which is uncontrollable: it is no supervisor of this plant",
+            "in state {} the supervisor disables the uncontrollable event {}: it is not a supervisor of this plant",
             supervisor.state_name(disabled.state),
             plant.alphabet().name(disabled.event)
         );
@@ -434,7 +434,7 @@ fn compare(left: &Automaton, right: &Automaton) -> Answer {
         Ok(states) => {
             let states: Vec<u32> = states.iter().map(|state| state.number()).collect();
             let result = json!({ "isomorphic": true, "states": states });
-            return Answer::done("identical up to the numbers of the states", result);
+            return Answer::done("isomorphic", result);
         }
         Err(difference) => difference,
     };
@@ -442,21 +442,21 @@ fn compare(left: &Automaton, right: &Automaton) -> Answer {
     let reason = match &difference {
         Difference::StateCounts(one, two) => format!("{one} states and {two} states"),
         Difference::Enabled { word, event } => format!(
-            "after {} only one of them can do {}",
+            "after {} only one of them allows {}",
             said(word),
             left.alphabet().union([right.alphabet()]).name(*event)
         ),
         Difference::Marked { word } => format!("after {} only one of them is marked", said(word)),
         Difference::Merged { word, other } => {
             format!(
-                "{} and {} lead to one state in only one of them",
+                "{} and {} lead to the same state in only one of them",
                 said(word),
                 said(other)
             )
         }
         Difference::Unreachable { name, reached } => {
             format!(
-                "only {reached} states of {name} are reached; isomorph compares reachable automata"
+                "only {reached} states of {name} are reachable; isomorph compares reachable automata"
             )
         }
     };
@@ -484,7 +484,7 @@ fn conflict(parts: &[&Automaton], bounds: Bounds) -> Result<Answer, TooLarge> {
         .map(|(part, &state)| format!("{} in {}", part.name(), part.state_name(state)))
         .collect();
     let text = format!(
-        "conflicting: after \"{}\" not all can come to marked states any more ({})",
+        "conflicting: after \"{}\" not all can reach marked states ({})",
         words.join(" "),
         states.join(", ")
     );

@@ -165,7 +165,7 @@ fn bounds(file: &NetFile, limit: usize) -> Result<Answer, Answer> {
     }
     if let Some(first) = stuck.first() {
         text.push_str(&format!(
-            "\n{} markings enable nothing, {first} the first",
+            "\n{} deadlock markings, the first is {first}",
             stuck.len()
         ));
     }
@@ -221,7 +221,7 @@ fn reduced(mut file: NetFile, output: Option<&Path>) -> Result<Answer, Answer> {
     file.net = net;
     let written = write_net(&file);
     let lines: String = steps.iter().map(|step| format!("{step}\n")).collect();
-    let mut text = format!("{lines}{places} places and {transitions} transitions are left");
+    let mut text = format!("{lines}{places} places and {transitions} transitions remain");
     let mut result = json!({ "places": places, "transitions": transitions, "removed": steps });
     match output {
         Some(path) => {
@@ -284,7 +284,7 @@ fn ladder(
     let answer = match prove_hybrid(&file.net, &named, &made, ProofSettings::default()) {
         Err(error) => failed(error.code(), error),
         Ok(HybridVerdict::Refuted(found)) => {
-            let message = format!("the ladder does not do what net and supervisors say:\n{found}");
+            let message = format!("the ladder differs from the net and its supervisors:\n{found}");
             failed("U0875", message)
         }
         Ok(HybridVerdict::Proved(proof)) => proved(&print(&made.program), &proof, &found, output),
@@ -299,7 +299,7 @@ fn supervisors(paths: &[PathBuf]) -> Result<Vec<Automaton>, Answer> {
             let Sources { read, reports } = automata::model(path)?;
             if read.supervisors.is_empty() {
                 let path = path.display();
-                let message = format!("{path} has no supervisor; `understudy synth` makes them");
+                let message = format!("{path} has no supervisor; `understudy synth` creates them");
                 let answer = Answer::failed(Status::BadInput, "U0651", message);
                 return Err(answer.with_reports(reports));
             }
@@ -343,14 +343,17 @@ fn proved(
     }
     let said_before = match found {
         Ok(found) => notes(found),
-        Err(error) => format!("nothing was looked for beforehand: {error}\n"),
+        Err(error) => format!("preliminary check omitted: {error}\n"),
     };
     let mut text = format!(
         "{}proved over {} states in {} scans, {} markings",
         said_before, proof.states, proof.scans, proof.markings
     );
     if !proof.never_fired.is_empty() {
-        text.push_str(&format!("; never fired: {}", proof.never_fired.join(" ")));
+        text.push_str(&format!(
+            "; transitions that never fire: {}",
+            proof.never_fired.join(" ")
+        ));
     }
     said(&mut text, &mut result, path);
     Answer::done(text, result).and_next(&[&"verify", &path])

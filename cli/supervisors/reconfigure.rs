@@ -50,7 +50,7 @@ fn reconfigure(arguments: &Arguments) -> Result<Answer, Answer> {
     narrow(arguments, &mut project)?;
     let outcome = analyse(&project).map_err(|failure| failed(&failure))?;
     for span in &outcome.idle {
-        let message = "this relation concerns no state that the ladder can be in";
+        let message = "this relation affects no reachable state of the ladder";
         reports[0]
             .diagnostics
             .push(Diagnostic::warning("U1251", message, span.clone()));

@@ -34,7 +34,7 @@ pub(crate) fn reduced(
         if told.elapsed() >= BETWEEN {
             told = Instant::now();
             console.note(&format!(
-                "{} s: order {} of {}: {} of {} states tried, {} left; Ctrl-C takes what there is",
+                "{} s: order {} of {}: {} of {} states tried, {} left; Ctrl-C accepts the result so far",
                 begin.elapsed().as_secs(),
                 at.order,
                 at.orders,
@@ -50,7 +50,7 @@ pub(crate) fn reduced(
         .map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))?;
     let warning = (!made.is_complete).then(|| {
         format!(
-            "warning[U0847]: the reduction was {} after {} s at {} of {} states; the supervisor has the same effect, but fewer states may do\n",
+            "warning[U0847]: the reduction was {} after {} s at {} of {} states; the supervisor has the same effect, but may not be minimal\n",
             if interrupted { "interrupted" } else { "stopped" },
             begin.elapsed().as_secs(),
             made.supervisor.state_count(),

@@ -150,7 +150,7 @@ fn source(path: &Path) -> Result<Source, Answer> {
 fn some(path: &Path, automata: Vec<Automaton>, what: &str) -> Result<Vec<Automaton>, Answer> {
     if automata.is_empty() {
         let path = path.display();
-        let message = format!("{path} has no {what}; `understudy synth` makes supervisors");
+        let message = format!("{path} has no {what}; `understudy synth` creates supervisors");
         return Err(Answer::failed(Status::BadInput, "U0651", message));
     }
     Ok(automata)
@@ -276,7 +276,7 @@ fn answer(
         Verdict::Proved(proof) => proof,
         Verdict::Refuted(counterexample) => {
             result["counterexample"] = Value::String(counterexample.to_string());
-            let message = format!("the ladder does not keep the supervisor:\n{counterexample}");
+            let message = format!("the ladder violates the supervisor:\n{counterexample}");
             return Answer::done(notes, result).and_failure(Status::Failed, "U0875", message);
         }
     };

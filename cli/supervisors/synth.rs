@@ -147,7 +147,7 @@ fn explicit(
 
 fn specified(arguments: &Arguments, model: Model, bounds: Bounds) -> Result<Answer, Answer> {
     if arguments.reduce || arguments.minstate {
-        let message = "the engine `specified` takes the specifications as they are".to_owned();
+        let message = "the engine `specified` does not modify the specifications".to_owned();
         return Err(Answer::failed(Status::BadInput, "U0655", message));
     }
     let result = synthesise(&model.plants(), &model.specifications(), bounds)
@@ -349,7 +349,7 @@ fn written(
         [only] => automata::write(path, only)?,
         _ => {
             let message = format!(
-                "{}: {} supervisors need a file that ends in .toml",
+                "{}: {} supervisors require a .toml file",
                 path.display(),
                 supervisors.len()
             );

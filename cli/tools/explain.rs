@@ -33,7 +33,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         None => Answer::failed(
             Status::BadInput,
             "U0613",
-            format!("there is no code {code:?}; without one, all codes are listed"),
+            format!("unknown code {code:?}; `understudy explain` lists all codes"),
         ),
     }
 }

@@ -123,7 +123,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
         for address in addresses {
             listened = *address;
             console.note(&format!(
-                "listening on {address}, passing on to {}",
+                "listening on {address}, forwarding to {}",
                 arguments.to
             ));
         }
@@ -131,7 +131,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
     match ran {
         Ok(counters) => {
             let text = format!(
-                "{} came, {} passed on, {} lost on purpose, {} refused",
+                "{} received, {} forwarded, {} lost by impairment, {} refused",
                 counters.came, counters.passed, counters.lost, counters.refused
             );
             let carried = Carried {

@@ -144,7 +144,7 @@ fn a_supervisor_that_forbids_what_it_cannot_is_not_reduced() {
         assert!(
             answer
                 .errors
-                .contains("error[U0846]: in state b the supervisor forbids fail"),
+                .contains("error[U0846]: in state b the supervisor disables the uncontrollable event fail"),
             "{operation}: {}",
             answer.errors
         );

@@ -100,7 +100,7 @@ fn verification(
             OutputFinding::Never(which) => wrong.push(format!("{name} is never {}", lamp(which))),
             OutputFinding::Stuck(which, _) => {
                 wrong.push(format!(
-                    "{name} can get to where it is never {} again",
+                    "{name} can reach a state after which it is never {} again",
                     lamp(which)
                 ));
             }
@@ -108,7 +108,7 @@ fn verification(
         }
     }
     let mut proved = format!(
-        "every one of its {} outputs can be switched on and off, again and again",
+        "every one of its {} outputs can always be switched on and off again",
         switches.len()
     );
     let mut count = 0;
@@ -147,7 +147,7 @@ fn verification(
     }
     wrong.extend(undecided.told());
     if patience.is_over() {
-        wrong.push("a larger --budget gives the proof more time".to_owned());
+        wrong.push("increase --budget".to_owned());
     }
     Ok(if wrong.is_empty() {
         Verification::Passed(format!("verified: {proved}"))
@@ -179,7 +179,7 @@ impl Undecided {
             };
             let told = names.iter().take(TOLD).map(String::as_str);
             let told = told.collect::<Vec<_>>().join(", ");
-            format!("undecided about {told}{more}: {why}")
+            format!("undecided: {told}{more}: {why}")
         })
     }
 }

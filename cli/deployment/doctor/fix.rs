@@ -71,7 +71,7 @@ pub(super) fn fix(
     let asks = !console.is_json() && io::stdin().is_terminal() && io::stderr().is_terminal();
     let mut consent = |repair: &Repair| {
         if !may_repair() {
-            return Consent::Refused("it needs the rights of root");
+            return Consent::Refused("it requires root");
         }
         match (yes, asks) {
             (true, _) => {
@@ -79,9 +79,9 @@ pub(super) fn fix(
                 Consent::Given
             }
             (false, true) => asked(repair),
-            (false, false) => {
-                Consent::Refused("there is no terminal to ask on; --yes runs it without asking")
-            }
+            (false, false) => Consent::Refused(
+                "no terminal for the confirmation; --yes runs it without confirmation",
+            ),
         }
     };
     let repairs: Vec<Done> = to_do(findings)

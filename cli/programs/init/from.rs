@@ -50,7 +50,7 @@ pub(super) fn run(folder: &Path, arguments: &[PathBuf]) -> Answer {
     match files::write_new(folder, &all) {
         Err(answer) => answer,
         Ok(paths) => {
-            let marks = "\ncluster.toml marks with FILL IN what only the engineer of the plant knows: fail-safe outputs and plants\n";
+            let marks = "\ncomplete the entries marked FILL IN in cluster.toml: fail-safe outputs and plants\n";
             written(folder, &paths, marks).with_used(found.reports)
         }
     }
@@ -185,7 +185,7 @@ impl Found {
         };
         if program.outputs.is_empty() {
             let message = format!(
-                "{}: the program `{unit}` has no outputs, so that there is nothing to protect; declare them as outputs (VAR_OUTPUT, or AT %QX…), or leave the program out",
+                "{}: the program `{unit}` has no outputs to protect; declare outputs (VAR_OUTPUT, or AT %QX…) or omit the program",
                 report.name
             );
             self.fail("U0622", message);
@@ -221,7 +221,7 @@ impl Found {
             let fix = format!("name it on the command line: --from NAME={file}");
             if !is_name(name) || name.len() > MAXIMUM_PROGRAM_NAME {
                 let message = format!(
-                    "{file}: {name:?} is not a name for a controller: a name starts with a letter and has letters, digits, `-` and `_`, {MAXIMUM_PROGRAM_NAME} at most; {fix}"
+                    "{file}: {name:?} is not a controller name: expected a letter followed by letters, digits, `-` and `_`, at most {MAXIMUM_PROGRAM_NAME} characters; {fix}"
                 );
                 failures.push(("U0623", message));
                 continue;
@@ -233,7 +233,7 @@ impl Found {
                     path => format!("comes from {}", path.display()),
                 };
                 let message = format!(
-                    "{file}: the program `{name}` needs the name `{member}`, which is taken: it {whose}; {fix}"
+                    "{file}: the program `{name}` requires the name `{member}`, which is in use: it {whose}; {fix}"
                 );
                 failures.push(("U0624", message));
                 continue;
@@ -243,7 +243,7 @@ impl Found {
         let most = MAXIMUM_STATIONS - Draft::other_members().len();
         if self.programs.len() > most {
             let message = format!(
-                "{} programs: a cluster has at most {most} besides its understudy; make several clusters of them",
+                "{} programs: a cluster has at most {most} and its understudy; divide them into several clusters",
                 self.programs.len()
             );
             failures.push(("U0625", message));
@@ -272,7 +272,7 @@ impl Found {
                 return Ok(text.clone());
             }
             let copy = copies.iter().find(|copy| copy.file.name == wanted);
-            let copy = copy.ok_or_else(|| "it was not drafted".to_owned())?;
+            let copy = copy.ok_or_else(|| "cannot be drafted".to_owned())?;
             decode(copy.file.bytes.clone()).map_err(|error| error.to_string())
         });
         for report in &loaded.reports {

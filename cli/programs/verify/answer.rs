@@ -188,7 +188,7 @@ impl ProgramAnswer {
         if self.undecided_remarks > 0 {
             let _ = writeln!(
                 text,
-                "  {:<9} {} questions about the order and the effect of rungs",
+                "  {:<9} {} questions on the order and the effect of rungs",
                 "undecided", self.undecided_remarks
             );
         }
@@ -263,7 +263,7 @@ fn switch(circuit: &Circuit, signal: Signal, finding: &OutputFinding) -> Switch 
     let (verdict, message, scans) = match finding {
         OutputFinding::Free => (
             "free",
-            format!("{output} can be switched on and off, again and again"),
+            format!("{output} can always be switched on and off again"),
             None,
         ),
         OutputFinding::Never(which) => (
