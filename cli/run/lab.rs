@@ -18,7 +18,7 @@ use crate::console::Console;
 use crate::files;
 use crate::inspect::watch::{BesideArguments, Page};
 use crate::overrides::{OverrideArguments, link_kind, parse_size};
-use crate::run::outcome::{answer, circumstances, command_line, machine, verdict};
+use crate::run::outcome::{answer, circumstances, command_line, machine};
 use crate::run::wakefulness;
 use crate::tools::proxy::ImpairmentArguments;
 
@@ -282,7 +282,7 @@ pub(crate) fn judged(
     let console = RefCell::new(console);
     let judge = |account| {
         let (summary, _) = summarised(account, Vec::new(), JournalState::default());
-        let verdict = verdict(&summary);
+        let verdict = summary.verdict();
         if let Some(served) = &served {
             console
                 .borrow_mut()

@@ -119,11 +119,11 @@ fn text(summary: &Summary, directory: Option<&Path>) -> String {
         let lost = summary.journal.lost;
         let _ = writeln!(text, "the journal stopped ({reason}): {lost} records lost");
     }
-    let _ = writeln!(text, "{}", verdict(summary));
+    let _ = writeln!(text, "{}", summary.verdict());
     if !summary.passed && summary.circumstances.seed.is_some() {
         let _ = writeln!(text, "repeat with: {}", summary.circumstances.repeat);
     }
-    if may_have_been_late(summary) {
+    if summary.was_late() {
         let lighter = match summary.circumstances.link.as_str() {
             "udp" => "",
             _ => ", or --link udp,",
@@ -137,25 +137,6 @@ fn text(summary: &Summary, directory: Option<&Path>) -> String {
         let _ = writeln!(text, "report: {}", directory.join("report.html").display());
     }
     text
-}
-
-/// Verdict of the run in one line.
-pub(crate) fn verdict(summary: &Summary) -> String {
-    match (&summary.inconclusive, summary.passed, summary.interrupted) {
-        (_, true, _) => "passed: all expectations were met".to_owned(),
-        (Some(why), false, _) => format!("INCONCLUSIVE: {why}; neither passed nor failed"),
-        (None, false, true) => format!(
-            "interrupted after {} of {} cycles",
-            summary.cycles_run, summary.cycles_asked
-        ),
-        (None, false, false) if summary.cycles_run < summary.cycles_asked => {
-            format!(
-                "FAILED: only {} of {} cycles were completed",
-                summary.cycles_run, summary.cycles_asked
-            )
-        }
-        (None, false, false) => "FAILED".to_owned(),
-    }
 }
 
 /// Table II with a line for each plant and each remote I/O.
@@ -206,15 +187,4 @@ fn push_cycles(text: &mut String, summary: &Summary) {
         );
     }
     text.push('\n');
-}
-
-/// Whether processes were late: cycles had no provable outputs, and no applied output was wrong.
-fn may_have_been_late(summary: &Summary) -> bool {
-    let counts = || summary.remote_ios.iter().map(|remote_io| &remote_io.counts);
-    let lacking = counts().map(|counts| counts.held + counts.fail_safe + counts.missed);
-    summary.circumstances.world == World::Laboratory
-        && !summary.passed
-        && !summary.interrupted
-        && counts().all(|counts| counts.wrong == 0)
-        && lacking.sum::<u64>() > 0
 }

@@ -25,6 +25,7 @@ mod summary;
 mod table;
 mod terms;
 mod troubles;
+mod verdict;
 mod write;
 mod writer;
 

@@ -9,7 +9,7 @@ use understudy_ladder::from_circuit;
 use understudy_logic::Circuit;
 use understudy_logic::bdd::Diagrams;
 use understudy_parity::generate;
-use understudy_verification::program::{Answer as Proof, Bounds, Lamp, OutputFinding, Subject};
+use understudy_verification::program::{Bounds, Conclusion, Subject};
 use understudy_verification::property::{Properties, not_of_one_scan, read};
 use understudy_verification::prove_parity_while;
 
@@ -88,30 +88,7 @@ fn verification(
         go_on: &go_on,
         ..Bounds::default()
     };
-    let circuit = subject.circuit();
-    let mut wrong = Vec::new();
-    let mut undecided = Undecided::default();
-    let switches = subject.switches(bounds);
-    for (signal, finding) in &switches {
-        let name = signal.name(circuit);
-        let lamp = |lamp: &Lamp| if *lamp == Lamp::On { "on" } else { "off" };
-        match finding {
-            OutputFinding::Free => {}
-            OutputFinding::Never(which) => wrong.push(format!("{name} is never {}", lamp(which))),
-            OutputFinding::Stuck(which, _) => {
-                wrong.push(format!(
-                    "{name} can reach a state after which it is never {} again",
-                    lamp(which)
-                ));
-            }
-            OutputFinding::Undecided(why) => undecided.add(name.to_owned(), why),
-        }
-    }
-    let mut proved = format!(
-        "every one of its {} outputs can always be switched on and off again",
-        switches.len()
-    );
-    let mut count = 0;
+    let mut conclusion = Conclusion::new(subject.circuit(), &subject.switches(bounds));
     for (report, properties) in asked {
         let resolve = |property| {
             subject.resolve(property).map_err(|diagnostics| {
@@ -131,57 +108,19 @@ fn verification(
             return Err(Answer::bad_files(vec![report]));
         }
         let answers = subject.check(&formulas?, fair, bounds, &mut |_, _| {});
-        count += answers.len();
-        for (property, proof) in properties.properties.iter().zip(&answers) {
-            match proof {
-                Proof::Holds(_) => {}
-                Proof::Fails(_) => wrong.push(format!("`{}` does not hold", property.text)),
-                Proof::Undecided(why) => {
-                    undecided.add(format!("`{}`", property.text), &why.to_string());
-                }
+        for (property, answer) in properties.properties.iter().zip(&answers) {
+            conclusion.add(&property.text, answer);
+        }
+    }
+    Ok(match conclusion.verdict() {
+        Ok(proved) => Verification::Passed(format!("verified: {proved}")),
+        Err(mut reasons) => {
+            if patience.is_over() {
+                reasons.push("increase --budget".to_owned());
             }
+            Verification::NotPassed(reasons.join("; "))
         }
-    }
-    if count > 0 {
-        proved.push_str(&format!("; {count} properties hold"));
-    }
-    wrong.extend(undecided.told());
-    if patience.is_over() {
-        wrong.push("increase --budget".to_owned());
-    }
-    Ok(if wrong.is_empty() {
-        Verification::Passed(format!("verified: {proved}"))
-    } else {
-        Verification::NotPassed(wrong.join("; "))
     })
-}
-
-/// Undecided properties, grouped by reason.
-#[derive(Default)]
-struct Undecided(Vec<(String, Vec<String>)>);
-
-/// Maximum number of names per reason.
-const TOLD: usize = 3;
-
-impl Undecided {
-    fn add(&mut self, name: String, why: &str) {
-        match self.0.iter_mut().find(|(known, _)| known == why) {
-            Some((_, names)) => names.push(name),
-            None => self.0.push((why.to_owned(), vec![name])),
-        }
-    }
-
-    fn told(self) -> impl Iterator<Item = String> {
-        self.0.into_iter().map(|(why, names)| {
-            let more = match names.len().saturating_sub(TOLD) {
-                0 => String::new(),
-                more => format!(" and {more} more"),
-            };
-            let told = names.iter().take(TOLD).map(String::as_str);
-            let told = told.collect::<Vec<_>>().join(", ");
-            format!("undecided: {told}{more}: {why}")
-        })
-    }
 }
 
 /// The group with its understudy, proved to be the sum of its members.
