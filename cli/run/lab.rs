@@ -33,16 +33,17 @@ pub(crate) struct Arguments {
     /// Cluster file
     #[arg(value_name = "CLUSTER.toml")]
     cluster: PathBuf,
-    #[command(flatten)]
-    pub(crate) run: RunArguments,
     /// Scenario file; without it the cluster runs undisturbed
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) run: RunArguments,
     #[command(flatten)]
     beside: BesideArguments,
 }
 
 #[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Run")]
 pub(crate) struct RunArguments {
     /// Number of cycles, overrides the scenario; later steps and expectations are ignored
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=understudy_scenarios::MAXIMUM_CYCLES))]
@@ -52,14 +53,14 @@ pub(crate) struct RunArguments {
     pub(crate) restart: bool,
     #[command(flatten)]
     pub(crate) overrides: OverrideArguments,
-    #[command(flatten)]
-    pub(crate) network: NetworkArguments,
     /// Directory for runs; each run gets a subdirectory
     #[arg(long, value_name = "DIR", default_value = "runs")]
     pub(crate) out: PathBuf,
     /// Size limit of the journal, such as 200MB; the oldest records are removed first
     #[arg(long, value_name = "SIZE", default_value = "1GB", value_parser = parse_size)]
     pub(crate) journal_limit: u64,
+    #[command(flatten)]
+    pub(crate) network: NetworkArguments,
 }
 
 /// The network between the processes.

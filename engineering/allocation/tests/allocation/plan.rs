@@ -210,7 +210,7 @@ fn prices_decide_where_they_are_known() {
     let plan = allocate(&catalogue, &cell()[..2], &Options::default()).expect("a plan");
     assert_eq!(boxes(&plan), ["L: press", "L: robot"]);
     assert!(
-        plan.remarks[0].starts_with("2 of 4 prices are not known"),
+        plan.remarks[0].starts_with("2 of 4 prices are unknown"),
         "{:?}",
         plan.remarks
     );
