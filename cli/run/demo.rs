@@ -1,11 +1,13 @@
 //! `understudy demo`: the experiment of section V.B on processes.
 
+use std::num::NonZeroU64;
 use std::path::PathBuf;
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 use clap::Args;
 use understudy_cluster::{Cluster, press_cell};
-use understudy_scenarios::{Members, RunDirectory, Scenario, Summary, TABLE_TWO, read};
+use understudy_journal::{Members, RunDirectory};
+use understudy_scenarios::{Scenario, Summary, TABLE_TWO, read};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
@@ -13,6 +15,11 @@ use crate::files;
 use crate::inspect::watch::{BesideArguments, Page};
 use crate::run::lab::{Judged, RunArguments, in_laboratory, judged};
 use crate::run::wakefulness;
+
+/// Maximum duration of a demonstration, from its origin.
+const LONGEST: Duration = Duration::from_secs(25);
+/// Number of cycles of Table II.
+const TABLE_TWO_CYCLES: u32 = 1000;
 
 /// Run the press cell of the paper and kill each station once
 #[derive(Debug, Args)]
@@ -25,7 +32,8 @@ Example:
 
 Without --period the command measures the wake-up latency of this host for one second and selects the shortest of 10, 20, 50 and 100 ms
 that the host keeps. The scenario is that of Table II: station 1 is killed at cycle 200 and restarted at 327, station 2 at 400 and 527,
-station 3 at 600 and 727. With --watch the cluster keeps running after the scenario and accepts commands from the page until Ctrl-C.
+station 3 at 600 and 727. At a period of 50 or 100 ms the numbers of cycles are halved or quartered: a demonstration takes at most 25 s.
+With --watch the cluster keeps running after the scenario and accepts commands from the page until Ctrl-C.
 
 Exit status: 0 if every plant stayed functional and no wrong output was applied; 3 if the host was too slow for a verdict.")]
 pub(crate) struct Arguments {
@@ -47,8 +55,24 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
         return Answer::bad_files(vec![found.report]);
     };
     let page = arguments.beside.page().map(Page::staying);
+    let scenario = match run.cycles {
+        Some(_) => scenario,
+        None => scenario.compressed(divisor(&cell.cluster)),
+    };
     let answer = cell.run(&scenario, &run, page.as_ref(), console);
     answer.and_next(&[&"init", &"cell"])
+}
+
+/// Divisor of the cycles that limits the experiment to [`LONGEST`] at long periods.
+fn divisor(cluster: &Cluster) -> NonZeroU64 {
+    let period = cluster.agreement().schedule.period();
+    let divisor = (period * TABLE_TWO_CYCLES)
+        .as_nanos()
+        .div_ceil(LONGEST.as_nanos());
+    u64::try_from(divisor)
+        .ok()
+        .and_then(NonZeroU64::new)
+        .unwrap_or(NonZeroU64::MIN)
 }
 
 /// The press cell of section V, written to the directory of its run.
