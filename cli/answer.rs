@@ -1,4 +1,4 @@
-//! What a command answers, for people and for machines alike.
+//! The answer of a command, as text and as JSON.
 
 use std::borrow::Cow;
 use std::ffi::OsStr;
@@ -10,22 +10,22 @@ use understudy_text::{
     Diagnostic, Lines, MAXIMUM_MESSAGE, Position, Report, Severity, shell, shortened,
 };
 
-/// The most findings of all files together that an answer shows.
+/// Maximum number of findings in an answer.
 const MAXIMUM_SHOWN: usize = 500;
 
-/// The most failures that an answer shows.
+/// Maximum number of failures in an answer.
 const MAXIMUM_FAILURES: usize = 100;
 
-/// How a command ended.
+/// Exit status of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Status {
-    /// Exit status 0.
+    /// Exit status 0: success.
     Done,
-    /// Exit status 1: a run, or a check of what came of it.
+    /// Exit status 1: a run or a check failed.
     Failed,
-    /// Exit status 2: nothing was started.
+    /// Exit status 2: invalid input, nothing was started.
     BadInput,
-    /// Exit status 3: the host woke members too late for a verdict.
+    /// Exit status 3: the host was too slow for a verdict.
     Inconclusive,
 }
 
@@ -40,7 +40,7 @@ impl Status {
     }
 }
 
-/// A failure that has no place in a file.
+/// A failure without a position in a file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub(crate) struct Failure {
     /// Stable code, such as `U0501`.
@@ -49,28 +49,28 @@ pub(crate) struct Failure {
     pub(crate) message: String,
 }
 
-/// What a command answers.
+/// Answer of a command.
 #[derive(Debug)]
 pub(crate) struct Answer {
     pub(crate) status: Status,
-    /// For standard output.
+    /// Text for standard output.
     pub(crate) text: String,
-    /// The same for machines.
+    /// Result as JSON.
     pub(crate) result: Value,
-    /// Files that were read, with what was found in them.
+    /// Files that were read, with their findings.
     pub(crate) reports: Vec<Report>,
-    /// Nobody asked about the files: people are told how many warnings there are, and where to see them.
+    /// Print only the number of warnings, for commands that do not check files.
     pub(crate) counts_warnings: bool,
     pub(crate) failures: Vec<Failure>,
     pub(crate) about: Box<About>,
 }
 
-/// What few commands add to their answer.
+/// Parts of an answer that few commands use.
 #[derive(Debug, Default)]
 pub(crate) struct About {
-    /// Those of its numbers that stand at the top of the document too.
+    /// Numbers that are also top-level keys of the document.
     pub(crate) numbers: Map<String, Value>,
-    /// Commands that are useful after this one when it ended well; for people only.
+    /// Next steps after success; text only.
     pub(crate) next: Vec<String>,
 }
 
@@ -103,7 +103,7 @@ impl Answer {
         self
     }
 
-    /// Files that the command used: their warnings are counted for people, and told whole to machines.
+    /// Files that the command used: the text counts their warnings, JSON lists them.
     pub(crate) fn with_used(self, reports: Vec<Report>) -> Self {
         Self {
             counts_warnings: true,
@@ -116,7 +116,7 @@ impl Answer {
         self
     }
 
-    /// A command that is useful after this one, by its arguments.
+    /// Adds a next step, given by its arguments.
     pub(crate) fn and_next(mut self, arguments: &[&dyn AsRef<OsStr>]) -> Self {
         let words = arguments.iter();
         let words: Vec<_> = words.map(|word| word.as_ref().to_string_lossy()).collect();
@@ -145,7 +145,7 @@ impl Answer {
         self
     }
 
-    /// Bounds the failures and their messages, which may quote a file.
+    /// Limits the number and the length of failures.
     pub(crate) fn bound(&mut self) {
         let left = self.failures.len().saturating_sub(MAXIMUM_FAILURES);
         self.failures.truncate(MAXIMUM_FAILURES);
@@ -157,18 +157,18 @@ impl Answer {
         if left > 0 {
             self.failures.push(Failure {
                 code: "U0617".to_owned(),
-                message: format!("{left} more failures are not shown"),
+                message: format!("{left} more failures omitted"),
             });
         }
     }
 }
 
-/// A call of this program as a line of a shell.
+/// Command line of this program, quoted for a shell.
 pub(crate) fn shell_line<'a>(arguments: impl IntoIterator<Item = &'a str>) -> String {
     shell::line(std::iter::once("understudy").chain(arguments))
 }
 
-/// The findings of each file that an answer shows.
+/// Findings of each file, up to the maximum.
 pub(crate) fn shown(reports: &[Report]) -> impl Iterator<Item = (&Report, Vec<Diagnostic>)> {
     let mut left = MAXIMUM_SHOWN;
     reports.iter().map(move |report| {
@@ -178,61 +178,61 @@ pub(crate) fn shown(reports: &[Report]) -> impl Iterator<Item = (&Report, Vec<Di
     })
 }
 
-/// The document that every command answers with under `--json`.
+/// The document of every command with `--json`.
 #[derive(Debug, Serialize, JsonSchema)]
 pub(crate) struct Envelope<'a> {
-    /// The version of this program.
+    /// Version of this program.
     understudy: &'a str,
-    /// The command.
+    /// Command.
     command: &'a str,
-    /// The exit status: 0 done, 1 failed, 2 bad input and nothing was started.
+    /// Exit status: 0 success, 1 failed, 2 invalid input and nothing was started, 3 inconclusive.
     status: u8,
-    /// What was found in the files that were read.
+    /// Findings in the files that were read.
     diagnostics: Vec<PlacedDiagnostic<'a>>,
-    /// What failed, apart from what was found in files.
+    /// Failures without a position in a file.
     failures: &'a [Failure],
-    /// What the command answers; its shape is described for each command.
+    /// Result of the command; its structure depends on the command.
     result: &'a Value,
-    /// The numbers of `reliability` once more, such as `mttf_paper_hours`.
+    /// Numbers of `reliability`, repeated at the top level, such as `mttf_paper_hours`.
     #[serde(flatten)]
     numbers: &'a Map<String, Value>,
 }
 
-/// A diagnostic with its place.
+/// A finding with its position.
 #[derive(Debug, Serialize, JsonSchema)]
 struct PlacedDiagnostic<'a> {
-    /// The file as it was given.
+    /// File as named on the command line.
     file: &'a str,
     /// Counted from 1.
     line: usize,
     /// Counted from 1, in characters.
     column: usize,
-    /// The end, not included.
+    /// End, exclusive.
     end_line: usize,
-    /// The end, not included.
+    /// End, exclusive.
     end_column: usize,
     /// Stable code, such as `U0104`.
     code: &'static str,
     /// `error` or `warning`.
     severity: &'static str,
-    /// What is wrong.
+    /// Message.
     message: String,
-    /// Short text at the place.
+    /// Short text at the position.
     label: Option<String>,
-    /// The way out.
+    /// Fix.
     help: Option<String>,
-    /// Other places of the same file that explain this one.
+    /// Related positions in the same file.
     related: Vec<PlacedRelated>,
 }
 
-/// Another place.
+/// A related position.
 #[derive(Debug, Serialize, JsonSchema)]
 struct PlacedRelated {
     /// Counted from 1.
     line: usize,
     /// Counted from 1, in characters.
     column: usize,
-    /// What is to be seen there.
+    /// Message.
     message: String,
 }
 

@@ -21,11 +21,11 @@ use understudy_wire::{Member, StationId};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
-use crate::demo::PressCell;
 use crate::endurance;
 use crate::failover;
-use crate::lab::RunArguments;
 use crate::memory;
+use crate::run::demo::PressCell;
+use crate::run::lab::RunArguments;
 use crate::scan;
 
 /// Measure speed on this machine

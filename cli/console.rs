@@ -1,4 +1,4 @@
-//! The only place that prints: answers on standard output, diagnostics and progress on standard error.
+//! All printing: answers on standard output, diagnostics and progress on standard error.
 
 use std::io::{self, IsTerminal, Write};
 use std::process::ExitCode;
@@ -14,7 +14,7 @@ use understudy_text::{Diagnostic, Lines, Report, Severity};
 use crate::answer::{Answer, Envelope, Status, shown};
 use crate::excerpt::Shown;
 
-/// Where a command talks to.
+/// Output of a command.
 pub(crate) struct Console {
     json: bool,
     progress: Option<ProgressBar>,
@@ -33,15 +33,15 @@ impl Console {
         }
     }
 
-    /// Whether machines are answered.
+    /// Whether the answer is JSON.
     pub(crate) fn is_json(&self) -> bool {
         self.json
     }
 
-    /// Prints the answer and gives the exit status.
+    /// Prints the answer and returns the exit status.
     pub(crate) fn finish(self, command: &str, mut answer: Answer) -> ExitCode {
         answer.bound();
-        // A reader that is gone needs no answer.
+        // The reader may have closed the pipe.
         let _ = if self.json {
             print_json(command, &answer)
         } else {
@@ -50,7 +50,7 @@ impl Console {
         ExitCode::from(answer.status.code())
     }
 
-    /// How far a run is: a bar on a terminal, lines elsewhere, nothing under `--json`.
+    /// Shows the progress of a run: a bar on a terminal, otherwise lines; nothing with `--json`.
     pub(crate) fn show(&mut self, progress: &Progress) {
         if self.json {
             return;
@@ -72,7 +72,7 @@ impl Console {
                 bar.set_position(*done);
             }
             Progress::Failure { done, of } => {
-                // Some ten lines, however many there are.
+                // About ten lines in total.
                 if done == of || done % of.div_ceil(10).max(1) == 0 {
                     self.say(&format!("{done} of {of} failures"));
                 }
@@ -85,7 +85,9 @@ impl Console {
             Progress::Starting { members, .. } => {
                 self.say(&format!("starting {members} processes"));
             }
-            Progress::ComingIntoStep { .. } => self.say("waiting until everybody is synchronised"),
+            Progress::ComingIntoStep { .. } => {
+                self.say("waiting until all members are synchronised")
+            }
             Progress::Step { cycle, what } => self.say(&format!("cycle {cycle:>5}: {what}")),
             Progress::Ending => {
                 if let Some(bar) = self.progress.take() {
@@ -95,14 +97,14 @@ impl Console {
         }
     }
 
-    /// A line while a command runs; nothing under `--json`.
+    /// Prints a line while the command runs; nothing with `--json`.
     pub(crate) fn note(&mut self, line: &str) {
         if !self.json {
             self.say(line);
         }
     }
 
-    /// A bar of so many steps on a terminal, with `words` of the progress library's template; hidden elsewhere.
+    /// Progress bar of `length` steps with the template `words`; hidden without a terminal.
     pub(crate) fn bar(&self, length: u64, words: &str) -> ProgressBar {
         if self.json || !io::stderr().is_terminal() {
             return ProgressBar::hidden();
@@ -110,7 +112,7 @@ impl Console {
         progress_bar(length, words)
     }
 
-    /// One line, unless it is the last one again.
+    /// Prints a line unless it repeats the last one.
     fn say(&mut self, line: &str) {
         if self.said == line {
             return;
@@ -157,7 +159,7 @@ fn print_text(answer: &Answer) -> io::Result<()> {
     output.flush()?;
     let mut errors = io::stderr().lock();
     for failure in &answer.failures {
-        // Errors of the crates below begin with their code for those who only see the text.
+        // Messages of other crates begin with their code.
         let message = without_code(&failure.message);
         writeln!(errors, "error[{}]: {message}", failure.code)?;
     }
@@ -170,12 +172,12 @@ fn print_text(answer: &Answer) -> io::Result<()> {
     if let Some(failure) = answer.failures.first()
         && errors.is_terminal()
     {
-        writeln!(errors, "`understudy explain {}` says more", failure.code)?;
+        writeln!(errors, "`understudy explain {}` describes it", failure.code)?;
     }
     Ok(())
 }
 
-/// A message without the code that it begins with.
+/// Removes the code at the beginning of a message.
 fn without_code(message: &str) -> &str {
     let Some((code, rest)) = message.split_once(": ") else {
         return message;
@@ -188,7 +190,7 @@ fn without_code(message: &str) -> &str {
     }
 }
 
-/// How many warnings there are, and where they can be seen: a file that names the others shows theirs too.
+/// Prints the number of warnings and the command that shows them. A file that names the others shows theirs.
 fn print_count(reports: &[Report]) -> io::Result<()> {
     let count: usize = reports.iter().map(|report| report.diagnostics.len()).sum();
     let (warnings, them) = match count {
@@ -209,11 +211,11 @@ fn print_count(reports: &[Report]) -> io::Result<()> {
     let files = files.join(" ");
     writeln!(
         io::stderr(),
-        "{warnings}; `understudy check {files}` shows {them}"
+        "{warnings}; `understudy check {files}` lists {them}"
     )
 }
 
-/// The lines of a file are counted once, and all goes out together.
+/// Prints all findings of a file at once.
 fn print_report(report: &Report, found: &[Diagnostic]) -> io::Result<()> {
     if found.is_empty() {
         return Ok(());

@@ -8,9 +8,9 @@ use understudy_scenarios::{JOIN_CYCLES, Joined, Target, Trouble, TroubleRow, joi
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
-use crate::demo::PressCell;
-use crate::lab::RunArguments;
 use crate::overrides::link_kind;
+use crate::run::demo::PressCell;
+use crate::run::lab::RunArguments;
 
 /// What is lost in `bench join` where nobody says otherwise.
 const LOSS: f64 = 0.1;

@@ -1,4 +1,4 @@
-//! The lines of a file that one finding is shown in: long ones are cut around the place.
+//! Excerpt of a file for one finding; long lines are shortened around the position.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -7,50 +7,50 @@ use codespan_reporting::diagnostic::Label;
 use codespan_reporting::files::{Error, Files};
 use understudy_text::{Diagnostic, Lines};
 
-/// The most characters of a line that are shown, the marks for what is cut off not counted.
+/// Maximum number of characters of a line, without ellipses.
 const MAXIMUM_COLUMNS: usize = 120;
 
-/// Of these, the most that stand before the place.
+/// Maximum number of characters before the position.
 const COLUMNS_BEFORE: usize = 40;
 
-/// The most lines of one place that are shown; of a place with more, the first.
+/// Maximum number of lines of one position.
 const MAXIMUM_LINES: usize = 8;
 
-/// What stands for characters that are cut off.
+/// Ellipsis for omitted characters.
 const CUT: &str = "…";
 
-/// Lines of a file under the numbers that they have there.
+/// Lines of a file with their original numbers.
 pub(crate) struct Excerpt<'r> {
     name: &'r str,
     text: String,
-    /// By the number of the line in the file, from 0; ascending in `text` too.
+    /// By line number in the file, from 0; ascending in `text` too.
     lines: BTreeMap<usize, Line>,
 }
 
-/// One line, or the part of it that is shown.
+/// A line or the shown part of it.
 struct Line {
-    /// The bytes of the file that are shown.
+    /// Shown bytes of the file.
     shown: Range<usize>,
-    /// Characters of the line before them.
+    /// Number of characters of the line before them.
     before: usize,
-    /// Where the line begins in the excerpt.
+    /// Start of the line in the excerpt.
     start: usize,
-    /// Where `shown` begins in the excerpt.
+    /// Start of `shown` in the excerpt.
     text: usize,
-    /// Where `shown` ends in the excerpt.
+    /// End of `shown` in the excerpt.
     end: usize,
 }
 
-/// A finding with the lines that it is shown in.
+/// A finding with its excerpt.
 pub(crate) struct Shown<'r> {
     pub(crate) excerpt: Excerpt<'r>,
     pub(crate) labels: Vec<Label<()>>,
-    /// Further places that are not in the excerpt.
+    /// Related positions outside of the excerpt.
     pub(crate) notes: Vec<String>,
 }
 
 impl<'r> Shown<'r> {
-    /// `text` and its `lines` are those of the file `name`.
+    /// Makes the excerpt of `text`, the file `name`.
     pub(crate) fn new(
         name: &'r str,
         text: &str,
@@ -96,14 +96,14 @@ impl<'r> Shown<'r> {
 }
 
 impl<'r> Excerpt<'r> {
-    /// Of each line the part around the first of `places` that is on it.
+    /// Shows each line around the first of `places` in it.
     fn new<'p>(
         name: &'r str,
         text: &str,
         lines: &Lines<'_>,
         places: impl Iterator<Item = &'p Range<usize>>,
     ) -> Self {
-        // By line: the byte that is shown in any case.
+        // By line: the byte that must be shown.
         let mut wanted: BTreeMap<usize, usize> = BTreeMap::new();
         for place in places {
             let (first, last) = (lines.index(place.start), lines.index(place.end));
@@ -112,7 +112,7 @@ impl<'r> Excerpt<'r> {
                 wanted.entry(line).or_insert(lines.range(line).start);
             }
         }
-        // A single line between two others is shown as well.
+        // A single line between two shown lines is shown as well.
         let numbers: Vec<usize> = wanted.keys().copied().collect();
         for pair in numbers.windows(2) {
             if pair[0] + 2 == pair[1] {
@@ -158,13 +158,13 @@ impl<'r> Excerpt<'r> {
         );
     }
 
-    /// Whether a byte of the file is in the excerpt.
+    /// Whether the excerpt contains a byte of the file.
     fn shows(&self, lines: &Lines<'_>, offset: usize) -> bool {
         let line = self.lines.get(&lines.index(offset));
         line.is_some_and(|line| (line.shown.start..=line.shown.end).contains(&offset))
     }
 
-    /// A place of the file as one of the excerpt.
+    /// Translates a position in the file to the excerpt.
     fn mapped(&self, lines: &Lines<'_>, place: &Range<usize>) -> Range<usize> {
         let map = |offset: usize| match self.lines.get(&lines.index(offset)) {
             None => self.text.len(),
@@ -190,7 +190,7 @@ fn without_newline(text: &str, line: Range<usize>) -> Range<usize> {
     line.start..line.start + length
 }
 
-/// The part of a line around `focus`; all of it where it is short.
+/// Part of a line around `focus`; a short line as a whole.
 fn window(text: &str, line: Range<usize>, focus: usize) -> Range<usize> {
     let content = &text[line.clone()];
     if content.len() <= MAXIMUM_COLUMNS || content.chars().nth(MAXIMUM_COLUMNS).is_none() {

@@ -12,7 +12,7 @@ use crate::answer::{Answer, Status};
 use crate::bench;
 use crate::console::Console;
 use crate::files;
-use crate::lab::RunArguments;
+use crate::run::lab::RunArguments;
 
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {

@@ -1,4 +1,4 @@
-//! Reading the files that a command is given.
+//! Reads and writes the files of a command.
 
 use std::fs;
 use std::io;
@@ -13,18 +13,18 @@ use understudy_text::{Report, decode};
 use crate::answer::{Answer, Status};
 use crate::kind::{self, Kind};
 
-/// The text of a file; a failure names it and says why not.
+/// Text of a file.
 pub(crate) fn text(path: &Path) -> Result<String, Answer> {
     decoded(path, bytes(path)?)
 }
 
-/// The bytes of a file.
+/// Bytes of a file.
 pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>, Answer> {
     fs::read(path)
         .map_err(|error| Answer::failed(Status::BadInput, "U0601", unreadable(path, &error)))
 }
 
-/// The text that the bytes of a file stand for.
+/// Decodes the bytes of a file.
 pub(crate) fn decoded(path: &Path, bytes: Vec<u8>) -> Result<String, Answer> {
     decode(bytes).map_err(|error| {
         let message = format!("{} is not a text file: {error}", path.display());
@@ -32,17 +32,17 @@ pub(crate) fn decoded(path: &Path, bytes: Vec<u8>) -> Result<String, Answer> {
     })
 }
 
-/// The text of a file that has to be of one kind.
+/// Text of a file of the given kind.
 pub(crate) fn text_of(wanted: Kind, path: &Path) -> Result<String, Answer> {
     let text = text(path)?;
     kind::expect(wanted, path, &text)?;
     Ok(text)
 }
 
-/// Files that folders of the project begin with.
+/// Main files of a project folder.
 const FIRST_FILES: [&str; 3] = ["cluster.toml", "model.toml", "reconfiguration.toml"];
 
-/// Why a file cannot be read, and which one was probably meant.
+/// Message for an unreadable file, with a suggestion.
 pub(crate) fn unreadable(path: &Path, error: &io::Error) -> String {
     let (reason, meant) = if path.is_dir() {
         let first = FIRST_FILES.iter().map(|name| path.join(name));
@@ -63,7 +63,7 @@ pub(crate) fn unreadable(path: &Path, error: &io::Error) -> String {
     )
 }
 
-/// The file beside it whose name is nearest.
+/// File in the same folder with the most similar name.
 fn nearest_file(path: &Path) -> Option<PathBuf> {
     let folder = path.parent()?;
     let place = if folder == Path::new("") {
@@ -86,12 +86,12 @@ fn nearest_file(path: &Path) -> Option<PathBuf> {
     Some(folder.join(nearest))
 }
 
-/// Writes a file; a failure names it and says why not.
+/// Writes a file.
 pub(crate) fn write(path: &Path, text: &str) -> Result<(), Answer> {
     fs::write(path, text).map_err(|error| unwritable(path, &error))
 }
 
-/// Writes a file anew: whole, or not at all.
+/// Replaces a file atomically.
 pub(crate) fn replace(path: &Path, text: &str) -> Result<(), Answer> {
     let mut staged = path.as_os_str().to_owned();
     staged.push(".new");
@@ -103,21 +103,21 @@ pub(crate) fn replace(path: &Path, text: &str) -> Result<(), Answer> {
     })
 }
 
-/// Reads a cluster file and the ladders that it names, which stand beside it.
+/// Reads a cluster file and the programs that it names, relative to its folder.
 pub(crate) fn read_cluster(path: &Path, text: &str, overrides: Overrides) -> Loaded {
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
     let mut loaded =
         understudy_cluster::read_with(&path.display().to_string(), text, overrides, &mut |name| {
             named_file(&folder, name)
         });
-    // Ladders are shown as a person would open them from here.
+    // Programs are named relative to the current folder.
     for report in loaded.reports.iter_mut().skip(1) {
         report.name = folder.join(&report.name).display().to_string();
     }
     loaded
 }
 
-/// A cluster without errors, and the files that it came from with their warnings.
+/// A valid cluster, and its files with their warnings.
 pub(crate) fn cluster(path: &Path, overrides: Overrides) -> Result<(Cluster, Vec<Report>), Answer> {
     let text = text_of(Kind::Cluster, path)?;
     let Loaded { cluster, reports } = read_cluster(path, &text, overrides);
@@ -127,7 +127,7 @@ pub(crate) fn cluster(path: &Path, overrides: Overrides) -> Result<(Cluster, Vec
     }
 }
 
-/// A scenario for a cluster, without errors.
+/// A valid scenario for a cluster.
 pub(crate) fn scenario(path: &Path, cluster: &Cluster) -> Result<Scenario, Answer> {
     let text = text_of(Kind::Scenario, path)?;
     let found = read_scenario(
@@ -140,14 +140,14 @@ pub(crate) fn scenario(path: &Path, cluster: &Cluster) -> Result<Scenario, Answe
         .ok_or_else(|| Answer::bad_files(vec![found.report]))
 }
 
-/// A file to be written.
+/// A file to write.
 pub(crate) struct NewFile {
-    /// Its name, without folders.
+    /// File name without folders.
     pub(crate) name: String,
     pub(crate) bytes: Vec<u8>,
 }
 
-/// Writes files of a template into a folder that has none of them.
+/// Writes the files of a template to a folder without overwriting.
 pub(crate) fn write_template(
     folder: &Path,
     files: &[TemplateFile],
@@ -159,7 +159,7 @@ pub(crate) fn write_template(
     write_new(folder, &files.collect::<Vec<_>>())
 }
 
-/// Writes files into a folder that has none of them: all, or none.
+/// Writes all files to a folder, or none, without overwriting.
 pub(crate) fn write_new(folder: &Path, files: &[NewFile]) -> Result<Vec<PathBuf>, Answer> {
     let paths: Vec<PathBuf> = files.iter().map(|file| folder.join(&file.name)).collect();
     let existing: Vec<String> = paths
@@ -169,7 +169,7 @@ pub(crate) fn write_new(folder: &Path, files: &[NewFile]) -> Result<Vec<PathBuf>
         .collect();
     if !existing.is_empty() {
         let message = format!(
-            "nothing is overwritten, and these files exist already: {}; name another folder, or move them away",
+            "these files already exist and are not overwritten: {}; choose another folder or move them",
             existing.join(", ")
         );
         return Err(Answer::failed(Status::BadInput, "U0603", message));

@@ -1,4 +1,4 @@
-//! What a file is, so that one in the wrong place is told from one that is wrong.
+//! Recognises the kind of a file, to report a file of the wrong kind as such.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use understudy_supervisor::FileKind;
 
 use crate::answer::{Answer, Status};
 
-/// The files that people write.
+/// Kind of an input file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     Cluster,
@@ -20,13 +20,13 @@ pub(crate) enum Kind {
     Map,
     Ads,
     Ladder,
-    /// Neither the name nor the contents tell it.
+    /// Neither the name nor the content determines the kind.
     Unknown,
 }
 
 impl Kind {
-    /// By the ending, for TOML by keys that only one kind has, and for programs by what they begin with. TOML that could be anything is
-    /// taken for a cluster file.
+    /// Determines the kind by file extension, for TOML by characteristic keys, for programs by their first lines. Other TOML is
+    /// considered a cluster file.
     pub(crate) fn of(path: &Path, text: &str) -> Self {
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
         if ending == "ads" {
@@ -48,7 +48,7 @@ impl Kind {
         }
     }
 
-    /// As `check` and its answers for machines call it.
+    /// Name in the answers of `check`.
     pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Cluster => "cluster",
@@ -67,18 +67,18 @@ impl Kind {
         match self {
             Self::Cluster => "a cluster file",
             Self::Scenario => "a scenario",
-            Self::Project => "a project of reconfiguration",
+            Self::Project => "a reconfiguration project",
             Self::Model => "a model of plants and specifications",
             Self::Net => "a Petri net",
-            Self::Map => "a map of signals",
-            Self::Ads => "an automaton of TCT",
+            Self::Map => "a signal map",
+            Self::Ads => "a TCT automaton",
             Self::Ladder => "a ladder",
-            Self::Unknown => "a file of unknown form",
+            Self::Unknown => "a file of unknown formatatat",
         }
     }
 }
 
-/// A failure where a file is of another kind than `wanted`. Files of unknown form pass: their own reader says what is wrong.
+/// Fails if a file is not of the `wanted` kind. Unrecognised files pass; their reader reports the errors.
 pub(crate) fn expect(wanted: Kind, path: &Path, text: &str) -> Result<(), Answer> {
     let found = Kind::of(path, text);
     let is_sure = match found {
@@ -91,17 +91,17 @@ pub(crate) fn expect(wanted: Kind, path: &Path, text: &str) -> Result<(), Answer
     }
     let way_out = match (wanted, found) {
         (Kind::Cluster, Kind::Scenario) => {
-            "`lab` and `simulate` take a scenario by --scenario, behind its cluster file"
+            "give a scenario to `lab` and `simulate` by --scenario, after the cluster file"
         }
         (Kind::Cluster, Kind::Ladder) => {
-            "a cluster file names ladders as `ladder = \"FILE\"`, and `understudy init` writes one to begin with"
+            "a cluster file names programs by `ladder = \"FILE\"`; `understudy init` writes a first one"
         }
-        (Kind::Ladder, Kind::Cluster) => "name one of the ladders that stand in it",
-        (Kind::Cluster, _) => "`understudy init` writes one to begin with",
-        _ => "`understudy check` says what a file is, and what is wrong with it",
+        (Kind::Ladder, Kind::Cluster) => "name one of its ladder programs",
+        (Kind::Cluster, _) => "`understudy init` writes a first one",
+        _ => "`understudy check` reports the kind of a file and its errors",
     };
     let message = format!(
-        "{} is {}, and {} is wanted here: {way_out}",
+        "{} is {}; expected {}: {way_out}",
         path.display(),
         found.in_a_sentence(),
         wanted.in_a_sentence()

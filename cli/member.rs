@@ -278,7 +278,7 @@ fn read_keys(arguments: &Arguments, cluster: &Cluster, member: Member) -> Result
     hold_back_signals()
         .map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))?;
     let keys = MemberKeys::load(folder, cluster, member, now);
-    let keys = keys.map_err(|errors| crate::keys::failed(&errors))?;
+    let keys = keys.map_err(|errors| crate::deployment::keys::failed(&errors))?;
     let keys = Arc::new(keys);
     let seal = keys.begin_life(now);
     let watch = keys.watch();
@@ -289,7 +289,7 @@ fn read_keys(arguments: &Arguments, cluster: &Cluster, member: Member) -> Result
             channel: (!arguments.in_laboratory).then(|| channel(keys, cluster)),
             _watch: Some(watch),
         }),
-        (Err(error), _) | (_, Err(error)) => Err(crate::keys::failed(&[error])),
+        (Err(error), _) | (_, Err(error)) => Err(crate::deployment::keys::failed(&[error])),
     }
 }
 
@@ -305,7 +305,7 @@ fn new_life(keys: &Arc<MemberKeys>) -> NewLife {
 fn channel(keys: Arc<MemberKeys>, cluster: &Cluster) -> ChannelSettings {
     let tls = keys.tls().clone();
     ChannelSettings {
-        keys: crate::operate::tls_keys(&tls),
+        keys: crate::deployment::operate::tls_keys(&tls),
         admitted: Box::new(move || {
             let (operators, members) = keys.admitted();
             Admitted { operators, members }

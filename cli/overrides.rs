@@ -1,4 +1,4 @@
-//! What the command line says instead of the cluster file, and passes on to every process.
+//! Overrides of the cluster file, passed on to every process.
 
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -11,23 +11,23 @@ use understudy_text::duration::{parse_positive};
 
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct OverrideArguments {
-    /// Period of a cycle in place of the cluster file's, such as 10ms
+    /// Cycle period, such as 10ms, overrides the cluster file
     #[arg(long, value_name = "TIME", value_parser = parse_positive)]
     period: Option<Duration>,
-    /// What carries the frames, in place of the cluster file's
+    /// Link, overrides the cluster file
     #[arg(long, value_enum)]
     link: Option<LinkArgument>,
-    /// Who may speak, in place of the cluster file's
+    /// Authentication, overrides the cluster file
     #[arg(long, value_enum)]
     security: Option<SecurityArgument>,
-    /// How many failures are masked, in place of the cluster file's
+    /// Redundancy mode, overrides the cluster file
     #[arg(long, value_enum)]
     mode: Option<ModeArgument>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum LinkArgument {
-    /// Plain UDP
+    /// UDP
     Udp,
     /// Zenoh
     Zenoh,
@@ -35,17 +35,17 @@ enum LinkArgument {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum SecurityArgument {
-    /// Whoever has the keys of the cluster
+    /// Accept only frames sealed with the keys of the cluster
     Keys,
-    /// Everybody on the network
+    /// Accept all frames from the network
     Off,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum ModeArgument {
-    /// Any number, as long as an understudy lives
+    /// Mask any number of controller failures while one understudy is working
     Full,
-    /// One, as in the paper
+    /// Mask one failure, as in the paper
     Paper,
 }
 
@@ -68,12 +68,12 @@ impl OverrideArguments {
         }
     }
 
-    /// Whether the command line says the period.
+    /// Whether a period was given.
     pub(crate) fn has_period(&self) -> bool {
         self.period.is_some()
     }
 
-    /// The same with a period.
+    /// The same overrides with a period.
     pub(crate) fn with_period(&self, period: Duration) -> Self {
         Self {
             period: Some(period),
@@ -81,7 +81,7 @@ impl OverrideArguments {
         }
     }
 
-    /// The same over the link that was asked for, or over each of them.
+    /// The overrides for the given link, or for each link.
     pub(crate) fn each_link(&self) -> Vec<(LinkKind, Self)> {
         let links = [
             (LinkKind::Udp, LinkArgument::Udp),
@@ -103,7 +103,7 @@ impl OverrideArguments {
         over.collect()
     }
 
-    /// The same as arguments of another process.
+    /// The overrides as command-line arguments.
     pub(crate) fn to_arguments(&self) -> Vec<String> {
         let mut arguments = Vec::new();
         if let Some(period) = self.period {
@@ -131,7 +131,7 @@ impl OverrideArguments {
     }
 }
 
-/// What carries the frames of a cluster.
+/// Link of a cluster.
 pub(crate) fn link_kind(cluster: &Cluster) -> LinkKind {
     match cluster.link() {
         Link::Udp => LinkKind::Udp,
@@ -149,7 +149,7 @@ pub(crate) fn parse_size(text: &str) -> Result<u64, String> {
     match parsed {
         Some(size) if (1e5..1e16).contains(&size) => Ok(size as u64),
         _ => Err(format!(
-            "{text:?} is no size of at least 100kB with its unit, such as 200MB or 1GB"
+            "{text:?} is not a size: expected at least 100kB with a unit, such as 200MB or 1GB"
         )),
     }
 }
@@ -158,7 +158,7 @@ pub(crate) fn parse_size(text: &str) -> Result<u64, String> {
 pub(crate) fn parse_address(text: &str) -> Result<SocketAddr, String> {
     text.parse().map_err(|_| {
         format!(
-            "{text:?} is no address with its port, the host as a number, such as 127.0.0.1:7480"
+            "{text:?} is not an address: expected a numeric host and a port, such as 127.0.0.1:7480"
         )
     })
 }

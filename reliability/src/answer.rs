@@ -11,7 +11,7 @@ use crate::quantity::{grouped, probability, stated};
 use crate::system::System;
 use crate::transient::AfterFailure;
 
-/// The answer, as it stands in JSON. Times in hours. What is nothing was not asked for.
+/// Result of `reliability`, as in JSON. Times in hours; absent values were not requested.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Answer {
     /// What was asked.
@@ -22,11 +22,11 @@ pub struct Answer {
     pub mttf_paper_hours: f64,
     /// The cluster as it is built here.
     pub mttf_cluster_hours: f64,
-    /// A full duplex of 2N boxes, (21).
+    /// Full duplex of 2N controllers, (21).
     pub mttf_duplex_hours: f64,
-    /// N boxes and no spare.
+    /// N controllers without redundancy.
     pub mttf_simplex_hours: f64,
-    /// 3N boxes, two of three.
+    /// 3N controllers, two out of three.
     pub mttf_tmr_hours: f64,
     /// Standard deviation of the cluster's time to failure.
     pub deviation_cluster_hours: Option<f64>,
@@ -61,7 +61,7 @@ pub struct Mission {
     pub unreliability_simplex: Option<f64>,
     /// 1 - R of TMR.
     pub unreliability_tmr: Option<f64>,
-    /// All boxes of the paper's model work, (15).
+    /// All stations of the paper's model work, (15).
     pub p0: Option<f64>,
     /// Some box of it is down, (16).
     pub p1: Option<f64>,
@@ -89,7 +89,7 @@ pub fn calculate(options: &Options) -> Result<Answer, Vec<ReliabilityError>> {
             let at = |chain: &Chain| chain.transient(hours, AfterFailure::Final).map_err(one);
             let (cluster, simplex) = (at(&cluster_chain)?, at(&simplex.chain()?)?);
             let states = at(&paper_chain)?;
-            // Its first state is the one in which all boxes work, and it comes back to no failure.
+            // In its first state all stations work.
             let p0 = states.probabilities[0];
             let alive = (1..paper_chain.states()).filter(|state| !paper_chain.is_failure(*state));
             let p1: f64 = alive.map(|state| states.probabilities[state]).sum();

@@ -1,4 +1,4 @@
-//! Boxes that are not like the others, as they stand on a command line: `NAME=MTBF,MTTR` or `NAME*COUNT=MTBF,MTTR`.
+//! Stations with individual times on the command line: `NAME=MTBF,MTTR` or `NAME*COUNT=MTBF,MTTR`.
 
 use std::str::FromStr;
 
@@ -33,7 +33,7 @@ impl FromStr for UnequalBoxes {
             text: text.to_owned(),
             why: why.to_owned(),
         };
-        let (which, times) = text.split_once('=').ok_or_else(|| wrong("it has no ="))?;
+        let (which, times) = text.split_once('=').ok_or_else(|| wrong("missing ="))?;
         let (mtbf, mttr) = times
             .split_once(',')
             .ok_or_else(|| wrong("after = stand an MTBF and an MTTR with a comma between them"))?;
@@ -61,7 +61,7 @@ impl FromStr for UnequalBoxes {
     }
 }
 
-/// A shared part as it stands on a command line: `NAME=MTBF`.
+/// A shared part on the command line: `NAME=MTBF`.
 impl FromStr for crate::system::SharedPart {
     type Err = ReliabilityError;
 
@@ -76,7 +76,7 @@ impl FromStr for crate::system::SharedPart {
             }),
             _ => Err(ReliabilityError::BoxText {
                 text: text.to_owned(),
-                why: "it is written NAME=MTBF".to_owned(),
+                why: "expected NAME=MTBF".to_owned(),
             }),
         }
     }

@@ -1,4 +1,4 @@
-//! A campaign of failures, whoever ran it, held against the model: estimates with intervals, the fit, and what contradicts it.
+//! A measured campaign of failures compared with the model: estimates with intervals, goodness of fit, contradictions.
 
 use std::collections::BTreeMap;
 
@@ -41,7 +41,7 @@ pub struct Campaign {
     pub failures: Vec<SystemFailure>,
     /// Hours of runs that were given up before they failed.
     pub censored_hours: Vec<f64>,
-    /// Failures of single boxes that a masking was asked of.
+    /// Failures of single stations that should have been masked.
     pub box_failures: u64,
     /// Those of them that were masked.
     pub masked: u64,
@@ -53,7 +53,7 @@ pub struct Campaign {
     pub unfinished_repair_hours: Vec<f64>,
 }
 
-/// A campaign beside the model.
+/// A campaign compared with the model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Assessment {
     /// Where it was run.
@@ -72,7 +72,7 @@ pub struct Assessment {
     pub model_hours: f64,
     /// Whether the model lies in the interval.
     pub agrees: bool,
-    /// Share of failures of boxes that were masked.
+    /// Share of masked station failures.
     pub coverage: Option<Interval>,
     /// Mean time to detect, in hours.
     pub detection_hours: Option<Interval>,
@@ -86,7 +86,7 @@ pub struct Assessment {
     pub rare_event: RareEvent,
     /// How often each cause was found.
     pub causes: BTreeMap<String, u64>,
-    /// After so many failures, the estimate and its interval.
+    /// Estimate with its interval after a number of failures.
     pub running: Vec<(usize, Interval)>,
     /// The failures, the first of them.
     pub log: Vec<SystemFailure>,
@@ -186,7 +186,7 @@ fn doubts(found: &Assessment, system: &System) -> Vec<String> {
     let mut doubts = Vec::new();
     if !found.agrees {
         doubts.push(format!(
-            "The model's MTTF of {} h lies outside the measured interval.",
+            "The model's MTTF of {} h is outside of the measured interval.",
             grouped(found.model_hours)
         ));
     }
@@ -194,7 +194,7 @@ fn doubts(found: &Assessment, system: &System) -> Vec<String> {
         && !coverage.covers(system.coverage.get())
     {
         doubts.push(format!(
-            "The model takes a coverage of {}, which lies outside the measured interval.",
+            "The model takes a coverage of {}, which is outside of the measured interval.",
             system.coverage.get()
         ));
     }

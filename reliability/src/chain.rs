@@ -38,7 +38,7 @@ impl ChainBuilder {
         Self::default()
     }
 
-    /// Adds a state and gives its place. Names are for people and need not differ; an empty name stands for the place.
+    /// Adds a state and returns its index. Names need not be unique; an empty name is replaced by the index.
     pub fn state(&mut self, name: impl Into<String>) -> usize {
         self.names.push(name.into());
         self.failures.push(false);

@@ -96,7 +96,7 @@ pub fn answer_chain(
         Some(hours) => {
             let first = chain.transient(hours.get(), AfterFailure::Final)?;
             let later = chain.transient(hours.get(), AfterFailure::Repaired)?;
-            // Without a failure state there is no failure, and this is no number that is too small.
+            // Without a failure state there is no failure, and this is not a number that is too small.
             let failed = |probability| match failures().next() {
                 None => Some(0.0),
                 Some(_) => stated(probability),

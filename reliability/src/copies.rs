@@ -28,7 +28,7 @@ pub struct Survival {
 }
 
 impl System {
-    /// The chain of `copies` boxes for each controller, of which one may be down at a time.
+    /// Chain with `copies` controllers in place of each, of which one may be down at a time.
     ///
     /// # Errors
     /// As [`System::chain`].

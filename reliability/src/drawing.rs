@@ -225,7 +225,7 @@ fn label(value: f64) -> String {
 /// One bar of a tornado: name, and the values at its two ends.
 pub(crate) type Bar = (String, f64, f64);
 
-/// Width of the names beside a tornado, in pixels.
+/// Width of the names of a tornado diagram, in pixels.
 const NAMES: i32 = 260;
 
 /// Bars around `centre`; on a logarithmic axis where they reach far.

@@ -225,7 +225,7 @@ impl<'a> Alive<'a> {
         Ok(gathered[0] / eliminated.leaving[0])
     }
 
-    /// The mean time of a chain whose states stand in a line.
+    /// Mean time to failure of a birth-death chain.
     fn line(&self) -> Result<f64, ReliabilityError> {
         birth_death_mttf(self.order.len(), |place| {
             let mut level = Level {

@@ -57,7 +57,7 @@ pub enum ReliabilityError {
         maximum: u64,
     },
     /// A text that is no time.
-    #[error("U0705: {text:?} is no time: {why}")]
+    #[error("U0705: {text:?} is not a time: {why}")]
     TimeText {
         /// As it was given.
         text: String,
@@ -134,7 +134,7 @@ pub enum ReliabilityError {
         reached: f64,
     },
     /// A result that no double holds.
-    #[error("U0715: {what} is beyond the range of the arithmetic")]
+    #[error("U0715: {what} is outside of the numeric range")]
     OutOfRange {
         /// Which one.
         what: String,
@@ -163,7 +163,7 @@ pub enum ReliabilityError {
         /// Groups asked for.
         groups: u64,
     },
-    /// A text that is neither boxes nor a part with times.
+    /// Invalid text of stations or of a shared part.
     #[error("U0720: {text:?} names no boxes with their times: {why}")]
     BoxText {
         /// As it was given.

@@ -28,17 +28,17 @@ pub struct PerUnit {
 pub struct FigurePoint {
     /// N
     pub controllers: u32,
-    /// Without spares, N boxes.
+    /// N controllers without an understudy.
     pub simplex_hours: f64,
-    /// The paper's model, N + 1 boxes.
+    /// The paper's model, N + 1 stations.
     pub paper: PerUnit,
-    /// The cluster as built, with one understudy, N + 1 boxes.
+    /// The implemented cluster with one understudy, N + 1 stations.
     pub cluster: PerUnit,
-    /// The full duplex, 2N boxes.
+    /// Full duplex, 2N controllers.
     pub duplex: PerUnit,
 }
 
-/// The points of figures 5 and 6 for boxes with these times.
+/// Points of figures 5 and 6 for stations with these times.
 ///
 /// # Errors
 /// As [`System::chain`] and [`Chain::mttf`](crate::Chain::mttf).

@@ -46,7 +46,7 @@ const MAXIMUM_FINDINGS: usize = 200;
 /// What was read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadChain {
-    /// The chain, where nothing stands against it.
+    /// The chain, if it is valid.
     pub chain: Option<Chain>,
     /// The text with all that was found.
     pub report: Report,
@@ -145,7 +145,7 @@ impl Reader {
             self.constant(line, name, value, offset);
         } else {
             self.findings.push(
-                Diagnostic::error("U0721", "this is no line of a chain", whole).with_help(
+                Diagnostic::error("U0721", "this is not a line of a chain", whole).with_help(
                     "write `name = 10000h`, `state name`, `state name start`, `state name failure` or `from -> to : 1 / 24h`",
                 ),
             );
@@ -167,8 +167,12 @@ impl Reader {
         };
         if let Some(before) = self.constants.get(name) {
             self.findings.push(
-                Diagnostic::error("U0722", format!("the constant {name} is there twice"), span)
-                    .with_related(before.span.clone(), "here for the first time"),
+                Diagnostic::error(
+                    "U0722",
+                    format!("the constant {name} is declared twice"),
+                    span,
+                )
+                .with_related(before.span.clone(), "first occurrence"),
             );
         } else {
             self.constants.insert(name.into(), constant);
@@ -189,8 +193,8 @@ impl Reader {
         }
         if let Some(&place) = self.places.get(name) {
             self.findings.push(
-                Diagnostic::error("U0722", format!("the state {name} is there twice"), span)
-                    .with_related(self.states[place].1.clone(), "here for the first time"),
+                Diagnostic::error("U0722", format!("the state {name} is declared twice"), span)
+                    .with_related(self.states[place].1.clone(), "first occurrence"),
             );
             return;
         }
@@ -205,12 +209,12 @@ impl Reader {
                 ("start", None) => self.start = Some((place, span)),
                 ("start", Some((_, before))) => self.findings.push(
                     Diagnostic::error("U0726", "a chain has one start", span)
-                        .with_related(before.clone(), "here is the first one"),
+                        .with_related(before.clone(), "first start"),
                 ),
                 _ => {
                     let finding = Diagnostic::error(
                         "U0721",
-                        format!("{word} says nothing about a state"),
+                        format!("{word} is not a property of a state"),
                         span,
                     );
                     self.findings
@@ -382,7 +386,7 @@ impl Reader {
                     format!("the state {state} cannot be reached from the start"),
                     span,
                 )
-                .with_help("add a transition that leads there, or leave the state out")
+                .with_help("add a transition that leads there, or remove the state")
             }
             error => Diagnostic::error("U0730", error.to_string(), end..end),
         };
@@ -418,7 +422,7 @@ impl Reader {
     }
 }
 
-/// Where a part of a line stands in the text.
+/// Position of a part of a line in the text.
 fn span_of(line: &str, part: &str, offset: usize) -> Range<usize> {
     let start = offset
         + (part.as_ptr() as usize)

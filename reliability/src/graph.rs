@@ -199,7 +199,7 @@ fn edge(
             f64::midpoint(start.1, end.1) + ny,
         )
     };
-    // Nearer to where it comes from, so that the rates of both directions stand apart.
+    // Nearer to its origin, so that the rates of both directions do not overlap.
     let at = |start: f64, control: f64, end: f64| 0.42 * start + 0.46 * control + 0.12 * end;
     let place = (
         at(start.0, control.0, end.0),

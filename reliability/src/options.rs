@@ -1,4 +1,4 @@
-//! What is asked about a cluster of alike boxes, from a command line or a cluster file, and the system that it means.
+//! Options of a reliability calculation, from the command line or a cluster file, and the resulting system.
 
 use serde::Serialize;
 
@@ -30,13 +30,13 @@ pub struct Options {
     pub coverage: f64,
     /// Mean time to detect a failure.
     pub detection: Option<Hours>,
-    /// Share β of failures that hit all boxes at once.
+    /// Common-cause factor β: share of failures that affect all stations.
     pub beta: f64,
     /// How β is counted.
     pub convention: CommonCauseConvention,
     /// Parts that everything depends on.
     pub shared: Vec<SharedPart>,
-    /// The time over which it has to work.
+    /// Mission time.
     pub mission: Option<Hours>,
 }
 
@@ -128,7 +128,7 @@ impl Options {
 }
 
 impl System {
-    /// The same boxes under the paper's rule, with one spare: S2 after any second failure, (14).
+    /// The same stations in paper mode, with one understudy: S2 after any second failure, (14).
     pub fn as_paper(&self) -> Self {
         let mut paper = self.clone();
         paper.rule = Rule::Paper;

@@ -86,12 +86,12 @@ impl FromStr for Hours {
         }
         let Some(length) = unit_length(unit) else {
             return Err(refused(format!(
-                "{unit:?} is no unit; there are us, ms, s, min, h, d and y"
+                "{unit:?} is not a unit; expected us, ms, s, min, h, d and y"
             )));
         };
         let value: f64 = number
             .parse()
-            .map_err(|_| refused(format!("{number:?} is no number")))?;
+            .map_err(|_| refused(format!("{number:?} is not a number")))?;
         Self::new(trimmed, value * length)
     }
 }
@@ -232,9 +232,9 @@ mod tests {
         check("2y", Ok(17_520.0));
         check("10000", Err("write 10000h for hours"));
         check("", Err("such as 10000h"));
-        check("h", Err("\"\" is no number"));
+        check("h", Err("\"\" is not a number"));
         check("3 weeks", Err("\"weeks\" is no unit"));
-        check("12½h", Err("\"12½\" is no number"));
+        check("12½h", Err("\"12½\" is not a number"));
         check("½", Err("no unit"));
         check("0h", Err("0h is 0 hours"));
         check("-4h", Err("is -4 hours"));

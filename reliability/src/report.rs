@@ -177,11 +177,14 @@ fn curve(chain: &Chain, from: f64, to: f64) -> Result<Vec<(f64, f64, f64)>, Reli
 
 fn assumptions(options: &Options) -> Vec<String> {
     let mut said = vec![
-        "Boxes fail independently of each other, at a constant rate; times to repair are exponential.".into(),
-        "A returning box takes over its states in a time that is short beside its repair.".into(),
+        "Stations fail independently at constant rates; repair times are exponential.".into(),
+        "A repaired station receives its states in a time that is short compared with its repair."
+            .into(),
         match options.crews {
-            None => "There is a repair crew for each box.".to_owned(),
-            Some(crews) => format!("{crews} boxes can be repaired at the same time; which ones is left to chance."),
+            None => "Each station has its own repair crew.".to_owned(),
+            Some(crews) => {
+                format!("{crews} stations can be repaired at the same time, in random order.")
+            }
         },
     ];
     said.push(if options.coverage < 1.0 {
@@ -190,7 +193,8 @@ fn assumptions(options: &Options) -> Vec<String> {
             options.coverage
         )
     } else {
-        "Every failure is masked as long as the words that remain allow it (coverage 1).".into()
+        "Every failure is masked as long as the remaining parity words allow it (coverage 1)."
+            .into()
     });
     said.push(match options.detection {
         None => "Repair starts at the failure: detection takes no time.".into(),
@@ -213,16 +217,16 @@ fn assumptions(options: &Options) -> Vec<String> {
     if options.beta > 0.0 {
         said.push(match options.convention {
             crate::CommonCauseConvention::Additive => format!(
-                "Common causes take all boxes at β λ with β = {}, besides the failures of each box at λ (additive).",
+                "Common causes affect all stations at β λ with β = {}, in addition to the failures of each station at λ (additive).",
                 options.beta
             ),
             crate::CommonCauseConvention::Split => format!(
-                "Of the failures of a box, the share β = {} takes all boxes, and 1 - β that box alone (split).",
+                "Of the failures of a station, the share β = {} affects all stations, and 1 - β only that station (split).",
                 options.beta
             ),
         });
     } else {
-        said.push("No common cause takes several boxes at once.".into());
+        said.push("No common cause affects several stations.".into());
     }
     if options.shared.is_empty() {
         said.push("Network, power and remote I/Os do not fail.".into());
@@ -320,7 +324,7 @@ fn pictures(data: &ReportData) -> Result<Value, ReliabilityError> {
         };
         data.over_time.iter().map(curve).collect()
     };
-    let controllers = || linear("controllers that are not redundant, N");
+    let controllers = || linear("non-redundant controllers, N");
     let bars: Vec<_> = data
         .sensitivities
         .iter()

@@ -187,7 +187,7 @@ pub fn what_if(
     spare.understudies.count += 1;
     changes.push((
         if system.groups > 1 {
-            "one more understudy in each group".into()
+            "one additional understudy per group".into()
         } else {
             "one more understudy".into()
         },
@@ -198,17 +198,17 @@ pub fn what_if(
         let kind = kind_at(&mut faster, index);
         kind.mttr = scaled(kind.mttr, 0.5).map_err(one)?;
     }
-    changes.push(("repair twice as fast".into(), faster));
+    changes.push(("half the MTTR".into(), faster));
     let mut better = system.clone();
     for index in 0..=system.controllers.len() {
         let kind = kind_at(&mut better, index);
         kind.mtbf = scaled(kind.mtbf, 2.0).map_err(one)?;
     }
-    changes.push(("boxes that fail half as often".into(), better));
+    changes.push(("stations with twice the MTBF".into(), better));
     if let Some(crews) = system.crews {
         let mut staffed = system.clone();
         staffed.crews = Some(crews + 1);
-        changes.push(("one more repair crew".into(), staffed));
+        changes.push(("one additional repair crew".into(), staffed));
     }
     if system.coverage < Probability::ONE {
         let mut covered = system.clone();
@@ -220,7 +220,7 @@ pub fn what_if(
     if let Some(latency) = system.detection {
         let mut sooner = system.clone();
         sooner.detection = Some(scaled(latency, 0.5).map_err(one)?);
-        changes.push(("detection twice as fast".into(), sooner));
+        changes.push(("half the detection time".into(), sooner));
     }
     changes
         .into_iter()

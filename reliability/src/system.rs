@@ -41,13 +41,13 @@ pub struct BoxKind {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rule {
-    /// At the second failure of any of its boxes, (14).
+    /// At the second failure of any of its stations, (14).
     Paper,
     /// When all understudies and at least one controller are down.
     AsBuilt,
 }
 
-/// How the share beta of failures that hit all boxes at once is counted.
+/// Convention for the common-cause factor beta.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CommonCauseConvention {
@@ -57,7 +57,7 @@ pub enum CommonCauseConvention {
     Split,
 }
 
-/// Failures that hit all boxes at once. λ is that of the kind that fails most often.
+/// Common-cause failures. λ is that of the kind with the highest failure rate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CommonCause {
     /// β
@@ -93,7 +93,7 @@ pub struct System {
     pub coverage: Probability,
     /// Mean time from a failure to its detection, after which repair starts.
     pub detection: Option<Hours>,
-    /// Failures that hit all boxes at once.
+    /// Common-cause failures.
     pub common_cause: Option<CommonCause>,
     /// Parts that everything depends on.
     pub shared: Vec<SharedPart>,
@@ -178,7 +178,7 @@ impl System {
         }
     }
 
-    /// The chain of this system; its first state is the one in which all boxes work, its last `failed`.
+    /// Markov chain of this system. In its first state all stations work; its last state is `failed`.
     ///
     /// # Errors
     /// As [`System::check`], and more states than [`MAXIMUM_MODEL_STATES`].

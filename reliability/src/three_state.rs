@@ -22,7 +22,7 @@ const SERIES_UP_TO: f64 = 30.0;
 /// State probabilities, (15) to (17).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct StateProbabilities {
-    /// All boxes work.
+    /// All stations work.
     pub p0: f64,
     /// One box is down, and nothing is lost.
     pub p1: f64,

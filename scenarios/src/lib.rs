@@ -19,6 +19,7 @@ mod summary;
 mod table;
 mod terms;
 mod troubles;
+mod verdict;
 mod write;
 
 pub use account::{Account, Counts, Interval, OriginRule, Presence, Service, Stall, Terms};

@@ -88,7 +88,7 @@ fn a_property_that_does_not_hold_keeps_a_program_from_its_controller() {
     assert!(
         answer
             .output
-            .contains("no box for painting: it is not recommended"),
+            .contains("no box for painting: not recommended"),
         "{}",
         answer.output
     );

@@ -137,7 +137,7 @@ fn what_is_wrong_with_the_arguments_is_said() {
     check(&[PRESS_CELL, "--shard", "9/8"], "from 1 to N");
     // Parts of different seeds are not those of one campaign.
     check(&[PRESS_CELL, "--shard", "1/2"], "--seed <N>");
-    check(&[PRESS_CELL, "--faults", "crush"], "there is no fault");
+    check(&[PRESS_CELL, "--faults", "crush"], "unknown fault");
     check(&[PRESS_CELL, "--budget", "10"], "invalid duration `10`");
     check(&[PRESS_CELL, "--cycles", "3"], "150");
     check(&["merge", "nowhere", "neither"], "neither");

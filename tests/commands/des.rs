@@ -142,9 +142,9 @@ fn a_supervisor_that_forbids_what_it_cannot_is_not_reduced() {
         let answer = understudy(&["des", operation, &plant, &supervisor, "-o", out]);
         assert_eq!(answer.status, 1, "{operation}: {}", answer.output);
         assert!(
-            answer
-                .errors
-                .contains("error[U0846]: in state b the supervisor forbids fail"),
+            answer.errors.contains(
+                "error[U0846]: in state b the supervisor disables the uncontrollable event fail"
+            ),
             "{operation}: {}",
             answer.errors
         );

@@ -4,42 +4,14 @@ use insta::assert_snapshot;
 
 use crate::understudy;
 
-const COMMANDS: [&str; 34] = [
-    "allocate",
-    "catalogue",
-    "resources",
-    "campaign",
-    "demo",
-    "lab",
-    "watch",
-    "simulate",
-    "check",
-    "explain",
-    "parity",
-    "draw",
-    "supervisor-to-ladder",
-    "reconfigure",
-    "reliability",
-    "measure",
-    "top",
-    "why",
-    "journal",
-    "diff",
-    "animate",
-    "init",
-    "keys",
-    "operate",
-    "doctor",
-    "gateway",
-    "node",
-    "remote-io",
-    "plant",
-    "proxy",
-    "bench",
-    "schema",
-    "completions",
-    "man",
-];
+/// The commands that the help lists, under the headings of their groups.
+fn commands() -> Vec<String> {
+    let help = understudy(&["--help"]).output;
+    let lists = help.split("Options:").next().unwrap_or_default();
+    let lines = lists.lines().filter_map(|line| line.strip_prefix("  "));
+    let names = lines.filter_map(|line| line.split_whitespace().next());
+    names.map(str::to_owned).collect()
+}
 
 #[test]
 fn the_command_explains_itself() {
@@ -48,7 +20,9 @@ fn the_command_explains_itself() {
 
 #[test]
 fn every_command_has_an_example() {
-    for command in COMMANDS {
+    let commands = commands();
+    assert!(commands.len() > 35, "{commands:?}");
+    for command in &commands {
         let help = understudy(&[command, "--help"]);
         assert_eq!(help.status, 0, "{command}");
         assert!(
@@ -119,4 +93,17 @@ fn keys_without_addresses_are_said_to_be_for_one_machine() {
     assert!(renewed.output.starts_with(warning), "{}", renewed.output);
     let revoked = crate::understudy_in(&folder, &["keys", "revoke", "tank"]);
     assert!(!revoked.output.contains("U0915"), "{}", revoked.output);
+}
+
+#[test]
+fn manual_and_completions_have_the_groups_of_the_help() {
+    let manual = understudy(&["man"]).output;
+    for heading in ["Run and test clusters", "Inspect runs", "Tools"] {
+        assert!(
+            manual.contains(&format!(".SH \"{heading}\""))
+                || manual.contains(&format!(".SH {heading}"))
+        );
+    }
+    let script = understudy(&["completions", "fish"]).output;
+    assert!(script.contains("inspect: "), "{script}");
 }

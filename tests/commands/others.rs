@@ -238,14 +238,14 @@ fn a_file_in_the_wrong_place_is_named_with_the_way_out() {
         "U0616",
         "understudy init",
     );
-    check(&["draw", cell], "U0616", "one of the ladders");
+    check(&["draw", cell], "U0616", "one of its ladder programs");
     check(&["synth", cell], "U0616", "a model of plants");
     check(&["petri", "bounds", cell], "U0616", "a Petri net");
-    check(&["reconfigure", cell], "U0616", "a project");
+    check(&["reconfigure", cell], "U0616", "a reconfiguration project");
     check(
         &["des", "trim", "examples/vents/vents.ladder"],
         "U0616",
-        "an automaton",
+        "a TCT automaton",
     );
     check(
         &["convert", "examples/vents/vents.ladder", "vents.pdf"],
@@ -271,7 +271,7 @@ fn what_was_only_used_has_its_warnings_counted() {
     let run = ["simulate", cell, "--cycles", "10"];
     let answer = understudy(&run);
     assert_eq!(answer.status, 0, "{}", answer.errors);
-    let expected = format!("3 warnings; `understudy check {cell}` shows them\n");
+    let expected = format!("3 warnings; `understudy check {cell}` lists them\n");
     let (said, _) = answer.errors.split_once("next:").expect("a next step");
     assert_eq!(said, expected);
     let json = understudy(&[&run[..], &["--json"]].concat()).json();

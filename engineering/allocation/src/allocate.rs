@@ -1,9 +1,9 @@
-//! The plan: for every box of a plant the controllers that could be it, ranked, and the boxes to take.
+//! The plan: ranked suitable controllers for every controller position of a plant, and the selection.
 //!
 //! Two rules come from the redundancy itself. An understudy never shares a box with a program of its own group, nor with another
 //! understudy of it: when that box fails, what is to be restored and what restores it are gone together. And programs of one group share no
 //! box unless the user says so: a box that fails would take two of them, and then one understudy of the paper's kind cannot restore either.
-//! A remote I/O stands at the plant and shares with nobody.
+//! A remote I/O is located at the plant and is never shared.
 
 mod preference;
 mod stock;
@@ -73,11 +73,11 @@ pub struct Options {
     pub share_members: bool,
     /// Whether programs are placed that did not pass verification.
     pub unverified: bool,
-    /// The only boxes that there are; every model of the catalogue where this is empty.
+    /// Available controllers; empty: every model of the catalogue.
     pub stock: Vec<Stock>,
 }
 
-/// A controller beside one box.
+/// Assessment of a controller for one position.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Candidate {
     /// Who makes it.
@@ -87,7 +87,7 @@ pub struct Candidate {
     /// Every criterion.
     #[serde(flatten)]
     pub fit: Fit,
-    /// What a reader of its figures has to know.
+    /// Note on its figures.
     pub notes: String,
 }
 
@@ -149,11 +149,11 @@ pub struct BoxOnPlan {
 pub struct Allocation {
     /// Each box that is wanted.
     pub items: Vec<Placed>,
-    /// The boxes to take.
+    /// Selected controllers.
     pub boxes: Vec<BoxOnPlan>,
     /// Whether no better packing exists by what is preferred.
     pub best: bool,
-    /// What a reader has to know.
+    /// Notes on the plan.
     pub remarks: Vec<String>,
 }
 
@@ -317,7 +317,7 @@ fn taken<'a>(loads: impl Iterator<Item = &'a BTreeMap<Dimension, crate::fit::Loa
 /// Why an item is on no box.
 fn why(item: &Item, candidates: &[Candidate], may_be_placed: bool) -> String {
     if !may_be_placed {
-        return format!("it is not recommended: {}", item.verification.message());
+        return format!("not recommended: {}", item.verification.message());
     }
     let count = |verdict| {
         let of_it = candidates
@@ -328,11 +328,11 @@ fn why(item: &Item, candidates: &[Candidate], may_be_placed: bool) -> String {
     match (count(Verdict::Fits), count(Verdict::Unknown)) {
         (0, 0) => format!("none of {} controllers fits", candidates.len()),
         (0, unknown) => format!(
-            "no controller is known to fit: {unknown} of {} lack a figure, the others do not fit",
+            "no controller is known to be suitable: {unknown} of {} lack a figure, the others are unsuitable",
             candidates.len()
         ),
         (fitting, _) => {
-            format!("there are not enough boxes: of {fitting} that fit all are taken")
+            format!("insufficient stock: of {fitting} suitable controllers, all are in use")
         }
     }
 }

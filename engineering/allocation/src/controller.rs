@@ -51,7 +51,7 @@ pub struct Controller {
     pub numbers: BTreeMap<Quantity, Figure<u64>>,
     /// What is known in words.
     pub texts: BTreeMap<Statement, Figure<String>>,
-    /// What a reader of its figures has to know, such as that sources conflict.
+    /// Note on its figures, such as conflicting sources.
     pub notes: String,
 }
 
@@ -125,7 +125,7 @@ impl fmt::Display for Controller {
 pub struct Family {
     /// Each with its source.
     pub numbers: BTreeMap<FamilyQuantity, Figure<u64>>,
-    /// What a reader of these figures has to know.
+    /// Note on these figures.
     pub notes: String,
 }
 
@@ -142,7 +142,7 @@ impl Family {
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Catalogue {
     controllers: BTreeMap<(String, String), Controller>,
-    /// By name; a controller's family need not stand here.
+    /// Families by name; a controller's family may be missing.
     pub families: BTreeMap<String, Family>,
 }
 

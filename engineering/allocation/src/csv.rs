@@ -50,7 +50,7 @@ fn field(text: &str, at: usize, wrong: &mut Vec<Diagnostic>) -> (Field, usize) {
         if let Some(quote) = plain.find('"') {
             let span = at + quote..at + quote + 1;
             let message = "a quote inside a field that does not begin with one";
-            let help = "put the whole field in quotes, and double the quotes in it";
+            let help = "quote the whole field and double the quotes in it";
             wrong.push(Diagnostic::error("U1101", message, span).with_help(help));
         }
         let field = Field {
@@ -63,7 +63,7 @@ fn field(text: &str, at: usize, wrong: &mut Vec<Diagnostic>) -> (Field, usize) {
     let mut from = at + 1;
     loop {
         let Some(quote) = text[from..].find('"').map(|quote| from + quote) else {
-            let message = "the quote of this field is not closed";
+            let message = "missing closing quote in this field";
             wrong.push(Diagnostic::error("U1101", message, at..at + 1));
             let field = Field {
                 text: content,
@@ -79,7 +79,7 @@ fn field(text: &str, at: usize, wrong: &mut Vec<Diagnostic>) -> (Field, usize) {
         }
         let end = end_of_plain(quote + 1);
         if !text[quote + 1..end].trim().is_empty() {
-            let message = "something follows the closing quote of this field";
+            let message = "text after the closing quote of this field";
             wrong.push(Diagnostic::error("U1101", message, quote + 1..end));
         }
         let field = Field {

@@ -1,6 +1,6 @@
 //! What is known about a controller: numbers and texts, each with the source that says so.
 //!
-//! Unknown is unknown: a figure that nobody has seen is absent, and never 0. A 0 in the catalogue is a statement: "it has none".
+//! An unknown figure is absent, never 0. A 0 in the catalogue states that the controller has none.
 
 use std::fmt;
 

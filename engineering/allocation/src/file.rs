@@ -88,7 +88,7 @@ fn read_records(text: &str, wrong: &mut Vec<Diagnostic>) -> Catalogue {
             row.len(),
             header.len()
         );
-        let help = "a field with a comma stands in quotes";
+        let help = "quote fields that contain a comma";
         wrong.push(Diagnostic::error("U1102", message, whole(row)).with_help(help));
         None
     });
@@ -111,7 +111,7 @@ fn whole(row: &[Field]) -> Range<usize> {
     start..row.last().map_or(start, |field| field.span.end)
 }
 
-/// Where each known column stands.
+/// Position of each known column.
 struct Columns {
     places: BTreeMap<&'static str, usize>,
 }
@@ -132,7 +132,7 @@ impl Columns {
                 continue;
             };
             if places.insert(name, place).is_some() {
-                let message = format!("the column `{name}` stands twice");
+                let message = format!("the column `{name}` occurs twice");
                 wrong.push(Diagnostic::error("U1104", message, field.span.clone()));
             }
         }
@@ -199,9 +199,9 @@ impl Row<'_> {
         let family = self.name("family", wrong);
         let kind = Kind::of(self.text("kind"));
         if kind.is_none() {
-            let message = format!("`{}` is no kind of controller", self.text("kind"));
+            let message = format!("`{}` is not a kind of controller", self.text("kind"));
             let diagnostic = Diagnostic::error("U1106", message, self.span("kind"));
-            wrong.push(diagnostic.with_help("kinds are `plc` and `embedded`"));
+            wrong.push(diagnostic.with_help("expected `plc` or `embedded`"));
         }
         Some(Controller::new(&vendor?, &model?, &family?, kind?))
     }
@@ -217,10 +217,10 @@ fn number(
     let value = quantity.parse(text);
     if value.is_none() {
         let message = format!(
-            "`{text}` is no {quantity}: a number from 0 to {} is meant",
+            "`{text}` is not a valid {quantity}: expected a number from 0 to {}",
             quantity.text(quantity.most())
         );
-        let help = "leave the field empty where the figure is not known";
+        let help = "leave the field empty if the figure is unknown";
         wrong.push(Diagnostic::error("U1107", message, span).with_help(help));
     }
     value

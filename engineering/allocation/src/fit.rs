@@ -93,7 +93,7 @@ pub struct Finding {
     pub sources: Vec<String>,
 }
 
-/// A controller beside the needs of a box.
+/// Compares a controller with the requirements of a position.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Fit {
     /// Of all criteria together.
@@ -222,7 +222,7 @@ fn network(judge: &mut Judge<'_>) {
     let Some(figure) = controller.texts.get(&Statement::CommPorts) else {
         judge.unknown(
             "ethernet",
-            "needs an Ethernet port; which ports it has is not known".into(),
+            "needs an Ethernet port; its ports are unknown".into(),
         );
         return;
     };

@@ -102,7 +102,7 @@ pub fn instructions(program: &Program) -> Vec<Instruction> {
     for rung in &program.rungs {
         writer.series(&rung.network, Power::Rail);
         if rung.coils.is_empty() {
-            // A block at the end of its rung: nobody takes its output.
+            // A block at the end of its rung has an unused output.
             writer.list.pop();
         }
         for (place, coil) in rung.coils.iter().enumerate() {

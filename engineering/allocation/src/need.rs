@@ -26,7 +26,7 @@ pub struct Need {
     pub analog_outputs: u64,
     /// The program that it runs; a remote I/O runs none.
     pub program: Option<Resources>,
-    /// Time in which a scan has to be over, where it matters.
+    /// Maximum scan time, if limited.
     pub scan_within: Option<Duration>,
     /// Whether it needs an Ethernet port.
     pub ethernet: bool,
@@ -39,7 +39,7 @@ pub struct Terms {
     pub reserve_percent: u8,
     /// Whether inputs and outputs of expansion modules count.
     pub expansion: bool,
-    /// What is asked beside.
+    /// Additional requirements.
     pub requirements: Vec<Requirement>,
     /// How families store programs, for families of which the catalogue does not say it.
     pub assumptions: BTreeMap<FamilyQuantity, u64>,

@@ -1,4 +1,4 @@
-//! Which boxes to take so that all items are placed and the boxes cost least: a 0/1 integer program.
+//! Placement of all items on controllers at minimum cost: a 0/1 integer program.
 //!
 //! ```text
 //! min  Σ c_t y_tk + B Σ v_i            k-th copy of type t is taken; item i is left over, which costs more than all boxes
@@ -92,7 +92,7 @@ pub fn pack(
     })
 }
 
-/// Boxes for the items that share with nobody and want nothing that is scarce, and all other items.
+/// Controllers for the items that share none and need no limited stock, and all other items.
 fn settled(
     items: usize,
     types: &[BoxType],
@@ -147,7 +147,7 @@ fn pack_rest(
     }
 }
 
-/// Whether fewer items are left over, or as many and the boxes cost less.
+/// Whether fewer items remain unplaced, or the same number at lower cost.
 fn is_better(items: usize, types: &[BoxType], one: &[PackedBox], other: &[PackedBox]) -> bool {
     let measure = |boxes: &[PackedBox]| {
         let placed: usize = boxes.iter().map(|packed| packed.items.len()).sum();

@@ -1,4 +1,4 @@
-//! From the programs of a plant to the boxes that it wants.
+//! Controller positions required by the programs of a plant.
 //!
 //! Where remote I/Os have the terminals, a group of programs wants a controller for each, its understudies, and a remote I/O for each;
 //! all of them speak over a network, and scan once a period. A program that stands alone wants one controller with its terminals.
@@ -32,14 +32,14 @@ pub struct Group {
     pub understudies: Vec<String>,
     /// What the generated program consists of.
     pub understudy: Resources,
-    /// What was proved about the generated program, beside its members.
+    /// Result of the proof of the generated program.
     pub parity: Verification,
     /// From one scan to the next.
     pub period: Duration,
 }
 
 impl Group {
-    /// The boxes that the group wants; `number` tells it from other groups.
+    /// Controller positions of the group; `number` distinguishes it from other groups.
     pub fn items(&self, number: usize) -> Vec<Item> {
         let station = |role, program| Need {
             role,

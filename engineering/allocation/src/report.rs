@@ -211,7 +211,7 @@ pub fn text(allocation: &Allocation, all: bool) -> String {
     }
     if !allocation.best {
         text.push_str(
-            "there may be a better packing: models were left out, for there were too many\n",
+            "a better placement may exist: some models were omitted because of their number\n",
         );
     }
     for remark in &allocation.remarks {
@@ -225,7 +225,7 @@ fn push_item(text: &mut String, item: &Placed, shown: usize) {
     if let Some(program) = &item.program {
         let _ = write!(
             text,
-            ": {} rungs, {} elements, {} instructions, {} timers, {} counters, {} bits that remember",
+            ": {} rungs, {} elements, {} instructions, {} timers, {} counters, {} retentive bits",
             program.rungs,
             program.elements(),
             program.instructions,

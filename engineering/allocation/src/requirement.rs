@@ -1,4 +1,4 @@
-//! What a person asks of a controller beside what the program needs: `digital_inputs>=24`, `vendor=Siemens`, `remote-io:ethernet`.
+//! User requirements in addition to those of the program: `digital_inputs>=24`, `vendor=Siemens`, `remote-io:ethernet`.
 
 use std::fmt;
 use std::time::Duration;
@@ -76,7 +76,7 @@ pub enum Asked {
 /// One requirement.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Requirement {
-    /// Of which boxes; of all where nothing is said.
+    /// Role of the controllers concerned; none: all roles.
     pub role: Option<Role>,
     /// What is asked.
     pub asked: Asked,
@@ -84,9 +84,9 @@ pub struct Requirement {
     pub text: String,
 }
 
-/// A requirement that is none.
+/// Invalid requirement.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("U1130: `{text}` is no requirement: {reason}")]
+#[error("U1130: `{text}` is not a requirement: {reason}")]
 pub struct RequirementError {
     /// As it was written.
     pub text: String,
@@ -98,7 +98,7 @@ impl Requirement {
     /// Reads `[role:]name>=number`, `[role:]name~words`, `[role:]name=word` or `[role:]ethernet`.
     ///
     /// # Errors
-    /// An unknown role or name, a number that is none, or a comparison that the name does not have.
+    /// An unknown role or name, an invalid number, or a comparison that the name does not support.
     pub fn parse(text: &str) -> Result<Self, RequirementError> {
         let wrong = |reason: String| RequirementError {
             text: text.to_owned(),
@@ -110,7 +110,7 @@ impl Requirement {
                 let found = Role::ALL.into_iter().find(|known| known.name() == role);
                 let role = found.ok_or_else(|| {
                     wrong(format!(
-                        "`{role}` is no role; roles are controller, understudy and remote-io"
+                        "`{role}` is not a role; expected controller, understudy or remote-io"
                     ))
                 })?;
                 (Some(role), rest)
@@ -124,7 +124,7 @@ impl Requirement {
         })
     }
 
-    /// Whether it is asked of boxes of this role.
+    /// Whether it applies to controllers of this role.
     pub fn is_of(&self, role: Role) -> bool {
         self.role.is_none_or(|asked| asked == role)
     }
@@ -135,7 +135,7 @@ fn asked(text: &str) -> Result<Asked, String> {
         return Ok(Asked::Ethernet);
     }
     let Some(at) = text.find(['=', '~', '<', '>']) else {
-        let help = "a comparison such as digital_inputs>=24, vendor=Siemens or languages~ladder is meant, or ethernet";
+        let help = "a comparison such as digital_inputs>=24, vendor=Siemens or languages~ladder is expected, or ethernet";
         return Err(help.to_owned());
     };
     let (name, rest) = text.split_at(at);
@@ -146,7 +146,7 @@ fn asked(text: &str) -> Result<Asked, String> {
     let name = name.trim().replace('-', "_");
     let value = rest[sign.len()..].trim();
     if value.is_empty() {
-        return Err("nothing stands behind the comparison".to_owned());
+        return Err("missing value after the comparison".to_owned());
     }
     if let Some(quantity) = quantity(&name) {
         return number(quantity, sign, value);
@@ -168,7 +168,7 @@ fn asked(text: &str) -> Result<Asked, String> {
         "model" => only("=", Asked::Model(value.to_owned())),
         "kind" => match Kind::of(value) {
             Some(kind) => only("=", Asked::Kind(kind)),
-            None => Err(format!("`{value}` is no kind; kinds are plc and embedded")),
+            None => Err(format!("`{value}` is not a kind; expected plc or embedded")),
         },
         "scan_time" => match duration::parse_positive(value) {
             Ok(time) => only("<=", Asked::ScanTime(time)),
@@ -216,7 +216,7 @@ fn number(quantity: Quantity, sign: &str, value: &str) -> Result<Asked, String> 
     let number = number.filter(|number| *number <= quantity.most());
     match number {
         Some(number) => Ok(Asked::Number(quantity, bound, number)),
-        None => Err(format!("`{value}` is no {quantity}")),
+        None => Err(format!("`{value}` is not a valid {quantity}")),
     }
 }
 

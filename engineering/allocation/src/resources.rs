@@ -34,7 +34,7 @@ pub struct Resources {
     pub coils: u64,
     /// Function blocks of every kind.
     pub blocks: u64,
-    /// Parallel paths beside the first.
+    /// Additional parallel paths.
     pub branches: u64,
     /// Timers: TON, TOF, TP.
     pub timers: u64,
@@ -108,7 +108,7 @@ impl Resources {
         self.contacts + self.coils + self.blocks
     }
 
-    /// Inputs and outputs: what has to be wired.
+    /// Number of wired inputs and outputs.
     pub fn points(&self) -> u64 {
         self.inputs + self.outputs + self.analog_inputs + self.analog_outputs
     }
@@ -130,7 +130,7 @@ impl Resources {
             ("counters", self.counters),
             ("blocks", self.blocks),
             ("memory bits", self.memory_bits),
-            ("bits that remember", self.data_bits),
+            ("retentive bits", self.data_bits),
             ("instructions", self.instructions),
         ]
     }

@@ -22,7 +22,7 @@ pub struct Effect {
     pub stopped: Vec<String>,
     /// Events that may go on.
     pub going: Vec<String>,
-    /// Whether the repair is enough to go on in every case; otherwise the operator may have to release.
+    /// Whether the repair is sufficient to continue in every case; otherwise the operator may have to release.
     pub comes_back: bool,
 }
 
@@ -138,7 +138,7 @@ impl Outcome {
         let mut needed = 0_u64;
         for failed in harmful {
             if failed & needed == 0 {
-                // One of them has to work; with one channel there is no choice.
+                // One of them must work; a single channel leaves no choice.
                 needed |= 1 << failed.trailing_zeros();
             }
         }

@@ -16,10 +16,10 @@ use crate::settle::NoCommand;
 use crate::signals::{Bits, Signals};
 use crate::timing::Timing;
 
-/// Past so many states of the mega-controller the analysis is given up.
+/// Maximum number of states of the mega-controller.
 const MAXIMUM_MEGA_STATES: usize = 2_000_000;
 
-/// Past so many states the proof is given up.
+/// Maximum number of states of the proof.
 const MAXIMUM_PROOF_STATES: usize = 2_000_000;
 
 /// What came of it.
@@ -59,8 +59,8 @@ pub enum Failure {
     /// The ladder or the plant is no circuit at this period.
     #[error("U1220: {0}")]
     NoCircuit(String),
-    /// Ladder and plant come to a standstill for ever.
-    #[error("U1221: after {way}, ladder and plant stand still for ever in state {state}")]
+    /// Ladder and plant reach a permanent standstill.
+    #[error("U1221: after {way}, ladder and plant remain indefinitely in state {state}")]
     Deadlock {
         /// Its vector.
         state: String,

@@ -32,7 +32,7 @@ pub struct Move {
 }
 
 impl Move {
-    /// Whether it stands under `event`.
+    /// Whether it belongs to `event`.
     pub fn is(&self, event: Event) -> bool {
         match event {
             Event::Omega => self.events.is_empty(),

@@ -37,9 +37,9 @@ pub struct Patience {
     pub grace: Duration,
     /// An event may come so much later than the model's latest.
     pub late: Duration,
-    /// A failed channel has to be quiet for so long before it is believed again.
+    /// Time without changes before a failed channel is accepted again.
     pub quiet: Duration,
-    /// So many times; then the operator has to release it.
+    /// Number of automatic repairs; afterwards the operator must release the channel.
     pub repairs: u16,
 }
 
@@ -183,57 +183,51 @@ impl<'a> Writer<'a> {
         let mut outputs = Vec::new();
         let mut bits = Vec::new();
         for channel in &channels {
-            declared.push(input(of(channel, "failed"), "the device says so"));
-            declared.push(input(
-                of(channel, "recalled"),
-                "it was failed before a restart",
-            ));
+            declared.push(input(of(channel, "failed"), "reported by the device"));
+            declared.push(input(of(channel, "recalled"), "failed before a restart"));
             outputs.push(memory(of(channel, "diagnosed"), "it is failed"));
-            outputs.push(memory(of(channel, "unsteady"), "it is not believed yet"));
-            bits.push(memory(of(channel, "out"), "failed, whoever says so"));
-            bits.push(memory(
-                of(channel, "last"),
-                "what it showed in the scan before",
-            ));
+            outputs.push(memory(of(channel, "unsteady"), "not yet accepted"));
+            bits.push(memory(of(channel, "out"), "failed, by device or diagnosis"));
+            bits.push(memory(of(channel, "last"), "value in the previous scan"));
             bits.push(memory(
                 of(channel, "moves"),
-                "it shows something else than in the scan before",
+                "value changed since the previous scan",
             ));
+            bits.push(memory(of(channel, "seen"), "last accepted value"));
             bits.push(memory(
-                of(channel, "seen"),
-                "its last value that was believed",
+                of(channel, "differs"),
+                "value differs from the accepted one",
             ));
-            bits.push(memory(of(channel, "differs"), "it shows another one"));
             bits.push(memory(of(channel, "accepted"), "which has lasted"));
-            bits.push(memory(of(channel, "waits"), "which has not lasted yet"));
+            bits.push(memory(
+                of(channel, "waits"),
+                "changed value, not yet stable",
+            ));
             bits.push(memory(
                 of(channel, "gone"),
-                "which was gone before it had lasted",
+                "changed value that was not stable",
             ));
             bits.push(memory(
                 of(channel, "explains"),
-                "if it is failed, the plant is in the model",
+                "assuming that it has failed, the plant is in the model",
             ));
             bits.push(memory(of(channel, "accused"), ""));
             bits.push(memory(
                 of(channel, "moved"),
-                "it has moved since it was found failed",
+                "it has changed since it was diagnosed as failed",
             ));
             bits.push(memory(
                 of(channel, "fits"),
-                "it shows what the plant may show",
+                "value is possible for the plant",
             ));
             bits.push(memory(
                 of(channel, "spent"),
-                "it was repaired too often to be believed by itself",
+                "repaired too often to be accepted automatically",
             ));
             bits.push(memory(of(channel, "mended"), ""));
         }
         for name in self.unwatched() {
-            bits.push(memory(
-                of(&name, "last"),
-                "what it showed in the scan before",
-            ));
+            bits.push(memory(of(&name, "last"), "value in the previous scan"));
         }
         declared.push(input(
             Name::from("diagnosis.driven"),
@@ -244,12 +238,12 @@ impl<'a> Writer<'a> {
             "the operator has released",
         ));
         for (name, text) in [
-            ("diagnosis.started", "there was a scan before"),
+            ("diagnosis.started", "a previous scan exists"),
             ("diagnosis.out", "a channel is failed"),
             ("diagnosis.change", "an input is seen to have changed"),
-            ("diagnosis.possible", "the plant may be somewhere"),
-            ("diagnosis.anywhere", "the plant may be anywhere"),
-            ("diagnosis.lost", "nothing explained the scan before"),
+            ("diagnosis.possible", "the plant has a possible state"),
+            ("diagnosis.anywhere", "the plant may be in any state"),
+            ("diagnosis.lost", "no state explained the previous scan"),
             ("diagnosis.one", "the plant may be in one state at least"),
             ("diagnosis.two", "and in another"),
             ("diagnosis.tracked", "which was concluded, not supposed"),

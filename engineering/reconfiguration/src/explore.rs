@@ -71,7 +71,7 @@ struct Joint {
 /// states of equal vectors apart.
 ///
 /// # Errors
-/// It is too large, or ladder and plant come to a standstill for ever.
+/// It is too large, or ladder and plant reach a permanent standstill.
 pub fn explore(
     ladder: &Circuit,
     plant: &Circuit,

@@ -44,7 +44,7 @@ pub struct Question {
     pub analysis: Analysis,
     /// Which of several safe commands.
     pub objective: Objective,
-    /// Past so many states it is given up.
+    /// Maximum number of states.
     pub maximum_states: usize,
 }
 
@@ -242,7 +242,7 @@ impl Builder<'_> {
     fn can_happen(&self, place: usize, label: &Label) -> bool {
         let state = &self.states[place];
         let (Label::Seen(events), Some(command)) = (label, &state.command) else {
-            // A second failure of the same channel would tell, and nobody waits for it.
+            // Only a second failure of the same channel would decide this.
             return self.question.analysis == Analysis::Section2
                 || !matches!(label, Label::Break(_));
         };

@@ -31,7 +31,7 @@ use crate::signals::Bits;
 /// A combined ladder would have more rungs than this.
 pub const MAXIMUM_RUNGS: usize = 60_000;
 
-/// Which bit means what; all that a proof has to know.
+/// Meaning of the bits, for the proof.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Correspondence {
     /// The bit of each latched state of Θ.

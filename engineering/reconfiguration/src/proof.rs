@@ -39,7 +39,7 @@ pub struct Claim<'a> {
     pub combined: &'a Program,
     /// Which bit means what.
     pub correspondence: &'a Correspondence,
-    /// What each latched bit stands for, by the place that the correspondence names: states of S, and failed channels as bits.
+    /// Meaning of each latched bit of the correspondence: states of S, and failed channels as bits.
     pub sets: &'a dyn Fn(usize) -> (Vec<u32>, u64),
     /// The inputs that may fail.
     pub channels: &'a [usize],
@@ -49,7 +49,7 @@ pub struct Claim<'a> {
     pub late: bool,
     /// From one scan to the next.
     pub period: Duration,
-    /// Past so many states the proof is given up.
+    /// Maximum number of states of the proof.
     pub maximum_states: usize,
 }
 
@@ -82,7 +82,7 @@ pub enum NotProved {
         "U1242: the proof needs more than {0} states; ask about fewer channels, or lengthen the period"
     )]
     TooLarge(usize),
-    /// The ladder is none.
+    /// The ladder is invalid.
     #[error("U1243: {0}")]
     NoCircuit(#[from] LowerError),
     /// A bit of the correspondence is not in the ladder.
@@ -150,7 +150,7 @@ struct Prover<'a> {
 /// Proves `claim`.
 ///
 /// # Errors
-/// It is refuted, too large, or the ladder is none.
+/// It is refuted, too large, or the ladder is invalid.
 pub fn prove(claim: &Claim<'_>) -> Result<Proof, NotProved> {
     let correspondence = claim.correspondence;
     let mut watched = claim.combined.clone();
@@ -322,7 +322,7 @@ impl Prover<'_> {
         Ok(())
     }
 
-    /// One scan that was made: what has to hold after it, and where it has led.
+    /// One scan: the conditions after it, and the resulting state.
     fn follow(
         &mut self,
         happening: Happening,

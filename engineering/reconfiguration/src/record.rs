@@ -24,7 +24,7 @@ const MAXIMUM_MEMORY: usize = 8;
 /// A run: inputs and outputs of each scan.
 pub type Run = Vec<(Bits, Bits)>;
 
-/// Why a record is none.
+/// Reason why a record is invalid.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum RecordError {
     /// A line that cannot be read.

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use crate::controller::Controller;
 use crate::signals::{Bits, Event};
 
-/// What each output has to be; `None` is "don't care", dc.
+/// Required value of each output; `None` is "don't care", dc.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Row(pub Vec<Option<bool>>);
 

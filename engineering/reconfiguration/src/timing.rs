@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 /// What an exploration knows of times.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Timing {
-    /// Of each state of S, the scans of its longest stay; none where it may last for ever.
+    /// Longest stay in each state of S, in scans; none if unlimited.
     pub longest_stay: Vec<Option<u32>>,
     /// Of each input, the scans between two of its changes that are nearest to each other; none where it changes once at most.
     pub shortest_pulse: Vec<Option<u32>>,

@@ -14,7 +14,7 @@ pub use write::{AdsError, write_ads};
 
 use crate::automaton::State;
 
-/// The format has room for so many states.
+/// Maximum number of states of the format.
 pub const MAXIMUM_STATES: usize = 2_000_000;
 
 /// The highest label of the format.

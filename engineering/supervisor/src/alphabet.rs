@@ -53,7 +53,7 @@ impl Event {
 }
 
 /// The events of an automaton in ascending order of their labels; an event may be in it and on no transition, and is then
-/// forbidden for ever.
+/// permanently forbidden.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Alphabet(Arc<[Event]>);
 
@@ -94,7 +94,7 @@ impl Alphabet {
         &self.0[place as usize]
     }
 
-    /// Where the event `label` stands.
+    /// Position of the event `label`.
     pub fn place(&self, label: Label) -> Option<u32> {
         let place = self.0.binary_search_by_key(&label, |event| event.label);
         place.ok().map(|place| place as u32)
@@ -105,7 +105,7 @@ impl Alphabet {
         self.place(label).is_some()
     }
 
-    /// The name of `label`, or its number where it is none of its events.
+    /// Name of `label`, or its number if it is not an event of the alphabet.
     pub fn name(&self, label: Label) -> String {
         match self.place(label) {
             Some(place) => self.event(place).name.clone(),

@@ -360,7 +360,7 @@ impl Automaton {
         word.try_fold(self.initial()?, |state, &label| self.step(state, label))
     }
 
-    /// Events of its alphabet that stand on no transition: TCT's "blocked events".
+    /// Events of its alphabet without a transition: TCT's "blocked events".
     pub fn blocked_events(&self) -> Vec<Label> {
         let mut used = vec![false; self.alphabet.len()];
         for edge in &self.edges {

@@ -16,7 +16,7 @@ use crate::automaton::{Automaton, State};
 pub(crate) use layout::{Graph, lay_out};
 pub(crate) use picture::{LINE, Picture, Shape, Style, middle, text_size};
 
-/// A picture of more states or arrows is for nobody to read.
+/// Larger pictures are illegible.
 const MAXIMUM_DRAWN: usize = 400;
 
 /// Too large to draw.

@@ -94,7 +94,7 @@ impl Events {
         events
     }
 
-    /// The event that a word names; what is wrong with it where there is none.
+    /// The event named by a word, or the error.
     pub(crate) fn find(&self, form: &mut Form<'_>, (name, place): &Word<'_>) -> Option<Label> {
         let label = self.get(name);
         if label.is_none() {

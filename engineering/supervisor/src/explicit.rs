@@ -43,7 +43,7 @@ pub enum TooLarge {
         /// The bound.
         memory_bytes: usize,
     },
-    /// A state of so many components does not fit the widest tuple.
+    /// Too many components for the widest tuple.
     #[error(
         "U0831: a state of the product takes {bits} bits, and the explicit engine has room for {limit}; use the symbolic engine (--engine symbolic) or fewer components"
     )]

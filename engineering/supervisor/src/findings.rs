@@ -90,7 +90,7 @@ pub fn synthesis_findings(model: &Model, result: &Supcon) -> Vec<Finding> {
     findings
 }
 
-/// U0846 where the specifications, as they were given, are no supervisors: something has to be forbidden beyond them.
+/// U0846 if the given specifications are not supervisors: further events must be forbidden.
 pub fn specification_findings(result: &Supcon) -> Option<Finding> {
     let (kept, explored) = (result.supervisor.state_count(), result.explored_states);
     let message = format!(

@@ -253,7 +253,7 @@ impl<'t> Form<'t> {
     }
 }
 
-/// The inside of a quoted text as it stands in the file, and its place.
+/// Content of a quoted text in the file, with its position.
 pub(crate) fn trimmed(text: &str, span: Place) -> Word<'_> {
     let raw = text.get(span.clone()).unwrap_or_default();
     let start = span.start + (raw.len() - raw.trim_start_matches(['"', '\'']).len());

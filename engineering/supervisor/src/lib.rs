@@ -36,9 +36,7 @@ pub use findings::{
 };
 pub use kind::FileKind;
 pub use model::{Model, ReadModel, Signal, read_model, write_model};
-pub use modular::{
-    LocalSupervisor, ModularSupervisor, Together, coordinator, synthesise_modularly,
-};
+pub use modular::{LocalSupervisor, ModularSupervisor, Together, synthesise_modularly};
 pub use schema::{map_schema, model_schema, net_schema};
 pub use symbolic::{
     SymbolicBounds, SymbolicSupervisor, TooComplex, Verdict, nonconflicting_symbolically,

@@ -13,7 +13,7 @@ use crate::synthesis::synthesise;
 /// The supervisor of one specification.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LocalSupervisor {
-    /// Which specification; none for plants that only have to be nonblocking.
+    /// Specification; none for plants that must only be nonblocking.
     pub specification: Option<usize>,
     /// Which plants.
     pub plants: Vec<usize>,
@@ -85,16 +85,6 @@ pub fn synthesise_modularly(
     let supervisors: Vec<&Automaton> = local.iter().map(|one| &one.result.supervisor).collect();
     let together = together(&supervisors, bounds);
     Ok(ModularSupervisor { local, together })
-}
-
-/// Coordinates local supervisors that conflict: the least that must be forbidden besides so that they do not.
-///
-/// # Errors
-/// Their product passes the bounds.
-pub fn coordinator(supervisors: &[&Automaton], bounds: Bounds) -> Result<Supcon, TooLarge> {
-    let mut result = synthesise(supervisors, &[], bounds)?;
-    result.supervisor = result.supervisor.with_name("COORDINATOR");
-    Ok(result)
 }
 
 fn together(supervisors: &[&Automaton], bounds: Bounds) -> Together {

@@ -1,4 +1,4 @@
-//! The symbolic engine: sets of states as decision diagrams, for products that nobody can list.
+//! The symbolic engine: sets of states as decision diagrams, for products too large to enumerate.
 //!
 //! A component's state is a block of bits, one component a level; the order of the levels is chosen so that components that share
 //! events stand together. What is reached, forwards or backwards, is found by saturation (G. Ciardo, G. Lüttgen, R. Siminiescu, 2001;

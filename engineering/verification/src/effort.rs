@@ -1,17 +1,17 @@
-//! How long a proof may go on. Who has a clock is asked again and again; here there is none.
+//! Effort of a proof. The caller, who has a clock, decides repeatedly whether to continue.
 
 use std::fmt;
 
 use understudy_logic::bdd::BddError;
 
-/// What is being done, for whoever waits.
+/// Current work, for the progress.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Work {
-    /// Sets of states are computed as decision diagrams, in so many steps so far.
+    /// Computing sets of states as decision diagrams; number of steps so far.
     Diagrams(u64),
     /// So many states were listed.
     States(usize),
-    /// Runs of so many scans are searched as clauses.
+    /// Searching runs of this number of scans as clauses.
     Scans(u32),
 }
 
@@ -30,7 +30,7 @@ impl fmt::Display for Work {
 /// Whether to go on, asked many times a second; never again after the first no.
 pub type GoOn<'a> = &'a dyn Fn(Work) -> bool;
 
-/// Goes on for ever.
+/// Never stops.
 pub(crate) const ALWAYS: GoOn<'static> = &|_| true;
 
 /// Why a set of states was not computed.

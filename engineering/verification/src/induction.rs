@@ -26,7 +26,7 @@ pub enum Induction {
     Holds(u32),
     /// It does not hold at the end of this run.
     Fails(Trace),
-    /// Neither was proved. No run of so many scans refutes it.
+    /// Undecided. No run of this number of scans refutes it.
     Undecided(u32),
 }
 

@@ -1,5 +1,6 @@
-//! A ladder against its properties, and against what everybody wants of a ladder without saying so.
+//! Proofs of the properties of a ladder program, requested and standard.
 
+mod conclusion;
 mod questions;
 mod remarks;
 mod sampled;
@@ -21,6 +22,7 @@ use crate::explicit::Explicit;
 use crate::property::{Named, Property};
 use crate::symbolic::{Resolved, Signal, Trace, resolve};
 
+pub use conclusion::Conclusion;
 pub use remarks::{Remark, Remarks};
 pub(crate) use sampled::words;
 use stages::Stages;
@@ -67,7 +69,7 @@ pub enum Answer {
 pub struct Subject {
     circuit: Circuit,
     outputs: usize,
-    /// Every state that can be reached, once somebody needed all of them.
+    /// All reachable states, computed on first use.
     listed: OnceCell<Explicit>,
 }
 
@@ -97,7 +99,7 @@ impl Subject {
     /// The formula of `property` over the program's signals; what is wrong has places in the property's file.
     ///
     /// # Errors
-    /// Every name that is no signal of the program (U0435).
+    /// Every name that is not a signal of the program (U0435).
     pub fn resolve(&self, property: &Property) -> Result<Resolved, Vec<Diagnostic>> {
         resolve(&property.formula, &self.circuit).map_err(|unknown| {
             unknown
@@ -111,11 +113,15 @@ impl Subject {
         let outputs = self.circuit.outputs().iter().map(|output| &output.name);
         let names = outputs.chain(self.circuit.inputs()).map(String::as_str);
         let help = suggestion(&named.name, names);
-        let message = format!("`{}` is no signal of `{}`", named.name, self.circuit.name());
+        let message = format!(
+            "`{}` is not a signal of `{}`",
+            named.name,
+            self.circuit.name()
+        );
         Diagnostic::error("U0435", message, named.span.clone()).with_help(help)
     }
 
-    /// Decides `properties`; `fair` restricts the runs that are looked at. Each answer is told as it comes.
+    /// Decides `properties`; `fair` restricts the runs considered. Each result is reported immediately.
     pub fn check(
         &self,
         properties: &[Resolved],

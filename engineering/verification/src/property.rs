@@ -117,7 +117,7 @@ impl<S> Formula<S> {
         })
     }
 
-    /// Every signal in it, from left to right, as often as it stands there.
+    /// All signals from left to right, with repetitions.
     pub fn signals(&self) -> Vec<&S> {
         match self {
             Self::Constant(_) => Vec::new(),
@@ -212,12 +212,12 @@ impl<S: fmt::Display> fmt::Display for Operand<'_, S> {
     }
 }
 
-/// A name where it stands.
+/// A name with its position.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Named {
     /// The name.
     pub name: String,
-    /// Where it stands in the text.
+    /// Position in the text.
     pub span: Range<usize>,
 }
 

@@ -130,7 +130,7 @@ impl<'c> Checker<'c> {
     /// Whether every first scan satisfies `property`: the registers as they start, the inputs any.
     ///
     /// # Errors
-    /// The diagrams need more nodes than allowed, or nobody waits any longer.
+    /// The diagrams need more nodes than allowed, or the caller stopped the proof.
     pub fn check(&mut self, property: &Resolved) -> Result<Verdict, Stopped> {
         let cone = model::Cone::of(self.circuit, self.fair.iter().chain([property]));
         if let Some((_, error)) = self.too_large.as_ref().filter(|(large, _)| {

@@ -6,7 +6,7 @@ use understudy_logic::Circuit;
 
 use crate::symbolic::Trace;
 
-/// Columns beside each other.
+/// Number of columns.
 const WIDTH: usize = 30;
 
 /// So many scans without a change are folded, and more.
@@ -89,7 +89,7 @@ pub fn scan_table(circuit: &Circuit, trace: &Trace) -> String {
         let last = trace.scans.len() - 1;
         let _ = writeln!(
             text,
-            "after scan {last} all goes on as from scan {again}, for ever"
+            "after scan {last} the run repeats from scan {again} indefinitely"
         );
     }
     text

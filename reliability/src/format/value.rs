@@ -28,7 +28,7 @@ impl Value {
     }
 }
 
-/// What is wrong with a value; `unknown` is the name that nobody declared.
+/// Error in a value; `unknown` is an undeclared name.
 pub(super) struct Wrong {
     pub(super) diagnostic: Diagnostic,
     pub(super) unknown: Option<String>,
@@ -197,7 +197,7 @@ impl<Constant: FnMut(&str) -> Option<Option<Value>>> Parser<'_, Constant> {
         let Ok(number) = rest[..length].parse::<f64>() else {
             return Err(Wrong::new(
                 "U0721",
-                format!("{} is no number", &rest[..length]),
+                format!("{} is not a number", &rest[..length]),
                 span,
             ));
         };
@@ -224,7 +224,7 @@ impl<Constant: FnMut(&str) -> Option<Option<Value>>> Parser<'_, Constant> {
                 dimension: 1,
             }),
             None => {
-                let mut wrong = Wrong::new("U0725", format!("{unit} is no unit of time"), span);
+                let mut wrong = Wrong::new("U0725", format!("{unit} is not a unit of time"), span);
                 wrong.diagnostic.help = Some(
                     "there are us, ms, s, min, h, d and y; a product is written with *".into(),
                 );

@@ -13,7 +13,7 @@ pub struct Interval {
     pub estimate: Option<f64>,
     /// Lower end.
     pub lower: f64,
-    /// Upper end; nothing where there is none.
+    /// Upper limit, if any.
     pub upper: Option<f64>,
     /// Two-sided.
     pub confidence: f64,

@@ -4,7 +4,6 @@
 
 use crate::chain::Chain;
 use crate::error::ReliabilityError;
-use crate::three_state::ThreeState;
 use crate::transient::AfterFailure;
 
 /// Entries of a table.
@@ -20,21 +19,6 @@ pub struct Law {
 }
 
 impl Law {
-    /// Of the three-state model: hypoexponential, the sum of two exponential phases.
-    pub fn of_three_states(model: &ThreeState) -> Self {
-        let mean = model.mttf();
-        let hours = times(mean);
-        let exposure = hours
-            .iter()
-            .map(|hours| -model.log_reliability(*hours))
-            .collect();
-        Self {
-            mean,
-            hours,
-            exposure,
-        }
-    }
-
     /// Of the first failure of a chain.
     ///
     /// # Errors

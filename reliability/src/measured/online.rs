@@ -23,9 +23,9 @@ const MINIMUM_DRAWS: usize = 100;
 pub struct Observed {
     /// Hours from the first record to the last.
     pub hours: f64,
-    /// Hours for which boxes worked, added up over all boxes.
+    /// Total operating hours of all stations.
     pub working_hours: f64,
-    /// When boxes failed, in hours since the first record, ascending.
+    /// Times of station failures, in hours since the first record, ascending.
     pub failures_at: Vec<f64>,
     /// How many of these failures the redundancy that was left should have masked.
     pub asked: u64,
@@ -33,7 +33,7 @@ pub struct Observed {
     pub masked: u64,
     /// Repairs that were finished.
     pub repairs: u64,
-    /// Hours for which boxes were under repair, added up.
+    /// Total repair hours.
     pub repairing_hours: f64,
     /// Times from failures to their detection, in hours.
     pub detection_hours: Vec<f64>,
@@ -52,7 +52,7 @@ pub struct Outlook {
     pub detection_rate: Option<Interval>,
     /// The hours to come.
     pub ahead_hours: f64,
-    /// R over them, with all boxes working now; the estimate is the median of what is credible.
+    /// R over this period, with all stations working now; the estimate is the posterior median.
     pub reliability: Interval,
     /// The probability of working over them: R averaged over what is not known of the rates.
     pub predicted: f64,
@@ -266,7 +266,7 @@ fn doubts(observed: &Observed, random: &mut impl Rng) -> Vec<String> {
     }
     if p(as_bunched) < UNLIKELY {
         doubts.push(format!(
-            "Failures are not independent: they come in bunches (p = {:.4}); a common cause should be in the model.",
+            "Failures are not independent: they are clustered (p = {:.4}); the model should include a common cause.",
             p(as_bunched)
         ));
     }

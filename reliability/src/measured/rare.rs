@@ -38,7 +38,7 @@ pub struct RareEvent {
     pub relative_half_width: f64,
 }
 
-/// One way out of a state.
+/// One transition from a state.
 struct Exit {
     to: usize,
     probability: f64,

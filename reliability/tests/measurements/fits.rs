@@ -8,6 +8,28 @@ fn model(mttr: f64) -> ThreeState {
     ThreeState::new(3, 1e-4, 1.0 / mttr).expect("a model")
 }
 
+/// The law of the same model, from its chain.
+fn law(mttr: f64) -> Law {
+    let kind = |name: &str, count| BoxKind {
+        name: name.into(),
+        count,
+        mtbf: Hours::new("mtbf", 10_000.0).expect("a time"),
+        mttr: Hours::new("mttr", mttr).expect("a time"),
+    };
+    let system = System {
+        controllers: vec![kind("controllers", 3)],
+        understudies: kind("understudy", 1),
+        groups: 1,
+        rule: Rule::Paper,
+        crews: None,
+        coverage: Probability::ONE,
+        detection: None,
+        common_cause: None,
+        shared: Vec::new(),
+    };
+    Law::of_chain(&system.chain().expect("a chain")).expect("a law")
+}
+
 fn sample(model: &ThreeState, count: usize, seed: u64) -> Vec<f64> {
     let mut random = Pcg64::seed_from_u64(seed);
     (0..count).map(|_| model.draw(&mut random)).collect()
@@ -17,7 +39,7 @@ fn sample(model: &ThreeState, count: usize, seed: u64) -> Vec<f64> {
 fn critical_values_are_those_of_the_literature_where_there_are_any() {
     // At long odds the law is exponential. Stephens (1974): A² at 5 % is 2.492 where the law is known and 1.321/(1 + 0.6/n) where its
     // mean was fitted; D is 1.358/√n where known (n large), and about 1.094/√n (Lilliefors 1969) where fitted.
-    let law = Law::of_three_states(&model(0.01));
+    let law = law(0.01);
     let hours = sample(&model(0.01), 100, 1);
     let mut random = Pcg64::seed_from_u64(2);
     let known = fit(&hours, &law, Null::Specified, 4_000, &mut random).expect("a fit");
@@ -42,8 +64,7 @@ fn critical_values_are_those_of_the_literature_where_there_are_any() {
 
 #[test]
 fn a_true_law_is_rejected_as_often_as_promised() {
-    let model = model(5_000.0);
-    let law = Law::of_three_states(&model);
+    let (law, model) = (law(5_000.0), model(5_000.0));
     for null in [Null::Specified, Null::ScaleFitted] {
         let rejected = (0..200)
             .filter(|&seed| {
@@ -64,7 +85,7 @@ fn a_true_law_is_rejected_as_often_as_promised() {
 fn an_exponential_law_is_told_from_a_hypoexponential_one() {
     // Strong acceleration: repair is slow, and short times are rarer than in an exponential law of the same mean.
     let hypoexponential = model(5_000.0);
-    let exponential = Law::of_three_states(&model(1e-3));
+    let exponential = law(1e-3);
     let mut random = Pcg64::seed_from_u64(3);
     let found = fit(
         &sample(&hypoexponential, 1_000, 4),
@@ -78,25 +99,7 @@ fn an_exponential_law_is_told_from_a_hypoexponential_one() {
 
 #[test]
 fn the_law_of_a_chain_is_that_of_its_closed_form() {
-    let kind = |name: &str, count| BoxKind {
-        name: name.into(),
-        count,
-        mtbf: Hours::new("mtbf", 10_000.0).expect("a time"),
-        mttr: Hours::new("mttr", 500.0).expect("a time"),
-    };
-    let system = System {
-        controllers: vec![kind("controllers", 3)],
-        understudies: kind("understudy", 1),
-        groups: 1,
-        rule: Rule::Paper,
-        crews: None,
-        coverage: Probability::ONE,
-        detection: None,
-        common_cause: None,
-        shared: Vec::new(),
-    };
-    let law = Law::of_chain(&system.chain().expect("a chain")).expect("a law");
-    let model = model(500.0);
+    let (law, model) = (law(500.0), model(500.0));
     for step in 1..100 {
         let hours = model.mttf() * f64::from(step) / 20.0;
         let found = law.unreliability(hours);
@@ -111,7 +114,7 @@ fn the_law_of_a_chain_is_that_of_its_closed_form() {
 
 #[test]
 fn what_allows_no_test_is_refused() {
-    let law = Law::of_three_states(&model(24.0));
+    let law = law(24.0);
     let mut random = Pcg64::seed_from_u64(5);
     let mut code = |hours: &[f64], bootstrap| {
         fit(hours, &law, Null::Specified, bootstrap, &mut random)

@@ -24,7 +24,7 @@ pub enum Preference {
     Reserve,
 }
 
-/// Fewer boxes are better than better boxes.
+/// A smaller number of controllers is preferred to better controllers.
 const BOX: f64 = 10_000.0;
 
 /// The controllers in the order of a preference.
@@ -62,12 +62,12 @@ pub(super) fn order(
     }
     if preference == Preference::Cost && known < types.len() {
         remarks.push(if known == 0 {
-            "no price is known, so nothing here is about cost: the models that suffice stand by the size of their memory, and the fewest boxes are \
+            "no price is known: sufficient models are ranked by memory size, and the smallest number of controllers is \
              taken (`understudy catalogue import FILE --update` brings prices)"
                 .to_owned()
         } else {
             format!(
-                "{} of {} prices are not known: a model without a price is ranked behind those with one, by the size of its memory",
+                "{} of {} prices are unknown: models without a price are ranked after those with one, by memory size",
                 types.len() - known,
                 types.len()
             )
@@ -98,7 +98,7 @@ pub(super) fn order(
 }
 
 impl Order {
-    /// What a box of a type costs the packing: its price; without prices one box more than any choice among boxes.
+    /// Cost of a controller type: its price; without prices, an additional controller costs more than any choice of type.
     pub(super) fn cost<'a>(&self, place: usize, fits: impl Iterator<Item = &'a Fit>) -> f64 {
         let (rank, price) = self.places[place];
         if self.priced {

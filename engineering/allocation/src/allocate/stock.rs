@@ -1,9 +1,9 @@
-//! The boxes that there are.
+//! Controllers in stock.
 
 use super::AllocationError;
 use crate::controller::{Catalogue, Controller};
 
-/// So many boxes of a model.
+/// A number of controllers of one model.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Stock {
     /// A model, or vendor and model with a blank between.
@@ -12,7 +12,7 @@ pub struct Stock {
     pub count: usize,
 }
 
-/// Each controller that may be taken, with the number of boxes where it is limited; all that are wrong with the stock.
+/// Permitted controllers, with their limited numbers; otherwise all errors of the stock.
 pub(super) fn types<'a>(
     catalogue: &'a Catalogue,
     stock: &[Stock],

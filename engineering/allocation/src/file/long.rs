@@ -26,17 +26,17 @@ pub(super) fn catalogue(rows: &[Row<'_>], wrong: &mut Vec<Diagnostic>) -> Catalo
         let figure = row.text("figure");
         if let Some(first) = seen.get(&key) {
             let message = if figure.is_empty() {
-                "this line stands twice".to_owned()
+                "this line occurs twice".to_owned()
             } else {
-                format!("the figure `{figure}` stands twice")
+                format!("the figure `{figure}` occurs twice")
             };
             let diagnostic = Diagnostic::error("U1108", message, row.span("figure"));
-            wrong.push(diagnostic.with_related(first.clone(), "here for the first time"));
+            wrong.push(diagnostic.with_related(first.clone(), "first occurrence"));
             continue;
         }
         seen.insert(key, row.span("figure"));
         if !figure.is_empty() && row.text("source").is_empty() {
-            let message = "a figure without a source: who says so?";
+            let message = "a figure without a source";
             wrong.push(Diagnostic::error("U1109", message, row.span("source")));
         }
         if row.text("model").is_empty() {
@@ -71,7 +71,7 @@ fn family(row: &Row<'_>, catalogue: &mut Catalogue, wrong: &mut Vec<Diagnostic>)
     let text = row.text("figure");
     let quantity = FamilyQuantity::ALL.into_iter();
     let Some(quantity) = quantity.into_iter().find(|known| known.name() == text) else {
-        let message = format!("`{text}` is no figure of a family");
+        let message = format!("`{text}` is not a figure of a family");
         let diagnostic = Diagnostic::error("U1111", message, row.span("figure"));
         wrong.push(diagnostic.with_help(suggestion(text, known)));
         return;
@@ -79,7 +79,7 @@ fn family(row: &Row<'_>, catalogue: &mut Catalogue, wrong: &mut Vec<Diagnostic>)
     let value = row.text("value");
     let Some(value) = FamilyQuantity::parse(value) else {
         let message = format!(
-            "`{value}` is no {quantity}: a number from 0 to {} is meant",
+            "`{value}` is not a valid {quantity}: expected a number from 0 to {}",
             FamilyQuantity::MOST
         );
         wrong.push(Diagnostic::error("U1107", message, row.span("value")));
@@ -133,7 +133,7 @@ fn model(row: &Row<'_>, catalogue: &mut Catalogue, wrong: &mut Vec<Diagnostic>) 
             .into_iter()
             .chain(Statement::ALL.map(Statement::name))
             .collect();
-        let message = format!("`{figure}` is no figure of a controller");
+        let message = format!("`{figure}` is not a figure of a controller");
         let diagnostic = Diagnostic::error("U1111", message, row.span("figure"));
         wrong.push(diagnostic.with_help(suggestion(figure, names)));
     }

@@ -54,7 +54,7 @@ pub(super) fn catalogue(rows: &[Row<'_>], wrong: &mut Vec<Diagnostic>) -> Catalo
         });
         let texts: Vec<_> = texts.collect();
         if source.is_empty() && !(numbers.is_empty() && texts.is_empty()) {
-            let message = "figures without a source: who says so?";
+            let message = "figures without a source";
             wrong.push(Diagnostic::error("U1109", message, row.span("source_url")));
         }
         let Some(mut controller) = row.controller(wrong) else {
@@ -68,7 +68,7 @@ pub(super) fn catalogue(rows: &[Row<'_>], wrong: &mut Vec<Diagnostic>) -> Catalo
         if let Some(first) = seen.get(&key) {
             let message = format!("{controller} stands twice");
             let diagnostic = Diagnostic::error("U1108", message, row.span("model"));
-            wrong.push(diagnostic.with_related(first.clone(), "here for the first time"));
+            wrong.push(diagnostic.with_related(first.clone(), "first occurrence"));
             continue;
         }
         seen.insert(key, row.span("model"));

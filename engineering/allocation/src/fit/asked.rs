@@ -48,7 +48,7 @@ pub(super) fn judge(judge: &mut Judge<'_>, requirement: &Requirement, need: &Nee
                 let holds = value.to_lowercase().contains(words);
                 is(holds, format!("{statement}: {value}"), vec![source.clone()]);
             }
-            None => judge.unknown(&criterion, format!("its {statement} is not known")),
+            None => judge.unknown(&criterion, format!("its {statement} is unknown")),
         },
         Asked::Number(quantity, bound, value) => match controller.numbers.get(quantity) {
             Some(figure) => {
@@ -64,7 +64,7 @@ pub(super) fn judge(judge: &mut Judge<'_>, requirement: &Requirement, need: &Nee
                     vec![figure.source.clone()],
                 );
             }
-            None => judge.unknown(&criterion, format!("its {quantity} is not known")),
+            None => judge.unknown(&criterion, format!("its {quantity} is unknown")),
         },
         Asked::ScanTime(within) => {
             let Some(program) = &need.program else { return };
@@ -75,7 +75,7 @@ pub(super) fn judge(judge: &mut Judge<'_>, requirement: &Requirement, need: &Nee
                     is(scan <= within.as_nanos(), message, vec![figure.source]);
                 }
                 None => {
-                    let message = "the time of an instruction is not known".to_owned();
+                    let message = "the instruction time is unknown".to_owned();
                     judge.unknown(&criterion, message);
                 }
             }

@@ -71,7 +71,7 @@ impl<'a> Judge<'a> {
         let usable = self.terms.usable(has);
         let reserve = match self.terms.reserve_percent {
             0 => String::new(),
-            percent => format!(", of which {percent} % stay free"),
+            percent => format!(" with a reserve of {percent} %"),
         };
         let (verdict, message) = if need <= usable {
             let message = format!("needs {need} of {has}{unit}{reserve}");
@@ -118,7 +118,7 @@ impl<'a> Judge<'a> {
             (has, Some(expansion)) if self.terms.expansion => {
                 let has = has.map_or_else(|| "not known".to_owned(), |has| has.to_string());
                 let message = format!(
-                    "needs {need} {words}; on board: {has}, and \"{expansion}\" beside: whether that is enough is for you to say"
+                    "needs {need} {words}; on board: {has}, and \"{expansion}\" as expansion: check whether that is sufficient"
                 );
                 let figure = self.controller.texts.get(&Statement::MaxExpansionIo);
                 let source = figure.map(|figure| figure.source.clone());
@@ -137,7 +137,7 @@ impl<'a> Judge<'a> {
                 }
             }
             (None, _) => {
-                let message = format!("needs {need}; how many {words} it has is not known");
+                let message = format!("needs {need}; how many {words} it has is unknown");
                 self.unknown(name, message);
             }
         }
@@ -157,7 +157,7 @@ impl<'a> Judge<'a> {
         let name = quantity.name();
         let Some(has) = self.controller.number(quantity) else {
             let Some(source) = by_memory else {
-                let message = format!("needs {need}; how many {name} it has is not known");
+                let message = format!("needs {need}; how many {name} it has is unknown");
                 return self.unknown(name, message);
             };
             let message = format!("needs {need}, and has as many as its memory holds");
@@ -183,7 +183,7 @@ impl<'a> Judge<'a> {
     ) {
         let name = quantity.name();
         let Some(has) = self.controller.number(quantity) else {
-            let message = format!("needs {bytes} bytes; how many it has is not known");
+            let message = format!("needs {bytes} bytes; its capacity is unknown");
             return self.unknown(name, message);
         };
         let all: Vec<String> = sources
@@ -204,7 +204,7 @@ impl<'a> Judge<'a> {
     pub(super) fn memory_unknown(&mut self, quantity: Quantity, missing: &str, units: u64) {
         let name = quantity.name();
         let family = &self.controller.family;
-        let mut message = format!("what is not known of the family {family}: {missing}");
+        let mut message = format!("unknown figures of the family {family}: {missing}");
         match self.controller.number(quantity) {
             Some(0) => {
                 let message = "needs some bytes and has none".to_owned();
@@ -213,10 +213,11 @@ impl<'a> Judge<'a> {
             }
             Some(has) => {
                 let most = self.terms.usable(has) / units.max(1);
-                message =
-                    format!("{message}; up to {most} each would do for {units} in {has} bytes");
+                message = format!(
+                    "{message}; up to {most} each would be sufficient for {units} in {has} bytes"
+                );
             }
-            None => message.push_str("; nor is it known how many bytes it has"),
+            None => message.push_str("; its capacity in bytes is unknown too"),
         }
         let sources = self.source(quantity);
         self.said(name, Verdict::Unknown, message, sources);
@@ -230,7 +231,7 @@ impl<'a> Judge<'a> {
         let Some(time) = self.instruction_time() else {
             let most = usable / instructions.max(1);
             let message = format!(
-                "the time of an instruction is not known; up to {most} ns would do for {instructions} in {within:?}"
+                "the instruction time is unknown; up to {most} ns would do for {instructions} in {within:?}"
             );
             return self.unknown(criterion, message);
         };

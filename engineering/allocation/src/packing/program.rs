@@ -47,7 +47,7 @@ pub(super) fn solve(
     let left_over: Vec<Variable> = (0..items).map(|_| binary()).collect();
     let dearest = chosen.iter().map(|&one| types[one].cost);
     let dearest = dearest.fold(0.0, f64::max).max(1e-9);
-    // In units of the dearest box a left-over item costs more than all boxes together.
+    // In units of the most expensive controller, an unplaced item costs more than all controllers together.
     let lost = items as f64 + 1.0;
     let mut objective = Expression::from(0.0);
     for copy in &copies {

@@ -127,7 +127,7 @@ fn programs_without_an_understudy_share_what_holds_them() {
         .collect();
     assert_eq!(
         why,
-        vec!["there are not enough boxes: of 1 that fit all are taken"; 2]
+        vec!["insufficient stock: of 1 suitable controllers, all are in use"; 2]
     );
 }
 
@@ -210,7 +210,7 @@ fn prices_decide_where_they_are_known() {
     let plan = allocate(&catalogue, &cell()[..2], &Options::default()).expect("a plan");
     assert_eq!(boxes(&plan), ["L: press", "L: robot"]);
     assert!(
-        plan.remarks[0].starts_with("2 of 4 prices are not known"),
+        plan.remarks[0].starts_with("2 of 4 prices are unknown"),
         "{:?}",
         plan.remarks
     );
@@ -253,7 +253,7 @@ fn what_is_not_verified_is_not_recommended_unless_the_user_insists() {
     assert_eq!(boxes(&plan), ["S: robot-io", "S: understudy"]);
     assert!(plan.items[0].candidates.is_empty());
     let why = plan.items[0].left_over.as_deref();
-    assert_eq!(why, Some("it is not recommended: y can never be on"));
+    assert_eq!(why, Some("not recommended: y can never be on"));
     let insisted = Options {
         unverified: true,
         ..Options::default()
@@ -268,7 +268,9 @@ fn a_controller_of_which_a_figure_is_missing_is_never_taken() {
     assert_eq!(plan.items[0].count(Verdict::Unknown), 1);
     assert_eq!(
         plan.items[0].left_over.as_deref(),
-        Some("no controller is known to fit: 1 of 1 lack a figure, the others do not fit")
+        Some(
+            "no controller is known to be suitable: 1 of 1 lack a figure, the others are unsuitable"
+        )
     );
 }
 

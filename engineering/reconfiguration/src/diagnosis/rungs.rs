@@ -55,7 +55,7 @@ impl Writer<'_> {
             vec![on(&lost)],
         ]);
         self.program.push_titled(
-            "may the plant be anywhere?",
+            "may the plant be in any state?",
             network,
             vec![coil(Plain, &anywhere)],
         );
@@ -93,7 +93,7 @@ impl Writer<'_> {
             let title = format!("{channel}: what it shows, once it has lasted");
             self.program
                 .push_titled(&title, any(failed.into()), vec![coil(Plain, &out)]);
-            // A failed channel, and one that is looked at for the first time, is taken as it is.
+            // A failed channel, and a channel in its first scan, is accepted as it is.
             let as_it_is = any(vec![vec![off(&started)], vec![on(&out)]]);
             for value in [true, false] {
                 let mut network = as_it_is.clone();
@@ -148,7 +148,7 @@ impl Writer<'_> {
         }
     }
 
-    /// Whether changes of a channel have to last: the model's shortest pulse of it is long enough to be seen all the same.
+    /// Whether changes of a channel must be stable: the shortest pulse in the model is still detected.
     fn is_filtered(&self, channel: &str) -> bool {
         let inputs = &self.ground.controller.signals.inputs;
         let place = inputs.iter().position(|input| input == channel);
@@ -267,7 +267,7 @@ impl Writer<'_> {
             network
         });
         self.program.push_titled(
-            "is there a state that explains it?",
+            "does a state explain it?",
             any(branches.collect()),
             vec![coil(Plain, &possible)],
         );
@@ -310,7 +310,7 @@ impl Writer<'_> {
             let spent = coil(Plain, &of(&channel, "spent"));
             self.program
                 .push_rung(vec![on(&accused), counter], vec![spent]);
-            // It has moved where it came back by itself; a value that it was accused of has to change once more.
+            // A channel that recovered by itself has changed; a value that caused the diagnosis must change once more.
             self.program
                 .push_rung(vec![on(&accused), off(&gone)], vec![coil(Reset, &moved)]);
             self.program
@@ -338,7 +338,7 @@ impl Writer<'_> {
             .push_rung(vec![on(&one)], vec![coil(Plain, &tracked)]);
         let lost = Name::from("diagnosis.lost");
         self.program.push_titled(
-            "nothing explains it: the plant may be anywhere",
+            "no state explains it: the plant may be in any state",
             vec![off(&one)],
             vec![coil(Plain, &lost)],
         );

@@ -1,4 +1,4 @@
-//! What has to hold after every scan.
+//! Conditions after every scan.
 
 use super::{Prover, World};
 use crate::controller::{Controller, Move};

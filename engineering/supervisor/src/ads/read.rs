@@ -108,7 +108,7 @@ fn words(text: &str, line: Range<usize>) -> Vec<Range<usize>> {
 /// The longest line that is quoted, in characters; a heading is shorter.
 const MAXIMUM_QUOTE: usize = 120;
 
-/// A number with the place where it stands.
+/// A number with its position.
 type Placed<T> = (T, Range<usize>);
 
 #[derive(Default)]
@@ -371,7 +371,7 @@ impl Reader {
         transitions
     }
 
-    /// Everything that `Automaton::new` may object to has been looked at with its place.
+    /// All errors of `Automaton::new` were reported with their positions.
     fn build(
         &mut self,
         name: String,

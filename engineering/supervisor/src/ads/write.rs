@@ -36,7 +36,7 @@ impl AdsError {
 
 /// The .ADS text of `automaton`, as TCT writes it.
 ///
-/// The format has no list of events: one that stands on no transition is lost, see [`Automaton::blocked_events`].
+/// The format has no list of events: events without a transition are lost, see [`Automaton::blocked_events`].
 ///
 /// # Errors
 /// More states or higher labels than the format has.

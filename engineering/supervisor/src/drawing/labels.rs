@@ -1,4 +1,4 @@
-//! Where labels stand on their arrows, so that they can be read.
+//! Positions of labels on their arrows.
 
 use super::layout::Point;
 
@@ -21,13 +21,13 @@ impl Area {
     }
 }
 
-/// Lines of text, and where they may stand, the best place first.
+/// Lines of text with their possible positions, the best first.
 pub(crate) struct Label {
     pub(crate) places: Vec<Point>,
     pub(crate) lines: Vec<String>,
 }
 
-/// Shares of the way along an arrow at which its label may stand.
+/// Relative positions of labels along an arrow.
 const SHARES: [f64; 9] = [0.5, 0.42, 0.58, 0.34, 0.66, 0.26, 0.74, 0.18, 0.82];
 
 impl Label {

@@ -1,4 +1,4 @@
-//! Where the nodes of a graph stand in a picture, and by which points its arrows pass.
+//! Positions of the nodes of a graph in a picture, and the points of its arrows.
 //!
 //! In layers, after Sugiyama: a node stands in the column of its distance from the first ones. An arrow back over several
 //! columns passes each of them at a place of its own, so that it crosses no node. Within a column the order follows the

@@ -51,9 +51,9 @@ impl Shape {
 /// What has been drawn, and how far it reaches.
 pub(crate) struct Picture {
     shapes: String,
-    /// What stands on arrows, to be placed when all of them are known.
+    /// Labels of arrows, placed after all arrows.
     labels: Vec<Label>,
-    /// Where no label may stand.
+    /// Areas without labels.
     taken: Vec<Area>,
     low: Point,
     high: Point,
@@ -77,7 +77,7 @@ impl Picture {
         self.high = (self.high.0.max(x + dx), self.high.1.max(y + dy));
     }
 
-    /// No label is to stand within so much of a point.
+    /// Minimum distance of a label from a point.
     pub(crate) fn keep_free(&mut self, centre: Point, half: Point) {
         self.taken.push(Area { centre, half });
     }
@@ -184,7 +184,7 @@ impl Picture {
         );
     }
 
-    /// Labels come last, so that no line goes through them: first those that can stand in one place only.
+    /// Labels come last, so that no line crosses them: first those with a single possible position.
     fn place_labels(&mut self) {
         let mut labels = std::mem::take(&mut self.labels);
         labels.sort_by_key(|label| label.places.len() > 1);

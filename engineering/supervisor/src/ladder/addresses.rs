@@ -29,7 +29,7 @@ impl Located {
     }
 }
 
-/// The addresses under the key `addresses`; U0867 for one that is none.
+/// Addresses under the key `addresses`; U0867 for an invalid one.
 pub(crate) fn read_addresses(form: &mut Form<'_>, table: &DeTable) -> Vec<Located> {
     let entries = table.get("addresses").and_then(|value| form.table(value));
     let mut located = Vec::new();

@@ -20,7 +20,7 @@ use crate::{Automaton, Label, State};
 /// Letters of a state's name past which its bit bears its number, and the name is a comment.
 const LONGEST_STATE: usize = 24;
 
-/// Which bits of a program stand for what in the model; all that a proof needs to know about a ladder.
+/// Meaning of the bits of a program in the model, for the proof.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Correspondence {
     /// The bit of each state of each automaton, supervisors first.
@@ -38,7 +38,7 @@ pub struct Conversion {
     pub rows: Vec<Vec<Row>>,
     /// Events whose bits are reset by the rungs that use them (AEEM), ascending.
     pub consumed: Vec<Label>,
-    /// Which bits stand for what.
+    /// Meaning of the bits.
     pub correspondence: Correspondence,
 }
 
@@ -379,7 +379,7 @@ impl<'a> Converter<'a> {
         }
     }
 
-    /// True where what [`Self::occurrence`] gives may stand in several rungs.
+    /// Whether the result of [`Self::occurrence`] may be used in several rungs.
     fn is_level(&self, label: Label) -> bool {
         let Some(Meaning::Input(place)) = self.partition.meaning(label) else {
             return false;

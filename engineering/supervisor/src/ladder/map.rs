@@ -249,7 +249,7 @@ pub struct Pulse {
     pub event: Name,
     /// Its signal.
     pub signal: Name,
-    /// The signal is a memory bit: nobody outside of the PLC is told.
+    /// The signal is a memory bit, not visible outside of the PLC.
     pub memory: bool,
 }
 

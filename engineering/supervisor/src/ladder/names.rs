@@ -11,7 +11,7 @@ pub(crate) struct Names {
 }
 
 impl Names {
-    /// Keeps a name that stands already.
+    /// Reserves an existing name.
     pub(crate) fn take(&mut self, name: &str) {
         self.taken.insert(name.to_owned());
     }
@@ -46,7 +46,7 @@ impl Names {
 /// What a name in a ladder looks like.
 pub(crate) const ILLEGAL_NAME: &str = "letters, digits and `_`, single dots between its parts, a letter or `_` first, no word of the format";
 
-/// Whether `name` can stand in a ladder.
+/// Whether `name` is valid in a ladder.
 pub(crate) fn is_legal(name: &str) -> bool {
     let part = |part: &str| {
         !part.is_empty()

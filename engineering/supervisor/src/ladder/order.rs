@@ -13,7 +13,7 @@ use crate::{Label, State};
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Group {
     pub(crate) label: Label,
-    /// It stands here for the second time, for what other events of the scan have made possible.
+    /// Second occurrence, for events enabled by others in the same scan.
     pub(crate) again: bool,
 }
 
@@ -59,7 +59,7 @@ pub(crate) fn groups(modules: &Modules) -> Vec<Group> {
         order.push(next);
     }
     let place: BTreeMap<Label, usize> = order.iter().copied().zip(0..).collect();
-    // The last place below which an event has to stand again.
+    // Last position after which an event must occur again.
     let mut again: BTreeMap<usize, BTreeSet<Label>> = BTreeMap::new();
     for &label in &order {
         let late = enables

@@ -24,7 +24,7 @@ pub(crate) fn rising(operand: &Name) -> Element {
     contact(ContactKind::Rising, operand)
 }
 
-/// Passes power while one of `operands` is 1; `None` where there is none.
+/// Conducts while one of `operands` is 1; `None` without operands.
 pub(crate) fn any<'n>(operands: impl IntoIterator<Item = &'n Name>) -> Option<Element> {
     let mut contacts: Vec<Element> = operands.into_iter().map(open).collect();
     match contacts.len() {

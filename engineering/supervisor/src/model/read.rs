@@ -60,7 +60,7 @@ pub fn read_model(text: &str, mut load: impl FnMut(&str) -> Result<String, Strin
     }
 }
 
-/// The files beside a model.
+/// Files named by a model.
 pub(super) struct Loader<'l> {
     load: &'l mut dyn FnMut(&str) -> Result<String, String>,
     files: &'l mut Vec<Report>,

@@ -74,7 +74,7 @@ pub fn selfloop(automaton: &Automaton, events: &[Event]) -> Result<Automaton, Al
     })
 }
 
-/// `allevents`: one marked state that allows every event of `alphabet` for ever.
+/// `allevents`: one marked state that allows every event of `alphabet`.
 pub fn allevents(alphabet: &Alphabet) -> Automaton {
     let edges = (0..alphabet.len() as u32).map(|event| Edge {
         event,

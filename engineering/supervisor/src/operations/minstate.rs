@@ -47,7 +47,7 @@ pub fn minstate(automaton: &Automaton) -> Automaton {
     let name = automaton.name().to_owned();
     let minimal = Automaton::from_parts(name, automaton.alphabet().clone(), marked, first, merged);
     match automaton.state_names() {
-        // A state that stands for several is called after the first of them.
+        // A merged state has the name of its first state.
         Some(names) => minimal.named_states(
             leaders
                 .iter()

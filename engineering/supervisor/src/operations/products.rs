@@ -61,7 +61,7 @@ pub fn mutex(
     Ok(restrict(&automaton, name, &keep).0)
 }
 
-/// More names than this are for nobody to read.
+/// Maximum number of listed names.
 const NAMED_STATES: usize = 20_000;
 
 /// The names of the components' states side by side, where all components have names for them.

@@ -39,13 +39,13 @@ pub enum Explanation {
 /// The result of [`supcon`] and its like.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Supcon {
-    /// The trim recogniser of the supremal controllable sublanguage; EMPTY where there is none.
+    /// Trim recogniser of the supremal controllable sublanguage; EMPTY if that is empty.
     pub supervisor: Automaton,
     /// A nearest place where the specification as it was given is not controllable. The supervisor keeps away from it.
     pub violation: Option<Violation>,
     /// Why the supervisor is EMPTY, where it is.
     pub explanation: Option<Explanation>,
-    /// Events of the plant that the specification does not know, and that the meet therefore forbids for ever.
+    /// Events of the plant outside of the alphabet of the specification, which the meet forbids.
     pub not_lifted: Vec<Label>,
     /// States of the product that were explored. The product may have more: behind a state in which a specification forbids what the
     /// plant does, nothing is explored.

@@ -182,7 +182,7 @@ struct Cells {
     /// Bigger states come later in the order that is tried; the root of a cell is its first.
     enabled: Vec<u64>,
     disabled: Vec<u64>,
-    /// For each state and event a target, [`NONE`] where there is none.
+    /// Target for each state and event, or [`NONE`].
     targets: Vec<u32>,
     /// What a tentative merge changed.
     undo: Vec<Change>,
@@ -193,7 +193,7 @@ struct Cells {
     patience: u32,
 }
 
-/// Pairs of states that are looked at between two questions whether to go on: some milliseconds.
+/// Number of pairs of states between two checks whether to continue: some milliseconds.
 const PATIENCE: u32 = 1 << 16;
 
 enum Change {
@@ -405,7 +405,7 @@ impl Cells {
             first.push(edges.len() as u32);
         }
         let alphabet = supervisor.alphabet().clone();
-        // A cell stands for many states, and the name of one of them would mislead.
+        // A cell represents many states; the name of one would mislead.
         Automaton::from_parts("SIMSUP".to_owned(), alphabet, marked, first, edges)
     }
 }

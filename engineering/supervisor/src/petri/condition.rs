@@ -21,7 +21,7 @@ const MAXIMUM_NESTING: usize = 64;
 
 const SIGNS: [(char, When); 3] = [('/', When::Low), ('+', When::Rising), ('-', When::Falling)];
 
-/// Reads a condition; `place` is that of its first letter. U0888 for what is none, U0855 for an illegal name.
+/// Reads a condition; `place` is that of its first letter. U0888 for an invalid condition, U0855 for an invalid name.
 pub(super) fn parse_condition(form: &mut Form<'_>, (text, place): Word<'_>) -> Condition {
     let mut parser = Parser {
         form,
@@ -40,7 +40,7 @@ pub(super) fn parse_condition(form: &mut Form<'_>, (text, place): Word<'_>) -> C
 struct Parser<'p, 't> {
     form: &'p mut Form<'t>,
     text: &'p str,
-    /// Where the text stands in its file.
+    /// Position of the text in its file.
     start: usize,
     at: usize,
     depth: usize,
@@ -60,7 +60,7 @@ impl Parser<'_, '_> {
             Diagnostic::error("U0888", message, place..place + length)
                 .with_help("a condition looks like \"body_present /stop [ +start | -door ]\""),
         );
-        // Nothing behind it is looked at.
+        // The rest is ignored.
         self.at = self.text.len();
     }
 

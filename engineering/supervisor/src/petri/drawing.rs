@@ -14,7 +14,7 @@ use crate::drawing::{
 const PLACE: f64 = 17.0;
 const BAR: (f64, f64) = (4.0, 20.0);
 
-/// A picture of more places and transitions is for nobody to read.
+/// Larger pictures are illegible.
 const MAXIMUM_DRAWN: usize = 200;
 
 /// The text that Graphviz draws.

@@ -11,7 +11,7 @@ pub type Marking = Box<[u32]>;
 /// Why a net's markings are not known.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ExplorationError {
-    /// A run that can be repeated for ever, each time with more tokens.
+    /// A run that can be repeated indefinitely with more tokens each time.
     #[error("U0895: place `{place}` is not bounded: after {} it holds more, and nothing is missing", run.join(" "))]
     Unbounded {
         /// A place that grows.

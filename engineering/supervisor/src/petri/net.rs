@@ -88,7 +88,7 @@ pub struct NetTransition {
     pub enablers: Vec<Arc>,
     /// χ.
     pub condition: Condition,
-    /// τ: how long it has to be enabled, with its condition, before it fires.
+    /// τ: time for which it must be enabled, with its condition, before it fires.
     pub delay: Option<Duration>,
 }
 
@@ -110,7 +110,7 @@ fn weight(arcs: &[Arc], place: usize) -> u32 {
 /// Why places and transitions do not make a net.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NetError {
-    /// A name that stands twice.
+    /// A duplicate name.
     #[error("U0891: `{name}` is the name of two places or two transitions")]
     Duplicate {
         /// The name.
@@ -278,7 +278,7 @@ impl Net {
     }
 
     /// The marking after `transition` has fired; `None` where `marking` does not enable it: enabling rules 1 to 3, and
-    /// capacities. Conditions and delays are not looked at.
+    /// capacities. Conditions and delays are ignored.
     pub fn fire(&self, marking: &[u32], transition: &NetTransition) -> Option<Box<[u32]>> {
         let has = |arc: &Arc| marking[arc.place] >= arc.weight;
         if !transition.enablers.iter().all(has) || transition.inhibitors.iter().any(has) {

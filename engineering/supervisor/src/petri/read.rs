@@ -219,7 +219,7 @@ fn report(form: &mut Form<'_>, error: &NetError, names: &[Name]) {
         let named = names.iter().filter(|known| known.as_str() == name);
         named.collect()
     };
-    // Places stand before transitions.
+    // Places precede transitions.
     let place = match error {
         // That it has no name was said.
         NetError::Duplicate { name } if name.is_empty() => return,

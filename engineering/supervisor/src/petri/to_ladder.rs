@@ -1,4 +1,4 @@
-//! A net as a ladder, and the hybrid controller: a net with supervisors beside it that follow it and inhibit it.
+//! A net as a ladder, and the hybrid controller: a net with supervisors that follow and inhibit it.
 //!
 //! Steps 7 to 9 of section 3. The order of the rungs: timers; what begins anew in each scan; edges; then each transition of
 //! the net, *with the supervisors' rungs for its event directly below it*; counters; actions. So the supervisors have seen
@@ -44,7 +44,7 @@ pub enum HybridError {
         /// The event.
         event: String,
     },
-    /// A signal's name cannot stand in a ladder, or is input and output at once.
+    /// A signal name is invalid in a ladder, or is both input and output.
     #[error("U0899: the ladder of the net has errors: {}", .0.iter().map(|found| found.message.as_str()).collect::<Vec<_>>().join("; "))]
     Invalid(Vec<Diagnostic>),
 }
@@ -78,7 +78,7 @@ pub struct HybridLadder {
     pub timers: Vec<Option<Name>>,
 }
 
-/// Makes the ladder of `net` beside `supervisors`, which may be none. At most `limit` markings are looked at for its bounds.
+/// Makes the ladder of `net` and `supervisors`, if any. At most `limit` markings are explored for its bounds.
 ///
 /// # Errors
 /// See [`HybridError`].

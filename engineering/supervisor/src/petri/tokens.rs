@@ -9,7 +9,7 @@ use understudy_ladder::{Block, BlockKind, Coil, Comparison, Element, Feed, Name,
 use super::net::{NetTransition, Place};
 use crate::ladder::rung::{closed, open, reset, rung, set};
 
-/// What stands for the tokens of a place.
+/// Representation of the tokens of a place.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Tokens {
     Flags(Vec<Name>),
@@ -34,7 +34,7 @@ fn compare(counter: &Name, relation: Relation, count: u32) -> Element {
 }
 
 impl Tokens {
-    /// Whether a counter can stand for `place`.
+    /// Whether a counter can represent `place`.
     pub(super) fn can_count(
         index: usize,
         place: &Place,

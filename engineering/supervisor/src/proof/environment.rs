@@ -140,7 +140,7 @@ impl Environment {
         }
     }
 
-    /// What of an image has to be kept for the next scan: momentary inputs are 0 again.
+    /// Part of an image kept for the next scan: momentary inputs return to 0.
     pub(super) fn kept(&self, image: &[bool]) -> Vec<bool> {
         let kinds = self.kinds.iter().zip(image);
         kinds

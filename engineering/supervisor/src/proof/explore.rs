@@ -19,9 +19,9 @@ use crate::{Label, State};
 pub struct ProofSettings {
     /// The mode that the ladder was generated for.
     pub mode: Mode,
-    /// At most so many inputs change in one scan.
+    /// Maximum number of inputs that change in one scan.
     pub simultaneous: usize,
-    /// Past so many states of ladder and inputs the proof is given up.
+    /// Maximum number of states of ladder and inputs.
     pub maximum_states: usize,
 }
 
@@ -42,7 +42,7 @@ impl Default for ProofSettings {
 /// that a counterexample is as short as any.
 ///
 /// # Errors
-/// A map that does not fit, a ladder that is none or lacks the bits, or more states than the limit.
+/// An unsuitable map, an invalid ladder or one that lacks the bits, or more states than the limit.
 pub fn prove(
     program: &Program,
     modules: &Modules,

@@ -35,7 +35,7 @@ pub use verdict::{HybridCounterexample, HybridDeviation, HybridProof, HybridVerd
 /// tokens, states of the supervisors and actions are those of net and supervisors.
 ///
 /// # Errors
-/// A ladder that is none or lacks the bits, or more states than the limit.
+/// An invalid ladder or one that lacks the bits, or more states than the limit.
 pub fn prove_hybrid(
     net: &Net,
     supervisors: &[Automaton],
@@ -89,7 +89,7 @@ fn freed(ladder: &HybridLadder) -> Program {
     program
 }
 
-/// Where the bits of the ladder stand among the outputs and registers of its circuit.
+/// Positions of the ladder's bits among the outputs and registers of its circuit.
 struct Bits {
     fires: Vec<usize>,
     /// For each place, bit k is 1 while there are more than k tokens.

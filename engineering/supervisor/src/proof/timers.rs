@@ -1,4 +1,4 @@
-//! Timers in a proof: free in when they end, so that no number of scans has to be waited for.
+//! Timers in a proof end at any time, so that their scans need not be counted.
 //!
 //! A rung that is nothing but a contact and an on-delay timer becomes an input that is 1 only while that contact's signal was
 //! 1 and stays 1 until it is 0. Every run of the real timer is one of these, whatever its preset.

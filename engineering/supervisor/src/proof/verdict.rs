@@ -1,4 +1,4 @@
-//! What a proof answers: how much was looked at, or the shortest run to a scan that is not allowed.
+//! Result of a proof: the extent of the exploration, or the shortest run to a forbidden scan.
 
 use std::fmt;
 
@@ -16,7 +16,7 @@ pub enum Verdict {
     Refuted(Box<Counterexample>),
 }
 
-/// How much was looked at.
+/// Extent of the exploration.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Proof {
     /// States of the ladder with its inputs' last values.
@@ -73,7 +73,7 @@ pub enum Deviation {
         /// The signals.
         signals: Vec<String>,
     },
-    /// States or commands are none of those allowed.
+    /// Forbidden states or commands.
     NotAllowed,
     /// A supervisor has no transition for an uncontrollable event that the plants can generate: it is not controllable.
     Uncontrollable {

@@ -1,4 +1,4 @@
-//! Which component stands on which level.
+//! Assignment of components to levels.
 
 use crate::alphabet::Label;
 use crate::automaton::Automaton;

@@ -261,7 +261,7 @@ impl<'a> SymbolicSupervisor<'a> {
         self.alphabet.contains(event).then(|| moved.collect())?
     }
 
-    /// What the supervisor says about `event` in the tuple `states`; `plants` are the first so many components.
+    /// Decision of the supervisor on `event` in the tuple `states`; the first `plants` components are plants.
     pub fn verdict(&self, states: &[State], event: Label, plants: usize) -> Verdict {
         let knows = |part: &Automaton| part.alphabet().contains(event);
         let mut of_plants = self.parts.iter().zip(states).take(plants);

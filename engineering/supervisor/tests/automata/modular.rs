@@ -2,8 +2,8 @@
 
 use understudy_supervisor::operations::{control_equivalent, sync, trim};
 use understudy_supervisor::{
-    Automaton, Bounds, SymbolicBounds, Together, coordinator, nonconflicting_symbolically,
-    synthesise, synthesise_modularly,
+    Automaton, Bounds, SymbolicBounds, Together, nonconflicting_symbolically, synthesise,
+    synthesise_modularly,
 };
 
 use crate::models::{MODELS, Model};
@@ -26,7 +26,8 @@ fn local_supervisors_are_the_monolithic_one_together() {
         let joint = if nonconflicting {
             sync(&local, bounds).expect("it fits")
         } else {
-            coordinator(&local, bounds).expect("it fits").supervisor
+            let coordinator = synthesise(&local, &[], bounds);
+            coordinator.expect("it fits").supervisor
         };
         let whole = synthesise(&model.plants(), &model.specifications(), bounds).expect("it fits");
         let plant = sync(&model.plants(), bounds).expect("it fits");

@@ -14,7 +14,7 @@ use crate::symbolic::{Cone, Resolved, Signal};
 #[derive(Clone)]
 pub(super) struct Patience<'g> {
     pub(super) go_on: GoOn<'g>,
-    /// Scans so far, for whoever waits.
+    /// Number of scans so far, for the progress.
     pub(super) scans: u32,
     /// Steps of the search that are left; none after the first refusal.
     pub(super) steps: Cell<u64>,

@@ -107,11 +107,11 @@ impl Remarking<'_> {
             return;
         }
         let message = format!(
-            "rung {} has no effect: no coil of it ever changes anything",
+            "rung {} has no effect: none of its coils ever changes a value",
             rung + 1
         );
         let place = self.program.rungs[rung].coils[0].target.span();
-        let help = "leave the rung out, or look for a contact that never closes";
+        let help = "remove the rung, or find the contact that never closes";
         self.remarks.found.push(Remark {
             diagnostic: Diagnostic::warning("U0443", message, place).with_help(help),
             trace: None,
@@ -137,7 +137,7 @@ impl Remarking<'_> {
                 self.resets(&writes[place + 1..], &self.last(&inputs)),
             );
             let message = format!(
-                "`{}` is set in rung {} and reset in rung {} of the same scan, always: it is never seen set",
+                "`{}` is set in rung {} and reset in rung {} of the same scan, always: it is never set at the end of a scan",
                 self.name(set),
                 set.rung + 1,
                 resets.rung + 1
@@ -153,7 +153,7 @@ impl Remarking<'_> {
                     "`{}` is set and reset in one scan: the program can run through it in one go (avalanche)",
                     self.name(resets)
                 );
-                let help = "turn the rungs around, so that the rung that leaves a step stands above the one that enters it";
+                let help = "reorder the rungs: the rung that leaves a step precedes the one that enters it";
                 self.remark("U0446", message, help, [writes[0], resets], inputs);
                 return;
             }
@@ -179,7 +179,7 @@ impl Remarking<'_> {
             return;
         };
         let message = format!(
-            "the coils of `{}` in rungs {} and {} can want different values in one scan; the order of the rungs decides, and rung {} wins",
+            "the coils of `{}` in rungs {} and {} can assign different values in one scan; the order of the rungs decides, and rung {} wins",
             self.name(later),
             earlier.rung + 1,
             later.rung + 1,

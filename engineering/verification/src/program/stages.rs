@@ -33,9 +33,9 @@ const FEW_STEPS: u64 = 200_000;
 pub struct Undecided {
     /// What was in the way of decision diagrams.
     pub why: Stopped,
-    /// No run of at most so many scans breaks it.
+    /// No run of up to this number of scans violates it.
     pub unbroken: Option<u32>,
-    /// None of so many states, those nearest to the start, breaks it.
+    /// None of this number of states nearest to the start violates it.
     pub listed: Option<usize>,
 }
 

@@ -28,7 +28,7 @@ pub enum OutputFinding {
 }
 
 impl Subject {
-    /// Whether each output can be switched on and off for ever.
+    /// Whether each output can always be switched on and off again.
     pub fn switches(&self, bounds: Bounds<'_>) -> Vec<(Signal, OutputFinding)> {
         let outputs: Vec<Signal> = self.outputs().collect();
         let questions: Vec<Resolved> = outputs

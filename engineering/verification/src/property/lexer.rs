@@ -52,11 +52,11 @@ const SIGNS: [(&str, Sign); 11] = [
     (")", Sign::Close),
     ("[", Sign::OpenSquare),
     ("]", Sign::CloseSquare),
-    // As it stands before a contact in the ladder's text.
+    // As before a contact in the text of a ladder.
     ("/", Sign::Not),
 ];
 
-/// The tokens of `text`, which stands at `offset` in its file.
+/// Tokens of `text`, at `offset` in its file.
 pub(super) fn tokens<'t>(
     text: &'t str,
     offset: usize,
@@ -85,7 +85,7 @@ pub(super) fn tokens<'t>(
             push(Sign::Word, word_length(rest))
         } else {
             let place = offset + at..offset + at + first.len_utf8();
-            let message = format!("{first:?} means nothing in a property");
+            let message = format!("{first:?} is not allowed in a property");
             diagnostics.push(
                 Diagnostic::error("U0430", message, place)
                     .with_help("the signs are ! & | -> <-> ( ) [ ] and .."),

@@ -20,13 +20,13 @@ use super::{Formula, MAXIMUM_NESTING, MAXIMUM_SCANS, Named, Path, Property};
 pub struct Properties {
     /// In the order of the file.
     pub properties: Vec<Property>,
-    /// What comes again and again in every run that is looked at; each speaks of one scan.
+    /// Fairness conditions, true infinitely often in every run considered; each refers to one scan.
     pub fair: Vec<Property>,
     /// What is wrong, in the order of the places.
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Reads a file of properties: a line each, `#` begins a comment, `name:` may stand before one, `fair:` before a condition.
+/// Reads a property file: one property per line, `#` begins a comment, `name:` names a property, `fair:` marks a fairness condition.
 pub fn read(text: &str) -> Properties {
     let mut found = Properties::default();
     let mut offset = 0;
@@ -61,7 +61,7 @@ pub fn read(text: &str) -> Properties {
 
 /// A condition of fairness that looks at other scans.
 pub fn not_of_one_scan(span: std::ops::Range<usize>) -> Diagnostic {
-    let message = "a condition of fairness speaks of one scan only";
+    let message = "a fairness condition refers to one scan only";
     Diagnostic::error("U0434", message, span).with_help(
         "leave out AG, EF and the like: a condition p means that p comes again and again",
     )
@@ -272,7 +272,7 @@ impl<'t> Parser<'_, 't> {
         taken
     }
 
-    /// Whether these words stand somewhere from here on.
+    /// Whether these words follow somewhere.
     pub(super) fn has_words(&self, words: &str) -> bool {
         let words: Vec<&str> = words.split(' ').collect();
         let rest = &self.tokens[self.at..];

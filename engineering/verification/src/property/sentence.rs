@@ -17,7 +17,7 @@ use super::parse::{Parser, Read};
 use super::{Formula, Path};
 
 impl Parser<'_, '_> {
-    /// A sentence; nothing where the words are none of a sentence, and then nothing was taken.
+    /// A sentence; none without consuming anything if the words do not form one.
     pub(super) fn sentence(&mut self) -> Option<Option<Read>> {
         if self.takes_word("never") {
             return Some(self.never());

@@ -62,7 +62,7 @@ impl Module {
         module
     }
 
-    /// The parameter that stands for an operand.
+    /// Parameter of an operand.
     fn parameter(&mut self, operand: &str) -> String {
         if let Some(place) = self.reads.iter().position(|read| read == operand) {
             return self.parameters[place].clone();

@@ -50,7 +50,7 @@ impl Converter<'_> {
     /// The bit that the rungs of each automaton read; automata that need none of their own share one.
     fn own_bits(&mut self, label: Label) -> Bits {
         let event = self.event_name(label);
-        // An event that stands again is announced twice, which wants a bit that is set and reset.
+        // A repeated event is announced twice, which requires a bit that is set and reset.
         let has_bit = self.bits.contains_key(&label);
         let word = if has_bit { "now" } else { "" };
         let mut bits = Bits::default();

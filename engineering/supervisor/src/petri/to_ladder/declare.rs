@@ -126,7 +126,7 @@ impl<'a> Maker<'a> {
         }
     }
 
-    /// Whether a token that has come to the place in this scan has to wait for the next before `taker` takes it.
+    /// Whether a token that reaches the place in this scan must wait for the next scan before `taker` removes it.
     pub(super) fn rests(&self, place: usize, taker: &NetTransition) -> bool {
         let edges_of = |transition: &NetTransition| {
             let mut edges = BTreeSet::new();

@@ -1,4 +1,4 @@
-//! What has to be seen of a ladder after a scan.
+//! Observed values of a ladder after a scan.
 
 use super::reference::{Now, Reference, Seen};
 use super::verdict::HybridDeviation;

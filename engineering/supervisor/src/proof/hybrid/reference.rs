@@ -108,7 +108,7 @@ impl<'a> Reference<'a> {
         self.kept(kept)
     }
 
-    /// What of an image has to be kept for the next scan.
+    /// Part of an image kept for the next scan.
     pub(super) fn kept(&self, image: &[bool]) -> Vec<bool> {
         let mut kept = image.to_vec();
         for &over in self.over.iter().flatten() {

@@ -11,7 +11,7 @@ pub enum HybridVerdict {
     Refuted(Box<HybridCounterexample>),
 }
 
-/// How much was looked at.
+/// Extent of the exploration.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HybridProof {
     /// States of the ladder with its inputs' last values.

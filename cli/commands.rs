@@ -1,0 +1,207 @@
+//! The commands, in groups. The parser, the help, the manual and the completions are made from this table, and it runs the command.
+
+use clap::builder::Styles;
+use clap::{Arg, ArgAction, ArgMatches, Args, Command};
+
+use crate::answer::Answer;
+use crate::console::Console;
+use crate::{deployment, inspect, programs, reliability, run, supervisors, tools};
+
+/// A command line without errors, ready to run.
+pub(crate) struct Call {
+    pub(crate) json: bool,
+    /// Name of the command.
+    pub(crate) name: &'static str,
+    run: Box<dyn FnOnce(&mut Console) -> Answer>,
+}
+
+impl Call {
+    pub(crate) fn run(self, console: &mut Console) -> Answer {
+        (self.run)(console)
+    }
+}
+
+/// Commands for one purpose.
+pub(crate) struct Group {
+    /// One word, such as `inspect`.
+    pub(crate) name: &'static str,
+    /// Heading in the help and the manual.
+    pub(crate) title: &'static str,
+    pub(crate) entries: Vec<Entry>,
+}
+
+/// One command: its arguments and the function that runs it.
+pub(crate) struct Entry {
+    name: &'static str,
+    parser: Command,
+    bind: Box<dyn Fn(&ArgMatches) -> Result<Bound, clap::Error>>,
+}
+
+type Bound = Box<dyn FnOnce(&mut Console) -> Answer>;
+
+impl Group {
+    /// Parsers of the commands of this group.
+    pub(crate) fn parsers(&self) -> impl Iterator<Item = Command> {
+        self.entries.iter().map(|entry| entry.parser.clone())
+    }
+}
+
+/// A command with arguments of type `A`, which carry its description and examples.
+pub(crate) fn command<A: Args + 'static>(
+    name: &'static str,
+    run: impl Fn(A, &mut Console) -> Answer + Copy + 'static,
+) -> Entry {
+    Entry {
+        name,
+        parser: A::augment_args(Command::new(name)),
+        bind: Box::new(move |matches| {
+            let arguments = A::from_arg_matches(matches)?;
+            Ok(Box::new(move |console| run(arguments, console)))
+        }),
+    }
+}
+
+/// Every command, in the order of the help.
+pub(crate) fn groups() -> [Group; 7] {
+    [
+        run::group(),
+        inspect::group(),
+        programs::group(),
+        supervisors::group(),
+        reliability::group(),
+        deployment::group(),
+        tools::group(),
+    ]
+}
+
+/// Parses the command line of this process.
+///
+/// # Errors
+/// Where the arguments are wrong, and where help or the version was asked for.
+pub(crate) fn parse() -> Result<Call, clap::Error> {
+    let groups = groups();
+    let matches = parser(&groups).try_get_matches()?;
+    let json = matches.get_flag("json");
+    let called = matches.subcommand();
+    let found = called.and_then(|(name, matches)| {
+        let mut entries = groups.iter().flat_map(|group| &group.entries);
+        Some((entries.find(|entry| entry.name == name)?, matches))
+    });
+    // The parser requires one of the commands.
+    let (entry, matches) =
+        found.ok_or_else(|| clap::Error::new(clap::error::ErrorKind::MissingSubcommand))?;
+    Ok(Call {
+        json,
+        name: entry.name,
+        run: (entry.bind)(matches)?,
+    })
+}
+
+/// The whole command line.
+pub(crate) fn parser(groups: &[Group]) -> Command {
+    let json = Arg::new("json")
+        .long("json")
+        .global(true)
+        .action(ArgAction::SetTrue)
+        .help("Print one JSON document on standard output (docs/json.md)");
+    let parser = Command::new("understudy")
+        .version(env!("CARGO_PKG_VERSION"))
+        .about("A redundant array of independent controllers: RAID for PLCs")
+        .help_template(template(groups))
+        .after_help(
+            "\
+Example:
+  understudy demo          run the press cell of the paper on processes of this machine
+  understudy init cell     write a small cluster as a starting point
+
+`understudy COMMAND --help` describes a command, `understudy explain CODE` an error.
+
+Exit status:
+  0  success
+  1  a run or a check failed
+  2  invalid input, nothing was started
+  3  inconclusive: the host was too slow
+
+Understudy is not a safety PLC.",
+        )
+        .subcommand_required(true)
+        .arg_required_else_help(true)
+        .arg(json)
+        .subcommands(groups.iter().flat_map(Group::parsers));
+    flowing(parser)
+}
+
+/// The help of the whole command line, with the commands under the headings of their groups.
+fn template(groups: &[Group]) -> String {
+    let styles = Styles::styled();
+    let (heading, literal) = (styles.get_header(), styles.get_literal());
+    let mut template = "{about-with-newline}\n{usage-heading} {usage}\n\n".to_owned();
+    for group in groups {
+        template.push_str(&format!("{heading}{}:{heading:#}\n", group.title));
+        for Entry { name, parser, .. } in &group.entries {
+            let about = parser.get_about().map(ToString::to_string);
+            let about = about.unwrap_or_default();
+            template.push_str(&format!("  {literal}{name:<20}{literal:#}  {about}\n"));
+        }
+        template.push('\n');
+    }
+    template + &format!("{heading}Options:{heading:#}\n{{options}}{{after-help}}")
+}
+
+/// The command, and all below it, with the text after the options as paragraphs as wide as the terminal.
+fn flowing(command: Command) -> Command {
+    let command = match command.get_after_help() {
+        Some(text) => {
+            let text = paragraphs(&text.to_string());
+            command.after_help(text)
+        }
+        None => command,
+    };
+    command.mut_subcommands(flowing)
+}
+
+/// Joins each line to the one before, except indented lines, such as examples, and the lines next to them.
+fn paragraphs(text: &str) -> String {
+    let mut joined = String::new();
+    let mut flows = false;
+    for line in text.lines() {
+        let is_prose = !line.is_empty() && !line.starts_with(' ');
+        if !joined.is_empty() {
+            joined.push(if flows && is_prose { ' ' } else { '\n' });
+        }
+        joined.push_str(line);
+        flows = is_prose;
+    }
+    joined
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn prose_flows_and_examples_keep_their_lines() {
+        let text =
+            "Example:\n  understudy demo\n  understudy init cell\n\nAll is\nwell.\n\nThe end.";
+        let expected =
+            "Example:\n  understudy demo\n  understudy init cell\n\nAll is well.\n\nThe end.";
+        assert_eq!(paragraphs(text), expected);
+    }
+
+    #[test]
+    fn the_table_is_a_valid_command_line() {
+        parser(&groups()).debug_assert();
+    }
+    #[test]
+    fn every_summary_fits_on_one_line() {
+        for entry in groups().iter().flat_map(|group| &group.entries) {
+            let about = entry.parser.get_about().map(ToString::to_string);
+            let length = about.map_or(0, |about| about.chars().count());
+            assert!(
+                (10..=70).contains(&length),
+                "{}: {length} characters",
+                entry.name
+            );
+        }
+    }
+}

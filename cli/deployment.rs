@@ -1,0 +1,35 @@
+//! Commands that select controllers, issue keys, check machines and operate members.
+
+mod allocate;
+mod catalogue;
+mod doctor;
+mod gateway;
+pub(crate) mod keys;
+pub(crate) mod operate;
+mod resources;
+
+use crate::commands::{Group, command};
+use crate::member;
+
+pub(crate) fn group() -> Group {
+    Group {
+        name: "deployment",
+        title: "Deploy and operate clusters",
+        entries: vec![
+            command("resources", |it, _| resources::run(&it)),
+            command("allocate", |it, console| allocate::run(&it, console)),
+            command("catalogue", |it, _| catalogue::run(&it)),
+            command("keys", |it, _| keys::run(&it)),
+            command("doctor", |it, console| doctor::run(&it, console)),
+            command("node", |it, _| member::run_station(&it)),
+            command("remote-io", |it: member::RemoteIoArguments, _| {
+                member::run_remote_io(&it.common)
+            }),
+            command("plant", |it: member::PlantArguments, _| {
+                member::run_plant(&it.common)
+            }),
+            command("operate", |it, _| operate::run(&it)),
+            command("gateway", |it, console| gateway::run(&it, console)),
+        ],
+    }
+}

@@ -1,0 +1,163 @@
+//! Reads ladder programs and clusters from the command line.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use understudy_cluster::{Cluster, Overrides};
+use understudy_interchange::parse_program;
+use understudy_ladder::Program;
+use understudy_logic::Circuit;
+use understudy_parity::{ParityController, generate};
+use understudy_text::Report;
+
+use crate::answer::{Answer, Status};
+use crate::files;
+use crate::kind::Kind;
+
+/// Programs of the command line.
+pub(crate) struct Programs {
+    /// One group for all ladder programs, one for each cluster.
+    pub(crate) groups: Vec<Group>,
+    /// Files with their findings.
+    pub(crate) reports: Vec<Report>,
+}
+
+/// Programs with a common understudy.
+pub(crate) struct Group {
+    pub(crate) cluster: Option<Box<Cluster>>,
+    pub(crate) members: Vec<Member>,
+    /// Generated parity controller; none for a single ladder program.
+    pub(crate) parity: Option<ParityController>,
+    pub(crate) period: Duration,
+    /// Prefix of its names, if there are several groups.
+    prefix: String,
+}
+
+/// A program with its circuit.
+pub(crate) struct Member {
+    pub(crate) name: String,
+    pub(crate) ladder: Program,
+    pub(crate) circuit: Circuit,
+}
+
+impl Group {
+    /// Name, unique among all groups.
+    pub(crate) fn name(&self, name: &str) -> String {
+        format!("{}{name}", self.prefix)
+    }
+}
+
+impl Programs {
+    /// Reads all files and reports all errors.
+    pub(crate) fn read(paths: &[PathBuf], period: Duration) -> Result<Self, Answer> {
+        let mut reports = Vec::new();
+        let mut wrong = Answer::done("", serde_json::Value::Null);
+        let mut ladders = Vec::new();
+        let mut clusters = Vec::new();
+        for path in paths {
+            let read = if path
+                .extension()
+                .is_some_and(|extension| extension == "toml")
+            {
+                files::cluster(path, Overrides::default()).map(|(cluster, found)| {
+                    reports.extend(found);
+                    clusters.push(cluster);
+                })
+            } else {
+                ladder(path, period).map(|(member, report)| {
+                    reports.push(report);
+                    ladders.push(member);
+                })
+            };
+            if let Err(answer) = read {
+                wrong.status = answer.status;
+                wrong.failures.extend(answer.failures);
+                wrong.reports.extend(answer.reports);
+            }
+        }
+        if wrong.status != Status::Done {
+            return Err(wrong);
+        }
+        let several = clusters.len() + usize::from(!ladders.is_empty()) > 1;
+        let prefix = |name: &str| {
+            if several {
+                format!("{name}/")
+            } else {
+                String::new()
+            }
+        };
+        let mut groups = Vec::new();
+        if !ladders.is_empty() {
+            groups.push(of_ladders(ladders, period, prefix("ladders"))?);
+        }
+        for cluster in clusters {
+            let prefix = prefix(cluster.name());
+            groups.push(of_cluster(cluster, prefix));
+        }
+        Ok(Self { groups, reports })
+    }
+
+    /// Title of all programs.
+    pub(crate) fn title(&self) -> String {
+        let names = self.groups.iter().map(|group| match &group.cluster {
+            Some(cluster) => cluster.name().to_owned(),
+            None => {
+                let names = group.members.iter().map(|member| member.name.as_str());
+                names.collect::<Vec<_>>().join(", ")
+            }
+        });
+        names.collect::<Vec<_>>().join(", ")
+    }
+}
+
+fn ladder(path: &Path, period: Duration) -> Result<(Member, Report), Answer> {
+    let text = files::text_of(Kind::Ladder, path)?;
+    let name = path.display().to_string();
+    let parsed = parse_program(&name, &text);
+    let report = Report {
+        name,
+        text,
+        diagnostics: parsed.diagnostics,
+    };
+    if report.has_errors() {
+        return Err(Answer::bad_files(vec![report]));
+    }
+    let circuit = parsed
+        .program
+        .lower(period)
+        .map_err(|error| Answer::failed(Status::BadInput, "U0436", error.to_string()))?;
+    let member = Member {
+        name: parsed.program.name.to_string(),
+        ladder: parsed.program,
+        circuit,
+    };
+    Ok((member, report))
+}
+
+fn of_ladders(members: Vec<Member>, period: Duration, prefix: String) -> Result<Group, Answer> {
+    let circuits: Vec<&Circuit> = members.iter().map(|member| &member.circuit).collect();
+    let parity = generate(&circuits)
+        .map_err(|error| Answer::failed(Status::BadInput, error.code(), super::message(&error)))?;
+    Ok(Group {
+        cluster: None,
+        parity: (members.len() > 1).then_some(parity),
+        members,
+        period,
+        prefix,
+    })
+}
+
+fn of_cluster(cluster: Cluster, prefix: String) -> Group {
+    let members = cluster.controllers().iter().map(|controller| Member {
+        name: controller.name.clone(),
+        ladder: controller.program.clone(),
+        circuit: controller.circuit.clone(),
+    });
+    Group {
+        members: members.collect(),
+        parity: Some(cluster.parity().clone()),
+        period: cluster.agreement().schedule.period(),
+        cluster: Some(Box::new(cluster)),
+        prefix,
+    }
+}

@@ -1,0 +1,171 @@
+//! Proofs about programs before their allocation.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use understudy_allocation::{Group as Wanted, Member, Resources, Verification};
+use understudy_ladder::from_circuit;
+use understudy_logic::Circuit;
+use understudy_logic::bdd::Diagrams;
+use understudy_parity::generate;
+use understudy_text::{Report, has_errors};
+use understudy_verification::program::{Answer as Proof, Bounds, Conclusion, Lamp, OutputFinding, Subject};
+use understudy_verification::property::{Properties, not_of_one_scan, read};
+use understudy_verification::prove_parity_while;
+
+use super::programs::{Group, Programs};
+use crate::answer::{Answer, Status};
+use crate::files;
+use crate::programs::verify::patience::Patience;
+
+/// Properties by program, with their file.
+pub(super) type Asked = BTreeMap<String, Vec<(Report, Properties)>>;
+
+/// Reads property files.
+pub(super) fn asked(files: &[(String, PathBuf)], programs: &Programs) -> Result<Asked, Answer> {
+    let names: Vec<String> = programs
+        .groups
+        .iter()
+        .flat_map(|group| group.members.iter().map(|member| group.name(&member.name)))
+        .collect();
+    let mut asked = Asked::new();
+    for (name, path) in files {
+        if !names.contains(name) {
+            let message = format!(
+                "there is no program `{name}`; there are {}",
+                names.join(", ")
+            );
+            return Err(Answer::failed(Status::BadInput, "U1134", message));
+        }
+        let text = files::text(path)?;
+        let found = read(&text);
+        let report = Report {
+            name: path.display().to_string(),
+            text,
+            diagnostics: found.diagnostics.clone(),
+        };
+        if has_errors(&report.diagnostics) {
+            return Err(Answer::bad_files(vec![report]));
+        }
+        asked.entry(name.clone()).or_default().push((report, found));
+    }
+    Ok(asked)
+}
+
+/// Programs of a group with the results of their proofs.
+pub(super) fn members(
+    group: &Group,
+    asked: &Asked,
+    patience: &Patience<'_>,
+) -> Result<Vec<Member>, Answer> {
+    let members = group.members.iter().enumerate().map(|(place, member)| {
+        let subject = Subject::new(&member.ladder, group.period)
+            .map_err(|error| Answer::failed(Status::BadInput, "U0436", error.to_string()))?;
+        let name = group.name(&member.name);
+        patience.turn_to(format!("`{name}`"));
+        let properties = asked.get(&name).map_or(&[][..], Vec::as_slice);
+        let remote_io = match &group.cluster {
+            Some(cluster) => group.name(&cluster.remote_ios()[place].name),
+            None => format!("{name}-io"),
+        };
+        Ok(Member {
+            program: Resources::of(&member.ladder),
+            verification: verification(&subject, properties, patience)?,
+            name,
+            remote_io,
+        })
+    });
+    members.collect()
+}
+
+fn verification(
+    subject: &Subject,
+    asked: &[(Report, Properties)],
+    patience: &Patience<'_>,
+) -> Result<Verification, Answer> {
+    let go_on = |work| patience.goes_on(work);
+    let bounds = Bounds {
+        go_on: &go_on,
+        ..Bounds::default()
+    };
+    let mut conclusion = Conclusion::new(subject.circuit(), &subject.switches(bounds));
+    for (report, properties) in asked {
+        let resolve = |property| {
+            subject.resolve(property).map_err(|diagnostics| {
+                let mut report = report.clone();
+                report.diagnostics = diagnostics;
+                Answer::bad_files(vec![report])
+            })
+        };
+        let formulas: Result<Vec<_>, _> = properties.properties.iter().map(resolve).collect();
+        let fair: Result<Vec<_>, _> = properties.fair.iter().map(resolve).collect();
+        let fair = fair?;
+        if let Some(place) = fair.iter().position(|formula| !formula.is_of_one_scan()) {
+            let start = report.text.find(&properties.fair[place].text).unwrap_or(0);
+            let mut report = report.clone();
+            let span = start..start + properties.fair[place].text.len();
+            report.diagnostics = vec![not_of_one_scan(span)];
+            return Err(Answer::bad_files(vec![report]));
+        }
+        let answers = subject.check(&formulas?, fair, bounds, &mut |_, _| {});
+        for (property, answer) in properties.properties.iter().zip(&answers) {
+            conclusion.add(&property.text, answer);
+        }
+    }
+    Ok(match conclusion.verdict() {
+        Ok(proved) => Verification::Passed(format!("verified: {proved}")),
+        Err(mut reasons) => {
+            if patience.is_over() {
+                reasons.push("increase --budget".to_owned());
+            }
+            Verification::NotPassed(reasons.join("; "))
+        }
+    })
+}
+
+/// The group with its understudy, proved to be the sum of its members.
+pub(super) fn group(
+    group: &Group,
+    members: Vec<Member>,
+    understudies: u8,
+    patience: &Patience<'_>,
+) -> Result<Wanted, Answer> {
+    let circuits: Vec<Circuit> = group
+        .members
+        .iter()
+        .map(|member| member.circuit.clone())
+        .collect();
+    let parity = match &group.parity {
+        Some(parity) => parity.clone(),
+        None => generate(&circuits).map_err(|error| {
+            Answer::failed(Status::BadInput, error.code(), super::message(&error))
+        })?,
+    };
+    patience.turn_to("the understudy".to_owned());
+    let go_on = |work| patience.goes_on(work);
+    let nodes = Diagrams::DEFAULT_LIMIT;
+    let proof = match prove_parity_while(&circuits, parity.circuit(), nodes, &go_on) {
+        Ok(proof) => Verification::Passed(format!(
+            "verified: it equals the sum of its members, {} registers and {} outputs compared",
+            proof.registers, proof.outputs
+        )),
+        Err(refutation) => Verification::NotPassed(refutation.to_string()),
+    };
+    let understudies = match &group.cluster {
+        Some(cluster) => {
+            let names = cluster.understudies().iter();
+            names.map(|found| group.name(&found.name)).collect()
+        }
+        None if understudies == 1 => vec![group.name("understudy")],
+        None => (1..=understudies)
+            .map(|number| group.name(&format!("understudy-{number}")))
+            .collect(),
+    };
+    Ok(Wanted {
+        members,
+        understudies,
+        understudy: Resources::of(&from_circuit(parity.circuit())),
+        parity: proof,
+        period: group.period,
+    })
+}

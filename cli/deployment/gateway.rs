@@ -1,0 +1,154 @@
+//! `understudy gateway`: read-only interfaces of a run.
+
+use std::fmt::Write as _;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use serde_json::json;
+use understudy_gateway::{
+    Area, Followed, GatewayError, Rate, RegisterMap, Run, mirror, serve_metrics, serve_modbus,
+};
+
+use crate::answer::{Answer, Status};
+use crate::console::Console;
+use crate::overrides::parse_address;
+
+/// Publish a run, read-only, by Prometheus, Modbus TCP or Zenoh
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy gateway metrics runs/latest --listen 127.0.0.1:9464
+  understudy gateway modbus runs/latest --listen 127.0.0.1:1502
+  understudy gateway registers runs/latest
+  understudy gateway zenoh runs/latest --listen 127.0.0.1:7447 --mirror 5/s
+
+The gateway reads the journal of a run, live or finished, and ends with SIGINT or SIGTERM. Connections are neither encrypted nor
+authenticated: bind the gateway to loopback or to a separate network (docs/monitoring.md).")]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, Subcommand)]
+enum What {
+    /// Prometheus metrics at http://ADDRESS/metrics
+    Metrics {
+        #[command(flatten)]
+        run: RunArgument,
+        /// Listening address; port 0 selects a free port
+        #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:9464", value_parser = parse_address)]
+        listen: SocketAddr,
+        /// Print the current metrics and exit
+        #[arg(long)]
+        once: bool,
+    },
+    /// Process image as a read-only Modbus TCP server
+    Modbus {
+        #[command(flatten)]
+        run: RunArgument,
+        /// Listening address; port 0 selects a free port
+        #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:1502", value_parser = parse_address)]
+        listen: SocketAddr,
+    },
+    /// Print the register map of the Modbus TCP server
+    Registers {
+        #[command(flatten)]
+        run: RunArgument,
+    },
+    /// States, values, remaining redundancy and events as JSON under Zenoh keys
+    Zenoh {
+        #[command(flatten)]
+        run: RunArgument,
+        /// Listening address (TCP)
+        #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:7447", value_parser = parse_address)]
+        listen: SocketAddr,
+        /// Maximum rate of each changed document: 1/s to 50/s
+        #[arg(long = "mirror", value_name = "RATE", default_value = "5/s")]
+        rate: Rate,
+    },
+}
+
+#[derive(Debug, Args)]
+struct RunArgument {
+    /// Directory of a run
+    #[arg(value_name = "RUN", default_value = "runs/latest")]
+    run: PathBuf,
+}
+
+impl RunArgument {
+    fn open(&self) -> Result<Run, Answer> {
+        Run::open(&self.run)
+            .map_err(|error| Answer::failed(Status::BadInput, error.code(), error.to_string()))
+    }
+}
+
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
+    match act(&arguments.what, console) {
+        Ok(answer) | Err(answer) => answer,
+    }
+}
+
+fn act(what: &What, console: &mut Console) -> Result<Answer, Answer> {
+    let mut ready = |address| console.note(&format!("listening on {address}"));
+    match what {
+        What::Metrics { run, once, .. } if *once => {
+            let metrics = understudy_gateway::exposition_of(&run.open()?).map_err(failed)?;
+            Ok(Answer::done(metrics.as_str(), json!({ "text": metrics })))
+        }
+        What::Metrics { run, listen, .. } => {
+            let run = Followed::new(&run.open()?).map_err(failed)?;
+            serve_metrics(&run, *listen, &mut ready).map_err(failed)?;
+            Ok(ended())
+        }
+        What::Modbus { run, listen } => {
+            let run = Followed::new(&run.open()?).map_err(failed)?;
+            serve_modbus(run, *listen, &mut ready).map_err(failed)?;
+            Ok(ended())
+        }
+        What::Registers { run } => {
+            let map = RegisterMap::new(run.open()?.cluster()).map_err(failed)?;
+            Ok(Answer::done(
+                table(&map),
+                json!({ "registers": map.places() }),
+            ))
+        }
+        What::Zenoh { run, listen, rate } => {
+            let run = Followed::new(&run.open()?).map_err(failed)?;
+            mirror(&run, *listen, *rate, &mut ready).map_err(failed)?;
+            Ok(ended())
+        }
+    }
+}
+
+fn failed(error: GatewayError) -> Answer {
+    Answer::failed(Status::Failed, error.code(), error.to_string())
+}
+
+fn ended() -> Answer {
+    Answer::done("", json!(null))
+}
+
+fn table(map: &RegisterMap) -> String {
+    let mut text = String::new();
+    let width = map.places().iter().map(|place| place.name.chars().count());
+    let width = width.max().unwrap_or(0);
+    for place in map.places() {
+        let area = match place.area {
+            Area::DiscreteInput => "discrete input",
+            Area::Coil => "coil",
+            Area::Register => "register",
+        };
+        let last = place.address + place.width - 1;
+        let addresses = match place.width {
+            1 => place.address.to_string(),
+            _ => format!("{}-{last}", place.address),
+        };
+        let _ = writeln!(
+            text,
+            "{area:14}  {addresses:>9}  {:width$}  {}",
+            place.name, place.meaning
+        );
+    }
+    text
+}

@@ -1,0 +1,213 @@
+//! `understudy operate`: operator commands, by the socket of a laboratory or by mutual TLS.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+use clap::{Args, ValueEnum};
+use serde_json::json;
+use understudy_bus::{Call, Request, TlsKeys};
+use understudy_cluster::Overrides;
+use understudy_journal::{Command, OperatorAction, Refusal};
+use understudy_keys::{Date, OperatorKeys, TlsFiles};
+use understudy_view::{Run, find_running_of};
+use understudy_wire::{Cycle, StateChoice};
+
+use crate::answer::{Answer, Status};
+use crate::files;
+
+/// Command or query a member
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy operate runs/latest --name robot kill
+  understudy operate runs/latest --name robot restart
+  understudy operate cell/cluster.toml --keys keys/members/operator --name robot-io status
+  understudy operate cell/cluster.toml --keys keys/members/operator --name robot-io release
+  understudy operate cell/cluster.toml --keys keys/members/operator --name robot-io accept-state --cycle 4711
+  understudy operate cell/cluster.toml --keys keys/members/operator --name robot journal --lines 100
+
+Without --keys the member belongs to a laboratory on this machine: that of the given run, or the running one of the cluster below --out.")]
+pub(crate) struct Arguments {
+    /// Cluster file, or directory of a running laboratory
+    #[arg(value_name = "CLUSTER.toml|RUN")]
+    target: PathBuf,
+    /// Folder of the operator's keys, for a remote member
+    #[arg(long, value_name = "DIR")]
+    keys: Option<PathBuf>,
+    /// Member
+    #[arg(long, value_name = "NAME")]
+    name: String,
+    /// Command or query
+    #[arg(value_enum)]
+    what: What,
+    /// For accept-state: cycle of the state as in the event `state-lost`; the command is refused if the newest state is of another cycle
+    #[arg(long, value_name = "CYCLE", required_if_eq("what", "accept-state"))]
+    cycle: Option<u64>,
+    /// Number of journal lines to print
+    #[arg(long, value_name = "N", default_value_t = u64::MAX, hide_default_value = true)]
+    lines: u64,
+    /// Reason, recorded in the journal of the laboratory
+    #[arg(long, value_name = "TEXT", default_value = "from the command line")]
+    reason: String,
+    /// Directory of runs
+    #[arg(long, value_name = "DIR", default_value = "runs")]
+    out: PathBuf,
+}
+
+impl Arguments {
+    /// Reply to `cold-start` or `accept-state`.
+    fn choice(&self) -> StateChoice {
+        match self.what {
+            What::AcceptState => StateChoice::Newest {
+                cycle: self.cycle.map(Cycle),
+            },
+            _ => StateChoice::Cold,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum What {
+    /// Print the status of the member
+    Status,
+    /// Print the canonical configuration of the member
+    Configuration,
+    /// Release the outputs of a cold-started program
+    Release,
+    /// Restart a program with lost state from its initial state
+    ColdStart,
+    /// Continue a program with lost state from the newest available state, of cycle --cycle
+    AcceptState,
+    /// Stop the member
+    Stop,
+    /// Print new journal records
+    Journal,
+    /// Kill its process (kill -9); laboratory only
+    Kill,
+    /// Restart its process; laboratory only
+    Restart,
+}
+
+/// Timeout; a member sends in every cycle.
+const SILENCE: Duration = Duration::from_secs(60);
+
+pub(crate) fn run(arguments: &Arguments) -> Answer {
+    let answer = match &arguments.keys {
+        Some(keys) => elsewhere(arguments, keys),
+        None => in_laboratory(arguments),
+    };
+    match answer {
+        Ok(answer) | Err(answer) => answer,
+    }
+}
+
+/// Sends the command to the laboratory that writes the run.
+fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
+    let word = arguments.what.to_possible_value();
+    let word = word.as_ref().map_or("", |value| value.get_name());
+    let command = match arguments.what {
+        What::Kill => Command::Kill,
+        What::Restart => Command::Restart,
+        What::Release => Command::Release,
+        What::ColdStart | What::AcceptState => Command::Choose {
+            choice: arguments.choice(),
+        },
+        What::Status | What::Configuration | What::Stop | What::Journal => {
+            let message = format!(
+                "`{word}` requires a remote member: give the folder of the operator's keys by --keys; a laboratory accepts kill, restart, release, cold-start and accept-state"
+            );
+            return Err(Answer::failed(Status::BadInput, "U0621", message));
+        }
+    };
+    let run = written(arguments)?;
+    let action = OperatorAction::Command {
+        member: crate::member::find(run.cluster(), &arguments.name)?,
+        command,
+        owner: crate::inspect::top::owner(),
+        reason: arguments.reason.clone(),
+    };
+    let done = run.commander().act_and_wait(&action);
+    done.map_err(|refusal| refused(&refusal))?;
+    let text = format!("{word} {}: done", arguments.name);
+    let result = json!({ "run": run.path(), "name": arguments.name, "done": word });
+    Ok(Answer::done(text, result).and_next(&[&"top", &run.path()]))
+}
+
+/// The named run, or the newest running one of the cluster.
+fn written(arguments: &Arguments) -> Result<Run, Answer> {
+    let target = &arguments.target;
+    if target.is_dir() {
+        return Run::open(target)
+            .map_err(|error| Answer::failed(Status::BadInput, error.code(), error.to_string()));
+    }
+    let (cluster, _) = files::cluster(target, Overrides::default())?;
+    find_running_of(&arguments.out, &cluster).ok_or_else(|| {
+        let message = format!(
+            "no laboratory of `{}` runs below {}; remote members require the keys of an operator (--keys DIR)",
+            cluster.name(),
+            arguments.out.display()
+        );
+        Answer::failed(Status::BadInput, "U0614", message)
+    })
+}
+
+fn refused(refusal: &Refusal) -> Answer {
+    let message = refusal.to_string();
+    // Messages of other processes begin with a code.
+    let code = message.split(':').next().unwrap_or_default().to_owned();
+    Answer::failed(Status::Failed, &code, message)
+}
+
+/// Sends the command to a remote member.
+fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
+    let (cluster, _) = files::cluster(&arguments.target, Overrides::default())?;
+    let keys = OperatorKeys::load(keys, &cluster, Date::of(SystemTime::now()));
+    let keys = keys.map_err(|errors| crate::deployment::keys::failed(&errors))?;
+    let member = crate::member::find(&cluster, &arguments.name)?;
+    let request = match arguments.what {
+        What::Status => Some(Request::Status),
+        What::Configuration => Some(Request::Configuration),
+        What::Release => Some(Request::Release),
+        What::ColdStart | What::AcceptState => Some(Request::Choose(arguments.choice())),
+        What::Stop => Some(Request::Stop),
+        What::Journal => None,
+        What::Kill | What::Restart => {
+            return Err(refused(&Refusal::Elsewhere {
+                name: arguments.name.clone(),
+                reason: "its process runs on another machine: stop or start it there".to_owned(),
+            }));
+        }
+    };
+    let address = cluster.address(member).ok_or_else(|| {
+        let message = format!("no address for {}", arguments.name);
+        Answer::failed(Status::BadInput, "U0608", message)
+    })?;
+    let failed = |error: understudy_bus::BusError| {
+        Answer::failed(Status::Failed, error.code(), error.to_string())
+    };
+    let hash = cluster.agreement().cluster;
+    let call = Call::to(address, hash, &arguments.name, &tls_keys(&keys.tls)).map_err(failed)?;
+    let Some(request) = request else {
+        let mut left = arguments.lines;
+        let take = |line: &str| {
+            left = left.saturating_sub(1);
+            // The reader closed the pipe.
+            writeln!(std::io::stdout(), "{line}").is_ok() && left > 0
+        };
+        call.follow(SILENCE, take).map_err(failed)?;
+        return Ok(Answer::done("", json!(null)));
+    };
+    let text = call.ask(&request).map_err(failed)?;
+    let result = serde_json::from_str(&text).unwrap_or_else(|_| json!({ "text": text }));
+    Ok(Answer::done(text, result))
+}
+
+/// Paths of the key files.
+pub(crate) fn tls_keys(tls: &TlsFiles) -> TlsKeys {
+    TlsKeys {
+        authority: tls.authority.clone(),
+        certificate: tls.certificate.clone(),
+        private_key: tls.private_key.clone(),
+    }
+}

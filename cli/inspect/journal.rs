@@ -1,0 +1,144 @@
+//! `understudy journal`: the events of a run as text.
+
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::Args;
+use serde_json::json;
+use understudy_text::MAXIMUM_SHOWN;
+use understudy_view::{Filter, JournalLine, Listing, Run, Trouble};
+
+use crate::answer::{Answer, Status};
+use crate::inspect::view::{RUN, refused, several};
+
+/// Print or follow the journal of a run
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy journal
+  understudy journal runs/latest --member robot --member robot-io --from 195 --to 230
+  understudy journal --follow --event flagged --event source --event value-fault
+
+Without filters all records are shown except the periodic ones of every cycle. Cycles are counted from the origin of the run, as in its
+report. With --follow and --json each line is a JSON object.")]
+pub(crate) struct Arguments {
+    /// Directory of a run
+    #[arg(value_name = "RUN", default_value = RUN)]
+    run: PathBuf,
+    /// Print new records until the run ends
+    #[arg(long)]
+    follow: bool,
+    /// Show only records of this member; repeatable
+    #[arg(long, value_name = "NAME")]
+    member: Vec<String>,
+    /// Show only this kind of record, such as flagged; repeatable
+    #[arg(long, value_name = "EVENT")]
+    event: Vec<String>,
+    /// Show only this controller, its remote I/O and its plant; repeatable
+    #[arg(long, value_name = "CONTROLLER")]
+    program: Vec<String>,
+    /// First cycle
+    #[arg(long, value_name = "CYCLE", allow_hyphen_values = true)]
+    from: Option<i64>,
+    /// Last cycle
+    #[arg(long, value_name = "CYCLE", allow_hyphen_values = true)]
+    to: Option<i64>,
+    /// Include the periodic records of every cycle
+    #[arg(long)]
+    all: bool,
+}
+
+/// Polling interval of a growing journal.
+const LOOK: Duration = Duration::from_millis(100);
+
+pub(crate) fn run(arguments: &Arguments, json: bool) -> Answer {
+    answered(arguments, json).unwrap_or_else(|answer| answer)
+}
+
+fn answered(arguments: &Arguments, json: bool) -> Result<Answer, Answer> {
+    let run = Run::open(&arguments.run).map_err(|error| refused(&error))?;
+    let filter = Filter {
+        members: arguments.member.clone(),
+        events: arguments.event.clone(),
+        programs: arguments.program.clone(),
+        from: arguments.from,
+        to: arguments.to,
+        ordinary: arguments.all,
+    };
+    let listing = run.listing(filter).map_err(|errors| several(&errors))?;
+    if arguments.follow {
+        return Ok(followed(&run, listing, json));
+    }
+    let mut lines = Vec::new();
+    let (mut troubles, mut more) = (Vec::new(), 0_usize);
+    for trouble in read(&run, listing, &mut |line| lines.push(line)) {
+        if troubles.len() < MAXIMUM_SHOWN {
+            troubles.push(trouble.to_string());
+        } else {
+            more += 1;
+        }
+    }
+    if more > 0 {
+        troubles.push(format!("{more} more unreadable lines of the journal"));
+    }
+    let mut text: String = lines.iter().map(|line| line.to_text() + "\n").collect();
+    if lines.is_empty() {
+        text += "Only periodic records of every cycle; show them with --all.\n";
+    }
+    for trouble in &troubles {
+        text += &format!("       -  {trouble}\n");
+    }
+    Ok(Answer::done(
+        text,
+        json!({ "lines": lines, "troubles": troubles }),
+    ))
+}
+
+/// The present records, and the errors between them.
+fn read(run: &Run, mut listing: Listing, take: &mut dyn FnMut(JournalLine)) -> Vec<Trouble> {
+    let mut source = run.follow();
+    let mut troubles = Vec::new();
+    loop {
+        let taken = source.poll(&mut |found| match found {
+            Ok(record) => listing.take(&record).into_iter().for_each(&mut *take),
+            Err(trouble) => troubles.push(trouble),
+        });
+        if taken == 0 || listing.is_past() {
+            troubles.extend(source.failure());
+            return troubles;
+        }
+    }
+}
+
+/// Prints each new line until the run ends or the reader closes the pipe.
+fn followed(run: &Run, mut listing: Listing, json: bool) -> Answer {
+    let mut source = run.follow();
+    let mut output = std::io::stdout();
+    let mut reader_is_there = true;
+    loop {
+        let over = run.is_finished();
+        let taken = source.poll(&mut |found| {
+            let line = match found {
+                Ok(record) => listing.take(&record).map(|line| {
+                    if json {
+                        serde_json::to_string(&line).unwrap_or_default()
+                    } else {
+                        line.to_text()
+                    }
+                }),
+                Err(trouble) if json => Some(json!({ "trouble": trouble.to_string() }).to_string()),
+                Err(trouble) => Some(format!("       -  {trouble}")),
+            };
+            if let Some(line) = line {
+                reader_is_there &= writeln!(output, "{line}").is_ok();
+            }
+        });
+        if !reader_is_there || listing.is_past() || (over && taken == 0) {
+            return Answer::done("", json!(null)).with_status(Status::Done);
+        }
+        if taken == 0 {
+            std::thread::sleep(LOOK);
+        }
+    }
+}

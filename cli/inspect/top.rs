@@ -1,0 +1,229 @@
+//! `understudy top`: a live view of a run on the terminal.
+
+use std::io::{self, IsTerminal};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use clap::Args;
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+use ratatui::crossterm::event::{self, KeyCode, KeyEventKind, KeyModifiers};
+use understudy_attach::Attached;
+use understudy_journal::{Commander, JOURNAL_LIMIT_BYTES, RunDirectory};
+use understudy_view::{Alarm, Bounds, Key, Model, Run, Screen, Source, find_run_of};
+
+use crate::answer::{Answer, Status};
+use crate::console::Console;
+use crate::files;
+use crate::inspect::attach::AttachArguments;
+use crate::inspect::view::{RUN, refused};
+
+/// Show a live view of a run on the terminal
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy top
+  understudy top runs/latest --once
+  understudy top examples/press-cell/cluster.toml
+  understudy top cell/cluster.toml --keys keys/members/operator
+
+For a cluster file the newest run below --out is shown. Keys: q quit, space pause, tab events, alarms and remaining redundancy,
+a acknowledge, arrows scroll, h help. With --once or --json the current state is printed.")]
+pub(crate) struct Arguments {
+    /// Directory of a run, or cluster file
+    #[arg(value_name = "RUN|CLUSTER.toml", default_value = RUN)]
+    run: PathBuf,
+    /// Print the current state and exit
+    #[arg(long)]
+    once: bool,
+    /// Directory of runs
+    #[arg(long, value_name = "DIR", default_value = "runs")]
+    out: PathBuf,
+    #[command(flatten)]
+    elsewhere: AttachArguments,
+}
+
+/// Refresh interval without key strokes.
+const LOOK: Duration = Duration::from_millis(200);
+
+/// Size of the printed screen.
+const WIDTH: u16 = 100;
+const HEIGHT: u16 = 30;
+
+/// Maximum wait for the first cycle of a remote cluster.
+const HEARD_FOR: Duration = Duration::from_secs(20);
+
+/// Time in which all members of a remote cluster have reported.
+const ALL_SAY: Duration = Duration::from_secs(1);
+
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
+    answered(arguments, console).unwrap_or_else(|answer| answer)
+}
+
+fn answered(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
+    let (run, attached) = open(arguments, console)?;
+    if console.is_json() || arguments.once {
+        if attached.is_some() {
+            wait_for_a_cycle(&run);
+        }
+        let model = run
+            .read(Bounds::default())
+            .map_err(|error| refused(&error))?;
+        let mut screen = Screen::default();
+        let snapshot = model.snapshot();
+        return Ok(Answer::done(printed(&mut screen, &model)?, &snapshot));
+    }
+    if !io::stdout().is_terminal() || !io::stdin().is_terminal() {
+        let message = "not a terminal: use --once to print the current state";
+        return Err(Answer::failed(Status::BadInput, "U0578", message));
+    }
+    let mut terminal = ratatui::try_init().map_err(failed)?;
+    let commander = match &attached {
+        Some((_, attached)) => attached.commander(),
+        None => run.commander(),
+    };
+    let shown = show(&mut terminal, &run, &commander);
+    ratatui::restore();
+    shown.map_err(failed)?;
+    Ok(Answer::done("", ()))
+}
+
+/// Waits until remote members have reported cycles.
+fn wait_for_a_cycle(run: &Run) {
+    let mut source = run.follow();
+    let mut model = run.model(Bounds::default());
+    let started = Instant::now();
+    while model.cycle().is_none() && started.elapsed() < HEARD_FOR {
+        source.poll(&mut |found| {
+            if let Ok(record) = found {
+                model.note(&record);
+            }
+        });
+        std::thread::sleep(LOOK);
+    }
+    std::thread::sleep(ALL_SAY);
+}
+
+type Opened = (Run, Option<(RunDirectory, Attached)>);
+
+fn open(arguments: &Arguments, console: &mut Console) -> Result<Opened, Answer> {
+    let path = arguments.run.as_path();
+    let is_cluster = path
+        .extension()
+        .is_some_and(|extension| extension == "toml");
+    let open = |path: &Path| Run::open(path).map_err(|error| refused(&error));
+    if !is_cluster && !arguments.elsewhere.is_wanted() {
+        return Ok((open(path)?, None));
+    }
+    let (cluster, _) = files::cluster(path, Default::default())?;
+    if arguments.elsewhere.is_wanted() {
+        let (out, limit) = (&arguments.out, JOURNAL_LIMIT_BYTES);
+        let attached = arguments
+            .elsewhere
+            .attach(path, &cluster, out, limit, console)?;
+        return Ok((open(attached.0.path())?, Some(attached)));
+    }
+    let run = find_run_of(&arguments.out, &cluster).map_err(|error| refused(&error))?;
+    Ok((run, None))
+}
+
+/// Records the acknowledgement of these alarms in the journal. They are shown as acknowledged once they are read there.
+fn acknowledge(seen: &[Alarm], commander: &Commander) {
+    let owner = owner();
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    let now = since.map_or(0, |since| since.as_secs());
+    for alarm in seen {
+        let seen = alarm.acknowledgement(owner.clone(), now);
+        // An acknowledgement that cannot be written leaves the alarm unacknowledged.
+        let _ = commander.acknowledge_and_wait(seen);
+    }
+}
+
+/// User of this terminal.
+pub(crate) fn owner() -> String {
+    std::env::var("USER").unwrap_or_else(|_| "terminal".to_owned())
+}
+
+fn failed(error: io::Error) -> Answer {
+    let message = format!("cannot write to the terminal: {error}");
+    Answer::failed(Status::Failed, "U0602", message)
+}
+
+fn printed(screen: &mut Screen, model: &Model) -> Result<String, Answer> {
+    let mut terminal =
+        Terminal::new(TestBackend::new(WIDTH, HEIGHT)).map_err(|never| match never {})?;
+    terminal
+        .draw(|frame| screen.draw(frame, model))
+        .map_err(|never| match never {})?;
+    let buffer = terminal.backend().buffer();
+    let rows = buffer.content.chunks(usize::from(WIDTH));
+    let lines = rows.map(|row| {
+        let line: String = row.iter().map(|cell| cell.symbol()).collect();
+        line.trim_end().to_owned() + "\n"
+    });
+    let text: String = lines.collect();
+    Ok(text.trim_end().to_owned() + "\n")
+}
+
+/// Shows the run until the user quits.
+fn show(
+    terminal: &mut ratatui::DefaultTerminal,
+    run: &Run,
+    commander: &Commander,
+) -> io::Result<()> {
+    let mut source: Source = run.follow();
+    let mut model = run.model(Bounds::default());
+    let mut screen = Screen::default();
+    loop {
+        let drawn = Instant::now();
+        while !screen.is_paused() {
+            let taken = source.poll(&mut |found| match found {
+                Ok(record) => model.note(&record),
+                Err(trouble) => model.trouble(&trouble),
+            });
+            if taken == 0 && run.is_finished() {
+                model.end();
+            }
+            // Draws the progress of reading a long journal.
+            if taken == 0 || drawn.elapsed() >= LOOK || event::poll(Duration::ZERO)? {
+                break;
+            }
+        }
+        let progress = source.progress().of_ended(model.is_finished());
+        terminal.draw(|frame| screen.draw_live(frame, &model, progress, Instant::now()))?;
+        let wait = if progress.is_at_end() || screen.is_paused() {
+            LOOK
+        } else {
+            Duration::ZERO
+        };
+        if !event::poll(wait)? {
+            continue;
+        }
+        let event::Event::Key(pressed) = event::read()? else {
+            continue;
+        };
+        if pressed.kind == KeyEventKind::Release {
+            continue;
+        }
+        let control = pressed.modifiers.contains(KeyModifiers::CONTROL);
+        let key = match pressed.code {
+            KeyCode::Char('q') | KeyCode::Esc => return Ok(()),
+            KeyCode::Char('c') if control => return Ok(()),
+            KeyCode::Char('a') => Key::Acknowledge,
+            KeyCode::Char('h' | '?') => Key::Help,
+            KeyCode::Char(' ') => Key::Pause,
+            KeyCode::Tab => Key::Next,
+            KeyCode::Up => Key::Up,
+            KeyCode::Down => Key::Down,
+            KeyCode::PageUp => Key::PageUp,
+            KeyCode::PageDown => Key::PageDown,
+            KeyCode::Left => Key::Left,
+            KeyCode::Right => Key::Right,
+            _ => continue,
+        };
+        let seen = screen.press(key, &model);
+        if !seen.is_empty() {
+            acknowledge(&seen, commander);
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! `understudy why`: the contacts that determined an output.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use understudy_view::{Bounds, Run};
+
+use crate::answer::Answer;
+use crate::inspect::view::{RUN, refused};
+
+/// Explain the value of an output in a cycle of a run
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy why press.move_down --at 212
+  understudy why grip --run runs/latest
+  understudy why robot.%QX0.0 --at 250 --json
+
+The program is evaluated again with the samples of the journal. The explanation names the contacts that determined the output, and the
+rungs and cycles that set the memory bits they read. For a reconstructed output it names the parity word, its members and the lineage
+that proves it.")]
+pub(crate) struct Arguments {
+    /// Output or memory bit by name or address, prefixed with its controller if the name is ambiguous
+    #[arg(value_name = "OUTPUT")]
+    output: String,
+    /// Cycle, counted from the origin of the run; default: the newest
+    #[arg(long, value_name = "CYCLE", allow_hyphen_values = true)]
+    at: Option<i64>,
+    /// Directory of a run
+    #[arg(long, value_name = "DIR", default_value = RUN)]
+    run: PathBuf,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Answer {
+    let found = Run::open(&arguments.run).and_then(|run| {
+        let until = arguments.at.unwrap_or(i64::MAX);
+        let model = run.read_until(Bounds::default(), until)?;
+        model.why(&arguments.output, arguments.at)
+    });
+    match found {
+        Ok(why) => Answer::done(why.to_text(), &why).and_next(&[&"watch", &arguments.run]),
+        Err(error) => refused(&error),
+    }
+}

@@ -1,0 +1,305 @@
+//! `understudy check`: all errors and warnings of project files.
+
+mod next;
+mod remarks;
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use clap::Args;
+use serde::Serialize;
+use understudy_cluster::{Cluster, Overrides};
+use understudy_interchange::{parse_program, unknown_form};
+use understudy_journal::Members;
+use understudy_scenarios::read;
+use understudy_supervisor::ladder::read_map;
+use understudy_supervisor::petri::read_net;
+use understudy_supervisor::read_ads;
+use understudy_text::duration;
+use understudy_text::{Diagnostic, Report, Severity, has_errors};
+
+use crate::answer::{Answer, Failure, Status};
+use crate::files::{self, read_cluster};
+use crate::kind::Kind;
+use crate::supervisors::automata;
+use crate::supervisors::reconfigure::read_project;
+use remarks::Looking;
+
+/// Check files and report all errors and warnings
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy check cluster.toml kill.toml
+  understudy check --json robot.ladder
+  understudy check model.toml net.toml map.toml SUPER.ADS
+
+The programs of a cluster are checked with it. Names in a scenario are checked against the cluster file given with it, otherwise against the
+cluster.toml in its folder. Ladder programs are also checked for rungs without effect, coils with conflicting values in one scan, and
+sequence steps that are passed in one scan; `understudy verify` shows example runs. Warnings do not change the exit status.")]
+pub(crate) struct Arguments {
+    /// Ladder programs (.ladder), TCT automata (.ADS), and clusters, scenarios, models, nets, signal maps and projects (.toml)
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
+    /// Time limit for the optional checks of large programs
+    #[arg(long, value_name = "TIME", default_value = "1s", value_parser = duration::parse)]
+    budget: Duration,
+}
+
+/// Scan period of a ladder without a cluster, as for `verify`.
+const PERIOD: Duration = Duration::from_millis(10);
+
+#[derive(Serialize)]
+struct Result {
+    files: Vec<CheckedFile>,
+    errors: usize,
+    warnings: usize,
+}
+
+#[derive(Serialize)]
+struct CheckedFile {
+    name: String,
+    /// `ladder`, `cluster`, `scenario`, `model`, `net`, `map`, `project`, `ADS` or `unknown`; null for an unreadable file.
+    kind: Option<&'static str>,
+    errors: usize,
+    warnings: usize,
+    /// Whether the time limit ended the optional checks early.
+    cut_short: bool,
+}
+
+#[derive(Default)]
+struct Found<'a> {
+    /// The named files, in their order.
+    given: Vec<(Kind, &'a Path)>,
+    cut_short: Vec<String>,
+    reports: Vec<(Kind, Report)>,
+    failures: Vec<Failure>,
+    unreadable: Vec<String>,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Answer {
+    let looking = Looking::new(arguments.budget);
+    let mut found = Found::default();
+    let mut scenarios = Vec::new();
+    let mut clusters = Vec::new();
+    for path in &arguments.files {
+        let Some(text) = found.text(path) else {
+            continue;
+        };
+        let kind = Kind::of(path, &text);
+        found.given.push((kind, path));
+        match kind {
+            Kind::Ads => {
+                let diagnostics = read_ads(&text).diagnostics;
+                found.add_file(Kind::Ads, path, text, diagnostics);
+            }
+            Kind::Net => {
+                let diagnostics = read_net(&text).diagnostics;
+                found.add_file(Kind::Net, path, text, diagnostics);
+            }
+            Kind::Map => {
+                let diagnostics = read_map(&text).diagnostics;
+                found.add_file(Kind::Map, path, text, diagnostics);
+            }
+            Kind::Model => found.add_model(path),
+            Kind::Ladder => {
+                let parsed = parse_program(&path.display().to_string(), &text);
+                let mut diagnostics = parsed.diagnostics;
+                if !has_errors(&diagnostics)
+                    && looking.at_rungs(&parsed.program, PERIOD, &mut diagnostics)
+                {
+                    found.cut_short.push(path.display().to_string());
+                }
+                found.add_file(Kind::Ladder, path, text, diagnostics);
+            }
+            Kind::Unknown => {
+                let diagnostics = vec![unknown_form(&text)];
+                found.add_file(Kind::Unknown, path, text, diagnostics);
+            }
+            Kind::Scenario => scenarios.push((path, text)),
+            Kind::Project => {
+                found.add_with_ladders(Kind::Project, read_project(path, &text).reports);
+            }
+            Kind::Cluster => {
+                let mut loaded = read_cluster(path, &text, Overrides::default());
+                if let Some(cluster) = &loaded.cluster {
+                    found.look(&looking, cluster, &mut loaded.reports);
+                }
+                found.add_with_ladders(Kind::Cluster, loaded.reports);
+                clusters.extend(loaded.cluster.as_ref().map(Members::of));
+            }
+        }
+    }
+    for (path, text) in scenarios {
+        let members = match clusters.as_slice() {
+            [only] => Some(only.clone()),
+            _ => members_beside(path),
+        };
+        let scenario = read(&path.display().to_string(), &text, members.as_ref());
+        found.add(Kind::Scenario, scenario.report);
+    }
+    let given = std::mem::take(&mut found.given);
+    next::after_check(found.answer(), &given)
+}
+
+/// Members of the `cluster.toml` in the folder of a scenario, if it is valid.
+fn members_beside(scenario: &Path) -> Option<Members> {
+    let path = scenario.with_file_name("cluster.toml");
+    let text = files::text(&path).ok()?;
+    let cluster = read_cluster(&path, &text, Overrides::default()).cluster?;
+    Some(Members::of(&cluster))
+}
+
+impl Found<'_> {
+    /// Checks the rungs of the programs of a cluster and its understudy.
+    fn look(&mut self, looking: &Looking, cluster: &Cluster, reports: &mut [Report]) {
+        let period = cluster.agreement().schedule.period();
+        let mut seen = Vec::new();
+        for controller in cluster.controllers() {
+            let of_it =
+                |report: &&mut Report| Path::new(&report.name).ends_with(&controller.ladder);
+            let Some(report) = reports.iter_mut().find(of_it) else {
+                continue;
+            };
+            let known = seen.contains(&report.name) || has_errors(&report.diagnostics);
+            seen.push(report.name.clone());
+            if !known && looking.at_rungs(&controller.program, period, &mut report.diagnostics) {
+                self.cut_short.push(report.name.clone());
+            }
+        }
+        if let Some(report) = reports.first_mut()
+            && looking.at_understudy(cluster, report)
+        {
+            self.cut_short.push(report.name.clone());
+        }
+    }
+
+    fn text(&mut self, path: &Path) -> Option<String> {
+        match files::text(path) {
+            Ok(text) => Some(text),
+            Err(answer) => {
+                self.unreadable.push(path.display().to_string());
+                self.failures.extend(answer.failures);
+                None
+            }
+        }
+    }
+
+    fn add_file(&mut self, kind: Kind, path: &Path, text: String, diagnostics: Vec<Diagnostic>) {
+        let report = Report {
+            name: path.display().to_string(),
+            text,
+            diagnostics,
+        };
+        self.add(kind, report);
+    }
+
+    /// Reads a model with its nets and automata.
+    fn add_model(&mut self, path: &Path) {
+        let reports = match automata::model(path) {
+            Ok(sources) => sources.reports,
+            Err(answer) => answer.reports,
+        };
+        for (index, report) in reports.into_iter().enumerate() {
+            let kind = match index {
+                0 => Kind::Model,
+                _ if report.name.ends_with(".toml") => Kind::Net,
+                _ => Kind::Ads,
+            };
+            self.add(kind, report);
+        }
+    }
+
+    /// Reports on a file and the ladders that it names.
+    fn add_with_ladders(&mut self, kind: Kind, reports: Vec<Report>) {
+        for (index, report) in reports.into_iter().enumerate() {
+            self.add(if index == 0 { kind } else { Kind::Ladder }, report);
+        }
+    }
+
+    /// Reports each ladder once, also if several files name it.
+    fn add(&mut self, kind: Kind, report: Report) {
+        if !self
+            .reports
+            .iter()
+            .any(|(_, known)| known.name == report.name)
+        {
+            self.reports.push((kind, report));
+        }
+    }
+
+    fn answer(self) -> Answer {
+        let count = |report: &Report, severity| {
+            let diagnostics = report.diagnostics.iter();
+            diagnostics
+                .filter(|diagnostic| diagnostic.severity == severity)
+                .count()
+        };
+        let checked = self.reports.iter().map(|(kind, report)| CheckedFile {
+            name: report.name.clone(),
+            kind: Some(kind.word()),
+            errors: count(report, Severity::Error),
+            warnings: count(report, Severity::Warning),
+            cut_short: self.cut_short.contains(&report.name),
+        });
+        let unreadable = self.unreadable.into_iter().map(|name| CheckedFile {
+            name,
+            kind: None,
+            errors: 1,
+            warnings: 0,
+            cut_short: false,
+        });
+        let files: Vec<CheckedFile> = checked.chain(unreadable).collect();
+        let errors = files.iter().map(|file| file.errors).sum();
+        let warnings = files.iter().map(|file| file.warnings).sum();
+        let mut text = String::new();
+        let width = files
+            .iter()
+            .map(|file| file.name.chars().count())
+            .max()
+            .unwrap_or(0);
+        for file in &files {
+            let verdict = match (file.errors, file.warnings) {
+                (0, 0) => "right".to_owned(),
+                (0, warnings) => format!("right, {}", number(warnings, "warning")),
+                (errors, 0) => number(errors, "error"),
+                (errors, warnings) => {
+                    format!(
+                        "{}, {}",
+                        number(errors, "error"),
+                        number(warnings, "warning")
+                    )
+                }
+            };
+            let kind = file.kind.unwrap_or("");
+            let more = if file.cut_short {
+                "; optional checks incomplete: increase --budget or use `understudy verify`"
+            } else {
+                ""
+            };
+            let _ = writeln!(text, "{:width$}  {kind:8}  {verdict}{more}", file.name);
+        }
+        let status = if errors == 0 {
+            Status::Done
+        } else {
+            Status::BadInput
+        };
+        let result = Result {
+            files,
+            errors,
+            warnings,
+        };
+        let mut answer = Answer::done(text, result)
+            .with_status(status)
+            .with_reports(self.reports.into_iter().map(|(_, report)| report).collect());
+        answer.failures = self.failures;
+        answer
+    }
+}
+
+fn number(count: usize, what: &str) -> String {
+    match count {
+        1 => format!("1 {what}"),
+        _ => format!("{count} {what}s"),
+    }
+}

@@ -1,0 +1,258 @@
+//! `understudy convert`: program formats and a report on unsupported elements.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+use understudy_interchange::plcopen::Fidelity;
+use understudy_interchange::{
+    Compared, Format, Reading, WriteError, Written, read, unknown_form, write,
+};
+use understudy_text::duration::parse_positive;
+use understudy_text::{Lines, MAXIMUM_SHOWN, Report, shortened};
+
+use crate::answer::{Answer, Status};
+use crate::files;
+use crate::kind::Kind;
+
+/// Convert a program between formats
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy convert examples/plcopen/pump.xml pump.ladder --fidelity
+  understudy convert examples/press-cell/robot.ladder robot.xml
+  understudy convert robot.xml robot.st --period 20ms
+
+The file extension determines the format: .ladder, .xml (PLCopen XML or digraph XML), .st (Structured Text), .ld (LDmicro).")]
+pub(crate) struct Arguments {
+    /// Input file
+    #[arg(value_name = "IN")]
+    from_file: PathBuf,
+    /// Output file; default: standard output
+    #[arg(value_name = "OUT")]
+    to_file: Option<PathBuf>,
+    /// Format of IN
+    #[arg(long, value_enum)]
+    from: Option<Form>,
+    /// Format of OUT
+    #[arg(long, value_enum)]
+    to: Option<Form>,
+    /// Program to convert, if IN contains several
+    #[arg(long, value_name = "NAME")]
+    unit: Option<String>,
+    /// Scan period; default: as in IN, otherwise 10ms
+    #[arg(long, value_name = "TIME", value_parser = parse_positive)]
+    period: Option<Duration>,
+    /// Report which elements were converted and which are unsupported
+    #[arg(long)]
+    fidelity: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Form {
+    /// Ladder text
+    Ladder,
+    /// PLCopen TC6 XML 2.01 (also reads 2.0)
+    Plcopen,
+    /// IEC 61131-3 Structured Text
+    St,
+    /// Digraph XML of the paper
+    Digraph,
+    /// LDmicro (input only)
+    Ldmicro,
+}
+
+impl Form {
+    fn format(self) -> Format {
+        match self {
+            Self::Ladder => Format::Ladder,
+            Self::Plcopen => Format::PlcOpen,
+            Self::St => Format::StructuredText,
+            Self::Digraph => Format::Digraph,
+            Self::Ldmicro => Format::LdMicro,
+        }
+    }
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Answer {
+    let read_file = match arguments.from {
+        Some(_) => files::text(&arguments.from_file),
+        None => files::text_of(Kind::Ladder, &arguments.from_file),
+    };
+    let source = match read_file {
+        Ok(source) => source,
+        Err(answer) => return answer,
+    };
+    let name = arguments.from_file.display().to_string();
+    let form = arguments.from.map(Form::format);
+    let reading = match form.or_else(|| Format::of(&name, &source)) {
+        Some(format) => read(format, &name, &source, arguments.unit.as_deref()),
+        None => Reading {
+            diagnostics: vec![unknown_form(&source)],
+            ..Reading::default()
+        },
+    };
+    let mut report = Report {
+        name,
+        text: source,
+        diagnostics: reading.diagnostics,
+    };
+    let mut kept = if arguments.fidelity {
+        fidelity_text(&reading.fidelity, &report)
+    } else {
+        String::new()
+    };
+    let Some(program) = reading.program else {
+        let fidelity = fidelity_value(&reading.fidelity, &report, None);
+        let mut answer = Answer::bad_files(vec![report]);
+        answer.text = kept;
+        answer.result = json!({ "file": null, "text": null, "fidelity": fidelity });
+        return answer;
+    };
+    let period = arguments.period.or(reading.period);
+    let written = form_of_output(arguments).and_then(|form| {
+        write(form.format(), &program, period).map_err(|error| (code(&error), error.to_string()))
+    });
+    let written = match written {
+        Ok(written) => written,
+        Err((code, message)) => {
+            return Answer::failed(Status::BadInput, code, message).with_reports(vec![report]);
+        }
+    };
+    if arguments.fidelity {
+        kept.push_str(&written_text(&written));
+    }
+    let fidelity = fidelity_value(&reading.fidelity, &report, Some(&written));
+    report.diagnostics.extend(written.losses);
+    let text = written.text;
+    let answer = match &arguments.to_file {
+        None => {
+            let result = json!({ "file": null, "text": text, "fidelity": fidelity });
+            Answer::done(format!("{text}{kept}"), result)
+        }
+        Some(path) => match files::write(path, &text) {
+            Ok(()) => {
+                let name = path.display().to_string();
+                let result = json!({ "file": name, "text": null, "fidelity": fidelity });
+                Answer::done(format!("written to {name}\n{kept}"), result)
+                    .and_next(&[&"check", path])
+            }
+            Err(answer) => answer,
+        },
+    };
+    answer.with_reports(vec![report])
+}
+
+/// Code of the error that prevented the conversion.
+pub(crate) fn code(error: &WriteError) -> &'static str {
+    match error {
+        WriteError::ReadOnly | WriteError::Program(_) => "U1014",
+        WriteError::Different(_) => "U1019",
+    }
+}
+
+fn form_of_output(arguments: &Arguments) -> Result<Form, (&'static str, String)> {
+    match (arguments.to, &arguments.to_file) {
+        (Some(form), _) => Ok(form),
+        (None, Some(path)) => form_of(path).map_err(|message| ("U1014", message)),
+        (None, None) => Ok(Form::Ladder),
+    }
+}
+
+/// Format by file extension.
+fn form_of(path: &Path) -> Result<Form, String> {
+    match Format::of_ending(&path.to_string_lossy()) {
+        Some(Format::Ladder) => Ok(Form::Ladder),
+        Some(Format::PlcOpen | Format::Digraph) => Ok(Form::Plcopen),
+        Some(Format::StructuredText) => Ok(Form::St),
+        Some(Format::LdMicro) => Ok(Form::Ldmicro),
+        None => Err(format!(
+            "{}: output formats are .ladder, .xml and .st; give --to for another file extension",
+            path.display()
+        )),
+    }
+}
+
+/// Maximum length of a printed note, in characters.
+const MAXIMUM_NOTE: usize = 300;
+
+fn fidelity_text(fidelity: &Fidelity, report: &Report) -> String {
+    let mut text = String::from("\n");
+    for count in &fidelity.counts {
+        let _ = writeln!(
+            text,
+            "{:<28} {:>5} in the file, {:>5} in the program",
+            count.what, count.in_file, count.in_program
+        );
+    }
+    let lines = Lines::new(&report.text);
+    for note in fidelity.notes.iter().take(MAXIMUM_SHOWN) {
+        let place = lines.position(note.span.start);
+        let message = shortened(&note.message, MAXIMUM_NOTE);
+        let _ = writeln!(text, "{}:{place}: {message}", report.name);
+    }
+    match fidelity.notes.len().saturating_sub(MAXIMUM_SHOWN) {
+        0 => {}
+        more => {
+            let _ = writeln!(text, "and {more} more");
+        }
+    }
+    text
+}
+
+/// Findings from reading the written text back.
+fn written_text(written: &Written) -> String {
+    let Compared {
+        signals,
+        blocks,
+        comments,
+        scans,
+        proved,
+    } = written.compared;
+    let lost = match written.losses.len() {
+        0 => "written completely".to_owned(),
+        1 => "not written completely: see the warning".to_owned(),
+        count => format!("not written completely: see the {count} warnings"),
+    };
+    let behaviour = if proved {
+        "proved equal in every scan".to_owned()
+    } else {
+        format!("equal in {scans} scans, not proved")
+    };
+    format!(
+        "read back and compared: {signals} signals, {blocks} blocks, {comments} comments; {lost}\nbehaviour: {behaviour}\n"
+    )
+}
+
+fn fidelity_value(fidelity: &Fidelity, report: &Report, written: Option<&Written>) -> Value {
+    let counts = fidelity.counts.iter().map(|count| {
+        json!({ "what": count.what, "in_file": count.in_file, "in_program": count.in_program })
+    });
+    let lines = Lines::new(&report.text);
+    let notes = fidelity.notes.iter().take(MAXIMUM_SHOWN).map(|note| {
+        let place = lines.position(note.span.start);
+        let message = shortened(&note.message, MAXIMUM_NOTE);
+        json!({ "line": place.line, "column": place.column, "message": message })
+    });
+    let written = written.map(|written| {
+        let losses = written.losses.iter().map(|found| found.message.as_str());
+        json!({
+            "losses": losses.collect::<Vec<_>>(),
+            "signals": written.compared.signals,
+            "blocks": written.compared.blocks,
+            "comments": written.compared.comments,
+            "scans": written.compared.scans,
+            "proved": written.compared.proved,
+        })
+    });
+    let notes: Vec<Value> = notes.collect();
+    let more = fidelity.notes.len() - notes.len();
+    json!({
+        "counts": counts.collect::<Vec<_>>(),
+        "notes": notes,
+        "more_notes": more,
+        "written": written,
+    })
+}

@@ -1,0 +1,94 @@
+//! `understudy init`: a new cluster from a template or from existing programs.
+
+mod from;
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use serde_json::json;
+use understudy_cluster::{TemplateFile, minimal, modbus_cell, template};
+
+use crate::answer::Answer;
+use crate::files;
+
+/// Write a new cluster from a template or from existing programs
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy init cell
+  understudy init cell --template modbus
+  understudy init cell --from plc.xml tank.st conveyor.ladder
+  understudy init cell --from north=north/plc.xml south=south/plc.xml
+
+--from reads programs in all formats of `understudy convert`. Each program gets a controller, a remote I/O and a placeholder for its plant;
+a file with several programs gives one controller per program. NAME= sets the name of the controller.")]
+pub(crate) struct Arguments {
+    /// Folder to create; existing files are not overwritten
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// Template
+    #[arg(long, value_enum, default_value_t)]
+    template: Template,
+    /// Existing programs, instead of a template
+    #[arg(long, value_name = "[NAME=]FILE", num_args = 1.., conflicts_with = "template")]
+    from: Vec<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+enum Template {
+    /// One program and one understudy
+    Minimal,
+    /// A filling tank and a conveyor with simulated plants
+    #[default]
+    Cell,
+    /// A tank with a Modbus TCP device and a script that simulates it, and a simulated press
+    Modbus,
+}
+
+impl Template {
+    fn files(self) -> &'static [TemplateFile] {
+        match self {
+            Self::Minimal => minimal(),
+            Self::Cell => template(),
+            Self::Modbus => modbus_cell(),
+        }
+    }
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Answer {
+    let folder = &arguments.folder;
+    if !arguments.from.is_empty() {
+        return from::run(folder, &arguments.from);
+    }
+    match files::write_template(folder, arguments.template.files()) {
+        Err(answer) => answer,
+        Ok(paths) => {
+            let answer = written(folder, &paths, "");
+            if arguments.template == Template::Modbus {
+                let device = folder.join("device.py");
+                return with_device(answer, &device);
+            }
+            answer
+        }
+    }
+}
+
+/// Answer that lists the files and the next steps.
+fn written(folder: &Path, paths: &[PathBuf], more: &str) -> Answer {
+    let names = paths.iter().map(|path| path.display().to_string());
+    let names: Vec<String> = names.collect();
+    let text = format!("{}\n{more}", names.join("\n"));
+    let (cluster, scenario) = (folder.join("cluster.toml"), folder.join("kill.toml"));
+    Answer::done(text, json!({ "files": names }))
+        .and_next(&[&"check", &cluster, &scenario])
+        .and_next(&[&"lab", &cluster, &"--scenario", &scenario])
+}
+
+/// Adds the instructions to start the simulated device.
+fn with_device(mut answer: Answer, device: &Path) -> Answer {
+    answer.text.push_str(&format!(
+        "\nStart the simulated device in a terminal of its own before the laboratory:\n  pip install pymodbus==3.16.1\n  python3 {}\n",
+        device.display()
+    ));
+    answer
+}

@@ -1,0 +1,330 @@
+//! A cluster from existing programs.
+//!
+//! Invariant: files are written only after every program was read and the drafted cluster was checked.
+
+use std::collections::HashMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use understudy_cluster::{
+    Draft, DraftProgram, MAXIMUM_PROGRAM_NAME, is_name, read as read_cluster,
+};
+use understudy_interchange::{
+    Format, Reading, USUAL_PERIOD, read_all, unknown_form, write as write_program,
+};
+use understudy_text::{Report, Severity, decode};
+use understudy_wire::MAXIMUM_STATIONS;
+
+use super::written;
+use crate::answer::{Answer, Failure};
+use crate::files::{self, NewFile};
+use crate::kind::{self, Kind};
+use crate::programs::convert::code;
+
+pub(super) fn run(folder: &Path, arguments: &[PathBuf]) -> Answer {
+    let mut found = Found::default();
+    for argument in arguments {
+        found.read(&Source::new(argument));
+    }
+    found.check();
+    if found.is_wrong() {
+        return found.refusal();
+    }
+    let draft = found.draft(folder);
+    let texts = draft.files();
+    found.check_draft(&texts);
+    if found.is_wrong() {
+        return found.refusal();
+    }
+    let texts = texts.into_iter().map(|(name, text)| NewFile {
+        name,
+        bytes: text.into_bytes(),
+    });
+    // A program that is already in the folder is used in place.
+    let copies = found.copies.into_iter().filter(|copy| {
+        let place = fs::canonicalize(folder.join(&copy.file.name));
+        !place.is_ok_and(|place| fs::canonicalize(&copy.source).is_ok_and(|source| source == place))
+    });
+    let all: Vec<NewFile> = texts.chain(copies.map(|copy| copy.file)).collect();
+    match files::write_new(folder, &all) {
+        Err(answer) => answer,
+        Ok(paths) => {
+            let marks = "\ncomplete the entries marked FILL IN in cluster.toml: fail-safe outputs and plants\n";
+            written(folder, &paths, marks).with_used(found.reports)
+        }
+    }
+}
+
+/// A file named on the command line.
+struct Source<'a> {
+    name: Option<&'a str>,
+    path: PathBuf,
+}
+
+impl<'a> Source<'a> {
+    /// `NAME=FILE` or a file. An existing file whose name contains `=` is a file.
+    fn new(argument: &'a Path) -> Self {
+        let split = argument.to_str().and_then(|text| text.split_once('='));
+        match split {
+            Some((name, file)) if !argument.exists() && !name.contains('/') => Self {
+                name: Some(name),
+                path: file.into(),
+            },
+            _ => Self {
+                name: None,
+                path: argument.to_owned(),
+            },
+        }
+    }
+
+    /// Controller name for one program of the file.
+    fn controller(&self, program: &str, is_only: bool) -> String {
+        match self.name {
+            None => program.to_owned(),
+            Some(name) if is_only => name.to_owned(),
+            Some(name) => format!("{name}-{program}"),
+        }
+    }
+}
+
+/// A program to write to the folder.
+struct Copied {
+    source: PathBuf,
+    file: NewFile,
+}
+
+#[derive(Default)]
+struct Found {
+    programs: Vec<DraftProgram>,
+    copies: Vec<Copied>,
+    /// Given file of each program.
+    sources: Vec<PathBuf>,
+    periods: Vec<Duration>,
+    reports: Vec<Report>,
+    failures: Vec<Failure>,
+}
+
+impl Found {
+    fn read(&mut self, source: &Source<'_>) {
+        let path = &source.path;
+        let read = files::bytes(path).and_then(|bytes| {
+            let text = files::decoded(path, bytes.clone())?;
+            kind::expect(Kind::Ladder, path, &text)?;
+            Ok((bytes, text))
+        });
+        let (bytes, text) = match read {
+            Ok(read) => read,
+            Err(answer) => {
+                self.failures.extend(answer.failures);
+                return;
+            }
+        };
+        let name = path.display().to_string();
+        let mut report = Report {
+            name: name.clone(),
+            text,
+            diagnostics: Vec::new(),
+        };
+        match Format::of(&name, &report.text) {
+            None => report.diagnostics.push(unknown_form(&report.text)),
+            Some(format) => {
+                let readings = read_all(format, &name, &report.text);
+                let is_only = readings.len() == 1;
+                for reading in readings {
+                    self.add(
+                        source,
+                        format,
+                        reading,
+                        is_only.then_some(&bytes),
+                        &mut report,
+                    );
+                }
+            }
+        }
+        self.reports.push(report);
+    }
+
+    /// A program of a file: a copy of the file if it is the only program, otherwise a ladder file.
+    fn add(
+        &mut self,
+        source: &Source<'_>,
+        format: Format,
+        reading: Reading,
+        only: Option<&Vec<u8>>,
+        report: &mut Report,
+    ) {
+        report.diagnostics.extend(reading.diagnostics);
+        let Some(program) = reading.program else {
+            return;
+        };
+        let unit = program.name.to_string();
+        // Digraphs are unnamed.
+        let own = match format {
+            Format::Digraph => source
+                .path
+                .file_stem()
+                .unwrap_or_default()
+                .to_string_lossy(),
+            _ => unit.as_str().into(),
+        };
+        let name = source.controller(&own, only.is_some());
+        let (ending, bytes) = match only {
+            Some(bytes) => (ending(&source.path, format), bytes.clone()),
+            None => match write_program(Format::Ladder, &program, reading.period) {
+                Ok(written) => {
+                    report.diagnostics.extend(written.losses);
+                    ("ladder".to_owned(), written.text.into_bytes())
+                }
+                Err(error) => {
+                    let message = format!("{}: {unit}: {error}", report.name);
+                    self.fail(code(&error), message);
+                    return;
+                }
+            },
+        };
+        if program.outputs.is_empty() {
+            let message = format!(
+                "{}: the program `{unit}` has no outputs to protect; declare outputs (VAR_OUTPUT, or AT %QX…) or omit the program",
+                report.name
+            );
+            self.fail("U0622", message);
+        }
+        let file = format!("{name}.{ending}");
+        self.periods.extend(reading.period);
+        self.sources.push(source.path.clone());
+        self.copies.push(Copied {
+            source: source.path.clone(),
+            file: NewFile {
+                name: file.clone(),
+                bytes,
+            },
+        });
+        self.programs.push(DraftProgram {
+            name,
+            file,
+            origin: format!("{}, program {unit}", report.name),
+            program,
+        });
+    }
+
+    /// Number and names of the programs.
+    fn check(&mut self) {
+        let mut failures = Vec::new();
+        let mut taken: HashMap<String, &Path> = HashMap::new();
+        for other in Draft::other_members() {
+            taken.insert(other.to_owned(), Path::new(""));
+        }
+        for (program, source) in self.programs.iter().zip(&self.sources) {
+            let name = &program.name;
+            let file = source.display();
+            let fix = format!("name it on the command line: --from NAME={file}");
+            if !is_name(name) || name.len() > MAXIMUM_PROGRAM_NAME {
+                let message = format!(
+                    "{file}: {name:?} is not a controller name: expected a letter followed by letters, digits, `-` and `_`, at most {MAXIMUM_PROGRAM_NAME} characters; {fix}"
+                );
+                failures.push(("U0623", message));
+                continue;
+            }
+            let members = program.members();
+            if let Some(member) = members.iter().find(|member| taken.contains_key(*member)) {
+                let whose = match taken[member] {
+                    path if path == Path::new("") => "is the understudy".to_owned(),
+                    path => format!("comes from {}", path.display()),
+                };
+                let message = format!(
+                    "{file}: the program `{name}` requires the name `{member}`, which is in use: it {whose}; {fix}"
+                );
+                failures.push(("U0624", message));
+                continue;
+            }
+            taken.extend(members.map(|member| (member, source.as_path())));
+        }
+        let most = MAXIMUM_STATIONS - Draft::other_members().len();
+        if self.programs.len() > most {
+            let message = format!(
+                "{} programs: a cluster has at most {most} and its understudy; divide them into several clusters",
+                self.programs.len()
+            );
+            failures.push(("U0625", message));
+        }
+        for (code, message) in failures {
+            self.fail(code, message);
+        }
+    }
+
+    fn draft(&mut self, folder: &Path) -> Draft {
+        let shortest = self.periods.iter().min().copied();
+        Draft::new(
+            cluster_name(folder),
+            shortest.unwrap_or(USUAL_PERIOD),
+            std::mem::take(&mut self.programs),
+        )
+    }
+
+    /// Reads the drafted cluster as it will be on disk and reports all errors.
+    fn check_draft(&mut self, texts: &[(String, String)]) {
+        let (file, text) = &texts[0];
+        let copies = &self.copies;
+        let loaded = read_cluster(file, text, &mut |wanted| {
+            let drafted = texts.iter().find(|(name, _)| name == wanted);
+            if let Some((_, text)) = drafted {
+                return Ok(text.clone());
+            }
+            let copy = copies.iter().find(|copy| copy.file.name == wanted);
+            let copy = copy.ok_or_else(|| "cannot be drafted".to_owned())?;
+            decode(copy.file.bytes.clone()).map_err(|error| error.to_string())
+        });
+        for report in &loaded.reports {
+            let errors = report.diagnostics.iter();
+            for error in errors.filter(|found| found.severity == Severity::Error) {
+                self.fail(error.code, error.message.clone());
+            }
+        }
+    }
+
+    fn fail(&mut self, code: &str, message: String) {
+        self.failures.push(Failure {
+            code: code.to_owned(),
+            message,
+        });
+    }
+
+    fn is_wrong(&self) -> bool {
+        !self.failures.is_empty() || self.reports.iter().any(Report::has_errors)
+    }
+
+    fn refusal(self) -> Answer {
+        let mut answer = Answer::bad_files(self.reports);
+        answer.failures = self.failures;
+        answer
+    }
+}
+
+/// File extension of a copy, with the format of the original.
+fn ending(path: &Path, format: Format) -> String {
+    let name = path.to_string_lossy();
+    match (Format::of_ending(&name), path.extension()) {
+        (Some(_), Some(ending)) => ending.to_string_lossy().to_lowercase(),
+        _ => format.ending().to_owned(),
+    }
+}
+
+/// Cluster name: the legal characters of the folder name.
+fn cluster_name(folder: &Path) -> String {
+    let absolute = std::path::absolute(folder).unwrap_or_default();
+    let name = absolute.file_name().unwrap_or_default().to_string_lossy();
+    let legal = |letter: char| {
+        if letter.is_ascii_alphanumeric() || letter == '_' {
+            letter
+        } else {
+            '-'
+        }
+    };
+    let name: String = name.chars().map(legal).take(MAXIMUM_PROGRAM_NAME).collect();
+    if is_name(&name) {
+        name
+    } else {
+        "cluster".to_owned()
+    }
+}

@@ -1,0 +1,85 @@
+//! `understudy parity`: the generated parity controller as equations, ladder or Structured Text.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+use understudy_cluster::{Cluster, Overrides};
+use understudy_ladder::{circuit_as_structured_text, from_circuit, print};
+use understudy_parity::{Equations, Style};
+
+use crate::answer::Answer;
+use crate::files;
+
+/// Print the generated understudy of a cluster
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy parity examples/press-cell/cluster.toml
+  understudy parity examples/press-cell/cluster.toml --as st --output understudy.st")]
+pub(crate) struct Arguments {
+    /// Cluster file
+    #[arg(value_name = "CLUSTER.toml")]
+    cluster: PathBuf,
+    /// Output format
+    #[arg(long = "as", value_enum, default_value = "equations")]
+    form: Form,
+    /// Output file; default: standard output
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Form {
+    /// Polynomials over GF(2), as in (30)-(35), and Boolean functions, as in (37)-(40)
+    Equations,
+    /// Ladder text
+    Ladder,
+    /// IEC 61131-3 Structured Text
+    St,
+    /// Equations as JSON
+    Json,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Answer {
+    let (cluster, reports) = match files::cluster(&arguments.cluster, Overrides::default()) {
+        Ok(read) => read,
+        Err(answer) => return answer,
+    };
+    let (text, result) = made(&cluster, arguments.form);
+    let answer = match &arguments.output {
+        None => Answer::done(text, result),
+        Some(path) => match files::write(path, &text) {
+            Ok(()) => {
+                let name = path.display().to_string();
+                Answer::done(format!("written to {name}"), json!({ "file": name }))
+                    .and_next(&[&"verify", &arguments.cluster])
+            }
+            Err(answer) => answer,
+        },
+    };
+    answer.with_used(reports)
+}
+
+/// Text and JSON of the controller.
+fn made(cluster: &Cluster, form: Form) -> (String, Value) {
+    let parity = cluster.parity();
+    let circuit = parity.circuit();
+    let text = match form {
+        Form::Ladder => print(&from_circuit(circuit)),
+        // Addresses of the members belong to other PLCs and would collide here.
+        Form::St => circuit_as_structured_text(circuit, cluster.agreement().schedule.period()),
+        Form::Equations | Form::Json => {
+            let equations = Equations::of(parity);
+            let value = serde_json::to_value(&equations).unwrap_or_default();
+            let text = if form == Form::Json {
+                serde_json::to_string_pretty(&equations).unwrap_or_default()
+            } else {
+                equations.to_text(Style::Symbols)
+            };
+            return (text, value);
+        }
+    };
+    let result = json!({ "text": text });
+    (text, result)
+}

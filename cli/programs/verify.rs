@@ -1,0 +1,350 @@
+//! `understudy verify`: proofs of properties of ladder programs.
+
+mod answer;
+pub(crate) mod patience;
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+use serde_json::json;
+use understudy_cluster::{Cluster, Overrides};
+use understudy_interchange::parse_program;
+use understudy_ladder::Program;
+use understudy_logic::Circuit;
+use understudy_text::duration::parse_positive;
+use understudy_text::{Report, has_errors};
+use understudy_verification::program::{Bounds, Remarks, Subject};
+use understudy_verification::property::{Properties, Property, not_of_one_scan, read, read_one};
+use understudy_verification::symbolic::Resolved;
+use understudy_verification::{GoOn, draw_runs, prove_parity, smv};
+
+use crate::answer::{Answer, Status};
+use crate::console::Console;
+use crate::files;
+use crate::kind::Kind;
+use answer::{Finding, ProgramAnswer};
+use patience::Patience;
+
+/// Prove properties of ladder programs or show counterexamples
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy verify examples/press-cell/press.ladder
+  understudy verify press.ladder --property \"never ram_down and ram_up\" --property \"AG EF ram_down\"
+  understudy verify press.ladder --properties press.properties --period 20ms
+  understudy verify press.ladder --property \"never ram_down and ram_up\" --draw runs.html
+  understudy verify press.ladder --smv scan --output press.smv
+  understudy verify examples/press-cell/cluster.toml
+  understudy verify examples/boiler/complete.ladder --period 100ms --budget 60s
+
+Without a property the command proves the standard property of every ladder program: each output can always be switched on and off again. It
+also remarks on rungs without effect, coils with conflicting values in one scan, and sequence steps that are passed in one scan. For a
+cluster it proves that the understudy equals the sum of its members. Formulas, sentences and property files: docs/properties.md.
+
+Exit status: 0 if everything is proved, 1 if a property fails or is undecided, 2 for invalid input.")]
+pub(crate) struct Arguments {
+    /// Ladder program or cluster file
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// File with one property per line
+    #[arg(long, value_name = "FILE")]
+    properties: Option<PathBuf>,
+    /// Property, as a CTL formula or a sentence; repeatable
+    #[arg(long, value_name = "TEXT")]
+    property: Vec<String>,
+    /// Fairness condition, true infinitely often in every run considered; repeatable
+    #[arg(long, value_name = "TEXT")]
+    fair: Vec<String>,
+    /// Scan period; determines the length of timers in scans
+    #[arg(long, value_name = "TIME", default_value = "10ms", value_parser = parse_positive)]
+    period: Duration,
+    /// Maximum number of live nodes of decision diagrams
+    #[arg(long, value_name = "NUMBER", default_value_t = 4_000_000)]
+    nodes: usize,
+    /// Time limit; the remaining properties stay undecided. Default: none
+    #[arg(long, value_name = "TIME", value_parser = parse_positive)]
+    budget: Option<Duration>,
+    /// Maximum depth of the induction, in scans, for undecided properties
+    #[arg(long, value_name = "SCANS", default_value_t = 20)]
+    induction: u32,
+    /// HTML page with all counterexamples and witnesses, drawn into the ladder scan by scan
+    #[arg(long, value_name = "FILE.html", conflicts_with = "smv")]
+    draw: Option<PathBuf>,
+    /// Write the program and its properties for NuSMV instead of proving them
+    #[arg(long, value_enum)]
+    smv: Option<Smv>,
+    /// Output file for --smv; default: standard output
+    #[arg(long, short, value_name = "FILE", requires = "smv")]
+    output: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Smv {
+    /// One step per scan
+    Scan,
+    /// One module per rung, as in the paper on the deployment of controllers
+    Rungs,
+}
+
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
+    let is_cluster = arguments
+        .file
+        .extension()
+        .is_some_and(|extension| extension == "toml");
+    let patience = Patience::new(arguments.budget, console);
+    if is_cluster {
+        return cluster(arguments, &patience);
+    }
+    let source = match files::text_of(Kind::Ladder, &arguments.file) {
+        Ok(source) => source,
+        Err(answer) => return answer,
+    };
+    let parsed = parse_program(&arguments.file.display().to_string(), &source);
+    let program = parsed.program;
+    let mut report = Report {
+        name: arguments.file.display().to_string(),
+        text: source,
+        diagnostics: parsed.diagnostics,
+    };
+    if report.has_errors() {
+        return Answer::bad_files(vec![report]);
+    }
+    let subject = match Subject::new(&program, arguments.period) {
+        Ok(subject) => subject,
+        Err(error) => return Answer::failed(Status::BadInput, "U0436", error.to_string()),
+    };
+    let asked = match asked(arguments, &subject) {
+        Ok(asked) => asked,
+        Err(mut answer) => {
+            answer.reports.insert(0, report);
+            return answer;
+        }
+    };
+    let answer = match arguments.smv {
+        Some(form) => text_for_nusmv(arguments, form, &program, &subject, &asked),
+        None => {
+            let go_on = |work| patience.goes_on(work);
+            let bounds = bounds(arguments, &go_on);
+            patience.turn_to("the order and the effect of the rungs".to_owned());
+            let remarks = match subject.remarks(&program, arguments.period, bounds) {
+                Ok(remarks) => remarks,
+                Err(error) => {
+                    return Answer::failed(Status::BadInput, "U0436", error.to_string());
+                }
+            };
+            let found = remarks.found.iter();
+            report
+                .diagnostics
+                .extend(found.map(|remark| remark.diagnostic.clone()));
+            proved(
+                arguments, &program, &subject, &remarks, &asked, &patience, bounds,
+            )
+            .and_next(&[&"init", &"cell", &"--from", &arguments.file])
+        }
+    };
+    answer.with_used(vec![report])
+}
+
+fn bounds<'a>(arguments: &Arguments, go_on: GoOn<'a>) -> Bounds<'a> {
+    Bounds {
+        nodes: arguments.nodes,
+        scans: arguments.induction,
+        go_on,
+        ..Bounds::default()
+    }
+}
+
+/// The requested properties and fairness conditions over the signals of the program.
+#[derive(Default)]
+struct Asked {
+    properties: Vec<(Property, Resolved)>,
+    fair: Vec<Resolved>,
+}
+
+fn asked(arguments: &Arguments, subject: &Subject) -> Result<Asked, Answer> {
+    let mut asked = Asked::default();
+    let mut reports = Vec::new();
+    if let Some(path) = &arguments.properties {
+        let text = files::text(path)?;
+        let found = read(&text);
+        reports.push((path.display().to_string(), text, found));
+    }
+    for (text, fair) in arguments
+        .property
+        .iter()
+        .map(|text| (text, false))
+        .chain(arguments.fair.iter().map(|text| (text, true)))
+    {
+        let name = if fair { "--fair" } else { "--property" };
+        let mut found = Properties::default();
+        match read_one(text) {
+            Ok(property) if fair => found.fair.push(property),
+            Ok(property) => found.properties.push(property),
+            Err(wrong) => found.diagnostics = wrong,
+        }
+        reports.push((name.to_owned(), text.clone(), found));
+    }
+    let mut wrong = Vec::new();
+    for (name, text, found) in reports {
+        let mut diagnostics = found.diagnostics;
+        for property in found.properties {
+            match subject.resolve(&property) {
+                Ok(formula) => asked.properties.push((property, formula)),
+                Err(unknown) => diagnostics.extend(unknown),
+            }
+        }
+        for condition in found.fair {
+            match subject.resolve(&condition) {
+                Ok(formula) if formula.is_of_one_scan() => asked.fair.push(formula),
+                Ok(_) => diagnostics.push(not_of_one_scan(0..text.len())),
+                Err(unknown) => diagnostics.extend(unknown),
+            }
+        }
+        if has_errors(&diagnostics) {
+            diagnostics.sort_by_key(|found| found.span.start);
+            wrong.push(Report {
+                name,
+                text,
+                diagnostics,
+            });
+        }
+    }
+    if wrong.is_empty() {
+        Ok(asked)
+    } else {
+        Err(Answer::bad_files(wrong))
+    }
+}
+
+fn text_for_nusmv(
+    arguments: &Arguments,
+    form: Smv,
+    program: &Program,
+    subject: &Subject,
+    asked: &Asked,
+) -> Answer {
+    let formulas: Vec<Resolved> = asked
+        .properties
+        .iter()
+        .map(|(_, formula)| formula.clone())
+        .collect();
+    let text = match form {
+        Smv::Scan => smv::of_circuit(subject.circuit(), &formulas, &asked.fair),
+        Smv::Rungs => smv::of_rungs(program),
+    };
+    match &arguments.output {
+        None => Answer::done(text.clone(), json!({ "text": text })),
+        Some(path) => match files::write(path, &text) {
+            Ok(()) => {
+                let name = path.display().to_string();
+                Answer::done(format!("written to {name}"), json!({ "file": name }))
+            }
+            Err(answer) => answer,
+        },
+    }
+}
+
+fn proved(
+    arguments: &Arguments,
+    ladder: &Program,
+    subject: &Subject,
+    remarks: &Remarks,
+    asked: &Asked,
+    patience: &Patience<'_>,
+    bounds: Bounds<'_>,
+) -> Answer {
+    patience.turn_to("the states of every output".to_owned());
+    let mut program = ProgramAnswer::of(subject, bounds, remarks);
+    let formulas: Vec<Resolved> = asked
+        .properties
+        .iter()
+        .map(|(_, formula)| formula.clone())
+        .collect();
+    let mut answered = 0;
+    let about = |answered| format!("{answered} of {} properties answered", formulas.len());
+    patience.turn_to(about(0));
+    let answers = subject.check(&formulas, asked.fair.clone(), bounds, &mut |_, _| {
+        answered += 1;
+        patience.turn_to(about(answered));
+    });
+    for ((property, formula), proof) in asked.properties.iter().zip(answers) {
+        program
+            .properties
+            .push(Finding::new(subject.circuit(), property, formula, proof));
+    }
+    let page = match &arguments.draw {
+        None => None,
+        Some(path) => match draw(path, arguments.period, ladder, subject, &program) {
+            Ok(name) => Some(name),
+            Err(answer) => return answer,
+        },
+    };
+    answer::of_programs(vec![program], None, page)
+}
+
+/// Writes the page of runs and returns its name.
+fn draw(
+    path: &Path,
+    period: Duration,
+    ladder: &Program,
+    subject: &Subject,
+    proved: &ProgramAnswer,
+) -> Result<String, Answer> {
+    let page = draw_runs(ladder, period, subject.circuit(), &proved.runs());
+    let page =
+        page.map_err(|error| Answer::failed(Status::BadInput, "U0436", error.to_string()))?;
+    files::write(path, &page)?;
+    Ok(path.display().to_string())
+}
+
+/// Proves the standard properties of all programs of a cluster, and that the understudy is the sum of its members.
+fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Answer {
+    let of_a_ladder = !arguments.property.is_empty()
+        || arguments.properties.is_some()
+        || arguments.smv.is_some()
+        || arguments.draw.is_some();
+    if of_a_ladder {
+        let message = "properties, --draw and --smv apply to one program; name a ladder file instead of the cluster";
+        return Answer::failed(Status::BadInput, "U0437", message);
+    }
+    let (cluster, reports) = match files::cluster(&arguments.file, Overrides::default()) {
+        Ok(read) => read,
+        Err(answer) => return answer,
+    };
+    let go_on = |work| patience.goes_on(work);
+    let bounds = bounds(arguments, &go_on);
+    let mut programs = Vec::new();
+    for controller in cluster.controllers() {
+        patience.turn_to(format!("`{}`", controller.program.name));
+        let period = cluster.agreement().schedule.period();
+        let subject = match Subject::new(&controller.program, period) {
+            Ok(subject) => subject,
+            Err(error) => return Answer::failed(Status::BadInput, "U0436", error.to_string()),
+        };
+        let remarks = match subject.remarks(&controller.program, period, bounds) {
+            Ok(remarks) => remarks,
+            Err(error) => return Answer::failed(Status::BadInput, "U0436", error.to_string()),
+        };
+        programs.push(ProgramAnswer::of(&subject, bounds, &remarks));
+    }
+    answer::of_programs(programs, Some(parity(&cluster)), None)
+        .with_used(reports)
+        .and_next(&[&"simulate", &arguments.file])
+}
+
+/// Result of the proof of the understudy.
+fn parity(cluster: &Cluster) -> Result<String, String> {
+    let members: Vec<Circuit> = cluster
+        .controllers()
+        .iter()
+        .map(|controller| controller.circuit.clone())
+        .collect();
+    match prove_parity(&members, cluster.parity().circuit()) {
+        Ok(proof) => Ok(format!(
+            "the understudy equals the sum of its members: {} registers and {} outputs compared",
+            proof.registers, proof.outputs
+        )),
+        Err(refutation) => Err(refutation.to_string()),
+    }
+}

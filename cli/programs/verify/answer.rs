@@ -1,0 +1,319 @@
+//! Results of `verify` as text and JSON.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use understudy_logic::Circuit;
+use understudy_verification::program::{
+    Answer as Proof, Bounds, Lamp, OutputFinding, Remarks, Subject,
+};
+use understudy_verification::property::Property;
+use understudy_verification::symbolic::{Resolved, Signal, Trace};
+use understudy_verification::{Shown, scan_table};
+
+use crate::answer::{Answer, Status};
+
+/// Result of `verify`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub(crate) struct Verification {
+    /// One entry for each ladder program.
+    programs: Vec<ProgramAnswer>,
+    /// Result of the proof of a cluster's understudy.
+    understudy: Option<String>,
+    /// Whether everything was proved.
+    proved: bool,
+    /// Page of runs.
+    page: Option<String>,
+}
+
+/// Results for one ladder program.
+#[derive(Debug, Serialize, JsonSchema)]
+pub(crate) struct ProgramAnswer {
+    name: String,
+    /// Number of state bits.
+    registers: usize,
+    /// For each output, whether it can always be switched on and off again.
+    switches: Vec<Switch>,
+    /// Remarks on the order and the effect of its rungs; they do not affect the verdict.
+    remarks: Vec<RemarkAnswer>,
+    /// Number of questions left undecided within the bounds.
+    undecided_remarks: usize,
+    /// Requested properties, in their order.
+    pub(super) properties: Vec<Finding>,
+}
+
+/// Remark on suspicious rungs.
+#[derive(Debug, Serialize, JsonSchema)]
+pub(crate) struct RemarkAnswer {
+    /// Stable code, such as `U0445`.
+    code: &'static str,
+    /// Description.
+    message: String,
+    /// Run that ends with it.
+    scans: Option<Scans>,
+}
+
+/// Result for one output.
+#[derive(Debug, Serialize, JsonSchema)]
+pub(crate) struct Switch {
+    output: String,
+    /// `free`, `never-on`, `never-off`, `stuck-on`, `stuck-off` or `undecided`.
+    verdict: &'static str,
+    /// Description.
+    message: String,
+    scans: Option<Scans>,
+}
+
+/// Result for one property.
+#[derive(Debug, Serialize, JsonSchema)]
+pub(crate) struct Finding {
+    name: Option<String>,
+    /// The property as written.
+    property: String,
+    /// The property as a CTL formula.
+    formula: String,
+    /// `holds`, `fails` or `undecided`.
+    verdict: &'static str,
+    /// Reason why it is undecided.
+    message: Option<String>,
+    /// Counterexample or witness.
+    scans: Option<Scans>,
+}
+
+/// Run from the first scan on.
+#[derive(Debug, Serialize, JsonSchema)]
+pub(crate) struct Scans {
+    /// Number of scans.
+    count: usize,
+    /// Values of each relevant signal by scan.
+    signals: BTreeMap<String, Vec<u8>>,
+    /// Scan to which the run returns after the last one.
+    again_from: Option<usize>,
+    #[serde(skip)]
+    table: String,
+    #[serde(skip)]
+    trace: Trace,
+}
+
+impl Scans {
+    fn of(circuit: &Circuit, trace: &Trace) -> Self {
+        let signals = trace.signals.iter().map(|&signal| {
+            let values = trace.values(signal).map(u8::from).collect();
+            (signal.name(circuit).to_owned(), values)
+        });
+        Self {
+            count: trace.scans.len(),
+            signals: signals.collect(),
+            again_from: trace.again_from,
+            table: scan_table(circuit, trace),
+            trace: trace.clone(),
+        }
+    }
+}
+
+impl ProgramAnswer {
+    /// Results of the standard questions, without properties.
+    pub(super) fn of(subject: &Subject, bounds: Bounds<'_>, remarks: &Remarks) -> Self {
+        let circuit = subject.circuit();
+        let switches = subject.switches(bounds).into_iter();
+        let remarked = remarks.found.iter().map(|remark| RemarkAnswer {
+            code: remark.diagnostic.code,
+            message: remark.diagnostic.message.clone(),
+            scans: remark.trace.as_ref().map(|trace| Scans::of(circuit, trace)),
+        });
+        Self {
+            name: circuit.name().to_owned(),
+            registers: circuit.registers().len(),
+            switches: switches
+                .map(|(signal, finding)| switch(circuit, signal, &finding))
+                .collect(),
+            remarks: remarked.collect(),
+            undecided_remarks: remarks.undecided,
+            properties: Vec::new(),
+        }
+    }
+
+    /// All counterexamples and witnesses with their titles.
+    pub(super) fn runs(&self) -> Vec<Shown<'_>> {
+        let switches = self
+            .switches
+            .iter()
+            .map(|switch| (&switch.message, switch.verdict, &switch.scans));
+        let properties = self
+            .properties
+            .iter()
+            .map(|finding| (&finding.property, finding.verdict, &finding.scans));
+        let remarks = self
+            .remarks
+            .iter()
+            .map(|remark| (&remark.message, "remark", &remark.scans));
+        let shown = switches.chain(remarks).chain(properties);
+        let shown = shown.filter_map(|(title, verdict, scans)| {
+            let trace = &scans.as_ref()?.trace;
+            Some(Shown {
+                title,
+                verdict: word(verdict),
+                trace,
+            })
+        });
+        shown.collect()
+    }
+
+    fn proved(&self) -> bool {
+        let free = self.switches.iter().all(|switch| switch.verdict == "free");
+        free && self
+            .properties
+            .iter()
+            .all(|finding| finding.verdict == "holds")
+    }
+
+    fn text(&self) -> String {
+        let mut text = format!("{}, {} state bits\n", self.name, self.registers);
+        for switch in &self.switches {
+            let _ = writeln!(text, "  {:<9} {}", word(switch.verdict), switch.message);
+            push_table(&mut text, switch.scans.as_ref());
+        }
+        for remark in &self.remarks {
+            let _ = writeln!(
+                text,
+                "  {:<9} {} {}",
+                word("remark"),
+                remark.code,
+                remark.message
+            );
+            push_table(&mut text, remark.scans.as_ref());
+        }
+        if self.undecided_remarks > 0 {
+            let _ = writeln!(
+                text,
+                "  {:<9} {} questions on the order and the effect of rungs",
+                "undecided", self.undecided_remarks
+            );
+        }
+        for finding in &self.properties {
+            let name = finding.name.as_ref().map(|name| format!("{name}: "));
+            let name = name.unwrap_or_default();
+            let _ = write!(
+                text,
+                "  {:<9} {name}{}",
+                word(finding.verdict),
+                finding.property
+            );
+            if finding.formula != finding.property {
+                let _ = write!(text, "   [{}]", finding.formula);
+            }
+            text.push('\n');
+            if let Some(message) = &finding.message {
+                let _ = writeln!(text, "            {message}");
+            }
+            push_table(&mut text, finding.scans.as_ref());
+        }
+        text
+    }
+}
+
+fn word(verdict: &str) -> &str {
+    match verdict {
+        "holds" | "free" => "proved",
+        "undecided" => "undecided",
+        "remark" => "remark",
+        _ => "FAILS",
+    }
+}
+
+fn push_table(text: &mut String, scans: Option<&Scans>) {
+    for line in scans.map(|scans| scans.table.lines()).into_iter().flatten() {
+        let _ = writeln!(text, "            {line}");
+    }
+}
+
+impl Finding {
+    pub(super) fn new(
+        circuit: &Circuit,
+        property: &Property,
+        formula: &Resolved,
+        proof: Proof,
+    ) -> Self {
+        let named = formula.map(&|signal: &Signal| Some(signal.name(circuit).to_owned()));
+        let scans = |trace: Option<Trace>| trace.map(|trace| Scans::of(circuit, &trace));
+        let (verdict, scans, message) = match proof {
+            Proof::Holds(trace) => ("holds", scans(trace), None),
+            Proof::Fails(trace) => ("fails", scans(trace), None),
+            Proof::Undecided(error) => ("undecided", None, Some(error.to_string())),
+        };
+        Self {
+            name: property.name.clone(),
+            property: property.text.clone(),
+            formula: named.map(|formula| formula.to_string()).unwrap_or_default(),
+            verdict,
+            message,
+            scans,
+        }
+    }
+}
+
+fn switch(circuit: &Circuit, signal: Signal, finding: &OutputFinding) -> Switch {
+    let output = signal.name(circuit).to_owned();
+    let lamp = |lamp: Lamp, on, off| match lamp {
+        Lamp::On => on,
+        Lamp::Off => off,
+    };
+    let (verdict, message, scans) = match finding {
+        OutputFinding::Free => (
+            "free",
+            format!("{output} can always be switched on and off again"),
+            None,
+        ),
+        OutputFinding::Never(which) => (
+            lamp(*which, "never-on", "never-off"),
+            format!("{output} is never {}", lamp(*which, "on", "off")),
+            None,
+        ),
+        OutputFinding::Stuck(which, trace) => (
+            lamp(*which, "stuck-off", "stuck-on"),
+            format!(
+                "after these scans {output} can never be switched {} again",
+                lamp(*which, "on", "off")
+            ),
+            Some(Scans::of(circuit, trace)),
+        ),
+        OutputFinding::Undecided(message) => ("undecided", format!("{output}: {message}"), None),
+    };
+    Switch {
+        output,
+        verdict,
+        message,
+        scans,
+    }
+}
+
+pub(super) fn of_programs(
+    programs: Vec<ProgramAnswer>,
+    understudy: Option<Result<String, String>>,
+    page: Option<String>,
+) -> Answer {
+    let right =
+        programs.iter().all(ProgramAnswer::proved) && understudy.as_ref().is_none_or(Result::is_ok);
+    let texts: Vec<String> = programs.iter().map(ProgramAnswer::text).collect();
+    let mut text = texts.join("\n");
+    if let Some(understudy) = &understudy {
+        let (word, message) = match understudy {
+            Ok(message) => ("proved", message),
+            Err(message) => ("FAILS", message),
+        };
+        let _ = writeln!(text, "\n{word}: {message}");
+    }
+    if let Some(page) = &page {
+        let _ = writeln!(text, "\nruns are drawn in {page}");
+    }
+    let status = if right { Status::Done } else { Status::Failed };
+    let result = Verification {
+        programs,
+        understudy: understudy.map(|proof| proof.unwrap_or_else(|message| message)),
+        proved: right,
+        page,
+    };
+    Answer::done(text.trim_end().to_owned(), result).with_status(status)
+}

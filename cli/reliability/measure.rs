@@ -1,0 +1,230 @@
+//! `understudy measure`: MTTF measured with the real protocol, compared with the model.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::time::{Duration, SystemTime};
+
+use clap::Args;
+use understudy_cluster::Cluster;
+use understudy_reliability::{Hours, Options};
+use understudy_scenarios::{
+    LaboratoryError, Measured, Planned, Progress, Question, QuestionError, RealCampaign, Speed,
+    hold_against_model, plan_campaign, run_campaign, run_real_campaign,
+};
+
+use crate::answer::{Answer, Status};
+use crate::console::Console;
+use crate::files;
+use crate::overrides::OverrideArguments;
+use crate::reliability::prediction::{Times, refused, write_report};
+use crate::run::lab::{NetworkArguments, laboratory_settings};
+use crate::run::simulate::seed_of_the_clock;
+
+/// Maximum time limit of a campaign on processes.
+const LONGEST_LIMIT: Duration = Duration::from_secs(365 * 24 * 3600);
+
+/// Measure the MTTF by random failures and compare it with the model
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy measure examples/press-cell/cluster.toml --mtbf 25h --mttr 30min --failures 200 --seed 1
+  understudy measure examples/press-cell/cluster.toml --real --mtbf 3s --mttr 200ms --failures 5
+
+Stations fail and are repaired at random until the system fails. The protocol itself is not accelerated: its time to detect a failure and to
+transfer states is measured and added to the repair time of the model, and the resulting bias is printed. The system fails when a remote
+I/O becomes fail-safe because no station holds the state of its program; in paper mode, at the second failure. Equal arguments and seeds
+give equal simulated campaigns.
+
+Exit status: 1 if the model is outside of the 95 % confidence interval, which happens by chance in one of twenty campaigns.")]
+pub(crate) struct Arguments {
+    /// Cluster file
+    #[arg(value_name = "CLUSTER.toml")]
+    cluster: PathBuf,
+    /// MTBF of a station
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
+    mtbf: String,
+    /// MTTR of a station, from the detection of the failure
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
+    mttr: String,
+    /// Number of repair crews; default: one per station
+    #[arg(long, value_name = "R")]
+    crews: Option<u32>,
+    /// Number of system failures to measure
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(2..=1_000_000))]
+    failures: u64,
+    /// Seed of all random numbers; the default is taken from the clock and printed
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Acceleration of failures and repairs; default: a mean repair takes 50 cycles, maximum 10,000
+    #[arg(
+        long,
+        value_name = "FACTOR",
+        conflicts_with = "cycles_per_mttr",
+        allow_hyphen_values = true
+    )]
+    acceleration: Option<f64>,
+    /// Acceleration, as the number of cycles of a mean repair
+    #[arg(long, value_name = "CYCLES", allow_hyphen_values = true)]
+    cycles_per_mttr: Option<f64>,
+    /// Kill (kill -9) and restart processes of this machine instead of simulated stations; Ctrl-C ends the measurement with partial results
+    #[arg(long)]
+    real: bool,
+    /// Maximum run time
+    #[arg(
+        long,
+        value_name = "TIME",
+        default_value = "10min",
+        requires = "real",
+        allow_hyphen_values = true
+    )]
+    limit: String,
+    /// Directory for the journals of the processes
+    #[arg(long, value_name = "DIR", default_value = "runs", requires = "real")]
+    out: PathBuf,
+    /// Allow an acceleration of more than 10,000 and run times of hours
+    #[arg(long)]
+    force: bool,
+    #[command(flatten)]
+    overrides: OverrideArguments,
+    /// Output folder for reliability.html, .json and .csv
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
+}
+
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
+    measured(arguments, console).unwrap_or_else(|answer| answer)
+}
+
+fn measured(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
+    let mut times = Times::default();
+    let mtbf = times.required("mtbf", Some(&arguments.mtbf));
+    let mttr = times.required("mttr", Some(&arguments.mttr));
+    let limit = times.required("limit", Some(&arguments.limit));
+    let (cluster, reports) = files::cluster(&arguments.cluster, arguments.overrides.overrides())?;
+    // Invalid crews and invalid times are reported together.
+    let any = Hours::new("any", 1.0).map_err(|error| refused(&[error]))?;
+    let mut crewed = Options::new(1, any, any);
+    crewed.crews = arguments.crews;
+    times.finish(crewed.system().err().unwrap_or_default())?;
+    let (Some(mtbf), Some(mttr), Some(limit)) = (mtbf, mttr, limit) else {
+        return Err(refused(&[]));
+    };
+    let question = Question {
+        mtbf,
+        mttr,
+        crews: arguments.crews,
+        failures: arguments.failures,
+        seed: arguments.seed.unwrap_or_else(seed_of_the_clock),
+        speed: match (arguments.acceleration, arguments.cycles_per_mttr) {
+            (Some(factor), _) => Speed::Factor(factor),
+            (None, Some(cycles)) => Speed::CyclesPerRepair(cycles),
+            (None, None) => Speed::Usual,
+        },
+        forced: arguments.force,
+    };
+    let planned = plan_campaign(&cluster, &question).map_err(|errors| not_begun(&errors))?;
+    let (measured, run) = if arguments.real {
+        on_processes(arguments, &cluster, &planned, limit, console)?
+    } else {
+        (in_the_simulator(&cluster, &planned, console)?, None)
+    };
+    let found =
+        hold_against_model(&cluster, &planned, measured).map_err(|errors| refused(&errors))?;
+    let status = if found.is_met() {
+        Status::Done
+    } else {
+        Status::Failed
+    };
+    let mut answer = Answer::done(found.to_text(), &found)
+        .with_used(reports)
+        .with_status(status)
+        .and_next(&[
+            &"reliability",
+            &arguments.cluster,
+            &"--mtbf",
+            &arguments.mtbf,
+            &"--mttr",
+            &arguments.mttr,
+        ]);
+    if let Some((directory, failure)) = run {
+        let _ = writeln!(answer.text, "journals: {}", directory.display());
+        if let Some(failure) = failure {
+            answer = answer.and_failure(Status::Failed, failure.code(), failure.to_string());
+        }
+    }
+    if let Some(folder) = &arguments.report {
+        let written = write_report(
+            folder,
+            &planned.options,
+            Some(&cluster),
+            Some(found.assessment),
+        );
+        match written {
+            Ok(said) => answer.text.push_str(&said),
+            Err(failed) => {
+                return Ok(failed.failures.iter().fold(answer, |answer, failure| {
+                    answer.and_failure(Status::Failed, &failure.code, &failure.message)
+                }));
+            }
+        }
+    }
+    Ok(answer)
+}
+
+fn in_the_simulator(
+    cluster: &Cluster,
+    planned: &Planned,
+    console: &mut Console,
+) -> Result<Measured, Answer> {
+    planned
+        .check_length()
+        .map_err(|error| not_begun(&[error]))?;
+    let of = planned.plan.failures;
+    let measured = run_campaign(cluster, &planned.plan, &mut |done| {
+        console.show(&Progress::Failure { done, of });
+    });
+    console.show(&Progress::Ending);
+    measured.map_err(|error| Answer::failed(Status::Failed, "U0530", error.to_string()))
+}
+
+/// Directory of the journals of a campaign on processes, and the reason of an early end.
+type OnProcesses = (PathBuf, Option<LaboratoryError>);
+
+fn on_processes(
+    arguments: &Arguments,
+    cluster: &Cluster,
+    planned: &Planned,
+    limit: Hours,
+    console: &mut Console,
+) -> Result<(Measured, Option<OnProcesses>), Answer> {
+    let real = RealCampaign {
+        laboratory: laboratory_settings(
+            cluster,
+            arguments.cluster.clone(),
+            &arguments.overrides,
+            NetworkArguments::default().settings(),
+        )?,
+        out: arguments.out.clone(),
+        now: SystemTime::now(),
+        limit: Duration::from_secs_f64((limit.get() * 3600.0).min(LONGEST_LIMIT.as_secs_f64())),
+    };
+    let failed = |code: &str, message: String| Answer::failed(Status::Failed, code, message);
+    let mut watch = |progress| console.show(&progress);
+    let run = run_real_campaign(cluster, &planned.plan, &real, &mut watch)
+        .map_err(|error| failed("U0602", error.to_string()))?;
+    match (run.measured, run.failure) {
+        (Some(measured), failure) => Ok((measured, Some((run.directory, failure)))),
+        (None, Some(failure)) => Err(failed(failure.code(), failure.to_string())),
+        (None, None) => Err(failed(
+            "U0531",
+            "ended before all members were synchronised: nothing was measured".to_owned(),
+        )),
+    }
+}
+
+fn not_begun(errors: &[QuestionError]) -> Answer {
+    errors.iter().fold(
+        Answer::done("", ()).with_status(Status::BadInput),
+        |answer, error| answer.and_failure(Status::BadInput, error.code(), error.to_string()),
+    )
+}

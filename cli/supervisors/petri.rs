@@ -1,0 +1,360 @@
+//! `understudy petri`: automation Petri nets and their ladder programs.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Subcommand, ValueEnum};
+use serde_json::{Value, json};
+use understudy_ladder::print;
+use understudy_supervisor::ladder::locate;
+use understudy_supervisor::petri::{
+    HybridError, NetFile, draw_net_dot, draw_net_svg, read_net, reduce, to_ladder, write_net,
+};
+use understudy_supervisor::proof::{
+    Finding, HybridProof, HybridVerdict, ProofSettings, hybrid_findings, prove_hybrid,
+};
+use understudy_supervisor::{Automaton, Model, write_model};
+use understudy_text::Report;
+
+use crate::answer::{Answer, Status};
+use crate::files;
+use crate::kind::Kind;
+use crate::supervisors::automata::{self, Sources, description, summary};
+use crate::supervisors::supervisor_to_ladder::{listed, notes, withheld};
+
+/// Analyse automation Petri nets and convert them to ladder
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy petri bounds examples/assembly-cell/net.toml
+  understudy synth examples/assembly-cell/model.toml --reduce --name keeper -o keeper.toml
+  understudy petri ladder examples/assembly-cell/net.toml --supervisor keeper.toml -o cell.ladder
+
+A model uses a net as its plant by [[plant]] net = \"net.toml\". A ladder program is written only if it is proved to behave as the net under
+its supervisors.")]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    operation: Operation,
+    /// Output file
+    #[arg(long, short, value_name = "FILE", global = true)]
+    output: Option<PathBuf>,
+    /// Maximum number of markings
+    #[arg(
+        long,
+        value_name = "NUMBER",
+        default_value_t = 1_000_000,
+        global = true
+    )]
+    markings: usize,
+}
+
+#[derive(Debug, Subcommand)]
+enum Operation {
+    /// Bound of each place, or a run that shows that a place is unbounded
+    Bounds {
+        #[arg(value_name = "NET.toml")]
+        net: PathBuf,
+    },
+    /// Reachability graph as an automaton: .ADS, .toml, .dot or .svg
+    Automaton {
+        #[arg(value_name = "NET.toml")]
+        net: PathBuf,
+    },
+    /// Smaller equivalent net (.toml)
+    Reduce {
+        #[arg(value_name = "NET.toml")]
+        net: PathBuf,
+    },
+    /// Proved ladder program of the net with its supervisors
+    Ladder {
+        #[arg(value_name = "NET.toml")]
+        net: PathBuf,
+        /// Supervisors: TCT automata (.ADS) or models with supervisors (.toml)
+        #[arg(long = "supervisor", value_name = "FILE", num_args = 1..)]
+        supervisors: Vec<PathBuf>,
+    },
+    /// Drawing of the net
+    Draw {
+        #[arg(value_name = "NET.toml")]
+        net: PathBuf,
+        /// Output format
+        #[arg(long = "as", value_enum, default_value = "svg")]
+        form: Form,
+    },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Form {
+    /// SVG picture
+    Svg,
+    /// Graphviz
+    Dot,
+}
+
+impl Operation {
+    fn net(&self) -> &Path {
+        match self {
+            Self::Bounds { net }
+            | Self::Automaton { net }
+            | Self::Reduce { net }
+            | Self::Ladder { net, .. }
+            | Self::Draw { net, .. } => net,
+        }
+    }
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Answer {
+    let path = arguments.operation.net();
+    let text = match files::text_of(Kind::Net, path) {
+        Ok(text) => text,
+        Err(answer) => return answer,
+    };
+    let read = read_net(&text);
+    let report = Report {
+        name: path.display().to_string(),
+        text,
+        diagnostics: read.diagnostics,
+    };
+    let Some(file) = read.file else {
+        return Answer::bad_files(vec![report]);
+    };
+    let output = arguments.output.as_deref();
+    let answer = match &arguments.operation {
+        Operation::Bounds { .. } => bounds(&file, arguments.markings),
+        Operation::Automaton { .. } => automaton(&file, arguments.markings, output),
+        Operation::Reduce { .. } => reduced(file, output),
+        Operation::Ladder { supervisors, .. } => {
+            return ladder(&file, supervisors, arguments.markings, output, report);
+        }
+        Operation::Draw { form, .. } => drawn(&file, *form, output),
+    };
+    match answer {
+        Ok(answer) | Err(answer) => answer.with_reports(vec![report]),
+    }
+}
+
+fn failed(code: &str, error: impl ToString) -> Answer {
+    Answer::failed(Status::Failed, code, error.to_string())
+}
+
+fn bounds(file: &NetFile, limit: usize) -> Result<Answer, Answer> {
+    let net = &file.net;
+    let explored = net
+        .explore(limit)
+        .map_err(|error| failed(error.code(), error))?;
+    let bounds = explored.bounds();
+    let places = net.places().iter().zip(&bounds);
+    let mut text = String::new();
+    let mut of_places = serde_json::Map::new();
+    for (place, bound) in places {
+        text.push_str(&format!("{}: at most {bound}\n", place.name));
+        of_places.insert(place.name.clone(), json!(bound));
+    }
+    let (markings, dead) = (explored.markings().len(), explored.dead_transitions());
+    let stuck: Vec<String> = explored
+        .dead_markings()
+        .into_iter()
+        .map(|marking| net.name_of(marking))
+        .collect();
+    let is_safe = bounds.iter().all(|&bound| bound <= 1);
+    text.push_str(&format!(
+        "{markings} markings{}",
+        if is_safe { ", and the net is safe" } else { "" }
+    ));
+    if !dead.is_empty() {
+        text.push_str(&format!("\nnever enabled: {}", dead.join(" ")));
+    }
+    if let Some(first) = stuck.first() {
+        text.push_str(&format!(
+            "\n{} deadlock markings, the first is {first}",
+            stuck.len()
+        ));
+    }
+    let result = json!({
+        "places": of_places,
+        "markings": markings,
+        "safe": is_safe,
+        "dead_transitions": dead,
+        "dead_markings": stuck,
+    });
+    Ok(Answer::done(text, result))
+}
+
+fn automaton(file: &NetFile, limit: usize, output: Option<&Path>) -> Result<Answer, Answer> {
+    let explored = file
+        .net
+        .explore(limit)
+        .map_err(|error| failed(error.code(), error))?;
+    let made = explored
+        .automaton()
+        .map_err(|error| failed(error.code(), error))?;
+    let made = made.with_event_names(&file.events);
+    let mut text = summary(&made);
+    let mut result = description(&made);
+    if let Some(path) = output {
+        if automata::is_model(path) {
+            // The automaton is a plant of a model, so that specifications can be added.
+            let model = Model {
+                name: made.name().to_owned(),
+                alphabet: made.alphabet().clone(),
+                plants: vec![made],
+                ..Model::default()
+            };
+            files::write(path, &write_model(&model))?;
+        } else {
+            automata::write(path, &made)?;
+        }
+        said(&mut text, &mut result, path);
+    }
+    Ok(Answer::done(text, result))
+}
+
+fn said(text: &mut String, result: &mut Value, path: &Path) {
+    let name = path.display().to_string();
+    text.push_str(&format!("\nwritten to {name}"));
+    result["file"] = Value::String(name);
+}
+
+fn reduced(mut file: NetFile, output: Option<&Path>) -> Result<Answer, Answer> {
+    let (net, steps) = reduce(&file.net);
+    let steps: Vec<String> = steps.iter().map(ToString::to_string).collect();
+    let (places, transitions) = (net.places().len(), net.transitions().len());
+    file.net = net;
+    let written = write_net(&file);
+    let lines: String = steps.iter().map(|step| format!("{step}\n")).collect();
+    let mut text = format!("{lines}{places} places and {transitions} transitions remain");
+    let mut result = json!({ "places": places, "transitions": transitions, "removed": steps });
+    match output {
+        Some(path) => {
+            files::write(path, &written)?;
+            said(&mut text, &mut result, path);
+        }
+        None => result["text"] = Value::String(written),
+    }
+    Ok(Answer::done(text, result))
+}
+
+fn drawn(file: &NetFile, form: Form, output: Option<&Path>) -> Result<Answer, Answer> {
+    let text = match form {
+        Form::Dot => draw_net_dot(&file.net),
+        Form::Svg => draw_net_svg(&file.net).map_err(|error| failed(error.code(), error))?,
+    };
+    let Some(path) = output else {
+        let result = json!({ "text": text });
+        return Ok(Answer::done(text, result));
+    };
+    files::write(path, &text)?;
+    let name = path.display().to_string();
+    Ok(Answer::done(
+        format!("written to {name}"),
+        json!({ "file": name }),
+    ))
+}
+
+fn ladder(
+    file: &NetFile,
+    paths: &[PathBuf],
+    limit: usize,
+    output: Option<&Path>,
+    mut report: Report,
+) -> Answer {
+    let supervisors = match supervisors(paths) {
+        Ok(supervisors) => supervisors,
+        Err(answer) => return answer,
+    };
+    let named = supervisors.into_iter();
+    let named: Vec<Automaton> = named
+        .map(|one| one.with_event_names(&file.events))
+        .collect();
+    let made = to_ladder(&file.net, &named, limit);
+    let mut made = match made {
+        Ok(made) => made,
+        // Names of ladder signals have positions in the net file.
+        Err(HybridError::Invalid(found)) => {
+            report.diagnostics.extend(found);
+            return Answer::bad_files(vec![report]);
+        }
+        Err(error) => return failed(error.code(), error).with_reports(vec![report]),
+    };
+    if let Err(found) = locate(&mut made.program, &file.addresses) {
+        report.diagnostics.extend(found);
+        return Answer::bad_files(vec![report]);
+    }
+    // Nets that cannot be explored in advance are still proved.
+    let found = hybrid_findings(&file.net, &named, limit).map_err(|error| error.to_string());
+    let answer = match prove_hybrid(&file.net, &named, &made, ProofSettings::default()) {
+        Err(error) => failed(error.code(), error),
+        Ok(HybridVerdict::Refuted(found)) => {
+            let message = format!("the ladder differs from the net and its supervisors:\n{found}");
+            failed("U0875", message)
+        }
+        Ok(HybridVerdict::Proved(proof)) => proved(&print(&made.program), &proof, &found, output),
+    };
+    answer.with_reports(vec![report])
+}
+
+fn supervisors(paths: &[PathBuf]) -> Result<Vec<Automaton>, Answer> {
+    let mut all = Vec::new();
+    for path in paths {
+        if automata::is_model(path) {
+            let Sources { read, reports } = automata::model(path)?;
+            if read.supervisors.is_empty() {
+                let path = path.display();
+                let message = format!("{path} has no supervisor; `understudy synth` creates them");
+                let answer = Answer::failed(Status::BadInput, "U0651", message);
+                return Err(answer.with_reports(reports));
+            }
+            all.extend(read.supervisors);
+        } else {
+            all.extend(automata::all(&[path])?.read);
+        }
+    }
+    Ok(all)
+}
+
+fn proved(
+    ladder: &str,
+    proof: &HybridProof,
+    found: &Result<Vec<Finding>, String>,
+    output: Option<&Path>,
+) -> Answer {
+    let mut result = json!({
+        "rungs": ladder.lines().filter(|line| line.starts_with("rung")).count(),
+        "proof": {
+            "states": proof.states,
+            "scans": proof.scans,
+            "markings": proof.markings,
+            "never_fired": proof.never_fired,
+        },
+        "findings": found.as_ref().ok().map(|found| listed(found)),
+    });
+    if let Some(answer) = found
+        .as_ref()
+        .ok()
+        .and_then(|found| withheld(found, &result))
+    {
+        return answer;
+    }
+    result["ladder"] = json!(ladder);
+    let Some(path) = output else {
+        return Answer::done(ladder, result);
+    };
+    if let Err(answer) = files::write(path, ladder) {
+        return answer;
+    }
+    let said_before = match found {
+        Ok(found) => notes(found),
+        Err(error) => format!("preliminary check omitted: {error}\n"),
+    };
+    let mut text = format!(
+        "{}proved over {} states in {} scans, {} markings",
+        said_before, proof.states, proof.scans, proof.markings
+    );
+    if !proof.never_fired.is_empty() {
+        text.push_str(&format!(
+            "; transitions that never fire: {}",
+            proof.never_fired.join(" ")
+        ));
+    }
+    said(&mut text, &mut result, path);
+    Answer::done(text, result).and_next(&[&"verify", &path])
+}

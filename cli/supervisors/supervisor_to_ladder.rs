@@ -1,0 +1,317 @@
+//! `understudy supervisor-to-ladder`: a proved ladder program of a supervisor.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+use understudy_ladder::print;
+use understudy_supervisor::ladder::{
+    Conversion, InputOutputMap, Located, Mode, Modules, convert, read_map, table,
+};
+use understudy_supervisor::proof::{
+    Finding, FindingSeverity, ProofSettings, Verdict, findings, prove,
+};
+use understudy_supervisor::{Automaton, Label, Model, Signal};
+use understudy_text::{Diagnostic, Report};
+
+use crate::answer::{Answer, Status};
+use crate::files;
+use crate::supervisors::automata::{self, Sources};
+
+/// Convert a supervisor to a proved ladder program
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy supervisor-to-ladder examples/motivating-example/supervisor.ADS \\
+      --io examples/motivating-example/map.toml --mode manual -o motivating.ladder
+
+The supervisor is a TCT automaton (.ADS) or a model (.toml) with supervisors. A reduced supervisor does not track the state of its plant;
+supply the plants by --plant. Findings about the supervisor are warnings, unless no ladder program can implement it. The ladder is written
+only if it is proved to do what the supervisor allows and nothing else, and no finding is an error.")]
+pub(crate) struct Arguments {
+    /// Supervisor: a TCT automaton (.ADS) or a model (.toml)
+    #[arg(value_name = "SUPERVISOR")]
+    supervisor: PathBuf,
+    /// Signal map from events to signals, overrides the model; an event without an entry gets a signal of its own that is 1 for
+    /// one scan
+    #[arg(long, value_name = "MAP.toml")]
+    io: Option<PathBuf>,
+    /// Selection among enabled commands
+    #[arg(long, value_enum, default_value = "automatic")]
+    mode: ModeWord,
+    /// Plants that the ladder tracks in addition to the supervisor
+    #[arg(long = "plant", value_name = "FILE", num_args = 1..)]
+    plants: Vec<PathBuf>,
+    /// Output file; default: standard output
+    #[arg(long, short, value_name = "FILE.ladder")]
+    output: Option<PathBuf>,
+    /// Print the rows of the function Omega instead of the ladder
+    #[arg(long)]
+    table: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ModeWord {
+    /// By the PLC
+    Automatic,
+    /// By the operator, if several are enabled
+    Manual,
+    /// By the operator, always
+    Requested,
+}
+
+impl From<ModeWord> for Mode {
+    fn from(word: ModeWord) -> Self {
+        match word {
+            ModeWord::Automatic => Self::Automatic,
+            ModeWord::Manual => Self::Manual,
+            ModeWord::Requested => Self::Requested,
+        }
+    }
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Answer {
+    match convert_and_prove(arguments) {
+        Ok(answer) | Err(answer) => answer,
+    }
+}
+
+fn convert_and_prove(arguments: &Arguments) -> Result<Answer, Answer> {
+    let supervisor = source(&arguments.supervisor)?;
+    let mut plants = Vec::new();
+    let mut signals = supervisor.model.signals.clone();
+    for path in &arguments.plants {
+        let plant = source(path)?.model;
+        signals.extend(plant.signals.into_iter().map(Signal::without_place));
+        plants.extend(some(path, plant.plants, "plant")?);
+    }
+    let supervisors = some(
+        &arguments.supervisor,
+        supervisor.model.supervisors.clone(),
+        "supervisor",
+    )?;
+    let (map, report) = read_signals(arguments, &supervisors, &plants, supervisor, signals)?;
+    let name = |automata: Vec<Automaton>| -> Vec<Automaton> {
+        automata
+            .into_iter()
+            .map(|automaton| map.name_events(automaton))
+            .collect()
+    };
+    let (supervisors, plants) = (name(supervisors), name(plants));
+    let modules = Modules {
+        supervisors: &supervisors,
+        plants: &plants,
+    };
+    let mode = Mode::from(arguments.mode);
+    let conversion = convert(&modules, &map, mode)
+        .map_err(|diagnostics| bad_map(report.clone(), diagnostics))?;
+    let found = findings(&modules)
+        .map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))?;
+    let settings = ProofSettings {
+        mode,
+        ..ProofSettings::default()
+    };
+    let verdict = prove(
+        &conversion.program,
+        &modules,
+        &map,
+        &conversion.correspondence,
+        settings,
+    )
+    .map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))?;
+    Ok(answer(arguments, &modules, &conversion, &found, verdict))
+}
+
+/// An input file: a model, or a TCT automaton in each of its roles.
+struct Source {
+    model: Model,
+    report: Report,
+}
+
+fn source(path: &Path) -> Result<Source, Answer> {
+    if automata::is_model(path) {
+        let Sources { read, mut reports } = automata::model(path)?;
+        return Ok(Source {
+            model: read,
+            report: reports.swap_remove(0),
+        });
+    }
+    let Sources { read, mut reports } = automata::all(&[&path.to_owned()])?;
+    Ok(Source {
+        model: Model {
+            plants: read.clone(),
+            supervisors: read,
+            ..Model::default()
+        },
+        report: reports.swap_remove(0),
+    })
+}
+
+fn some(path: &Path, automata: Vec<Automaton>, what: &str) -> Result<Vec<Automaton>, Answer> {
+    if automata.is_empty() {
+        let path = path.display();
+        let message = format!("{path} has no {what}; `understudy synth` creates supervisors");
+        return Err(Answer::failed(Status::BadInput, "U0651", message));
+    }
+    Ok(automata)
+}
+
+/// Signal map of the map file and the models, with the file of its positions.
+fn read_signals(
+    arguments: &Arguments,
+    supervisors: &[Automaton],
+    plants: &[Automaton],
+    supervisor: Source,
+    signals: Vec<Signal>,
+) -> Result<(InputOutputMap, Report), Answer> {
+    let modules = Modules {
+        supervisors,
+        plants,
+    };
+    let alphabet = modules.alphabet();
+    let addresses = supervisor.model.addresses;
+    let Some(path) = &arguments.io else {
+        let program = arguments.supervisor.file_stem().unwrap_or_default();
+        let mut map = InputOutputMap::of_signals(&program.to_string_lossy(), &alphabet, &signals);
+        map.addresses = addresses;
+        return Ok((map, supervisor.report));
+    };
+    let text = files::text(path)?;
+    let read = read_map(&text);
+    let report = Report {
+        name: path.display().to_string(),
+        text,
+        diagnostics: read.diagnostics,
+    };
+    let Some(map) = read.map else {
+        return Err(Answer::bad_files(vec![report]));
+    };
+    // Positions in the model do not belong to the map file.
+    let signals: Vec<Signal> = signals.into_iter().map(Signal::without_place).collect();
+    let located: Vec<Located> = addresses.into_iter().map(Located::without_place).collect();
+    let map = map.with_signals(&signals, &alphabet);
+    Ok((map.with_addresses(&located), report))
+}
+
+fn bad_map(mut report: Report, diagnostics: Vec<Diagnostic>) -> Answer {
+    report.diagnostics.extend(diagnostics);
+    report
+        .diagnostics
+        .sort_by_key(|diagnostic| diagnostic.span.start);
+    Answer::bad_files(vec![report])
+}
+
+fn severity(finding: &Finding) -> &'static str {
+    match finding.severity {
+        FindingSeverity::Warning => "warning",
+        FindingSeverity::Error => "error",
+    }
+}
+
+/// Findings as text, one line each.
+pub(crate) fn notes(found: &[Finding]) -> String {
+    let lines = found.iter().map(|finding| {
+        let (code, message) = (finding.code(), &finding.message);
+        format!("{}[{code}]: {message}\n", severity(finding))
+    });
+    lines.collect()
+}
+
+/// Findings as JSON.
+pub(crate) fn listed(found: &[Finding]) -> Value {
+    let numbers = |labels: &[Label]| {
+        labels
+            .iter()
+            .map(|label| label.number())
+            .collect::<Vec<_>>()
+    };
+    let listed = found.iter().map(|finding| {
+        json!({
+            "code": finding.code(),
+            "severity": severity(finding),
+            "message": finding.message,
+            "states": finding.states.iter().map(|state| state.number()).collect::<Vec<_>>(),
+            "events": numbers(&finding.events),
+            "run": numbers(&finding.run),
+        })
+    });
+    listed.collect()
+}
+
+/// Answer with findings that are errors: each is a failure, and the ladder is withheld.
+pub(crate) fn withheld(found: &[Finding], result: &Value) -> Option<Answer> {
+    let (errors, warnings): (Vec<&Finding>, Vec<&Finding>) = found
+        .iter()
+        .partition(|finding| finding.severity == FindingSeverity::Error);
+    if errors.is_empty() {
+        return None;
+    }
+    let warnings: Vec<Finding> = warnings.into_iter().cloned().collect();
+    let answer = Answer::done(notes(&warnings), result);
+    Some(errors.into_iter().fold(answer, |answer, finding| {
+        let message = format!("{}; the ladder is not written", finding.message);
+        answer.and_failure(Status::Failed, finding.code(), message)
+    }))
+}
+
+fn answer(
+    arguments: &Arguments,
+    modules: &Modules,
+    conversion: &Conversion,
+    found: &[Finding],
+    verdict: Verdict,
+) -> Answer {
+    let program = &conversion.program;
+    let notes = notes(found);
+    let mut result = json!({
+        "program": program.name.as_str(),
+        "rungs": program.rungs.len(),
+        "inputs": program.inputs.len(),
+        "outputs": program.outputs.len(),
+        "memory": program.memory.len(),
+        "consumed": conversion.consumed.iter().map(|label| label.number()).collect::<Vec<_>>(),
+        "findings": listed(found),
+    });
+    let proof = match verdict {
+        Verdict::Proved(proof) => proof,
+        Verdict::Refuted(counterexample) => {
+            result["counterexample"] = Value::String(counterexample.to_string());
+            let message = format!("the ladder violates the supervisor:\n{counterexample}");
+            return Answer::done(notes, result).and_failure(Status::Failed, "U0875", message);
+        }
+    };
+    result["proof"] = json!({
+        "states": proof.states,
+        "scans": proof.scans,
+        "joint_states": proof.joint_states,
+        "events": proof.events.len(),
+    });
+    if let Some(answer) = withheld(found, &result) {
+        return answer;
+    }
+    let ladder = print(program);
+    let text = if arguments.table {
+        let tables = modules.all().zip(&conversion.rows);
+        tables
+            .map(|(automaton, rows)| table(automaton, rows))
+            .collect::<Vec<_>>()
+            .join("\n")
+    } else {
+        ladder.clone()
+    };
+    result["ladder"] = Value::String(ladder.clone());
+    let Some(path) = &arguments.output else {
+        return Answer::done(text, result);
+    };
+    if let Err(answer) = files::write(path, &ladder) {
+        return answer;
+    }
+    let summary = format!(
+        "{notes}{} rungs written to {}; proved over {} states in {} scans",
+        program.rungs.len(),
+        path.display(),
+        proof.states,
+        proof.scans
+    );
+    Answer::done(summary, result).and_next(&[&"verify", path])
+}
