@@ -32,7 +32,7 @@ Example:
   understudy allocate pump.ladder --require \"vendor=Siemens\" --require \"inputs>=12\"
 
 A controller fits, does not fit, or is not known: a figure that the catalogue does not have never counts as enough. Nothing is placed whose
-program has not passed verification. How needs are counted and boxes packed: docs/allocation.md.
+program has not passed verification. How needs are counted and boxes packed: docs/how-to/allocation.md.
 
 Exit status: 0 when every box has its controller, 1 when one has not, 2 for bad input.")]
 pub(crate) struct Arguments {

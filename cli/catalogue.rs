@@ -28,7 +28,7 @@ Example:
   understudy catalogue export --output controllers.csv
 
 Without --catalogue it is the one that comes with the program, which is only read. With it, it is a file in one of the forms of
-docs/catalogue.md; `add` and `import` make it where there is none, with everything that comes with the program in it. A figure that is not
+docs/reference/catalogue.md; `add` and `import` make it where there is none, with everything that comes with the program in it. A figure that is not
 there is unknown, and never 0.")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
@@ -65,7 +65,7 @@ enum What {
     },
     /// Add the controllers of a file
     Import {
-        /// In one of the forms of docs/catalogue.md
+        /// In one of the forms of docs/reference/catalogue.md
         #[arg(value_name = "FILE.csv")]
         from: PathBuf,
         /// Take over new figures for controllers that are there

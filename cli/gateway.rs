@@ -24,7 +24,7 @@ Example:
   understudy gateway zenoh runs/latest --listen 127.0.0.1:7447 --mirror 5/s
 
 It reads the journal of the run, finished or not, and ends with SIGINT or SIGTERM. It serves in the clear and asks nobody who he is:
-bind it to loopback, or to a network of its own (docs/monitoring.md).")]
+bind it to loopback, or to a network of its own (docs/how-to/monitoring.md).")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     what: What,

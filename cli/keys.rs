@@ -25,7 +25,7 @@ Example:
   understudy keys issue cell/cluster.toml tank --folder cell/keys
 
 `init` issues keys to every member and to one operator. The folder members/NAME goes to the machine of NAME, and to nobody else
-(docs/deployment.md); the folder authority stays where keys are made.")]
+(docs/how-to/deployment.md); the folder authority stays where keys are made.")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     what: What,

@@ -84,7 +84,7 @@ Exit status: 0 when all is well, 1 when a run or a check of it failed, 2 when an
 Understudy is not a safety PLC."
 )]
 struct Arguments {
-    /// Answer with one JSON document on standard output (docs/json.md)
+    /// Answer with one JSON document on standard output (docs/reference/json.md)
     #[arg(long, global = true)]
     json: bool,
     #[command(subcommand)]

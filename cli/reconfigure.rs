@@ -23,7 +23,7 @@ Example:
 
 In DIR: report.md for a person, the automaton of the ladder, its feedback tables, the mega-controller (also as pictures), the
 integer programs with their solutions, module 2, the combined ladder, and all of it as result.json. Nothing is written unless the
-combined ladder is proved. The project file is described in docs/reconfiguration.md.")]
+combined ladder is proved. The project file is described in docs/reference/reconfiguration.md.")]
 pub(crate) struct Arguments {
     /// The project
     #[arg(value_name = "PROJECT.toml")]

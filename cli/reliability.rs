@@ -28,7 +28,7 @@ Example:
   understudy reliability --controllers 20 --mtbf 10000h --mttr 24h --box old*3=4000h,48h --shared power=200000h
   understudy reliability --chain plant.chain --mission 1y
 
-Times carry their unit: us, ms, s, min, h, d, y. What the numbers rest on: docs/reliability.md.")]
+Times carry their unit: us, ms, s, min, h, d, y. What the numbers rest on: docs/reference/reliability.md.")]
 pub(crate) struct Arguments {
     /// The cluster file; controllers and spares are counted in it
     #[arg(value_name = "CLUSTER.toml", conflicts_with_all = ["controllers", "spares", "chain"])]

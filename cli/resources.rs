@@ -19,7 +19,7 @@ Example:
   understudy resources examples/press-cell/cluster.toml
   understudy resources examples/press-cell/press.ladder --instructions
 
-Of several programs, and of a cluster, the generated understudy is counted too. What is counted how: docs/allocation.md.")]
+Of several programs, and of a cluster, the generated understudy is counted too. What is counted how: docs/how-to/allocation.md.")]
 pub(crate) struct Arguments {
     /// Ladder programs, or cluster files
     #[arg(value_name = "PROGRAM", required = true)]

@@ -39,7 +39,7 @@ Example:
 
 Without a property it asks what is asked of every ladder: can each output be switched on and off, again and again? It also remarks on rungs
 without effect, on coils that want different values in one scan, and on steps that are run through in one. Of a cluster also whether the
-understudy equals the sum of its members. docs/properties.md describes formulas, sentences and files of them.
+understudy equals the sum of its members. docs/reference/properties.md describes formulas, sentences and files of them.
 
 Exit status: 0 when everything was proved, 1 when something does not hold or is undecided, 2 for bad input.")]
 pub(crate) struct Arguments {

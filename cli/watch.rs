@@ -35,7 +35,7 @@ Example:
   understudy watch cell/cluster.toml --keys keys/members/operator        what runs on other machines
 
 A cluster file whose laboratory runs already below --out is looked at, and no other one is started. The page looks only, unless it is told --allow-commands. Where other machines can reach its address, it is served over TLS, and only to
-those that the file of --logins names (docs/watch.md).")]
+those that the file of --logins names (docs/reference/watch.md).")]
 pub(crate) struct Arguments {
     /// A cluster file, whose laboratory is run or looked at; or the directory of a run
     #[arg(value_name = "CLUSTER.toml|RUN")]

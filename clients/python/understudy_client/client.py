@@ -1,4 +1,4 @@
-"""The keys and documents are described in docs/zenoh-keys.md."""
+"""The keys and documents are described in docs/reference/zenoh-keys.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-//! What Prometheus scrapes, in the OpenMetrics text format. Names and labels are listed in `docs/monitoring.md`.
+//! What Prometheus scrapes, in the OpenMetrics text format. Names and labels are listed in `docs/how-to/monitoring.md`.
 //!
 //! Counters count records, so they begin at the first record of the journal that is still there, and never go back.
 

@@ -485,7 +485,7 @@ mod tests {
     /// Each row of the documentation, so that it cannot differ from what is read.
     #[test]
     fn the_documentation_has_every_key_with_its_bounds() {
-        let page = include_str!("../../../docs/cluster-file.md");
+        let page = include_str!("../../../docs/reference/cluster-file.md");
         let parameters = [&ROBOT_PARAMETERS, &PRESS_PARAMETERS, &FIELD];
         for section in SECTIONS.into_iter().chain(parameters) {
             assert!(page.contains(&section.header()), "{}", section.header());
@@ -502,7 +502,7 @@ mod tests {
                 );
                 assert!(
                     page.contains(&row),
-                    "docs/cluster-file.md lacks the row\n{row}"
+                    "docs/reference/cluster-file.md lacks the row\n{row}"
                 );
             }
         }
