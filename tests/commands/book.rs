@@ -24,6 +24,17 @@ fn pages_below(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
+/// The pages in the folder of the project itself.
+fn top_pages() -> Vec<PathBuf> {
+    let names = [
+        "README.md",
+        "ARCHITECTURE.md",
+        "CONTRIBUTING.md",
+        "CHANGELOG.md",
+    ];
+    names.iter().map(|name| root().join(name)).collect()
+}
+
 /// The text without its blocks of code, in which brackets are no links.
 fn prose(text: &str) -> String {
     let mut inside = false;
@@ -80,7 +91,7 @@ fn plain(path: &Path) -> PathBuf {
 
 #[test]
 fn every_link_leads_somewhere() {
-    let mut pages = vec![root().join("README.md"), root().join("ARCHITECTURE.md")];
+    let mut pages = top_pages();
     for folder in ["docs", "examples", "deployment", "clients"] {
         if root().join(folder).exists() {
             pages_below(&root().join(folder), &mut pages);
@@ -256,7 +267,7 @@ fn published(text: &str) -> Vec<String> {
 
 #[test]
 fn every_command_and_option_that_is_named_exists() {
-    let mut pages = vec![root().join("README.md"), root().join("ARCHITECTURE.md")];
+    let mut pages = top_pages();
     for folder in ["docs", "examples", "deployment", "clients"] {
         pages_below(&root().join(folder), &mut pages);
     }
