@@ -12,7 +12,7 @@ use understudy_allocation::{
     Allocation, FamilyQuantity, Item, MOST_RESERVE_PERCENT, Options, Preference, Provenance,
     Requirement, Stock, Terms, allocate, csv, html, text,
 };
-use understudy_scenarios::time_name;
+use understudy_journal::time_name;
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;

@@ -7,8 +7,8 @@ use std::time::{Duration, SystemTime};
 use clap::Args;
 use understudy_attach::{AttachError, Attached, find};
 use understudy_cluster::{Cluster, Security};
+use understudy_journal::{RunDirectory, keep_cluster};
 use understudy_keys::{Date, OperatorKeys};
-use understudy_scenarios::{RunDirectory, keep_cluster};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
@@ -67,7 +67,7 @@ impl AttachArguments {
             let unheard = unheard.join(", ");
             console.note(&format!("not heard, and called again and again: {unheard}"));
         }
-        let written = |error: understudy_scenarios::RunDirectoryError| {
+        let written = |error: understudy_journal::RunDirectoryError| {
             Answer::failed(Status::Failed, "U0602", error.to_string())
         };
         let directory = RunDirectory::create(out, SystemTime::now()).map_err(written)?;

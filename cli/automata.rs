@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 use understudy_diagnostic::Report;
-use understudy_scenarios::named_file;
+use understudy_journal::named_file;
 use understudy_supervisor::{
     Automaton, Model, draw_automaton_svg, draw_dot, read_ads, read_model, write_ads, write_model,
 };

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use understudy_cluster::{Cluster, Loaded, Overrides, TemplateFile};
 use understudy_diagnostic::spelling::nearest;
 use understudy_diagnostic::{Report, decode};
-use understudy_scenarios::{Members, Scenario, named_file, read as read_scenario};
+use understudy_journal::{Members, named_file};
+use understudy_scenarios::{Scenario, read as read_scenario};
 
 use crate::answer::{Answer, Status};
 use crate::kind::{self, Kind};

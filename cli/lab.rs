@@ -6,11 +6,11 @@ use std::time::SystemTime;
 
 use clap::{Args, ValueEnum};
 use understudy_cluster::Cluster;
+use understudy_journal::{JOURNAL_LIMIT_BYTES, JournalState, RunDirectory};
 use understudy_network::Share;
 use understudy_scenarios::{
-    Afterwards, Deaths, HostKind, JOURNAL_LIMIT_BYTES, JournalState, LaboratoryError,
-    LaboratorySettings, NetworkSettings, RunDirectory, RunDirectoryError, Scenario, Summary, World,
-    run_commanded,
+    Afterwards, Deaths, HostKind, LaboratoryError, LaboratorySettings, NetworkSettings,
+    ResultsError, Scenario, Summary, World, run_commanded, write_results,
 };
 
 use crate::answer::{Answer, Status};
@@ -241,7 +241,7 @@ fn invitation(verdict: &str, url: &str) -> String {
 
 /// What a run left besides its summary.
 pub(crate) struct Judged {
-    pub(crate) written: Result<(), RunDirectoryError>,
+    pub(crate) written: Result<(), ResultsError>,
     pub(crate) failure: Option<LaboratoryError>,
 }
 
@@ -308,7 +308,7 @@ pub(crate) fn judged(
         summary.inconclusive = None;
     }
     let judged = Judged {
-        written: directory.write_results(&summary, &account),
+        written: write_results(directory, &summary, &account),
         failure: run.failure,
     };
     Ok((summary, judged))

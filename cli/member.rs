@@ -13,10 +13,11 @@ use serde::Serialize;
 use serde_json::json;
 use understudy_bus::{
     Admitted, ChannelSettings, Commands, Endpoints, FieldDriver, Guard, LinkKind, MemberSettings,
-    NewLife, NoField, NoObserver, Peer, Segments, SimulatedField, ZENOH_RUNTIME, hold_back_signals,
+    NewLife, NoField, NoObserver, Peer, SimulatedField, ZENOH_RUNTIME, hold_back_signals,
     run_member,
 };
 use understudy_cluster::{Cluster, Security, why_unreachable};
+use understudy_journal::Segments;
 use understudy_keys::{Date, MemberKeys, RevocationWatch};
 use understudy_node::Station;
 use understudy_plant::PlantMachine;

@@ -6,8 +6,9 @@ use std::thread::available_parallelism;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use understudy_cluster::Cluster;
+use understudy_journal::Members;
 use understudy_model_checking::{ALL, Budget, Counterexample, Model, Promise, Start, check};
-use understudy_scenarios::{Expectation, Members, Scenario, parts, write};
+use understudy_scenarios::{Expectation, Scenario, parts, write};
 use understudy_wire::Member;
 
 use crate::answer::{Answer, Status};

@@ -8,8 +8,8 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 use understudy_bus::{Call, Request, TlsKeys};
 use understudy_cluster::Overrides;
+use understudy_journal::{Command, OperatorAction, Refusal};
 use understudy_keys::{Date, OperatorKeys, TlsFiles};
-use understudy_scenarios::{Command, OperatorAction, Refusal};
 use understudy_view::{Run, find_running_of};
 use understudy_wire::{Cycle, StateChoice};
 

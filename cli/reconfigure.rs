@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::Value;
 use understudy_diagnostic::{Diagnostic, Report};
+use understudy_journal::named_file;
 use understudy_ladder::print;
 use understudy_reconfiguration::project::{self, Loaded, Project};
 use understudy_reconfiguration::{Failure, Outcome, analyse};
-use understudy_scenarios::named_file;
 use understudy_supervisor::{draw_automaton_svg, draw_dot};
 
 use crate::answer::{Answer, Status};

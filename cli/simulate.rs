@@ -4,10 +4,10 @@ use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::Args;
-use understudy_scenarios::{
-    JOURNAL_LIMIT_BYTES, Journal, JournalState, Record, RunDirectory, RunEvent, Summary, World,
-    keep_cluster, simulate as run_simulation,
+use understudy_journal::{
+    JOURNAL_LIMIT_BYTES, Journal, JournalState, Record, RunDirectory, RunEvent, keep_cluster,
 };
+use understudy_scenarios::{Summary, World, simulate as run_simulation, write_results};
 
 use crate::answer::{Answer, Status};
 use crate::files;
@@ -97,7 +97,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     let circumstances = circumstances(&cluster, World::Simulator, Some(seed), machine(), repeat);
     let (summary, account) = Summary::new(account, &scenario, circumstances, journal);
     let written = directory.as_ref().map_or(Ok(()), |directory| {
-        directory.write_results(&summary, &account)
+        write_results(directory, &summary, &account)
     });
     let mut answer =
         answer(&summary, directory.as_ref().map(RunDirectory::path)).with_used(reports);

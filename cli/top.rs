@@ -9,7 +9,7 @@ use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::{self, KeyCode, KeyEventKind, KeyModifiers};
 use understudy_attach::Attached;
-use understudy_scenarios::{Commander, JOURNAL_LIMIT_BYTES, RunDirectory};
+use understudy_journal::{Commander, JOURNAL_LIMIT_BYTES, RunDirectory};
 use understudy_view::{Alarm, Bounds, Key, Model, Run, Screen, Source, find_run_of};
 
 use crate::answer::{Answer, Status};

@@ -16,7 +16,7 @@ pub(crate) fn refused(error: &ViewError) -> Answer {
 pub(crate) fn several(errors: &[ViewError]) -> Answer {
     let mut answer = Answer::done("", ()).with_status(Status::BadInput);
     for error in errors {
-        if let ViewError::Kept(understudy_scenarios::KeptError::Files { reports }) = error {
+        if let ViewError::Kept(understudy_journal::KeptError::Files { reports }) = error {
             answer.reports.extend(reports.iter().cloned());
         }
         answer = answer.and_failure(Status::BadInput, error.code(), error.to_string());

@@ -7,9 +7,8 @@ use std::time::SystemTime;
 use clap::Args;
 use serde::Serialize;
 use understudy_cluster::Cluster;
-use understudy_scenarios::{
-    Commander, Commands, LaboratoryError, MAXIMUM_CYCLES, RunDirectory, Scenario, commands,
-};
+use understudy_journal::{Commander, Commands, RunDirectory, commands};
+use understudy_scenarios::{LaboratoryError, MAXIMUM_CYCLES, Scenario};
 use understudy_view::{Run, find_running};
 use understudy_watch::{Certificate, Commanding, Logins, Served, Settings, WatchError, serve};
 

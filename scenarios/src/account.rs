@@ -6,7 +6,6 @@
 //! read one of them long before another: only [`MAXIMUM_OPEN_CYCLES`], which bound its memory, end the wait for a remote I/O that is gone.
 
 mod closing;
-mod numbering;
 mod presence;
 mod service;
 mod stalls;
@@ -17,6 +16,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_bus::HostEvent;
+use understudy_journal::{Happening, Members, Numbering, Record, RunEvent, moment};
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_simulator::{Action, Referee, Violation};
@@ -25,11 +25,8 @@ use understudy_wire::{
 };
 
 use crate::figure::Signals;
-use crate::members::Members;
-use crate::record::{Happening, Record, RunEvent, moment};
 use crate::scenario::{During, Scenario};
 
-pub use numbering::Numbering;
 pub use presence::{Interval, Presence};
 pub use service::{Counts, Service};
 pub use stalls::Stall;

@@ -20,20 +20,18 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use nix::time::{ClockId, clock_gettime};
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::mpsc::{Receiver, Sender, channel};
 use understudy_bus::{Cuts, LinkKind};
 use understudy_cluster::Cluster;
+use understudy_journal::{
+    Commands, Journal, JournalState, KEYS, Record, RunDirectory, RunEvent, RunSocket,
+    commands as queue_of_commands, keep_cluster, monotonic_ns,
+};
 use understudy_simulator::Action;
 use understudy_wire::Member;
 
 use crate::account::{Account, OriginRule, Terms};
-use crate::journal::{Journal, JournalState};
-use crate::kept::keep_cluster;
-use crate::operator::{Commands, RunSocket, commands as queue_of_commands};
-use crate::record::{Record, RunEvent};
-use crate::run_directory::RunDirectory;
 use crate::scenario::Scenario;
 
 pub use afterwards::Afterwards;
@@ -50,9 +48,6 @@ use steps::Steps;
 
 /// What the members say and nobody has read yet, at most; then they wait, and lose records rather than cycles.
 const UNREAD_LINES: usize = 16_384;
-
-/// The folder of the keys of a run, in its directory.
-pub(crate) const KEYS: &str = "keys";
 
 /// How often the clock is looked at when nobody says anything.
 const TICK: Duration = Duration::from_millis(50);
@@ -418,16 +413,4 @@ impl Laboratory<'_> {
             journal.flush();
         }
     }
-}
-
-/// The clock of the members' records.
-pub fn monotonic_ns() -> u64 {
-    // It exists on every Linux; a journal without times is still a journal.
-    clock_gettime(ClockId::CLOCK_MONOTONIC).map_or(0, |now| {
-        let nanoseconds = Duration::new(
-            u64::try_from(now.tv_sec()).unwrap_or(0),
-            u32::try_from(now.tv_nsec()).unwrap_or(0),
-        );
-        u64::try_from(nanoseconds.as_nanos()).unwrap_or(u64::MAX)
-    })
 }

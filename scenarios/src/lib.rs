@@ -5,19 +5,12 @@ mod campaign;
 mod figure;
 mod injection;
 mod joining;
-mod journal;
-mod kept;
 mod laboratory;
-mod leftovers;
-mod members;
-mod named_files;
 mod observed;
-mod operator;
 mod outlook;
 mod read;
-mod record;
 mod report;
-mod run_directory;
+mod results;
 mod scenario;
 mod schema;
 mod simulation;
@@ -26,11 +19,8 @@ mod table;
 mod terms;
 mod troubles;
 mod write;
-mod writer;
 
-pub use account::{
-    Account, Counts, Interval, Numbering, OriginRule, Presence, Service, Stall, Terms,
-};
+pub use account::{Account, Counts, Interval, OriginRule, Presence, Service, Stall, Terms};
 pub use campaign::{
     CampaignError, CampaignPlan, Found, Measured, OwnTime, Planned, Question, QuestionError,
     RealCampaign, RealCampaignRun, Speed, hold_against_model, options_of, plan_campaign,
@@ -43,27 +33,16 @@ pub use injection::{
     PictureError, Property, Role, Shard, inject, merge, picture,
 };
 pub use joining::{JOIN_CYCLES, Joined, join_trial};
-pub use journal::{JOURNAL_LIMIT_BYTES, Journal, JournalError, JournalState, records, records_of};
-pub use kept::{KeptError, keep_cluster, kept_cluster};
 pub use laboratory::{
     Afterwards, Deaths, HostKind, LaboratoryError, LaboratoryRun, LaboratorySettings,
-    NetworkSettings, Progress, monotonic_ns, run_commanded, run_laboratory,
+    NetworkSettings, Progress, run_commanded, run_laboratory,
 };
-pub use members::Members;
-pub use named_files::{ALLOWED_FOLDERS, named_file};
 pub use observed::{JournalView, ObservationError, observe_journal};
-pub use operator::{
-    Acknowledgement, Command, Commanded, Commander, Commands, OperatorAction, Refusal, RunSocket,
-    commands,
-};
 pub use outlook::{JournalOutlook, look_ahead};
 pub use read::{MAXIMUM_CYCLES, MAXIMUM_STEPS, ReadScenario, looks_like_a_scenario, read};
-pub use record::{Happening, LABORATORY, Record, RunEvent, moment};
 pub use report::{ReportError, report};
-pub use run_directory::{RunDirectory, RunDirectoryError, time_name};
-pub use scenario::{
-    ACTIONS, During, Expectation, SOURCES, Scenario, TABLE_TWO, action_word, source_word,
-};
+pub use results::{ResultsError, write_results};
+pub use scenario::{ACTIONS, During, Expectation, Scenario, TABLE_TWO, action_word};
 pub use schema::scenario_schema;
 pub use simulation::{NotInStep, simulate};
 pub use summary::{
@@ -75,4 +54,3 @@ pub use terms::parts;
 pub use troubles::{Target, Trouble, TroubleRow};
 pub use understudy_simulator::{Action, Disturbance, Fault, Network};
 pub use write::write;
-pub use writer::{Writing, writing};

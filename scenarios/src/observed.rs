@@ -10,8 +10,7 @@ use understudy_reliability::Observed;
 use understudy_simulator::Action;
 use understudy_wire::{Member, ProgramId, Source, StationId};
 
-use crate::journal::JournalError;
-use crate::record::{Happening, Record, RunEvent};
+use understudy_journal::{Happening, JournalError, Record, RunEvent};
 
 /// Nanoseconds of an hour.
 const HOUR_NS: f64 = 3.6e12;

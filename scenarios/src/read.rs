@@ -22,11 +22,11 @@ use toml::de::DeTable;
 use understudy_diagnostic::spelling::suggestion;
 use understudy_diagnostic::{Diagnostic, Report, has_errors};
 use understudy_form::{Codes, Fields, Placed, parse};
+use understudy_journal::{Members, SOURCES, source_word};
 use understudy_simulator::{Disturbance, Network};
 use understudy_wire::{Member, ProgramId, Source};
 
-use crate::members::Members;
-use crate::scenario::{During, Expectation, SOURCES, Scenario, source_word};
+use crate::scenario::{During, Expectation, Scenario};
 
 /// Cycles of one scenario, at most.
 pub const MAXIMUM_CYCLES: u64 = 100_000_000;

@@ -1,9 +1,10 @@
 //! The JSON schema of a scenario file, for editors.
 
 use schemars::Schema;
+use understudy_journal::{SOURCES, source_word};
 
 use crate::read::{MAXIMUM_CYCLES, MAXIMUM_NUMBER};
-use crate::scenario::{ACTIONS, SOURCES, source_word};
+use crate::scenario::ACTIONS;
 
 /// JSON Schema 2020-12 of the data of a scenario file. Whether names and cycles fit together is beyond a schema; [`crate::read`]
 /// checks it.

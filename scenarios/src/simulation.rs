@@ -1,13 +1,13 @@
 //! A scenario in virtual time: the same account as in the laboratory, from a seed.
 
 use understudy_cluster::Cluster;
+use understudy_journal::{Happening, Record, RunEvent};
 use understudy_plant::{Event as PlantEvent, Pace};
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_simulator::{Network, NotReady, Record as Simulated, Simulation};
 use understudy_wire::{Field, Image, Member, Moment};
 
 use crate::account::{Account, OriginRule, Terms};
-use crate::record::{Happening, Record, RunEvent};
 use crate::scenario::Scenario;
 use crate::terms::parts;
 

@@ -4,11 +4,11 @@ use std::fmt;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use understudy_journal::{JournalState, source_word};
 use understudy_wire::{Member, ProgramId, Source};
 
 use crate::account::{Account, Counts, Interval, Presence, RangeFinding, Service, Stall};
-use crate::journal::JournalState;
-use crate::scenario::{During, Scenario, action_text, source_word};
+use crate::scenario::{During, Scenario, action_text};
 
 /// The whole of `summary.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]

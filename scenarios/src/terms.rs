@@ -1,21 +1,13 @@
 //! What an account and the two worlds need of a cluster.
 
 use understudy_cluster::Cluster;
+use understudy_journal::Members;
 use understudy_simulator::Referee;
 pub use understudy_simulator::parts;
 use understudy_wire::{ProgramId, ProgramSet};
 
 use crate::account::Terms;
 use crate::figure::Signals;
-use crate::members::Members;
-
-impl Members {
-    /// All members of a cluster.
-    pub fn of(cluster: &Cluster) -> Self {
-        let name = |member| cluster.member_name(member).unwrap_or_default().to_owned();
-        Self::new(cluster.members().map(|member| (member, name(member))))
-    }
-}
 
 impl Terms {
     /// Of a cluster.

@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
+use understudy_journal::{Members, source_word};
 use understudy_simulator::{Action, Disturbance, Fault, Network};
 use understudy_wire::{Member, StationId};
 
-use crate::members::Members;
-use crate::scenario::{Expectation, Scenario, action_word, source_word};
+use crate::scenario::{Expectation, Scenario, action_word};
 
 /// The text; `members` are those of the scenario's cluster, and `remarks` stand above it for people.
 pub fn write(scenario: &Scenario, members: &Members, remarks: &[String]) -> String {

@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 
 use insta::assert_snapshot;
-use understudy_scenarios::{Members, looks_like_a_scenario, read};
+use understudy_journal::Members;
+use understudy_scenarios::{looks_like_a_scenario, read};
 use understudy_wire::{Member, ProgramId, StationId};
 
 fn members() -> Members {

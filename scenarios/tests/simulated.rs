@@ -1,9 +1,10 @@
 //! Every scenario file that comes with the project, in virtual time.
 
 use understudy_cluster::{Cluster, Overrides, press_cell};
+use understudy_journal::{Happening, Journal, JournalState, Members, Record, RunEvent, records};
 use understudy_scenarios::{
-    Account, Circumstances, Journal, JournalState, Members, OriginRule, Record, RunEvent, Scenario,
-    Summary, Table, Terms, World, figure, read, records, report, simulate,
+    Account, Circumstances, OriginRule, Scenario, Summary, Table, Terms, World, figure, read,
+    report, simulate,
 };
 use understudy_wire::Mode;
 
@@ -157,7 +158,6 @@ fn the_account_can_be_made_again_from_the_journal() {
 #[test]
 fn an_output_that_was_changed_is_found() {
     use understudy_remote_io::Event;
-    use understudy_scenarios::Happening;
     use understudy_wire::Source;
 
     let text = include_str!("../kill-each.toml");
@@ -196,7 +196,6 @@ fn an_output_that_was_changed_is_found() {
 fn what_was_not_written_is_not_judged_and_is_said() {
     use understudy_bus::HostEvent;
     use understudy_remote_io::Event;
-    use understudy_scenarios::Happening;
 
     let text = "title = \"Quiet\"\ncycles = 60\n[expect]\nwrong = 0\n";
     let (bytes, summary, _) = run(Mode::Full, text, 3);
@@ -234,7 +233,6 @@ fn what_was_not_written_is_not_judged_and_is_said() {
 #[test]
 fn what_a_stall_explains_is_apart() {
     use understudy_remote_io::Event;
-    use understudy_scenarios::Happening;
 
     let text = r#"
 title = "Nobody is left for the robot"
@@ -292,7 +290,6 @@ source = "reconstructed"
 #[test]
 fn a_run_on_a_late_host_is_inconclusive() {
     use understudy_remote_io::Event;
-    use understudy_scenarios::Happening;
 
     let text = "title = \"Nobody is left\"\ncycles = 60\n\n[[step]]\nat = 50\naction = \"crash\"\nstation = \"robot\"\n\n[[step]]\nat = 50\naction = \"crash\"\nstation = \"understudy\"\n\n[expect]\nheld = 0\n";
     let (bytes, summary, _) = run(Mode::Full, text, 3);
@@ -328,8 +325,6 @@ fn a_run_on_a_late_host_is_inconclusive() {
 
 #[test]
 fn what_is_read_long_after_the_rest_is_counted_all_the_same() {
-    use understudy_scenarios::Happening;
-
     let text = include_str!("../kill-each.toml");
     let (bytes, summary, _) = run(Mode::Full, text, 1);
     let (mut seen, mut kept) = (0, Vec::new());
@@ -356,7 +351,6 @@ fn what_is_read_long_after_the_rest_is_counted_all_the_same() {
 #[test]
 fn the_cycle_in_which_a_run_is_interrupted_is_none_of_it() {
     use understudy_remote_io::Event as RemoteIoEvent;
-    use understudy_scenarios::Happening;
 
     let text = include_str!("../kill-each.toml");
     let (bytes, _, _) = run(Mode::Full, text, 1);

@@ -9,11 +9,11 @@ use std::time::Duration;
 use tokio::sync::mpsc::{Receiver, channel};
 use tokio::sync::oneshot;
 use understudy_bus::{DONE, Request};
-use understudy_remote_io::Event as RemoteIoEvent;
-use understudy_scenarios::{
+use understudy_journal::{
     Command, Commanded, Commander, Commands, Happening, Journal, OperatorAction, Record, Refusal,
     RunDirectory, RunEvent, RunSocket, commands, monotonic_ns,
 };
+use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_wire::Member;
 
 use crate::error::AttachError;

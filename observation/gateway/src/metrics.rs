@@ -14,9 +14,9 @@ use prometheus_client::metrics::histogram::Histogram;
 use prometheus_client::registry::{Registry, Unit};
 use understudy_bus::HostEvent;
 use understudy_cluster::Cluster;
+use understudy_journal::{Happening, Members, Record, source_word};
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
-use understudy_scenarios::{Happening, Members, Record, source_word};
 use understudy_view::{Model, Run, Snapshot, StationState};
 use understudy_wire::{Member, ProgramId, StationId};
 

@@ -18,7 +18,8 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
 use understudy_cluster::{Cluster, press_cell, read};
-use understudy_scenarios::{Journal, Members, keep_cluster, read as read_scenario, simulate};
+use understudy_journal::{Journal, Members, keep_cluster};
+use understudy_scenarios::{read as read_scenario, simulate};
 use understudy_testing::skip;
 use understudy_view::{Bounds, Run};
 

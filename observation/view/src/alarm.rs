@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use understudy_scenarios::Acknowledgement;
+use understudy_journal::Acknowledgement;
 
 /// Alarms that are kept, at most; the oldest that are over and acknowledged go first.
 const MOST: usize = 1000;

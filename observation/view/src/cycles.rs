@@ -1,6 +1,6 @@
 //! Which cycle of the run a record belongs to.
 
-use understudy_scenarios::Numbering;
+use understudy_journal::Numbering;
 use understudy_wire::{Moment, ProgramId};
 
 /// One count of cycles over all epochs, as the report has it: from the origin of the run. Until the origin is known it begins

@@ -3,8 +3,8 @@
 mod members;
 mod processes;
 
+use understudy_journal::{Happening, Members, Record};
 use understudy_remote_io::Missing;
-use understudy_scenarios::{Happening, Members, Record};
 use understudy_wire::{Element, Member, ProgramId, ProgramSet, Set, StationId, StationSet};
 
 use crate::event::Level;

@@ -2,7 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use understudy_scenarios::source_word;
+use understudy_journal::source_word;
 use understudy_wire::{Image, ProgramId};
 
 use crate::model::Model;

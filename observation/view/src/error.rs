@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use understudy_scenarios::KeptError;
+use understudy_journal::KeptError;
 
 /// A question that has no answer.
 #[derive(Debug, thiserror::Error)]

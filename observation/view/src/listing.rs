@@ -6,8 +6,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_cluster::Cluster;
 use understudy_diagnostic::spelling::suggestion;
+use understudy_journal::{Happening, Members, Record, RunEvent, moment};
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
-use understudy_scenarios::{Happening, Members, Record, RunEvent, moment};
 use understudy_wire::{Member, Moment, ProgramId, Source};
 
 use crate::cycles::Cycles;

@@ -9,9 +9,9 @@ use std::sync::{Arc, OnceLock};
 
 use understudy_bus::HostEvent;
 use understudy_cluster::Cluster;
+use understudy_journal::{Action, Happening, Members, Record, RunEvent, moment};
 use understudy_ladder::Observer;
 use understudy_node::Event as StationEvent;
-use understudy_scenarios::{Action, Happening, Members, Record, RunEvent, moment};
 use understudy_wire::{Member, Moment, ProgramId, StationId};
 
 use crate::alarm::Alarms;

@@ -4,9 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde_json::Value;
-use understudy_bus::segments_of;
 use understudy_cluster::Cluster;
-use understudy_scenarios::{Commander, Writing, kept_cluster, writing};
+use understudy_journal::{Commander, Writing, kept_cluster, segments_of, writing};
 use understudy_wire::{Cycle, Epoch, Moment};
 
 use crate::error::ViewError;

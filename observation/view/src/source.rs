@@ -8,7 +8,7 @@ mod progress;
 
 use std::path::{Path, PathBuf};
 
-use understudy_scenarios::Record;
+use understudy_journal::Record;
 
 use channel::Channel;
 pub use channel::Feed;

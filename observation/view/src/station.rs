@@ -7,7 +7,7 @@
 //! ```
 
 use serde::{Deserialize, Serialize};
-use understudy_scenarios::Action;
+use understudy_journal::Action;
 use understudy_wire::{ProgramSet, StationSet};
 
 /// In one word.

@@ -8,7 +8,7 @@ mod text;
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_diagnostic::spelling::suggestion;
-use understudy_scenarios::source_word;
+use understudy_journal::source_word;
 use understudy_wire::{Member, ProgramId, Source, StationId};
 
 use crate::describe::missing_text;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError, RwLock, RwLockReadGuard};
 
 use tokio::sync::{Semaphore, watch};
-use understudy_scenarios::Commander;
+use understudy_journal::Commander;
 use understudy_view::{Alarm, Reading, Run};
 
 use crate::api::not_remembered;

@@ -5,9 +5,9 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
+use understudy_journal::{Action, Happening, Record, RunEvent};
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
-use understudy_scenarios::{Action, Happening, Record, RunEvent};
 use understudy_view::{LostState, Protection};
 use understudy_wire::{Force, Member, ProgramId, SignalPlace, StationId, StationSet};
 

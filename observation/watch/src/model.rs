@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::time::Instant;
 
+use understudy_journal::{Happening, Record};
 use understudy_remote_io::Event as RemoteIoEvent;
-use understudy_scenarios::{Happening, Record};
 use understudy_view::{Bounds, Margin, Model as RunModel, Progress, Reading, Run, Source, Trouble};
 use understudy_wire::{Member, ProgramId, StationId, StationSet};
 

@@ -5,8 +5,8 @@ mod members;
 use std::time::Instant;
 
 use serde::Serialize;
+use understudy_journal::source_word;
 use understudy_remote_io::Missing;
-use understudy_scenarios::source_word;
 use understudy_view::{Alarm, LostState, Margin, Outcome, Protection};
 use understudy_wire::{Member, ProgramId, ProgramSet, SignalPlace, Source, StationId};
 

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use rustls::pki_types::ServerName;
 use rustls::{ClientConfig, ClientConnection, RootCertStore, StreamOwned};
-use understudy_scenarios::Commander;
+use understudy_journal::Commander;
 use understudy_watch::{Certificate, Commanding, Logins, Served, Settings, WatchError, serve};
 
 const OPERATOR: &str = "0123456789abcdef0123456789abcdef";

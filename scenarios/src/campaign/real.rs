@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime};
 
 use understudy_cluster::Cluster;
+use understudy_journal::{Happening, Record, RunDirectory, RunDirectoryError, RunEvent};
 use understudy_simulator::{Action, Fault};
 use understudy_wire::{Member, Time};
 
@@ -15,8 +16,6 @@ use super::lives::{Lives, Order, Run};
 use super::seen::{Deadlines, Seen, of_station};
 use super::{CampaignPlan, Measured, gathered};
 use crate::laboratory::{Conductor, LaboratoryError, LaboratorySettings, Progress, run_conducted};
-use crate::record::{Happening, Record, RunEvent};
-use crate::run_directory::{RunDirectory, RunDirectoryError};
 use crate::scenario::{Expectation, Scenario};
 
 /// More than any limit of time lets pass.

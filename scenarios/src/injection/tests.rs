@@ -1,14 +1,14 @@
 //! Campaigns on the press cell: the same on any number of threads and shards, and small failures that a scenario file repeats.
 
 use understudy_cluster::press_cell;
+use understudy_journal::{JournalState, Members};
 use understudy_simulator::{Action, Fault};
 use understudy_wire::{Member, Source, StationId};
 
 use super::faultload::Injection;
 use super::*;
-use crate::members::Members;
 use crate::read::read;
-use crate::{Circumstances, JournalState, Scenario, Summary, World, simulate, write};
+use crate::{Circumstances, Scenario, Summary, World, simulate, write};
 
 fn cell() -> Cluster {
     let files = press_cell();

@@ -2,9 +2,10 @@
 
 use std::time::Instant;
 
+use understudy_journal::RunEvent;
+
 use super::{Laboratory, Progress};
 use crate::account::Account;
-use crate::record::RunEvent;
 
 /// A cluster that stays up when its scenario is over, until the run is asked to end. What happens then is in the journal, and not in the account.
 pub struct Afterwards<'a> {

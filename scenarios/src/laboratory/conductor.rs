@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use understudy_simulator::Fault;
 
-use crate::record::Record;
+use understudy_journal::Record;
 
 /// Told what happens, and asked what is to be done.
 pub(crate) trait Conductor {

@@ -1,12 +1,11 @@
 //! What the laboratory does when somebody commands.
 
+use understudy_journal::{Command, Commanded, OperatorAction, Refusal, RunEvent};
 use understudy_simulator::{Action, Fault};
 use understudy_wire::{Force, Member, ProgramId};
 
 use super::Laboratory;
 use super::process::Process;
-use crate::operator::{Command, Commanded, OperatorAction, Refusal};
-use crate::record::RunEvent;
 
 impl Laboratory<'_> {
     pub(super) async fn obey(&mut self, commanded: Commanded) {

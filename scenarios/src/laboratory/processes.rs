@@ -7,13 +7,13 @@ use std::time::{Duration, Instant};
 use tokio::process::Command;
 use tokio::sync::mpsc::Receiver;
 use understudy_bus::{Cuts, HostEvent, ZENOH_RUNTIME};
+use understudy_journal::{Happening, Record, RunEvent};
 use understudy_simulator::{Action, Fault};
 use understudy_wire::Member;
 
 use super::error::LaboratoryError;
 use super::process::{Process, Said, Saying};
 use super::{Deaths, Laboratory, Progress};
-use crate::record::{Happening, Record, RunEvent};
 use crate::scenario::action_word;
 
 /// How long a process may take to end by itself.

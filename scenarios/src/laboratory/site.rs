@@ -17,12 +17,12 @@ use std::path::{Path, PathBuf};
 
 use understudy_bus::{Endpoints, LinkKind, Peer};
 use understudy_cluster::Cluster;
+use understudy_journal::RunDirectory;
 use understudy_network::{Hosts, Impairment, NetworkError, Proxy, Route, Share, Transport};
 use understudy_simulator::Network;
 use understudy_wire::{Member, ProgramId};
 
 use super::error::LaboratoryError;
-use crate::run_directory::RunDirectory;
 use crate::scenario::Scenario;
 
 /// The port of the first member of a host.

@@ -7,10 +7,10 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
+use understudy_journal::Record;
 use understudy_simulator::Fault;
 
 use super::Conductor;
-use crate::record::Record;
 use crate::scenario::Scenario;
 
 /// Periods without a report after which the clock counts.

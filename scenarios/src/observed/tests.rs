@@ -193,7 +193,7 @@ fn a_journal_without_a_whole_cluster_or_with_a_broken_line_says_so() {
     ]);
     assert!(silent.contains("station 2, station 3"), "{silent}");
     let text = "{}\n{}\n";
-    let broken = observe_journal(crate::journal::records(text.as_bytes()));
+    let broken = observe_journal(understudy_journal::records(text.as_bytes()));
     assert_eq!(broken.expect_err("no record").code(), "U0532");
 }
 

@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 
 use understudy_cluster::{press_cell, read};
 use understudy_gateway::BOUNDS;
-use understudy_scenarios::{Members, read as read_scenario, simulate};
+use understudy_journal::Members;
+use understudy_scenarios::{read as read_scenario, simulate};
 use understudy_view::{Model, RunState};
 
 use super::*;

@@ -1,8 +1,8 @@
 //! What stations, remote I/Os and plants say of themselves.
 
+use understudy_journal::{Members, source_word};
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason};
-use understudy_scenarios::{Members, source_word};
 use understudy_wire::{Member, SignalPlace, StationId};
 
 use super::{Words, list, missing_text, program_name, programs, stations};

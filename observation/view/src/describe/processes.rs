@@ -1,7 +1,7 @@
 //! What the processes of the members say, and whoever runs them.
 
 use understudy_bus::HostEvent;
-use understudy_scenarios::{Action, Members, RunEvent};
+use understudy_journal::{Action, Members, RunEvent};
 use understudy_wire::{Member, StateChoice};
 
 use super::Words;

@@ -4,8 +4,8 @@ mod signs;
 
 use std::fmt::Write as _;
 
+use understudy_journal::source_word;
 use understudy_ladder::escaped;
-use understudy_scenarios::source_word;
 use understudy_wire::Source;
 
 use super::{Applied, Film};

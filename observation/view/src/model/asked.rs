@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use understudy_cluster::Cluster;
+use understudy_journal::Members;
 use understudy_ladder::{Evaluation, Observer};
 use understudy_logic::Scratch;
-use understudy_scenarios::Members;
 use understudy_wire::{Moment, ProgramId, StationId};
 
 use super::{Model, ProgramTrack, SentTurn};

@@ -1,8 +1,8 @@
 //! What is driven of each program, and why.
 
+use understudy_journal::{Record, moment, source_word};
 use understudy_plant::Event as PlantEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
-use understudy_scenarios::{Record, moment, source_word};
 use understudy_wire::{
     Field, Force, Image, Member, Moment, ProgramId, SignalPlace, Source, StationId, StationSet,
 };

@@ -1,7 +1,7 @@
 //! Protection of programs, and states that are lost.
 
+use understudy_journal::Record;
 use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason};
-use understudy_scenarios::Record;
 use understudy_wire::{Member, ProgramId};
 
 use super::Model;

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Instant;
 
-use understudy_scenarios::Record;
+use understudy_journal::Record;
 
 use super::Trouble;
 use super::progress::Progress;
@@ -93,7 +93,7 @@ impl Channel {
 
 #[cfg(test)]
 mod tests {
-    use understudy_scenarios::RunEvent;
+    use understudy_journal::RunEvent;
 
     use super::*;
 

@@ -13,9 +13,8 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
-use understudy_bus::closed_segments;
 use understudy_diagnostic::shortened;
-use understudy_scenarios::Record;
+use understudy_journal::{Record, closed_segments};
 
 use super::Trouble;
 use super::progress::Progress;

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use understudy_cluster::press_cell;
-use understudy_scenarios::{Journal, keep_cluster};
+use understudy_journal::{Journal, keep_cluster};
 use understudy_view::{Bounds, Filter, Run, find_run_of};
 
 use crate::support::{KILL_EACH, cell, model, records, scenario};

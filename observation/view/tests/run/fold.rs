@@ -1,6 +1,7 @@
 //! States, sources, events and alarms as they stand in the scenario.
 
-use understudy_scenarios::{Record, RunEvent, Scenario};
+use understudy_journal::{Record, RunEvent};
+use understudy_scenarios::Scenario;
 use understudy_view::{Model, RunState, Snapshot, StationState};
 use understudy_wire::{Member, ProgramId, Source, StationId};
 

@@ -6,7 +6,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
-use understudy_scenarios::Record;
+use understudy_journal::Record;
 use understudy_view::{Bounds, Filter, Listing, Model, Screen, diff};
 
 use crate::support::{KILL_EACH, cell, records, scenario};

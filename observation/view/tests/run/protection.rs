@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use understudy_scenarios::{Record, RunEvent};
+use understudy_journal::{Record, RunEvent};
 use understudy_view::{Bounds, LostState, Model, Protection};
 use understudy_wire::{Member, ProgramId, StationId};
 

@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use understudy_journal::moment;
 use understudy_ladder::Interpreter;
-use understudy_scenarios::{Network, Scenario, moment};
+use understudy_scenarios::{Network, Scenario};
 use understudy_view::{Bounds, Model};
 use understudy_wire::ProgramId;
 

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
-use understudy_scenarios::{Record, RunEvent};
+use understudy_journal::{Record, RunEvent};
 use understudy_view::{Key, Screen, Source};
 
 use crate::support::{KILL_EACH, cell, line, model, scenario};

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use understudy_cluster::{Cluster, Overrides, press_cell, read_with};
-use understudy_scenarios::{Members, Record, Scenario, read, simulate};
+use understudy_journal::{Members, Record};
+use understudy_scenarios::{Scenario, read, simulate};
 use understudy_view::{Bounds, Model};
 use understudy_wire::Mode;
 

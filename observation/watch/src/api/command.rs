@@ -7,7 +7,7 @@ use axum::extract::rejection::JsonRejection;
 use axum::extract::{Extension, State};
 use serde::Deserialize;
 use serde_json::{Value, json};
-use understudy_scenarios::Command;
+use understudy_journal::Command;
 use understudy_wire::{
     Force, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH, SignalPlace, StateChoice,
 };

@@ -6,7 +6,7 @@ use axum::Json;
 use axum::extract::rejection::QueryRejection;
 use axum::extract::{Query, State};
 use serde::{Deserialize, Serialize};
-use understudy_scenarios::source_word;
+use understudy_journal::source_word;
 use understudy_view::Timeline;
 use understudy_wire::{Image, ProgramId};
 

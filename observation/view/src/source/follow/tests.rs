@@ -2,8 +2,7 @@ use std::io::Write;
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use understudy_bus::Segments;
-use understudy_scenarios::{Happening, RunEvent};
+use understudy_journal::{Happening, RunEvent, Segments};
 
 use super::*;
 

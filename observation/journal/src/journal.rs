@@ -1,6 +1,6 @@
 //! `journal.jsonl`: every record of a run, one JSON object a line, in the order in which they were seen.
 //!
-//! It is kept in segments ([`understudy_bus::Segments`]), of which the oldest go when it reaches its limit.
+//! It is kept in segments ([`Segments`]), of which the oldest go when it reaches its limit.
 //!
 //! Invariant: the journal never stops the run. A full disk or any other failure to write ends the journal, not the cycle; how
 //! many records it lacks and why is said in the summary.
@@ -11,9 +11,9 @@ use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use understudy_bus::{Segments, segments_of};
 
 use crate::record::Record;
+use crate::segments::{Segments, segments_of};
 
 /// Where records go.
 #[derive(Debug)]

@@ -7,9 +7,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::laboratory::KEYS;
 use crate::operator::SOCKET;
-use crate::run_directory::is_of_latest;
+use crate::run_directory::{KEYS, is_of_latest};
 use crate::writer::{Writing, writing};
 
 /// Runs that are looked at, at most; the newest first.

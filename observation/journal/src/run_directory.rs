@@ -6,12 +6,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
 
-use crate::account::Account;
-use crate::figure::{FigureError, figure};
 use crate::leftovers::remove_leftovers;
-use crate::report::{ReportError, report};
-use crate::summary::Summary;
 use crate::writer::WriterLock;
+
+/// The folder of a run's keys, which goes when the run ends.
+pub const KEYS: &str = "keys";
 
 /// Directories with one name and a number, at most; then something is wrong.
 const MAXIMUM_TRIES: u32 = 1000;
@@ -34,15 +33,14 @@ pub enum RunDirectoryError {
         /// Why.
         source: io::Error,
     },
-    /// The figure.
-    #[error(transparent)]
-    Figure(#[from] FigureError),
-    /// The report.
-    #[error(transparent)]
-    Report(#[from] ReportError),
-    /// The summary.
-    #[error("the summary cannot be written as JSON: {0}")]
-    Summary(#[from] serde_json::Error),
+    /// A file that has no form in JSON.
+    #[error("{} cannot be written as JSON: {source}", path.display())]
+    Json {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: serde_json::Error,
+    },
 }
 
 impl RunDirectory {
@@ -146,23 +144,6 @@ impl RunDirectory {
             .and_then(|()| fs::write(&begun, text))
             .and_then(|()| fs::rename(&begun, &path))
             .map_err(|source| RunDirectoryError::Write { path, source })
-    }
-
-    /// Writes the summary, the figure and the report.
-    ///
-    /// # Errors
-    /// The first that failed; the others are tried all the same.
-    pub fn write_results(
-        &self,
-        summary: &Summary,
-        account: &Account,
-    ) -> Result<(), RunDirectoryError> {
-        let json = serde_json::to_string_pretty(summary)? + "\n";
-        let summary_written = self.write("summary.json", &json);
-        let figure = figure(account, summary)?;
-        let figure_written = self.write("figure10.svg", &figure);
-        let report_written = self.write("report.html", &report(summary, &figure)?);
-        summary_written.and(figure_written).and(report_written)
     }
 }
 

@@ -106,8 +106,11 @@ pub fn keep_cluster(run: &Path, file: &Path, cluster: &Cluster) -> Result<(), Ru
         write(&file, ladder)?;
         kept.ladders.insert(name.clone(), file);
     }
-    let json = serde_json::to_string_pretty(&kept)? + "\n";
-    write(KEPT_FILE, json.as_bytes())
+    let json = serde_json::to_string_pretty(&kept).map_err(|source| RunDirectoryError::Json {
+        path: folder.join(KEPT_FILE),
+        source,
+    })?;
+    write(KEPT_FILE, (json + "\n").as_bytes())
 }
 
 /// The cluster that was kept with a run.

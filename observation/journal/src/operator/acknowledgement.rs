@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::laboratory::monotonic_ns;
+use crate::clock::monotonic_ns;
 use crate::record::{Record, RunEvent};
 use crate::writer::WriterLock;
 

@@ -62,7 +62,7 @@ impl Numbering {
     }
 
     /// Whether every remote I/O that was ever there has told of a later deadline.
-    pub(crate) fn all_are_past(&self, number: i64) -> bool {
+    pub fn all_are_past(&self, number: i64) -> bool {
         let mut lasts = self.remote_ios.values();
         lasts.all(|last| last.number.saturating_add(last.idle) > number)
     }

@@ -1,5 +1,6 @@
 //! The members of a cluster by name.
 
+use understudy_cluster::Cluster;
 use understudy_wire::{Member, ProgramId, StationId};
 
 /// Every member of a cluster with its name: stations by rank, then remote I/Os, then plants.
@@ -7,6 +8,12 @@ use understudy_wire::{Member, ProgramId, StationId};
 pub struct Members(Vec<(Member, String)>);
 
 impl Members {
+    /// All members of a cluster.
+    pub fn of(cluster: &Cluster) -> Self {
+        let name = |member| cluster.member_name(member).unwrap_or_default().to_owned();
+        Self::new(cluster.members().map(|member| (member, name(member))))
+    }
+
     /// From all members; names are unique, which the reader of cluster files has checked.
     pub fn new(members: impl IntoIterator<Item = (Member, String)>) -> Self {
         let mut members: Vec<_> = members.into_iter().collect();

@@ -1,0 +1,35 @@
+//! The journal of a run: its records, its files, the directory that holds them, and what an operator adds to it.
+//!
+//! Every record of a laboratory, of the simulator and of a cluster elsewhere has this form, so that one account judges all of them and every
+//! viewer shows all of them.
+
+mod clock;
+mod journal;
+mod kept;
+mod leftovers;
+mod members;
+mod named_files;
+mod numbering;
+mod operator;
+mod record;
+mod run_directory;
+mod segments;
+mod source;
+mod writer;
+
+pub use clock::monotonic_ns;
+pub use journal::{JOURNAL_LIMIT_BYTES, Journal, JournalError, JournalState, records, records_of};
+pub use kept::{KeptError, keep_cluster, kept_cluster};
+pub use members::Members;
+pub use named_files::{ALLOWED_FOLDERS, named_file};
+pub use numbering::Numbering;
+pub use operator::{
+    Acknowledgement, Command, Commanded, Commander, Commands, OperatorAction, Refusal, RunSocket,
+    commands,
+};
+pub use record::{Happening, LABORATORY, Record, RunEvent, moment};
+pub use run_directory::{KEYS, RunDirectory, RunDirectoryError, time_name};
+pub use segments::{Segments, closed_segments, segments_of};
+pub use source::{SOURCES, source_word};
+pub use understudy_simulator::Action;
+pub use writer::{Writing, writing};
