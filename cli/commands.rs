@@ -103,7 +103,7 @@ pub(crate) fn parser(groups: &[Group]) -> Command {
         .long("json")
         .global(true)
         .action(ArgAction::SetTrue)
-        .help("Print one JSON document on standard output (docs/json.md)");
+        .help("Print one JSON document on standard output (docs/reference/json.md)");
     let parser = Command::new("understudy")
         .version(env!("CARGO_PKG_VERSION"))
         .about("A redundant array of independent controllers: RAID for PLCs")

@@ -17,8 +17,8 @@ use understudy_bus::{
     run_member,
 };
 use understudy_cluster::{Cluster, Security, why_unreachable};
-use understudy_cycle::{Machine};
-use understudy_journal::{Segments};
+use understudy_cycle::Machine;
+use understudy_journal::Segments;
 use understudy_keys::{Date, MemberKeys, RevocationWatch};
 use understudy_node::Station;
 use understudy_plant::PlantMachine;
@@ -36,7 +36,7 @@ use crate::overrides::{OverrideArguments, link_kind, parse_size};
 Example:
   understudy node cluster.toml --name robot
 
-Reports are JSON lines on standard output (docs/run-directory.md). Every member needs an address in the cluster file, or in
+Reports are JSON lines on standard output (docs/reference/run-directory.md). Every member needs an address in the cluster file, or in
 the file of --endpoints. SIGINT and SIGTERM end it in order; the lines `stop` and `release` on standard input are commands.")]
 pub(crate) struct Arguments {
     /// The cluster file

@@ -6,8 +6,8 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use understudy_bus::LinkKind;
 use understudy_cluster::{Cluster, Link, Overrides, Security};
-use understudy_cycle::{Mode};
-use understudy_text::duration::{parse_positive};
+use understudy_cycle::Mode;
+use understudy_text::duration::parse_positive;
 
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct OverrideArguments {

@@ -17,12 +17,12 @@ use understudy_text::duration::parse_positive;
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
+use crate::deployment::catalogue;
+use crate::programs::verify::patience::Patience;
+use crate::run::command_line;
+use crate::run::outcome::command_line;
+use crate::verify::patience::Patience;
 use crate::{catalogue, files};
-use crate::deployment::{catalogue};
-use crate::programs::verify::patience::{Patience};
-use crate::run::{command_line};
-use crate::run::outcome::{command_line};
-use crate::verify::patience::{Patience};
 use programs::{Programs, period};
 
 /// Select controllers for programs, understudies and remote I/Os
@@ -36,7 +36,7 @@ Example:
   understudy allocate pump.ladder --require \"vendor=Siemens\" --require \"inputs>=12\"
 
 A controller is suitable, unsuitable or unknown: an unknown figure never counts as sufficient. Programs are placed only after they have been
-verified. Calculation of requirements and placement: docs/allocation.md.
+verified. Calculation of requirements and placement: docs/how-to/allocation.md.
 
 Exit status: 0 if every program has a controller, 1 if one has none, 2 for invalid input.")]
 pub(crate) struct Arguments {

@@ -27,7 +27,7 @@ Example:
   understudy catalogue import prices.csv --catalogue ours.csv --update
   understudy catalogue export --output controllers.csv
 
-The default is the built-in catalogue, which is read-only. --catalogue names a file in a format of docs/catalogue.md; `add` and `import`
+The default is the built-in catalogue, which is read-only. --catalogue names a file in a format of docs/reference/catalogue.md; `add` and `import`
 create it with the contents of the built-in catalogue if it is missing. A missing figure is unknown, never 0.")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
@@ -64,7 +64,7 @@ enum What {
     },
     /// Import the controllers of a file
     Import {
-        /// Input file (formats: docs/catalogue.md)
+        /// Input file (formats: docs/reference/catalogue.md)
         #[arg(value_name = "FILE.csv")]
         from: PathBuf,
         /// Update the figures of existing controllers

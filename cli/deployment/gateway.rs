@@ -24,7 +24,7 @@ Example:
   understudy gateway zenoh runs/latest --listen 127.0.0.1:7447 --mirror 5/s
 
 The gateway reads the journal of a run, live or finished, and ends with SIGINT or SIGTERM. Connections are neither encrypted nor
-authenticated: bind the gateway to loopback or to a separate network (docs/monitoring.md).")]
+authenticated: bind the gateway to loopback or to a separate network (docs/how-to/monitoring.md).")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     what: What,

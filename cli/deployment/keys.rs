@@ -24,7 +24,7 @@ Example:
   understudy keys revoke tank --folder cell/keys
   understudy keys issue cell/cluster.toml tank --folder cell/keys
 
-`init` issues keys to all members and to one operator. Copy the folder members/NAME only to the machine of NAME (docs/deployment.md). Keep
+`init` issues keys to all members and to one operator. Copy the folder members/NAME only to the machine of NAME (docs/how-to/deployment.md). Keep
 the folder authority where keys are issued.")]
 pub(crate) struct Arguments {
     #[command(subcommand)]

@@ -10,7 +10,7 @@ use understudy_allocation::{Resources, instructions};
 use understudy_ladder::{Program, from_circuit};
 use understudy_text::duration::parse_positive;
 
-use crate::allocate::programs::{Programs};
+use crate::allocate::programs::Programs;
 use crate::answer::Answer;
 use crate::deployment::allocate::programs::{Programs, period};
 
@@ -21,7 +21,7 @@ Example:
   understudy resources examples/press-cell/cluster.toml
   understudy resources examples/press-cell/press.ladder --instructions
 
-For several programs, and for a cluster, the generated understudy is included. Method of calculation: docs/allocation.md.")]
+For several programs, and for a cluster, the generated understudy is included. Method of calculation: docs/how-to/allocation.md.")]
 pub(crate) struct Arguments {
     /// Ladder programs or cluster files
     #[arg(value_name = "PROGRAM", required = true)]

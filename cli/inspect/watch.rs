@@ -35,7 +35,7 @@ Example:
 
 If a laboratory of the cluster is already running below --out, the page shows that run. The page is read-only by default;
 --allow-commands enables commands. At an address that other machines can reach, the page is served over TLS to the users of the --logins
-file (docs/watch.md).")]
+file (docs/reference/watch.md).")]
 pub(crate) struct Arguments {
     /// Cluster file to run or attach to, or directory of a run
     #[arg(value_name = "CLUSTER.toml|RUN")]

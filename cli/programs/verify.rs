@@ -40,7 +40,7 @@ Example:
 
 Without a property the command proves the standard property of every ladder program: each output can always be switched on and off again. It
 also remarks on rungs without effect, coils with conflicting values in one scan, and sequence steps that are passed in one scan. For a
-cluster it proves that the understudy equals the sum of its members. Formulas, sentences and property files: docs/properties.md.
+cluster it proves that the understudy equals the sum of its members. Formulas, sentences and property files: docs/reference/properties.md.
 
 Exit status: 0 if everything is proved, 1 if a property fails or is undecided, 2 for invalid input.")]
 pub(crate) struct Arguments {

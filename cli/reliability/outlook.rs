@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::Value;
-use understudy_cycle::{Mode};
-use understudy_journal::{records};
+use understudy_cycle::Mode;
+use understudy_journal::records;
 use understudy_scenarios::{look_ahead, observe_journal};
 
 use crate::answer::{Answer, Status};

@@ -29,7 +29,7 @@ Example:
   understudy reliability --controllers 20 --mtbf 10000h --mttr 24h --box old*3=4000h,48h --shared power=200000h
   understudy reliability --chain plant.chain --mission 1y
 
-Units of time: us, ms, s, min, h, d, y. Models and assumptions: docs/reliability.md.")]
+Units of time: us, ms, s, min, h, d, y. Models and assumptions: docs/reference/reliability.md.")]
 pub(crate) struct Arguments {
     /// Cluster file; supplies the numbers of controllers and understudies
     #[arg(value_name = "CLUSTER.toml", conflicts_with_all = ["controllers", "spares", "chain"])]

@@ -23,7 +23,7 @@ Example:
 
 DIR receives report.md, result.json, the automaton of the ladder, its feedback tables, the mega-controller with pictures, the integer
 programs with their solutions, module 2 and the combined ladder. Files are written only if the combined ladder is proved. Project file:
-docs/reconfiguration.md.")]
+docs/reference/reconfiguration.md.")]
 pub(crate) struct Arguments {
     /// Project file
     #[arg(value_name = "PROJECT.toml")]

@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_bus::HostEvent;
-use understudy_cycle::{Agreement};
+use understudy_cycle::Agreement;
 use understudy_journal::{Happening, Members, Numbering, Record, RunEvent, moment};
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};

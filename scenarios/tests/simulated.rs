@@ -1,7 +1,7 @@
 //! Every scenario file that comes with the project, in virtual time.
 
 use understudy_cluster::{Cluster, Overrides, press_cell};
-use understudy_cycle::{Mode};
+use understudy_cycle::Mode;
 use understudy_journal::{Happening, Journal, JournalState, Members, Record, RunEvent, records};
 use understudy_scenarios::{
     Account, Circumstances, OriginRule, Scenario, Summary, Table, Terms, World, figure, read,

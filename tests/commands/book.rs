@@ -24,6 +24,17 @@ fn pages_below(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
+/// The pages in the folder of the project itself.
+fn top_pages() -> Vec<PathBuf> {
+    let names = [
+        "README.md",
+        "ARCHITECTURE.md",
+        "CONTRIBUTING.md",
+        "CHANGELOG.md",
+    ];
+    names.iter().map(|name| root().join(name)).collect()
+}
+
 /// The text without its blocks of code, in which brackets are no links.
 fn prose(text: &str) -> String {
     let mut inside = false;
@@ -80,7 +91,7 @@ fn plain(path: &Path) -> PathBuf {
 
 #[test]
 fn every_link_leads_somewhere() {
-    let mut pages = vec![root().join("README.md"), root().join("ARCHITECTURE.md")];
+    let mut pages = top_pages();
     for folder in ["docs", "examples", "deployment", "clients"] {
         if root().join(folder).exists() {
             pages_below(&root().join(folder), &mut pages);
@@ -206,7 +217,8 @@ fn what_the_pages_say_works() {
     pages_below(&root().join("examples"), &mut pages);
     // The pages of the codes are run with what each of them has to answer, and the gallery with its pictures.
     pages.retain(|page| {
-        !page.starts_with(root().join("docs/errors")) && !page.ends_with("docs/examples.md")
+        !page.starts_with(root().join("docs/errors"))
+            && !page.ends_with("docs/reference/examples.md")
     });
     assert!(pages.len() > 45, "{pages:?}");
     for page in pages {
@@ -216,14 +228,15 @@ fn what_the_pages_say_works() {
 
 #[test]
 fn the_gallery_shows_what_its_commands_draw() {
-    let page = root().join("docs/examples.md");
+    let page = root().join("docs/reference/examples.md");
     let folder = walk_through(&page);
     let mut other = Vec::new();
     for link in links(&fs::read_to_string(&page).expect("a page")) {
-        let Some(name) = link.strip_prefix("pictures/examples/") else {
+        let Some(name) = link.strip_prefix("../pictures/examples/") else {
             continue;
         };
-        let (made, shown) = (folder.join(name), root().join("docs").join(&link));
+        let shown = root().join("docs/pictures/examples").join(name);
+        let made = folder.join(name);
         if fs::read(&made).ok() != fs::read(&shown).ok() {
             other.push(format!("cp {} {}", made.display(), shown.display()));
         }
@@ -254,7 +267,7 @@ fn published(text: &str) -> Vec<String> {
 
 #[test]
 fn every_command_and_option_that_is_named_exists() {
-    let mut pages = vec![root().join("README.md"), root().join("ARCHITECTURE.md")];
+    let mut pages = top_pages();
     for folder in ["docs", "examples", "deployment", "clients"] {
         pages_below(&root().join(folder), &mut pages);
     }
@@ -314,7 +327,7 @@ fn every_command_and_option_that_is_named_exists() {
 /// The page on deployment copies one binary of a release, and installs it once.
 #[test]
 fn a_release_is_copied_and_installed_once() {
-    let page = fs::read_to_string(root().join("docs/deployment.md")).expect("a page");
+    let page = fs::read_to_string(root().join("docs/how-to/deployment.md")).expect("a page");
     let copy = page.lines().find(|line| line.starts_with("scp "));
     let pattern = copy.and_then(|line| line.split(' ').nth(1));
     let pattern = pattern.expect("a command that copies the binary");

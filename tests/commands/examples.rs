@@ -139,17 +139,20 @@ fn the_complete_controller_lights_burns_and_shuts_down() {
 
 #[test]
 fn every_example_is_explained_and_in_the_gallery() {
-    let gallery = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/examples.md");
+    let gallery = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reference/examples.md");
     let gallery = fs::read_to_string(gallery).expect("a page");
     for folder in folders() {
         let name = name(&folder);
         assert!(folder.join("README.md").exists(), "{name} has no README.md");
         for part in [
             format!("| [{name}](#{name}) |"),
-            format!("](../examples/{name})"),
-            format!("](pictures/examples/{name}.svg)"),
+            format!("](../../examples/{name})"),
+            format!("](../pictures/examples/{name}.svg)"),
         ] {
-            assert!(gallery.contains(&part), "docs/examples.md lacks {part}");
+            assert!(
+                gallery.contains(&part),
+                "docs/reference/examples.md lacks {part}"
+            );
         }
     }
 }

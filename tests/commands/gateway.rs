@@ -353,7 +353,7 @@ fn the_dashboard_and_the_page_name_metrics_that_there_are() {
     for name in metric_names(&dashboard) {
         assert!(exposed.contains(name.as_str()), "{name} is not exposed");
     }
-    for name in metric_names(&read("docs/monitoring.md")) {
+    for name in metric_names(&read("docs/how-to/monitoring.md")) {
         let is_there = exposed.contains(name.as_str())
             || exposed.contains(format!("{name}_count").as_str())
             || while_lost.contains(&format!("\n{name}{{"));

@@ -1,5 +1,5 @@
 # Boots systemd over a copy of this machine that is thrown away, in namespaces of its own, with a cell installed as
-# docs/deployment.md says. Called as `systemd.sh BINARY FOLDER`: FOLDER has cell/, keys/members/ and units/.
+# docs/how-to/deployment.md says. Called as `systemd.sh BINARY FOLDER`: FOLDER has cell/, keys/members/ and units/.
 set -e
 binary=$1 folder=$2
 mount --make-rprivate /

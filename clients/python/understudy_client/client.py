@@ -1,4 +1,4 @@
-"""Client of a Zenoh gateway. docs/zenoh-keys.md describes the keys and documents."""
+"""Client of a Zenoh gateway. docs/reference/zenoh-keys.md describes the keys and documents."""
 
 from __future__ import annotations
 

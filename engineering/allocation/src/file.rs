@@ -2,7 +2,7 @@
 //!
 //! The first is what people type; a line's figures share its source. The second keeps a source for every figure and has the figures of
 //! families too; it is what [`write`] writes, and [`read`] of it gives the same catalogue again. The header says which of the two a
-//! file is. Both are described in `docs/catalogue.md`.
+//! file is. Both are described in `docs/reference/catalogue.md`.
 
 mod long;
 mod wide;

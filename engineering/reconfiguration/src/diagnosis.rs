@@ -146,7 +146,7 @@ impl<'a> Writer<'a> {
                 format!(
                     "Finds failed input channels of {name} by what its plant can do. Written by `understudy reconfigure`;"
                 ),
-                "scanned by the remote I/O before each sample, see docs/reconfiguration.md.".into(),
+                "scanned by the remote I/O before each sample, see docs/reference/reconfiguration.md.".into(),
             ],
             ..Program::default()
         };

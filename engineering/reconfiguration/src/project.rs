@@ -1,4 +1,4 @@
-//! The project file: which ladder, which plant or records, which channels may fail, and Λ; `docs/reconfiguration.md` describes it.
+//! The project file: which ladder, which plant or records, which channels may fail, and Λ; `docs/reference/reconfiguration.md` describes it.
 //!
 //! | code | what is wrong |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! Metrics for Prometheus, in the OpenMetrics text format. `docs/monitoring.md` lists their names and labels.
+//! Metrics for Prometheus, in the OpenMetrics text format. `docs/how-to/monitoring.md` lists their names and labels.
 //!
 //! Deadlines are counted as in the report: from the origin of the run on. Other counters begin at the first record of the journal.
 

@@ -1,4 +1,4 @@
-//! The run as JSON under keys of Zenoh, at a limited rate. The keys are listed in `docs/zenoh-keys.md`.
+//! The run as JSON under keys of Zenoh, at a limited rate. The keys are listed in `docs/reference/zenoh-keys.md`.
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;

@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use understudy_cluster::{Cluster, Link, Overrides, Security, read_with};
-use understudy_cycle::{Mode};
+use understudy_cycle::Mode;
 use understudy_text::{Report, decode};
 
 use crate::named_files::{named_bytes, named_file};

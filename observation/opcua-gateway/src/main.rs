@@ -23,7 +23,7 @@ Example:
   understudy-opcua serve runs/latest --listen 192.0.2.7:4840 --certificates opcua
 
 It reads the journal of the run, finished or not, as `understudy gateway` does
-(docs/monitoring.md). Exit status: 0 when all is well, 1 when it cannot serve, 2 when an
+(docs/how-to/monitoring.md). Exit status: 0 when all is well, 1 when it cannot serve, 2 when an
 input is wrong and nothing was started."
 )]
 struct Arguments {

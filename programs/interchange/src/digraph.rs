@@ -11,7 +11,7 @@
 //!
 //! The paper's XML has normally open and normally closed contacts and outputs. The other elements of a ladder have edges of further
 //! types here, and what the paper leaves out (declarations, titles, comments) is in elements and attributes that its readers
-//! pass over; `docs/digraph-xml.md` lists all of it. Any acyclic digraph is read: one that is series and parallel becomes one network,
+//! pass over; `docs/reference/digraph-xml.md` lists all of it. Any acyclic digraph is read: one that is series and parallel becomes one network,
 //! and in any other each vertex becomes a memory bit.
 
 mod draw;

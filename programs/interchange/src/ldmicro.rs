@@ -17,7 +17,7 @@
 //!
 //! Its numbers are shared by name between counters, resets, moves and comparisons, and its instructions act in the middle of a
 //! wire; so a rung is written out as statements and lowered as Structured Text is. What each element does is described in
-//! `docs/ldmicro.md`; what only a microcontroller has is listed with its line.
+//! `docs/reference/ldmicro.md`; what only a microcontroller has is listed with its line.
 
 mod limits;
 mod parse;

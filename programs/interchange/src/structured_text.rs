@@ -16,7 +16,7 @@
 //!
 //! A scan of the ladder does what one execution of the text does. Standard blocks become blocks of the ladder where they can
 //! stand in a rung; other blocks and functions are put in place of their calls; numbers become as many bits as their
-//! values need. `docs/structured-text.md` describes what is supported.
+//! values need. `docs/reference/structured-text.md` describes what is supported.
 
 mod bounds;
 mod lexer;

@@ -14,7 +14,7 @@
 //!
 //! [`parse`] reads such a text and finds everything that is wrong with it in one run; [`Program::lower`] turns the program
 //! into the [`Circuit`](understudy_logic::Circuit) that all else works on; [`Interpreter`] is the reference for both.
-//! The format and its grammar are described in `docs/ladder-format.md`.
+//! The format and its grammar are described in `docs/reference/ladder-format.md`.
 
 mod check;
 mod draw;

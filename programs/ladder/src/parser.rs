@@ -1,7 +1,7 @@
 //! Lexemes to a [`Program`], with recovery: what is wrong is reported and passed over, so that one run finds everything.
 //!
 //! Recursive descent; every loop consumes a lexeme or ends, and brackets nest at most [`MAXIMUM_NESTING`] deep, so any text
-//! is read in linear time and bounded stack. The grammar is in `docs/ladder-format.md`; each function names its rule.
+//! is read in linear time and bounded stack. The grammar is in `docs/reference/ladder-format.md`; each function names its rule.
 
 mod rung;
 

@@ -98,7 +98,7 @@ impl Draft {
 # Drafted by `understudy init --from`. It runs as it is, with stand-ins for the plants.
 # Each line marked \"{MARK}\" asks for something that only the engineer of the plant knows. `understudy check` lists
 # the marks that are left; remove a mark when its section is done.
-# Every key is described in docs/cluster-file.md of Understudy.
+# Every key is described in docs/reference/cluster-file.md of Understudy.
 
 [cluster]
 name = \"{}\"

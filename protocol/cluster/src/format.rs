@@ -126,12 +126,12 @@ pub(crate) static CLUSTER: Section = Section {
                 words: &MODES,
                 default: true,
             },
-            "how many failures are masked: `full`, any number of controllers as long as one understudy lives; `paper`, one failure, and everything falls safe at the second",
+            "masked failures: `full`, any number of controllers as long as one understudy lives; `paper`, one failure, and all outputs become fail-safe at the second",
         ),
         key(
             "copies",
             count(1, 4, 2),
-            "how often each cyclic frame is sent, against loss",
+            "number of times that each cyclic frame is sent, against loss",
         ),
         key(
             "history",
@@ -141,17 +141,17 @@ pub(crate) static CLUSTER: Section = Section {
         key(
             "flag_after",
             count(1, MANY_CYCLES, 3),
-            "cycles of silence after which a station counts as failed, and its slot is closed",
+            "cycles without a turn after which a station is flagged, and its slot is closed",
         ),
         key(
             "shadow_cycles",
             count(0, MANY_CYCLES, 3),
-            "cycles for which a repaired station computes in shadow before it speaks",
+            "cycles for which a repaired station computes in shadow mode before it publishes",
         ),
         key(
             "listen_cycles",
             count(1, MANY_CYCLES, 4),
-            "cycles for which a station that starts listens before it believes that nobody is there",
+            "cycles for which a starting station listens before it founds an epoch of its own",
         ),
         key(
             "link",
@@ -159,7 +159,7 @@ pub(crate) static CLUSTER: Section = Section {
                 words: &LINKS,
                 default: true,
             },
-            "what carries the frames",
+            "the transport of the frames",
         ),
         key(
             "security",
@@ -167,7 +167,7 @@ pub(crate) static CLUSTER: Section = Section {
                 words: &SECURITIES,
                 default: true,
             },
-            "who may speak: `keys`, whoever has the keys of this cluster, see `understudy keys`; `off`, everybody on the network. The laboratory makes keys of its own for each run",
+            "whose frames are accepted: `keys`, those of members with keys of this cluster, see `understudy keys`; `off`, all frames on the network. The laboratory makes keys of its own for each run",
         ),
     ],
 };
@@ -215,12 +215,12 @@ pub(crate) static REMOTE_IO: Section = Section {
         key(
             "hold_cycles",
             count(0, MANY_CYCLES, 3),
-            "cycles for which the last true outputs are kept when nothing true is there",
+            "cycles for which the last proven outputs are held when no output can be proved",
         ),
         key(
             "fail_safe",
             Kind::Bits,
-            "outputs by name and what they are after that, such as `{ grip = true }`; `false` where not named",
+            "fail-safe values after that, by the name of the output, such as `{ grip = true }`; `false` for all others",
         ),
         key(
             "release",
@@ -228,7 +228,7 @@ pub(crate) static REMOTE_IO: Section = Section {
                 words: &RELEASES,
                 default: true,
             },
-            "who releases the outputs after the program has started from its initial state",
+            "how the outputs are released after a cold start of the program",
         ),
         key(
             "value_fault",
@@ -236,7 +236,7 @@ pub(crate) static REMOTE_IO: Section = Section {
                 words: &VALUE_FAULTS,
                 default: true,
             },
-            "what is driven while two stations say different outputs from one history and no third one says which is right: `hold`, the last true outputs and then the fail-safe ones, until they agree or the operator releases them; `alarm`, the outputs of the controller itself; `fail-safe`, the fail-safe outputs at once, until the operator releases them",
+            "the applied outputs while two stations publish different outputs of one history and there is no majority: `hold`, the last proven outputs and then the fail-safe ones, until the stations agree or the operator releases them; `alarm`, the outputs of the controller itself; `fail-safe`, the fail-safe outputs at once, until the operator releases them",
         ),
         key(
             "stale_state",
@@ -244,12 +244,12 @@ pub(crate) static REMOTE_IO: Section = Section {
                 words: &STALE_STATES,
                 default: true,
             },
-            "what follows where living stations hold only states that are older than the newest applied output: `operator`, the outputs are held, then fail-safe, until the operator chooses the older state or a cold start; `cold`, the program starts from its initial state",
+            "reaction when living stations hold only states that are older than the newest applied output: `operator`, the outputs are held, then fail-safe, until the operator chooses the older state or a cold start; `cold`, the program starts from its initial state",
         ),
         key(
             "diagnosis",
             Kind::Text,
-            "the file of a ladder that finds failed input channels, relative to the cluster file, see [reconfiguration.md](reconfiguration.md)",
+            "the file of a ladder that detects failed input channels, relative to the cluster file, see [reconfiguration](reconfiguration.md)",
         ),
         key(
             "field",
@@ -278,7 +278,7 @@ pub(crate) static FIELD: Section = Section {
                 most: Duration::from_secs(10),
                 default: Duration::from_millis(100),
             },
-            "how long one exchange with the device may take; then the connection is made anew",
+            "maximum time of one exchange with the device; then the connection is opened again",
         ),
         key(
             "stale_after",
@@ -287,17 +287,17 @@ pub(crate) static FIELD: Section = Section {
                 most: Duration::from_secs(60),
                 default: Duration::from_millis(200),
             },
-            "the age at which its last answer is worth nothing any more: the outputs are held, and then fail-safe",
+            "the age at which its last answer is too old: the outputs are held, and then fail-safe",
         ),
         key(
             "inputs",
             Kind::Points,
-            "where the inputs of the program come from; one that is not named stays 0",
+            "sources of the inputs of the program; an input without one is 0",
         ),
         key(
             "outputs",
             Kind::Points,
-            "where the outputs of the program go to; registers that are named belong to the remote I/O as a whole",
+            "targets of the outputs of the program; each named register belongs to the remote I/O completely",
         ),
     ],
 };
@@ -324,7 +324,7 @@ pub(crate) static PLANT: Section = Section {
         key(
             "ladder",
             Kind::Text,
-            "a program that is the plant: its inputs bear the names of the controller's outputs, its outputs those of the controller's inputs",
+            "a program as the plant: its inputs have the names of the controller's outputs, its outputs those of the controller's inputs",
         ),
         key(
             "fed_by",
@@ -485,7 +485,7 @@ mod tests {
     /// Each row of the documentation, so that it cannot differ from what is read.
     #[test]
     fn the_documentation_has_every_key_with_its_bounds() {
-        let page = include_str!("../../../docs/cluster-file.md");
+        let page = include_str!("../../../docs/reference/cluster-file.md");
         let parameters = [&ROBOT_PARAMETERS, &PRESS_PARAMETERS, &FIELD];
         for section in SECTIONS.into_iter().chain(parameters) {
             assert!(page.contains(&section.header()), "{}", section.header());
@@ -502,7 +502,7 @@ mod tests {
                 );
                 assert!(
                     page.contains(&row),
-                    "docs/cluster-file.md lacks the row\n{row}"
+                    "docs/reference/cluster-file.md lacks the row\n{row}"
                 );
             }
         }

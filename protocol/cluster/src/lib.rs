@@ -5,7 +5,7 @@
 //! starts. Two members that read equal files have equal [`configuration`](understudy_cycle::Agreement::configuration) hashes,
 //! and only such members work together; the hash is of [`Cluster::canonical_text`].
 //!
-//! The format is described in `docs/cluster-file.md`.
+//! The format is described in `docs/reference/cluster-file.md`.
 
 mod canonical;
 mod cluster;

@@ -46,8 +46,8 @@ use understudy_ladder::Program as LadderProgram;
 use understudy_logic::{Circuit, Scan};
 use understudy_node::Program;
 use understudy_remote_io::{Release, StaleState, ValueFault};
+use understudy_text::spelling::suggestion;
 use understudy_text::{Diagnostic, Report};
-use understudy_text::spelling::{suggestion};
 use understudy_wire::{ClusterHash, ConfigurationHash, Image, MAXIMUM_PROGRAMS};
 
 use self::ladders::Ladders;

@@ -255,7 +255,7 @@ impl Drop for Busy {
     }
 }
 
-/// `UNDERSTUDY_RESTARTS=1000 UNDERSTUDY_BUSY=8` measures what docs/performance.md says.
+/// `UNDERSTUDY_RESTARTS=1000 UNDERSTUDY_BUSY=8` measures what docs/evidence/performance.md says.
 #[test]
 fn restarts_beside_busy_threads_are_received_over_zenoh() {
     let number = |name, otherwise| {

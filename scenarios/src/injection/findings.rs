@@ -4,8 +4,8 @@ use std::fmt::{self, Write as _};
 
 use serde::{Deserialize, Serialize};
 use understudy_cluster::Cluster;
-use understudy_cycle::{Mode};
-use understudy_journal::{Members};
+use understudy_cycle::Mode;
+use understudy_journal::Members;
 use understudy_simulator::Tally;
 
 use super::coverage::CoverageRow;

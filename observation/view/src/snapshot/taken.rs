@@ -1,8 +1,8 @@
 //! How a snapshot is taken from the model of a run.
 
+use understudy_cycle::Mode;
 use understudy_journal::{Process, SourceCounts, source_word};
 use understudy_remote_io::Missing;
-use understudy_cycle::Mode;
 use understudy_wire::{Member, ProgramId, ProgramSet, SignalPlace, StationId};
 
 use super::{

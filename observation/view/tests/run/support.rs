@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use understudy_cluster::{Cluster, Overrides, press_cell, read_with};
-use understudy_cycle::{Mode};
+use understudy_cycle::Mode;
 use understudy_journal::{Members, Record};
 use understudy_scenarios::{Scenario, read, simulate};
 use understudy_view::{Bounds, Model};

@@ -2,7 +2,7 @@
 
 use understudy_ladder::{BlockKind, parse};
 
-const DOCUMENT: &str = include_str!("../../../../docs/ladder-format.md");
+const DOCUMENT: &str = include_str!("../../../../docs/reference/ladder-format.md");
 
 #[test]
 fn the_example_of_the_document_is_sound() {
