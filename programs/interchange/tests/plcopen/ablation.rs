@@ -54,11 +54,21 @@ const FORMAL: [&str; 10] = [
     "name of <pouInstance>",
 ];
 
-/// Whether a missing part of a file violates its schema and nothing else.
+/// Whether a missing part of a file violates its schema and nothing else. Inputs of functions, which have no instance, are read
+/// by their order; those of blocks are read by their names.
 fn is_formal(node: Node<'_, '_>, what: &str) -> bool {
-    let mut children = node.children().filter(Node::is_element);
-    let is_empty = children.all(|child| LAYOUT.contains(&child.tag_name().name()));
-    FORMAL.contains(&what) && (is_empty || !what.starts_with('<'))
+    let is_function = |node: Node<'_, '_>| {
+        node.tag_name().name() == "block" && !node.has_attribute("instanceName")
+    };
+    match what {
+        "formalParameter of <variable>" => node.ancestors().any(is_function),
+        "<p>" => node.text().unwrap_or_default().trim().is_empty(),
+        _ => {
+            let mut children = node.children().filter(Node::is_element);
+            let is_empty = children.all(|child| LAYOUT.contains(&child.tag_name().name()));
+            FORMAL.contains(&what) && (is_empty || !what.starts_with('<'))
+        }
+    }
 }
 
 /// The elements and attributes of a file without which it is read in the same way.
