@@ -107,3 +107,11 @@ fn manual_and_completions_have_the_groups_of_the_help() {
     let script = understudy(&["completions", "fish"]).output;
     assert!(script.contains("inspect: "), "{script}");
 }
+
+#[test]
+fn the_reference_lists_every_command() {
+    let page = std::fs::read_to_string("docs/reference/commands.md").expect("a page");
+    let rows = page.lines().filter_map(|line| line.strip_prefix("| `"));
+    let names: Vec<&str> = rows.filter_map(|row| row.split('`').next()).collect();
+    assert_eq!(names, commands());
+}
