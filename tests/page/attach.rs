@@ -127,7 +127,7 @@ fn a_laboratory_of_another_process_is_looked_at_and_commanded() {
     assert!(
         lines[0]["text"]
             .as_str()
-            .is_some_and(|text| text.contains("anna has seen"))
+            .is_some_and(|text| text.contains("anna has acknowledged"))
     );
 }
 
