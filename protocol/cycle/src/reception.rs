@@ -7,7 +7,7 @@ use understudy_wire::{ClusterHash, ConfigurationHash, Header, Member};
 
 /// Decides on headers alone. Remembers whom it has refused, at most once for each member of the cluster.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub struct Reception {
+pub(crate) struct Reception {
     own: Member,
     cluster: ClusterHash,
     configuration: ConfigurationHash,
@@ -18,7 +18,7 @@ pub struct Reception {
 
 /// What becomes of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Admission {
+pub(crate) enum Admission {
     /// It counts.
     Admitted,
     /// Of another cluster, of nobody in this one, one's own, or of a member that was refused before: dropped without a word.
@@ -32,7 +32,7 @@ pub enum Admission {
 
 impl Reception {
     /// For one member.
-    pub fn new(own: Member, agreement: &Agreement) -> Self {
+    pub(crate) fn new(own: Member, agreement: &Agreement) -> Self {
         Self {
             own,
             cluster: agreement.cluster,
@@ -44,7 +44,7 @@ impl Reception {
     }
 
     /// Decides on one header.
-    pub fn admit(&mut self, header: &Header) -> Admission {
+    pub(crate) fn admit(&mut self, header: &Header) -> Admission {
         let known = match header.sender {
             Member::Station(station) => station.index() < self.stations,
             Member::RemoteIo(program) | Member::Plant(program) => program.index() < self.programs,
