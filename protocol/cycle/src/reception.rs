@@ -1,11 +1,11 @@
-//! Whose frames are taken in at all.
+//! Admission of frames by their headers.
 
 use std::collections::BTreeSet;
 
 use crate::agreement::Agreement;
 use understudy_wire::{ClusterHash, ConfigurationHash, Header, Member};
 
-/// Decides on headers alone. Remembers whom it has refused, at most once for each member of the cluster.
+/// Admission of one member. Remembers the members that it has refused, at most one entry for each.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) struct Reception {
     own: Member,
@@ -16,14 +16,15 @@ pub(crate) struct Reception {
     refused: BTreeSet<Member>,
 }
 
-/// What becomes of a frame.
+/// Decision on a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Admission {
     /// It counts.
     Admitted,
-    /// Of another cluster, of nobody in this one, one's own, or of a member that was refused before: dropped without a word.
+    /// Of another cluster, of no member of this one, of this member itself, or of a member that was refused before: dropped
+    /// without a report.
     Dropped,
-    /// The first of a member with another configuration: dropped, and worth a word.
+    /// The first of a member with another configuration: dropped and reported.
     Refused {
         /// The configuration that it runs.
         theirs: ConfigurationHash,
@@ -53,7 +54,7 @@ impl Reception {
             return Admission::Dropped;
         }
         if header.configuration != self.configuration {
-            // A member that is in no cluster of this size is still worth a word, once for all of them.
+            // A sender that is in no cluster of this size is reported too, once for all of them.
             let member = if known { header.sender } else { self.own };
             let theirs = header.configuration;
             return if self.refused.insert(member) {

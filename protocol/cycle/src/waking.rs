@@ -1,4 +1,4 @@
-//! When a member wants to be woken, and whether its host does it.
+//! The time at which a member asks to be woken, and host stalls.
 
 use std::time::Duration;
 
