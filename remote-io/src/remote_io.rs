@@ -5,7 +5,9 @@
 //!                                                              (or holds, then falls safe)
 //! ```
 //!
-//! It drives at every deadline, also when no cycle was started: then it holds, and falls safe after `hold_cycles`. Its phases:
+//! It drives at every deadline, also when no cycle was started: then it holds, and falls safe after `hold_cycles`. What it knows of
+//! the history is one of three states ([`Knowledge`]), and proven outputs are applied on the proof alone or on the operator's
+//! release ([`Authority`]):
 //!
 //! ```text
 //!   Listening ── a living station holds a state ──────────────► Running from its lineage
@@ -16,32 +18,35 @@
 //!                a station returns with it, or the operator decides
 //! ```
 //!
-//! Invariant *Never back*: the history continues from a state before the [`Floor`] only if the operator says so.
+//! Invariant *Never back*: the history continues from a state before the floor only if the operator says so.
 
 mod deadline;
 mod forcing;
+mod knowledge;
 mod protection;
 mod recovery;
 mod sampling;
+#[cfg(test)]
+mod states;
 
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
 use understudy_cycle::{Arrival, Input, Machine, Output, Participant, RemoteIoInput};
 use understudy_wire::{
-    Body, ConfigurationHash, Frame, Holding, Image, Lineage, Member, Moment, ProgramId, Recalled,
-    Source, StateChoice, StationId, StationSet, Time,
+    Body, ConfigurationHash, Frame, Holding, Image, Member, Moment, ProgramId, Recalled, Source,
+    StateChoice, StationId, StationSet, Time,
 };
 
 use crate::diagnosis::Diagnosing;
 use crate::event::{Event, Missing};
-use crate::history::History;
 use crate::selection::Selection;
 use crate::settings::Settings;
 use crate::trust::Trust;
 use crate::witnesses::Witnesses;
 
 use forcing::Forcing;
+use knowledge::Knowledge;
 use protection::Protection;
 
 /// One remote I/O. See [`Machine`] for how it is driven.
@@ -50,31 +55,24 @@ pub struct RemoteIo {
     settings: Settings,
     member: Participant<Event>,
     witnesses: Witnesses,
-    phase: Phase,
-    /// What the sensors show.
-    sensors: Image,
+    knowledge: Knowledge,
+    /// What the operator is asked.
+    question: Option<Question>,
+    authority: Authority,
+    /// What the sensors show; `None` where it is not known: there is no u(i), and the program is not stepped.
+    sensors: Option<Image>,
     /// What the program sees of it, as of the last sample.
     field: Image,
     diagnosing: Diagnosing,
     /// Statuses that the diagnosis found to be 1 in the last scan.
     diagnosed: Image,
-    floor: Floor,
     /// When a cycle was counted last in which the history was looked for.
     looked: Time,
-    question: Option<Question>,
     protection: Protection,
-    /// Whether the operator has released everybody meanwhile.
-    pardons: bool,
-    /// The sensors cannot be seen: there is no u(i), and the program stands still.
-    field_lost: bool,
     forcing: Forcing,
-    released: bool,
     /// The turns of this cycle, by rank.
     turns: Vec<Option<Arc<Frame>>>,
-    /// Whether this cycle's deadline is over.
-    decided: bool,
-    /// Deadlines that passed without a cycle since the last one that was started.
-    idle: u32,
+    deadline: Deadline,
     /// Deadlines in a row at which nothing true was there.
     missed: u32,
     applied: Option<Applied>,
@@ -84,14 +82,25 @@ pub struct RemoteIo {
     differed: Vec<(Option<ProgramId>, StationSet)>,
 }
 
-/// The newest sample whose outputs were applied: an applied output has moved the plant, so the history never continues from a
-/// state before it. A cold start of which no output was applied moves nothing.
+/// Who authorises the outputs that are proven.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-enum Floor {
-    /// Not known after a restart: stations know more of the past than this remote I/O does.
-    Unknown,
-    /// Its cycle, and the lineage that it led to.
-    At { moment: Moment, lineage: Lineage },
+enum Authority {
+    /// The proof itself: they are applied.
+    Proof,
+    /// The operator: they are withheld until the release, after a cold start or a value fault.
+    Operator,
+}
+
+/// Where the next deadline is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Deadline {
+    /// In the current cycle.
+    Ahead,
+    /// In a later cycle, or in one that no station starts.
+    Passed {
+        /// Deadlines that passed without a cycle since the last one that was started.
+        idle: u32,
+    },
 }
 
 /// What the operator is asked.
@@ -110,18 +119,6 @@ struct Applied {
     outputs: Image,
 }
 
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-enum Phase {
-    /// The history is not known: cycles listened for, and whether a living station held a state in the last of them.
-    Listening { cycles: u32, held: bool },
-    /// The history, whether it has this cycle's sample, and the cycles for which no living station was on it.
-    Running {
-        history: History,
-        sampled: bool,
-        unfollowed: u32,
-    },
-}
-
 impl RemoteIo {
     /// A remote I/O that has just started: it listens first, and drives the fail-safe values until it knows better.
     pub fn new(now: Time, settings: Settings) -> Self {
@@ -132,25 +129,18 @@ impl RemoteIo {
         let mut remote_io = Self {
             member,
             witnesses: Witnesses::new(settings.program, agreement),
-            phase: Phase::Listening {
-                cycles: 0,
-                held: false,
-            },
-            sensors: Image::zero(settings.inputs),
+            knowledge: Knowledge::default(),
+            question: None,
+            authority: Authority::Proof,
+            sensors: Some(Image::zero(settings.inputs)),
             field: Image::zero(settings.inputs),
             diagnosing: Diagnosing::new(settings.diagnosis.as_deref()),
             diagnosed: Image::zero(settings.inputs),
-            floor: Floor::Unknown,
             looked: now,
-            question: None,
             protection: Protection::default(),
-            pardons: false,
-            field_lost: false,
             forcing: Forcing::default(),
-            released: true,
             turns: vec![None; stations],
-            decided: false,
-            idle: 0,
+            deadline: Deadline::Passed { idle: 0 },
             missed: 0,
             applied: None,
             last_true: None,
@@ -203,11 +193,10 @@ impl RemoteIo {
         match input {
             RemoteIoInput::Field(sensors) => {
                 if sensors.width() == self.settings.inputs {
-                    self.sensors.clone_from(sensors);
-                    self.field_lost = false;
+                    self.sensors = Some(sensors.clone());
                 }
             }
-            RemoteIoInput::FieldLost => self.field_lost = true,
+            RemoteIoInput::FieldLost => self.sensors = None,
             RemoteIoInput::Choose(choice) => self.choose(choice),
             RemoteIoInput::Release => self.release(),
             RemoteIoInput::Force(force) => self.force(now, force),
@@ -222,10 +211,10 @@ impl RemoteIo {
             self.report(Event::Released { moment });
             return self.choose(StateChoice::Newest { cycle: None });
         }
-        self.pardons |= self.floor == Floor::Unknown;
+        self.knowledge.pardon();
         self.diagnosing.release();
-        if !self.released || !self.trust.is_complete() {
-            self.released = true;
+        if self.authority == Authority::Operator || !self.trust.is_complete() {
+            self.authority = Authority::Proof;
             self.trust.release();
             self.report(Event::Released { moment });
         }
@@ -238,23 +227,22 @@ impl RemoteIo {
             recalled.program == program && recalled.inputs.width() == self.settings.inputs
         });
         self.witnesses.note(station, own, recalled);
-        if let (Phase::Running { history, .. }, Some(holding)) = (&mut self.phase, own)
-            && let Some(place) = history.place(holding.lineage)
+        if let (Some(run), Some(holding)) = (self.knowledge.run_mut(), own)
+            && let Some(place) = run.history.place(holding.lineage)
         {
-            history.confirm(place);
+            run.history.confirm(place);
         }
     }
 
     fn begin_cycle(&mut self, now: Time, moment: Moment, anchor: Time) {
         if self.member.clock.moment().is_some() {
-            if !self.decided {
+            if self.deadline == Deadline::Ahead {
                 self.decide(now);
             }
             self.close_cycle();
         }
         self.member.clock.begin(now, moment, anchor);
-        self.decided = false;
-        self.idle = 0;
+        self.deadline = Deadline::Ahead;
         self.turns.fill(None);
         self.find_history(now, moment);
         self.sample(now);
@@ -263,8 +251,8 @@ impl RemoteIo {
     fn close_cycle(&mut self) {
         self.member.close_cycle();
         self.witnesses.close_cycle();
-        if let Phase::Running { sampled, .. } = &mut self.phase {
-            *sampled = false;
+        if let Some(run) = self.knowledge.run_mut() {
+            run.sampled = false;
         }
     }
 
@@ -279,17 +267,18 @@ impl RemoteIo {
         if self.decides_at() > now {
             return;
         }
-        if !self.decided && self.member.clock.moment().is_some() {
-            self.decide(now);
-            return;
-        }
+        let Deadline::Passed { idle } = self.deadline else {
+            return self.decide(now);
+        };
         self.apply(Selection::Missing(Missing::NoCycle), None);
         self.note_idle();
         // One that was stopped for long does not make up for every deadline that it slept through.
         let period = self.settings.agreement.schedule.period();
         let passed = now.since(self.decides_at()).as_nanos() / period.as_nanos();
         let passed = u32::try_from(passed).unwrap_or(u32::MAX);
-        self.idle = self.idle.saturating_add(1).saturating_add(passed);
+        self.deadline = Deadline::Passed {
+            idle: idle.saturating_add(1).saturating_add(passed),
+        };
     }
 }
 
@@ -300,32 +289,27 @@ impl Hash for RemoteIo {
             settings: _,
             member,
             witnesses,
-            phase,
+            knowledge,
+            question,
+            authority,
             sensors,
             field,
             diagnosing,
             diagnosed,
-            floor,
             looked,
-            question,
             protection,
-            pardons,
-            field_lost,
             forcing,
-            released,
             turns,
-            decided,
-            idle,
+            deadline,
             missed,
             applied,
             last_true,
             trust,
             differed,
         } = self;
-        (member, witnesses, phase, field, field_lost, forcing).hash(hasher);
-        (sensors, diagnosing, diagnosed, pardons).hash(hasher);
-        (floor, looked, question, protection).hash(hasher);
-        (released, turns, decided, idle, missed, applied).hash(hasher);
+        (member, witnesses, knowledge, question, authority).hash(hasher);
+        (sensors, field, diagnosing, diagnosed, forcing).hash(hasher);
+        (looked, protection, turns, deadline, missed, applied).hash(hasher);
         (last_true, trust, differed).hash(hasher);
     }
 }

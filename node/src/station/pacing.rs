@@ -3,7 +3,6 @@
 //! The cycle master is the lowest-ranked living station. Every other one waits a guard time for each that comes before it, so that the
 //! next rank takes over when the cycle master is silent; two that pace at once start the same cycle, which harms nobody.
 
-use understudy_cycle::{Change, Output};
 use understudy_wire::{Body, StationSet, Time};
 
 use super::{CycleNotes, Station};

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use smallvec::SmallVec;
-use understudy_cycle::{Mode, Output};
+use understudy_cycle::Mode;
 use understudy_wire::{
     Holding, Moment, ProgramId, ProgramSet, StationId, StationSet, Time, Turn, Word,
 };

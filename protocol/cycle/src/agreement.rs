@@ -1,39 +1,39 @@
-//! What all members of one cluster have agreed on, because they read the same cluster file.
+//! The configuration that all members of one cluster share, because they read the same cluster file.
 
 use serde::{Deserialize, Serialize};
 
 use crate::schedule::Schedule;
 use understudy_wire::{ClusterHash, ConfigurationHash};
 
-/// Equal in every member; its hash is `configuration`, and a member with another hash is refused.
+/// Configuration of the cluster, equal in every member. A member with another hash of it is refused.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Agreement {
-    /// Whose frames these are.
+    /// Hash of the cluster's name, in every frame.
     pub cluster: ClusterHash,
-    /// Of the programs and of everything below.
+    /// Hash of the programs and of all values below.
     pub configuration: ConfigurationHash,
-    /// When who speaks.
+    /// Slots of a cycle.
     pub schedule: Schedule,
-    /// How many failures are masked.
+    /// Number of failures that are masked.
     pub mode: Mode,
     /// Samples that a remote I/O keeps and sends, this cycle's included: 1 to [`understudy_wire::MAXIMUM_HISTORY`].
     pub history: usize,
-    /// Cycles of silence after which a station is flagged, θ = 1: at least 1.
+    /// Cycles without a turn after which a station is flagged, θ = 1: at least 1.
     pub flag_after: u32,
-    /// Cycles for which an adopted state is computed in shadow before it takes part in the turns.
+    /// Cycles for which an adopted state is computed in shadow mode before its outputs are published.
     pub shadow_cycles: u32,
-    /// Cycles for which one who has just started listens before it believes that nobody has what it lacks: at least 1.
+    /// Cycles for which a member that has started waits for a state from other members: at least 1.
     pub listen_cycles: u32,
 }
 
-/// How many failures are masked.
+/// Number of failures that are masked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
-    /// A parity word for those who are synchronised, and one for each that was silent in this cycle: any number of failed
-    /// controllers, as long as one understudy lives.
+    /// One parity word over the programs whose controllers were received, and one for each other program: any number of failed
+    /// controllers, as long as one understudy is synchronised.
     #[default]
     Full,
-    /// The paper's: one word over all programs; the second failure is S2, and everything falls safe.
+    /// The paper's mode: one parity word over all programs. The second failure is the paper's state S2, and all outputs fall safe.
     Paper,
 }

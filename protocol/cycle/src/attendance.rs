@@ -1,7 +1,7 @@
-//! Who published in this cycle, and who has been silent for too long: the paper's failure flags θ.
+//! Which stations published in this cycle, and which were not received for too long: the paper's failure flags θ.
 //!
-//! Detection is by turns alone. Each member keeps its own view; nothing is decided on it but whose slot is closed, whom the
-//! cycle master's successor waits for, and which stations count as living.
+//! Detection is by turns alone. Each member keeps its own view. It decides only which slots are closed, which stations the
+//! successor of the cycle master waits for, and which stations count as living.
 
 use understudy_wire::{StationId, StationSet};
 
@@ -9,13 +9,13 @@ use understudy_wire::{StationId, StationSet};
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Attendance {
     flag_after: u32,
-    /// Cycles of silence in a row, by rank; at `flag_after` a station is flagged, and the count stays there.
+    /// Cycles in a row without a turn, by rank; at `flag_after` a station is flagged, and the count stays there.
     silent: Vec<u32>,
     flagged: StationSet,
     published: StationSet,
 }
 
-/// What became of a flag.
+/// A flag that changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Change {
     /// θ became 1.
@@ -35,7 +35,7 @@ impl Attendance {
         }
     }
 
-    /// A turn of this cycle was heard. True for the first of a station in a cycle.
+    /// Notes that a turn of this cycle was received. True for the first of a station in a cycle.
     pub fn heard(&mut self, station: StationId) -> bool {
         let first = station.index() < self.silent.len() && !self.published.contains(station);
         if first {
@@ -44,17 +44,17 @@ impl Attendance {
         first
     }
 
-    /// Who published in this cycle.
+    /// Stations that published in this cycle.
     pub fn published(&self) -> StationSet {
         self.published
     }
 
-    /// θ: who was silent for too long, up to the last cycle, and has not published in this one.
+    /// Flagged stations: not received for too long up to the last cycle, and not in this one.
     pub fn flagged(&self) -> StationSet {
         self.flagged.without(self.published)
     }
 
-    /// Ends a cycle that this member took part in; `change` is told of every flag that changes.
+    /// Ends a cycle that this member took part in; calls `change` with every flag that changes.
     pub fn close_cycle(&mut self, mut change: impl FnMut(Change)) {
         for (rank, silent) in self.silent.iter_mut().enumerate() {
             let station = StationId(rank as u8);

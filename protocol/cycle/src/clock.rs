@@ -1,9 +1,9 @@
 //! In which cycle a member is, and when that cycle started on its own clock.
 //!
 //! Any frame of a later cycle starts that cycle, so a lost Sync costs nothing. A member never goes back, with one exception:
-//! one that has heard nobody in its epoch for a few periods gives that epoch up for any that has company. So a
-//! restarted station whose link comes up late does not renumber the cluster's cycles, and nobody waits for ever in an epoch that
-//! its founder has left.
+//! a member that has received no other one in its epoch for a few periods gives that epoch up for an epoch with several members.
+//! So a restarted station whose link comes up late does not renumber the cluster's cycles, and no member waits indefinitely in
+//! an epoch that its founder has left.
 
 use std::time::Duration;
 
@@ -14,20 +14,20 @@ use understudy_wire::{Body, Epoch, Frame, Moment, Time};
 pub struct CycleClock {
     moment: Option<Moment>,
     anchor: Time,
-    /// When somebody else was last heard in this epoch.
+    /// Time at which another member was received last in this epoch.
     company: Option<Time>,
     alone: bool,
     /// Whether this member started the current cycle itself.
     founder: bool,
 }
 
-/// Periods of silence after which an epoch binds no more.
+/// Periods without a frame of another member after which an epoch binds no more.
 const LONELY_PERIODS: u32 = 4;
 
-/// What a frame's moment means to this member.
+/// Meaning of a frame's moment for this member.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Arrival {
-    /// Of a cycle that is over, or of an epoch that binds nobody.
+    /// Of a cycle that is over, or of an epoch that does not bind this member.
     Stale,
     /// Of the current cycle.
     Present,
@@ -46,7 +46,7 @@ impl CycleClock {
         self.anchor
     }
 
-    /// Whether nobody else has been heard in this epoch for some periods.
+    /// Whether no other member was received in this epoch for some periods.
     pub fn alone(&self) -> bool {
         self.alone
     }
@@ -77,7 +77,7 @@ impl CycleClock {
         let binds = match (self.alone, header.alone) {
             (true, false) => true,
             (false, true) => false,
-            // Nobody will follow one who does not pace, so it has to follow.
+            // No member follows one that does not start cycles, so it follows.
             (true, true) if !self.founder => true,
             (true, true) | (false, false) => header.moment.epoch > moment.epoch,
         };

@@ -1,13 +1,13 @@
-//! Whose frames are taken in at all.
+//! Admission of frames by their headers.
 
 use std::collections::BTreeSet;
 
 use crate::agreement::Agreement;
 use understudy_wire::{ClusterHash, ConfigurationHash, Header, Member};
 
-/// Decides on headers alone. Remembers whom it has refused, at most once for each member of the cluster.
+/// Admission of one member. Remembers the members that it has refused, at most one entry for each.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub struct Reception {
+pub(crate) struct Reception {
     own: Member,
     cluster: ClusterHash,
     configuration: ConfigurationHash,
@@ -16,14 +16,15 @@ pub struct Reception {
     refused: BTreeSet<Member>,
 }
 
-/// What becomes of a frame.
+/// Decision on a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Admission {
+pub(crate) enum Admission {
     /// It counts.
     Admitted,
-    /// Of another cluster, of nobody in this one, one's own, or of a member that was refused before: dropped without a word.
+    /// Of another cluster, of no member of this one, of this member itself, or of a member that was refused before: dropped
+    /// without a report.
     Dropped,
-    /// The first of a member with another configuration: dropped, and worth a word.
+    /// The first of a member with another configuration: dropped and reported.
     Refused {
         /// The configuration that it runs.
         theirs: ConfigurationHash,
@@ -32,7 +33,7 @@ pub enum Admission {
 
 impl Reception {
     /// For one member.
-    pub fn new(own: Member, agreement: &Agreement) -> Self {
+    pub(crate) fn new(own: Member, agreement: &Agreement) -> Self {
         Self {
             own,
             cluster: agreement.cluster,
@@ -44,7 +45,7 @@ impl Reception {
     }
 
     /// Decides on one header.
-    pub fn admit(&mut self, header: &Header) -> Admission {
+    pub(crate) fn admit(&mut self, header: &Header) -> Admission {
         let known = match header.sender {
             Member::Station(station) => station.index() < self.stations,
             Member::RemoteIo(program) | Member::Plant(program) => program.index() < self.programs,
@@ -53,7 +54,7 @@ impl Reception {
             return Admission::Dropped;
         }
         if header.configuration != self.configuration {
-            // A member that is in no cluster of this size is still worth a word, once for all of them.
+            // A sender that is in no cluster of this size is reported too, once for all of them.
             let member = if known { header.sender } else { self.own };
             let theirs = header.configuration;
             return if self.refused.insert(member) {

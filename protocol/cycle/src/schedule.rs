@@ -1,4 +1,4 @@
-//! When who speaks in a cycle of period T: the slots that every member computes for itself from the same configuration.
+//! The slots of a cycle of period T, which every member computes for itself from the same configuration.
 //!
 //! ```text
 //! 0        0.12 T                    0.45 T        0.55 T     0.65 T    0.70 T        T
@@ -6,8 +6,8 @@
 //!                                                      last call
 //! ```
 //!
-//! When its slot starts, a station waits for nobody any more; it speaks earlier when its predecessor has published. One that does not
-//! know its outputs by then, because a sample is late, waits for that until the last call. Copies of a frame follow it
+//! A station publishes when its slot starts, or earlier when its predecessor has published. A station that does not know its
+//! outputs by then, because a sample is late, waits for it until the last call. Copies of a frame follow it
 //! `copy_spacing` apart, and the last copy of the last turn leaves before the deadline.
 
 use std::time::Duration;
@@ -32,7 +32,7 @@ pub struct Schedule {
     stall: Duration,
 }
 
-/// Why there is no such schedule.
+/// Reason why a schedule is refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ScheduleError {
     /// The period is out of bounds.
@@ -149,7 +149,7 @@ impl Schedule {
     /// When `station` waits for its predecessors no more.
     ///
     /// # Panics
-    /// If it is not in the cluster; [`crate::Reception`] lets nobody else in.
+    /// If it is not in the cluster; only frames of the cluster's members are admitted.
     pub fn slot(&self, station: StationId) -> Duration {
         self.slots[station.index()]
     }

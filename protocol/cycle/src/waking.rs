@@ -1,4 +1,4 @@
-//! When a member wants to be woken, and whether its host does it.
+//! The time at which a member asks to be woken, and host stalls.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use understudy_wire::Time;
 
 /// The next wake-up of one member.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
-pub struct Waking {
+pub(crate) struct Waking {
     /// When it wants to be woken, as of its last input.
     asked: Time,
     /// What it had asked for when it last noticed a stall.
@@ -16,18 +16,18 @@ pub struct Waking {
 
 impl Waking {
     /// From now on it wants to be woken at `asked`.
-    pub fn ask(&mut self, asked: Time) {
+    pub(crate) fn ask(&mut self, asked: Time) {
         self.asked = asked;
     }
 
     /// When it wants to be woken.
-    pub fn asked(&self) -> Time {
+    pub(crate) fn asked(&self) -> Time {
         self.asked
     }
 
     /// By how much an input that comes at `now`, whatever it is, shows the host to have missed what was asked for. Once for each
     /// time that was asked for, and nothing up to [`Schedule::stall`].
-    pub fn stall(&mut self, now: Time, schedule: &Schedule) -> Option<Duration> {
+    pub(crate) fn stall(&mut self, now: Time, schedule: &Schedule) -> Option<Duration> {
         let due = self.asked;
         if now <= due || due == self.stalled {
             return None;

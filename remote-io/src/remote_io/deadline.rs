@@ -3,7 +3,8 @@
 use understudy_cycle::Output;
 use understudy_wire::{Image, Moment, Source, Time};
 
-use super::{Applied, Floor, Phase, Question, RemoteIo};
+use super::knowledge::Run;
+use super::{Applied, Authority, Deadline, Question, RemoteIo};
 use crate::event::{Event, Missing};
 use crate::history::History;
 use crate::selection::{Heard, Selection};
@@ -14,7 +15,7 @@ impl RemoteIo {
     /// The deadline of a cycle that was started. What was heard is worth nothing when it comes a period late.
     pub(super) fn decide(&mut self, now: Time) {
         let late = now.since(self.decides_at()) > self.settings.agreement.schedule.period();
-        self.decided = true;
+        self.deadline = Deadline::Passed { idle: 0 };
         let heard = Heard {
             turns: &self.turns,
             controllers: self.settings.agreement.schedule.controllers(),
@@ -23,25 +24,24 @@ impl RemoteIo {
         let settings = &self.settings;
         let width = settings.fail_safe.width();
         let mut accusation = None;
-        let (selection, sampled) = match &self.phase {
-            Phase::Listening { .. } => (Selection::Missing(Missing::NoHistory), None),
-            Phase::Running { sampled: false, .. } if self.field_lost => {
+        let (selection, sampled) = match self.knowledge.run() {
+            None => (Selection::Missing(Missing::NoHistory), None),
+            Some(Run { sampled: false, .. }) if self.sensors.is_none() => {
                 (Selection::Missing(Missing::BadQuality), None)
             }
-            Phase::Running { sampled: false, .. } => (Selection::Missing(Missing::NoCycle), None),
-            Phase::Running { history, .. } if late => {
+            Some(Run { sampled: false, .. }) => (Selection::Missing(Missing::NoCycle), None),
+            Some(Run { history, .. }) if late => {
                 let sampled = self.field_sampled(history);
                 (Selection::Missing(Missing::TooLate), Some(sampled))
             }
-            Phase::Running { history, .. } => {
+            Some(Run { history, .. }) => {
                 let (truth, answer) = (history.head(), settings.value_fault);
                 let (selected, found) =
                     heard.select(settings.program, truth, width, &mut self.trust, answer);
                 accusation = found;
-                let selection = if self.released {
-                    selected
-                } else {
-                    Selection::Missing(Missing::NotReleased)
+                let selection = match self.authority {
+                    Authority::Proof => selected,
+                    Authority::Operator => Selection::Missing(Missing::NotReleased),
                 };
                 (selection, Some(self.field_sampled(history)))
             }
@@ -58,7 +58,7 @@ impl RemoteIo {
         self.report_differences(moment);
         let doubted = matches!(selection, Selection::Missing(Missing::ValueFault));
         if doubted && self.settings.value_fault == ValueFault::FailSafe {
-            self.released = false;
+            self.authority = Authority::Operator;
             self.last_true = None;
         }
         self.apply(selection, sampled);
@@ -141,10 +141,7 @@ impl RemoteIo {
         if missing.is_none() {
             self.missed = 0;
             self.last_true = Some(outputs.clone());
-            if let Phase::Running { history, .. } = &self.phase {
-                let lineage = history.head();
-                self.floor = Floor::At { moment, lineage };
-            }
+            self.knowledge.applied(moment);
         }
         self.applied = Some(Applied {
             source,
@@ -167,9 +164,11 @@ impl RemoteIo {
     pub(super) fn decides_at(&self) -> Time {
         let schedule = &self.settings.agreement.schedule;
         let deadline = self.member.clock.anchor() + schedule.deadline();
-        if !self.decided && self.member.clock.moment().is_some() {
-            return deadline;
+        match self.deadline {
+            Deadline::Ahead => deadline,
+            Deadline::Passed { idle } => {
+                deadline + schedule.period() * (idle + 1) + schedule.grace()
+            }
         }
-        deadline + schedule.period() * (self.idle + 1) + schedule.grace()
     }
 }

@@ -5,7 +5,7 @@ use smallvec::SmallVec;
 use understudy_cycle::Mode;
 use understudy_wire::{Body, Lineage, Moment, StationId, StationSet, Turn};
 
-use super::{Phase, RemoteIo};
+use super::RemoteIo;
 use crate::event::{Event, Lacking, LackingReason};
 
 /// Stations of which each one alone proves the output.
@@ -24,13 +24,8 @@ pub(super) struct Protection {
 impl RemoteIo {
     /// Looks at the turns of a cycle at its deadline, where it was sampled.
     pub(super) fn watch_protection(&mut self) {
-        if let Phase::Running {
-            history,
-            sampled: true,
-            ..
-        } = &self.phase
-        {
-            self.note_protection(self.lacking(history.head()));
+        if let Some(run) = self.knowledge.run().filter(|run| run.sampled) {
+            self.note_protection(self.lacking(run.history.head()));
         }
     }
 

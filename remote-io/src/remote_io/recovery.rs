@@ -10,7 +10,8 @@
 
 use understudy_wire::{Holding, Moment, StateChoice, StationId, StationSet, Time};
 
-use super::{Floor, Phase, Question, RemoteIo};
+use super::knowledge::{Floor, Knowledge, Run};
+use super::{Authority, Question, RemoteIo};
 use crate::event::Event;
 use crate::history::History;
 use crate::settings::{Release, StaleState};
@@ -34,12 +35,13 @@ impl RemoteIo {
         if counted {
             self.looked = now;
         }
-        let waited = match &mut self.phase {
-            Phase::Running {
-                history,
-                unfollowed,
-                ..
-            } => {
+        let waited = match &mut self.knowledge {
+            Knowledge::ColdStarted { run, .. } | Knowledge::Known { run, .. } => {
+                let Run {
+                    history,
+                    unfollowed,
+                    ..
+                } = run;
                 let on_it = |holding: &Holding| history.place(holding.lineage).is_some();
                 let follower = self
                     .witnesses
@@ -58,7 +60,7 @@ impl RemoteIo {
                 }
                 waited
             }
-            Phase::Listening { cycles, held } => {
+            Knowledge::Listening { cycles, held, .. } => {
                 let holds = self.witnesses.newest().is_some();
                 // The station that held a state may come back, or have given it to another one.
                 if *held && !holds {
@@ -72,7 +74,7 @@ impl RemoteIo {
         // A station that could hold the state and is not there gets longer: it may be the only one that does.
         let patience = if self.witnesses.everybody() { 1 } else { 5 };
         // A history without a sample is one that no station can follow.
-        if waited < listen_cycles * patience || waited == 0 || self.field_lost {
+        if waited < listen_cycles * patience || waited == 0 || self.sensors.is_none() {
             return;
         }
         match self.verdict() {
@@ -93,26 +95,22 @@ impl RemoteIo {
         let Some((from, newest)) = self.witnesses.newest() else {
             return Verdict::Cold;
         };
-        match self.floor {
-            Floor::At { lineage, .. } => {
+        let proved = match &self.knowledge {
+            Knowledge::Known { floor, .. } => {
                 let mut holdings = self.witnesses.holdings();
-                match holdings.find(|(_, holding)| holding.lineage == lineage) {
+                return match holdings.find(|(_, holding)| holding.lineage == floor.lineage) {
                     Some((from, holding)) => Verdict::Adopt(from, *holding),
                     None => Verdict::Stale(from, *newest),
-                }
-            }
-            Floor::Unknown => {
-                let proved = match &self.phase {
-                    Phase::Listening { .. } => self.witnesses.covers_all_applied(newest),
-                    // What was applied before the cold start is not known, and nothing was applied since.
-                    Phase::Running { history, .. } => newest.born == history.born(),
                 };
-                match self.witnesses.disputed() {
-                    Some(stations) => Verdict::Disputed(stations),
-                    None if !proved => Verdict::Stale(from, *newest),
-                    None => Verdict::Adopt(from, *newest),
-                }
             }
+            Knowledge::Listening { .. } => self.witnesses.covers_all_applied(newest),
+            // What was applied before the cold start is not known, and nothing was applied since.
+            Knowledge::ColdStarted { run, .. } => newest.born == run.history.born(),
+        };
+        match self.witnesses.disputed() {
+            Some(stations) => Verdict::Disputed(stations),
+            None if !proved => Verdict::Stale(from, *newest),
+            None => Verdict::Adopt(from, *newest),
         }
     }
 
@@ -121,10 +119,7 @@ impl RemoteIo {
             return;
         }
         self.question = Some(Question::StateLost);
-        let applied = match self.floor {
-            Floor::At { moment, .. } => Some(moment),
-            Floor::Unknown => None,
-        };
+        let applied = self.knowledge.floor().map(|floor| floor.moment);
         let asks = self.settings.stale_state == StaleState::Operator;
         self.report(Event::StateLost {
             moment,
@@ -175,7 +170,11 @@ impl RemoteIo {
             }
             None => {
                 let awaits_release = self.settings.release == Release::Operator;
-                self.released = !awaits_release;
+                self.authority = if awaits_release {
+                    Authority::Operator
+                } else {
+                    Authority::Proof
+                };
                 self.last_true = None;
                 self.report(Event::StartedCold {
                     born: moment,
@@ -184,21 +183,15 @@ impl RemoteIo {
                 History::genesis(self.settings.hash, moment, capacity)
             }
         };
-        if self.floor == Floor::Unknown {
+        if self.knowledge.floor().is_none() {
             self.remember(moment, state.map(|(station, _)| station));
         }
         self.question = None;
-        if let Some((_, holding)) = state {
-            self.floor = Floor::At {
-                moment: holding.stepped,
-                lineage: holding.lineage,
-            };
-        }
-        self.phase = Phase::Running {
-            history,
-            sampled: false,
-            unfollowed: 0,
-        };
+        let adopted = state.map(|(_, holding)| Floor {
+            moment: holding.stepped,
+            lineage: holding.lineage,
+        });
+        self.knowledge.start(history, adopted);
     }
 
     /// After a restart: takes up from what the stations recall.
@@ -209,7 +202,7 @@ impl RemoteIo {
             self.field = inputs.clone();
         }
         let stations = self.witnesses.excluded();
-        if !self.pardons && !stations.is_empty() {
+        if !self.knowledge.pardons() && !stations.is_empty() {
             self.trust = Trust::excluding(stations);
             self.report(Event::RecalledExclusion { moment, stations });
         }

@@ -1,22 +1,22 @@
 //! The arbiter's side: what is added to the history of the program in each cycle.
 
-use understudy_wire::{Body, Moment, Sample, Source, Time};
+use understudy_wire::{Body, Image, Moment, Sample, Source, Time};
 
-use super::{Floor, Phase, RemoteIo};
+use super::RemoteIo;
 use crate::channel;
 use crate::diagnosis::Sight;
 use crate::event::Event;
 
 impl RemoteIo {
     /// What the program sees from now on, by what the sensors show and what the diagnosis finds of it.
-    fn see(&mut self, moment: Moment) {
-        let mut shown = self.sensors.clone();
+    fn see(&mut self, moment: Moment, sensors: &Image) {
+        let mut shown = sensors.clone();
         let mut unsteady = None;
         if let Some(diagnosis) = &self.settings.diagnosis {
             let applied = self.applied.as_ref();
             let outputs = applied.map_or(&self.settings.fail_safe, |applied| &applied.outputs);
             let sight = Sight {
-                sensors: &self.sensors,
+                sensors,
                 driven: &self.forcing.outputs(outputs),
                 is_true: applied.is_some_and(|applied| {
                     matches!(applied.source, Source::Direct | Source::Reconstructed)
@@ -40,20 +40,20 @@ impl RemoteIo {
     /// Takes u(i)(t) and says it. Where it is not known nothing is said, so that nobody steps the program: it goes on from
     /// its state when the sensors can be seen again.
     pub(super) fn sample(&mut self, now: Time) {
-        if self.field_lost {
+        if self.knowledge.run().is_none() {
             return;
         }
-        let moment = self.moment();
-        if matches!(self.phase, Phase::Running { .. }) {
-            self.see(moment);
-        }
-        let inputs = self.forcing.inputs(&self.field);
-        let Phase::Running {
-            history, sampled, ..
-        } = &mut self.phase
-        else {
+        let Some(sensors) = self.sensors.clone() else {
             return;
         };
+        let moment = self.moment();
+        self.see(moment, &sensors);
+        let inputs = self.forcing.inputs(&self.field);
+        let floor = self.knowledge.floor();
+        let Some(run) = self.knowledge.run_mut() else {
+            return;
+        };
+        let history = &mut run.history;
         let places = self
             .witnesses
             .holdings()
@@ -62,12 +62,8 @@ impl RemoteIo {
             let (oldest, newest) = range.unwrap_or((place, place));
             Some((oldest.min(place), newest.max(place)))
         });
-        let (floor, applied) = match self.floor {
-            Floor::At { moment, lineage } => (Some(lineage), Some(moment)),
-            Floor::Unknown => (None, None),
-        };
-        let void = history.push(&inputs, living, floor);
-        *sampled = true;
+        let void = history.push(&inputs, living, floor.map(|floor| floor.lineage));
+        run.sampled = true;
         let base = history.base();
         let (born, before) = (history.born(), history.before());
         let body = Body::Sample(Sample {
@@ -76,7 +72,7 @@ impl RemoteIo {
             before,
             after: history.head(),
             history: history.samples(),
-            applied,
+            applied: floor.map(|floor| floor.moment),
             excluded: self.trust.excluded(),
             gone: self.witnesses.gone(),
         });

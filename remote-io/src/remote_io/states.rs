@@ -1,0 +1,315 @@
+//! The table of a remote I/O: each reachable named state, with each input, and the state that follows.
+//!
+//! The states are found from a remote I/O that has just started, breadth first. The drawing in `docs/pictures/remote-io.dot`
+//! is made from the same table.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::sync::Arc;
+use std::time::Duration;
+
+use understudy_cycle::{Agreement, Input, Machine, Mode, Output, RemoteIoInput, Schedule};
+use understudy_wire::{
+    Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
+    Join, Lineage, Member, Moment, ProgramHash, ProgramId, ProgramSet, Recalled, Sample,
+    StateChoice, StationId, StationSet, Time, Turn, Word,
+};
+
+use super::knowledge::Knowledge;
+use super::{Authority, Question, RemoteIo};
+use crate::settings::{Release, Settings, StaleState, ValueFault};
+
+const PERIOD: Duration = Duration::from_millis(10);
+const PROGRAM: ProgramId = ProgramId(0);
+/// Cycles of one input: more than any patience of the remote I/O.
+const CYCLES: u64 = 16;
+
+/// What happens to a remote I/O whose program has a controller and an understudy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Happening {
+    /// No station is received.
+    NoStation,
+    /// Both stations are received, and hold no state.
+    NoState,
+    /// Both prove the output of this history; after a restart both hold the state of the newest applied sample.
+    OnHistory,
+    /// Both hold an older state.
+    OlderState,
+    /// They hold different states of one cycle.
+    DifferentStates,
+    /// They prove different outputs of this history.
+    ValueFault,
+    /// The operator releases.
+    Release,
+    /// The operator chooses a cold start.
+    ChooseCold,
+    /// The operator chooses the newest state.
+    ChooseNewest,
+}
+
+use Happening::*;
+
+const ALL: [(Happening, &str); 9] = [
+    (NoStation, "no station is received"),
+    (NoState, "stations hold no state"),
+    (OnHistory, "stations are on the history"),
+    (OlderState, "stations hold an older state"),
+    (DifferentStates, "stations hold different states"),
+    (ValueFault, "stations prove different outputs"),
+    (Release, "operator: release"),
+    (ChooseCold, "operator: choose cold"),
+    (ChooseNewest, "operator: choose newest"),
+];
+
+fn moment(cycle: u64) -> Moment {
+    Moment {
+        epoch: Epoch(1),
+        cycle: Cycle(cycle),
+    }
+}
+
+#[derive(Debug, Clone)]
+struct Bench {
+    remote_io: RemoteIo,
+    cycle: u64,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let agreement = Agreement {
+            cluster: ClusterHash(1),
+            configuration: ConfigurationHash(2),
+            schedule: Schedule::new(PERIOD, 1, 1, 1).expect("within the bounds"),
+            mode: Mode::Full,
+            history: 4,
+            flag_after: 3,
+            shadow_cycles: 1,
+            listen_cycles: 2,
+        };
+        let settings = Settings {
+            program: PROGRAM,
+            agreement: Arc::new(agreement),
+            hash: ProgramHash(1),
+            inputs: 1,
+            channels: Vec::new(),
+            diagnosis: None,
+            hold_cycles: 2,
+            fail_safe: Image::zero(1),
+            release: Release::Operator,
+            value_fault: ValueFault::FailSafe,
+            stale_state: StaleState::Operator,
+        };
+        Self {
+            remote_io: RemoteIo::new(Time(0), settings),
+            cycle: 100,
+        }
+    }
+
+    fn happens(&mut self, happening: Happening) {
+        let operator = |choice| Input::RemoteIo(RemoteIoInput::Choose(choice));
+        match happening {
+            Release => self.give(Input::RemoteIo(RemoteIoInput::Release)),
+            ChooseCold => self.give(operator(StateChoice::Cold)),
+            ChooseNewest => self.give(operator(StateChoice::Newest { cycle: None })),
+            _ => (0..CYCLES).for_each(|_| self.pass(happening)),
+        }
+        self.sample();
+    }
+
+    fn now(&self) -> Time {
+        Time(0) + PERIOD * self.cycle as u32
+    }
+
+    fn give(&mut self, input: Input<'_>) {
+        let now = self.now() + PERIOD * 9 / 10;
+        self.remote_io.handle_input(now, input);
+    }
+
+    /// One cycle.
+    fn pass(&mut self, happening: Happening) {
+        self.cycle += 1;
+        let deadline = self.now() + PERIOD * 65 / 100;
+        if happening != NoStation {
+            self.receive(0, Body::Sync);
+            let sample = self.sample();
+            for rank in [0, 1] {
+                let body = self.body(happening, rank, sample.as_ref());
+                self.receive(rank, body);
+            }
+        }
+        self.remote_io.handle_input(deadline, Input::Wakeup);
+    }
+
+    fn receive(&mut self, rank: u8, body: Body) {
+        let frame = Frame {
+            header: Header {
+                cluster: ClusterHash(1),
+                configuration: ConfigurationHash(2),
+                moment: moment(self.cycle),
+                sender: Member::Station(StationId(rank)),
+                alone: false,
+            },
+            body,
+        };
+        let now = self.now();
+        self.remote_io
+            .handle_input(now, Input::Frame(&Arc::new(frame)));
+    }
+
+    /// The sample that was sent; takes all other outputs away.
+    fn sample(&mut self) -> Option<Sample> {
+        let outputs = std::iter::from_fn(|| self.remote_io.poll_output());
+        outputs
+            .filter_map(|output| match output {
+                Output::Send(frame) => match &frame.body {
+                    Body::Sample(sample) => Some(sample.clone()),
+                    _ => None,
+                },
+                _ => None,
+            })
+            .last()
+    }
+
+    fn body(&self, happening: Happening, rank: u8, sample: Option<&Sample>) -> Body {
+        let holding = |lineage: Lineage, stepped: Moment| Holding {
+            program: PROGRAM,
+            born: moment(1),
+            lineage,
+            stepped,
+            digest: Digest(0),
+        };
+        let held = match (happening, sample) {
+            (OnHistory | ValueFault, Some(sample)) => {
+                let here = holding(sample.after, moment(self.cycle));
+                let output = happening == ValueFault && rank == 1;
+                return turn(here, output);
+            }
+            (OnHistory, None) => Some(holding(Lineage(7), moment(50))),
+            (OlderState, _) => Some(holding(Lineage(6), moment(30))),
+            (DifferentStates, _) => Some(holding(Lineage(8 + u64::from(rank)), moment(50))),
+            _ => None,
+        };
+        let recalled = Recalled {
+            program: PROGRAM,
+            witnessed: true,
+            applied: Some(moment(50)),
+            excluded: StationSet::EMPTY,
+            accounted_for: StationSet::EMPTY,
+            inputs: Image::zero(1),
+        };
+        Body::Join(Join {
+            wants: ProgramSet::EMPTY,
+            holdings: held.into_iter().collect(),
+            recalled: vec![recalled],
+            lacks: ProgramSet::EMPTY,
+        })
+    }
+
+    /// The name of its state.
+    fn state(&self) -> String {
+        let RemoteIo {
+            knowledge,
+            question,
+            authority,
+            ..
+        } = &self.remote_io;
+        let mut name = match knowledge {
+            Knowledge::Listening { .. } => "Listening",
+            Knowledge::ColdStarted { .. } => "ColdStarted",
+            Knowledge::Known { .. } => "Known",
+        }
+        .to_owned();
+        if *authority == Authority::Operator {
+            name.push_str(", awaits release");
+        }
+        match question {
+            Some(Question::Disputed) => name.push_str(", states disputed"),
+            Some(Question::StateLost) => name.push_str(", state lost"),
+            None => {}
+        }
+        name
+    }
+}
+
+fn turn(holding: Holding, output: bool) -> Body {
+    Body::Turn(Turn {
+        heard: StationSet::EMPTY,
+        holdings: [holding].into_iter().collect(),
+        words: [Word {
+            mask: ProgramSet::only(PROGRAM),
+            sum: Image::from_bits([output]),
+        }]
+        .into_iter()
+        .collect(),
+        recalled: Vec::new(),
+        lacks: ProgramSet::EMPTY,
+        relayed: Vec::new(),
+    })
+}
+
+/// For each reachable state, the states that follow, in the order of [`ALL`].
+fn table() -> Vec<(String, Vec<String>)> {
+    let start = Bench::new();
+    let mut found = vec![start.state()];
+    let mut benches = vec![start];
+    let mut rows = Vec::new();
+    while let Some(bench) = benches.get(rows.len()).cloned() {
+        let mut next = Vec::new();
+        for (happening, _) in ALL {
+            let mut bench = bench.clone();
+            bench.happens(happening);
+            let state = bench.state();
+            if !found.contains(&state) {
+                found.push(state.clone());
+                benches.push(bench);
+            }
+            next.push(state);
+        }
+        rows.push((bench.state(), next));
+    }
+    rows
+}
+
+fn drawing(table: &[(String, Vec<String>)]) -> String {
+    let mut text = String::from(
+        "// The states of a remote I/O. The test remote-io/src/remote_io/states.rs makes this file.\n\
+         digraph \"remote I/O\" {\n  node [shape=box, style=rounded];\n",
+    );
+    for (state, next) in table {
+        let mut edges: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+        let changes = next.iter().zip(ALL).filter(|(next, _)| *next != state);
+        for (next, (_, input)) in changes {
+            edges.entry(next).or_default().push(input);
+        }
+        for (next, inputs) in edges {
+            let label = inputs.join("\\n");
+            let _ = writeln!(text, "  \"{state}\" -> \"{next}\" [label=\"{label}\"];");
+        }
+    }
+    text.push_str("}\n");
+    text
+}
+
+#[test]
+fn each_state_answers_each_input() {
+    let table = table();
+    let mut text = String::new();
+    for (state, next) in &table {
+        let _ = writeln!(text, "{state}");
+        for (next, (_, input)) in next.iter().zip(ALL) {
+            let next = if next == state { "." } else { next };
+            let _ = writeln!(text, "  {input:<34} {next}");
+        }
+    }
+    insta::assert_snapshot!(text);
+}
+
+#[test]
+fn the_drawing_is_the_table() {
+    let drawing = drawing(&table());
+    let drawn = include_str!("../../../docs/pictures/remote-io.dot");
+    assert!(
+        drawing == drawn,
+        "docs/pictures/remote-io.dot should be\n{drawing}"
+    );
+}
