@@ -421,7 +421,8 @@ impl Account {
                 let told = newest.and_then(|newest| self.since_origin(newest));
                 self.cycles = self.cycles.min(told.unwrap_or(0));
             }
-            RunEvent::Started { .. }
+            RunEvent::Journal { .. }
+            | RunEvent::Started { .. }
             | RunEvent::Origin { .. }
             | RunEvent::Commanded { .. }
             | RunEvent::Acknowledged(_)

@@ -6,11 +6,10 @@
 
 use std::collections::BTreeMap;
 
+use understudy_journal::{Happening, JournalError, Record, RunEvent};
 use understudy_reliability::Observed;
 use understudy_simulator::Action;
 use understudy_wire::{Member, ProgramId, Source, StationId};
-
-use understudy_journal::{Happening, JournalError, Record, RunEvent};
 
 /// Nanoseconds of an hour.
 const HOUR_NS: f64 = 3.6e12;
@@ -42,7 +41,7 @@ pub struct JournalView {
 #[derive(Debug, thiserror::Error)]
 pub enum ObservationError {
     /// It cannot be read.
-    #[error("U0532: {0}")]
+    #[error("{}: {}", code_of(.0), .0)]
     Journal(#[from] JournalError),
     /// There is no time to observe.
     #[error(
@@ -58,9 +57,16 @@ impl ObservationError {
     /// The stable code.
     pub fn code(&self) -> &'static str {
         match self {
-            Self::Journal(_) => "U0532",
+            Self::Journal(error) => code_of(error),
             Self::NeverWhole { .. } => "U0533",
         }
+    }
+}
+
+fn code_of(error: &JournalError) -> &'static str {
+    match error {
+        JournalError::Version(_) => "U0534",
+        JournalError::Read(_) | JournalError::Line { .. } => "U0532",
     }
 }
 

@@ -24,7 +24,7 @@ pub struct Description {
 }
 
 /// Every word that [`Description::event`] can be.
-pub(crate) const EVENTS: [&str; 65] = [
+pub(crate) const EVENTS: [&str; 66] = [
     "acknowledged",
     "adopted",
     "adopted-lineage",
@@ -56,6 +56,7 @@ pub(crate) const EVENTS: [&str; 65] = [
     "synchronised",
     "interrupted",
     "joins",
+    "journal",
     "journal-lost",
     "link-failed",
     "link-reopened",

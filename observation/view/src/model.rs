@@ -381,7 +381,10 @@ impl Model {
             RunEvent::Attached {
                 member: Member::RemoteIo(program),
             } => self.misses_records(*program),
-            RunEvent::Commanded { .. } | RunEvent::Attached { .. } | RunEvent::Detached { .. } => {}
+            RunEvent::Journal { .. }
+            | RunEvent::Commanded { .. }
+            | RunEvent::Attached { .. }
+            | RunEvent::Detached { .. } => {}
         }
         self.happened(record, cycle, None);
     }

@@ -4,6 +4,7 @@ use std::io;
 use std::path::PathBuf;
 
 use understudy_bus::BusError;
+use understudy_journal::JOURNAL_VERSION;
 use understudy_keys::KeysError;
 use understudy_network::NetworkError;
 
@@ -75,6 +76,16 @@ pub enum LaboratoryError {
         /// The line, cut.
         line: String,
     },
+    /// A process is of another version of this program.
+    #[error(
+        "U0535: {name} reports version {found} of the journal, and this laboratory reads version {JOURNAL_VERSION}: start every member with the program of the laboratory"
+    )]
+    Version {
+        /// Which member.
+        name: String,
+        /// Version of its records.
+        found: u32,
+    },
     /// The scenario needs what only the simulator has.
     #[error("U0528: only `understudy simulate` has these steps of the scenario: {}", words.join(", "))]
     OnlySimulated {
@@ -118,6 +129,7 @@ impl LaboratoryError {
             Self::NoCycles { .. } => "U0525",
             Self::Step { .. } => "U0526",
             Self::Record { .. } => "U0527",
+            Self::Version { .. } => "U0535",
             Self::OnlySimulated { .. } => "U0528",
             Self::Network(error) => error.code(),
             Self::Endpoints(error) => error.code(),

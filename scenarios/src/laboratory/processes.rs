@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use tokio::process::Command;
 use tokio::sync::mpsc::Receiver;
 use understudy_bus::{Cuts, HostEvent, ZENOH_RUNTIME};
-use understudy_journal::{Happening, Record, RunEvent};
+use understudy_journal::{Happening, Record, RunEvent, check_version};
 use understudy_simulator::{Action, Fault};
 use understudy_wire::Member;
 
@@ -143,7 +143,14 @@ impl Laboratory<'_> {
                 line: line.chars().take(200).collect(),
             });
         };
-        if let Happening::Host(HostEvent::Ready { rights, .. }) = &record.event {
+        if let Happening::Host(HostEvent::Ready {
+            rights, version, ..
+        }) = &record.event
+        {
+            check_version(*version).map_err(|wrong| LaboratoryError::Version {
+                name: self.name(member),
+                found: wrong.found,
+            })?;
             self.ready.insert(member);
             self.machine.extend(rights.lacking.iter().cloned());
         }

@@ -192,9 +192,13 @@ fn a_journal_without_a_whole_cluster_or_with_a_broken_line_says_so() {
         applied(3, 0, Source::Direct),
     ]);
     assert!(silent.contains("station 2, station 3"), "{silent}");
-    let text = "{}\n{}\n";
-    let broken = observe_journal(understudy_journal::records(text.as_bytes()));
-    assert_eq!(broken.expect_err("no record").code(), "U0532");
+    let code = |bytes: &[u8]| {
+        let broken = observe_journal(understudy_journal::records(bytes));
+        broken.expect_err("no record").code()
+    };
+    let headed = [understudy_journal::journal_header(), b"{}\n{}\n".to_vec()].concat();
+    assert_eq!(code(&headed), "U0532");
+    assert_eq!(code(b"{}\n{}\n"), "U0534");
 }
 
 #[test]
