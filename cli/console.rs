@@ -9,7 +9,7 @@ use codespan_reporting::term::termcolor::{BufferedStandardStream, ColorChoice};
 use codespan_reporting::term::{self, Config};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use understudy_diagnostic::{Diagnostic, Lines, Report, Severity};
-use understudy_scenarios::Progress;
+use understudy_processes::Progress;
 
 use crate::answer::{Answer, Envelope, Status, shown};
 use crate::excerpt::Shown;

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use serde::Serialize;
+use understudy_campaigns::{JOIN_CYCLES, Joined, Target, Trouble, TroubleRow, join_trial};
 use understudy_network::Share;
-use understudy_scenarios::{JOIN_CYCLES, Joined, Target, Trouble, TroubleRow, join_trial};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;

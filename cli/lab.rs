@@ -8,10 +8,11 @@ use clap::{Args, ValueEnum};
 use understudy_cluster::Cluster;
 use understudy_journal::{JOURNAL_LIMIT_BYTES, JournalState, RunDirectory};
 use understudy_network::Share;
-use understudy_scenarios::{
+use understudy_processes::{
     Afterwards, Deaths, HostKind, LaboratoryError, LaboratorySettings, NetworkSettings,
-    ResultsError, Scenario, Summary, World, run_commanded, write_results,
+    run_commanded,
 };
+use understudy_scenarios::{ResultsError, Scenario, Summary, World, write_results};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;

@@ -6,6 +6,7 @@ use std::time::SystemTime;
 
 use clap::{Args, ValueEnum};
 use serde_json::{Map, Value, json};
+use understudy_campaigns::{options_of, set_unequal};
 use understudy_cluster::{Cluster, Overrides};
 use understudy_diagnostic::Report;
 use understudy_journal::time_name;
@@ -14,7 +15,6 @@ use understudy_reliability::{
     ReliabilityError, SharedPart, UnequalBoxes, answer_chain, calculate, read_chain, report,
     report_data,
 };
-use understudy_scenarios::{options_of, set_unequal};
 
 use crate::answer::{Answer, Status};
 use crate::files;

@@ -119,8 +119,10 @@ struct OpenCycle {
 /// The account of one run.
 #[derive(Debug, Clone)]
 pub struct Account {
-    pub(crate) terms: Terms,
-    pub(crate) cycles: u64,
+    /// What it knows of the cluster.
+    pub terms: Terms,
+    /// Cycles that are judged, from the origin on.
+    pub cycles: u64,
     numbering: Numbering,
     open: BTreeMap<i64, OpenCycle>,
     closed_up_to: Option<i64>,
@@ -141,7 +143,8 @@ pub struct Account {
     pub(crate) refused: Vec<(String, String)>,
     /// Records that members could not write, because their journals were too slow.
     pub(crate) unwritten: BTreeMap<Member, u64>,
-    pub(crate) interrupted: bool,
+    /// Whether the run was asked to end early.
+    pub interrupted: bool,
     /// Whether everybody was synchronised in the last cycle of the scenario.
     pub(crate) protected: bool,
     pub(crate) records: u64,

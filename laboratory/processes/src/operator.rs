@@ -5,7 +5,7 @@ use understudy_simulator::{Action, Fault};
 use understudy_wire::{Force, Member, ProgramId};
 
 use super::Laboratory;
-use super::process::Process;
+use crate::process::Process;
 
 impl Laboratory<'_> {
     pub(super) async fn obey(&mut self, commanded: Commanded) {

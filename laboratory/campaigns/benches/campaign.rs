@@ -1,7 +1,7 @@
 //! How long 1,000 failures of the simulated press cell take at MTBF/MTTR = 50 and an MTTR of 50 cycles; the bar is 120 s on two cores.
 
+use understudy_campaigns::{CampaignPlan, run_campaign};
 use understudy_cluster::{Overrides, press_cell, read_with};
-use understudy_scenarios::{CampaignPlan, run_campaign};
 
 const FAILURES: u64 = 1_000;
 

@@ -7,8 +7,7 @@ use serde::Serialize;
 use understudy_simulator::{Action, Fault};
 use understudy_wire::{Member, ProgramId, Schedule, StationId};
 
-use crate::scenario::{Expectation, Scenario};
-use crate::summary::Summary;
+use understudy_scenarios::{Expectation, Scenario, Summary};
 
 /// Cycles from the end of one trouble to the next: enough for a station to come back into step.
 const RECOVERY_CYCLES: f64 = 40.0;

@@ -5,7 +5,7 @@ use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_simulator::Record;
 use understudy_wire::Source;
 
-use crate::scenario::Expectation;
+use understudy_scenarios::Expectation;
 
 /// Cycles at the end of a run in which nothing is injected, where protection has to be back by the end.
 pub(super) const RECOVERY_CYCLES: u64 = 100;

@@ -3,10 +3,10 @@
 
 use std::ops::Range;
 
+use understudy_scenarios::{Expectation, Scenario};
 use understudy_simulator::{Action, Disturbance, Fault};
 
 use super::kind::{Kind, Role};
-use crate::scenario::{Expectation, Scenario};
 
 /// One fault and, where it has one, its end.
 #[derive(Debug, Clone, PartialEq)]

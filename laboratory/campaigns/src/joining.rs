@@ -5,9 +5,7 @@ use serde::Serialize;
 use understudy_simulator::{Action, Fault};
 use understudy_wire::{Member, Schedule, StationId};
 
-use crate::account::Presence;
-use crate::scenario::Scenario;
-use crate::summary::Summary;
+use understudy_scenarios::{Presence, Scenario, Summary};
 
 /// Cycles within which everybody has to be synchronised again.
 pub const JOIN_CYCLES: u64 = 100;

@@ -7,8 +7,7 @@ use understudy_wire::{Member, Source, StationId};
 
 use super::faultload::Injection;
 use super::*;
-use crate::read::read;
-use crate::{Circumstances, Scenario, Summary, World, simulate, write};
+use understudy_scenarios::{Circumstances, Scenario, Summary, World, read, simulate, write};
 
 fn cell() -> Cluster {
     let files = press_cell();

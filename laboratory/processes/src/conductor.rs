@@ -2,12 +2,11 @@
 
 use std::time::Instant;
 
+use understudy_journal::Record;
 use understudy_simulator::Fault;
 
-use understudy_journal::Record;
-
 /// Told what happens, and asked what is to be done.
-pub(crate) trait Conductor {
+pub trait Conductor {
     /// A record, in the order in which they are read.
     fn hear(&mut self, record: &Record, now: Instant);
 

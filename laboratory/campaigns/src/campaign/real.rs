@@ -9,14 +9,16 @@ use std::time::{Duration, Instant, SystemTime};
 
 use understudy_cluster::Cluster;
 use understudy_journal::{Happening, Record, RunDirectory, RunDirectoryError, RunEvent};
+use understudy_processes::{
+    Conductor, LaboratoryError, LaboratorySettings, Progress, run_conducted,
+};
+use understudy_scenarios::{Expectation, Scenario};
 use understudy_simulator::{Action, Fault};
 use understudy_wire::{Member, Time};
 
 use super::lives::{Lives, Order, Run};
 use super::seen::{Deadlines, Seen, of_station};
 use super::{CampaignPlan, Measured, gathered};
-use crate::laboratory::{Conductor, LaboratoryError, LaboratorySettings, Progress, run_conducted};
-use crate::scenario::{Expectation, Scenario};
 
 /// More than any limit of time lets pass.
 const ENDLESS_CYCLES: u64 = 1 << 40;

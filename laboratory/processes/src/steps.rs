@@ -8,10 +8,10 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use understudy_journal::Record;
+use understudy_scenarios::Scenario;
 use understudy_simulator::Fault;
 
 use super::Conductor;
-use crate::scenario::Scenario;
 
 /// Periods without a report after which the clock counts.
 const SILENT_PERIODS: u32 = 20;

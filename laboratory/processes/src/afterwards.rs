@@ -3,9 +3,9 @@
 use std::time::Instant;
 
 use understudy_journal::RunEvent;
+use understudy_scenarios::Account;
 
 use super::{Laboratory, Progress};
-use crate::account::Account;
 
 /// A cluster that stays up when its scenario is over, until the run is asked to end. What happens then is in the journal, and not in the account.
 pub struct Afterwards<'a> {

@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use super::process::Process;
 use super::{Laboratory, LaboratoryError, Progress};
+use crate::process::Process;
 
 const READY_PATIENCE: Duration = Duration::from_secs(20);
 const STEP_PATIENCE: Duration = Duration::from_secs(30);

@@ -19,11 +19,11 @@ use understudy_bus::{Endpoints, LinkKind, Peer};
 use understudy_cluster::Cluster;
 use understudy_journal::RunDirectory;
 use understudy_network::{Hosts, Impairment, NetworkError, Proxy, Route, Share, Transport};
+use understudy_scenarios::Scenario;
 use understudy_simulator::Network;
 use understudy_wire::{Member, ProgramId};
 
-use super::error::LaboratoryError;
-use crate::scenario::Scenario;
+use crate::error::LaboratoryError;
 
 /// The port of the first member of a host.
 const FIRST_PORT: u16 = 7450;

@@ -8,13 +8,13 @@ use tokio::process::Command;
 use tokio::sync::mpsc::Receiver;
 use understudy_bus::{Cuts, HostEvent, ZENOH_RUNTIME};
 use understudy_journal::{Happening, Record, RunEvent, check_version};
+use understudy_scenarios::action_word;
 use understudy_simulator::{Action, Fault};
 use understudy_wire::Member;
 
-use super::error::LaboratoryError;
-use super::process::{Process, Said, Saying};
 use super::{Deaths, Laboratory, Progress};
-use crate::scenario::action_word;
+use crate::error::LaboratoryError;
+use crate::process::{Process, Said, Saying};
 
 /// How long a process may take to end by itself.
 const END_PATIENCE: Duration = Duration::from_secs(3);

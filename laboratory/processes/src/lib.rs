@@ -31,11 +31,10 @@ use understudy_journal::{
 use understudy_simulator::Action;
 use understudy_wire::Member;
 
-use crate::account::{Account, OriginRule, Terms};
-use crate::scenario::Scenario;
+use understudy_scenarios::{Account, OriginRule, Scenario, Terms};
 
 pub use afterwards::Afterwards;
-pub(crate) use conductor::Conductor;
+pub use conductor::Conductor;
 pub use error::LaboratoryError;
 pub use site::{HostKind, NetworkSettings};
 
@@ -135,27 +134,14 @@ pub struct LaboratoryRun {
     pub failure: Option<LaboratoryError>,
 }
 
-/// Runs `scenario` on processes of its own; the journal and the list of addresses go to `directory`.
+/// Runs `scenario` on processes of its own; the journal and the list of addresses go to `directory`. With `commands` an operator may act on
+/// the members; the run then waits for cycles as long as that takes. With `afterwards` the cluster stays up.
 ///
 /// To be called from the main thread: its processes end when the thread ends that started them. SIGINT and SIGTERM end the
 /// run in order.
 ///
 /// # Errors
 /// [`LaboratoryError`] where nothing could be started; later failures are in [`LaboratoryRun::failure`].
-pub fn run_laboratory(
-    cluster: &Cluster,
-    scenario: &Scenario,
-    settings: LaboratorySettings,
-    directory: &RunDirectory,
-    watch: &mut dyn FnMut(Progress),
-) -> Result<LaboratoryRun, LaboratoryError> {
-    run_commanded(cluster, scenario, settings, directory, None, None, watch)
-}
-
-/// The same, while somebody may give commands; then it waits for cycles as long as that takes. With `afterwards` the cluster stays up.
-///
-/// # Errors
-/// As [`run_laboratory`].
 pub fn run_commanded(
     cluster: &Cluster,
     scenario: &Scenario,
@@ -173,7 +159,10 @@ pub fn run_commanded(
 }
 
 /// The same with a conductor in place of the scenario's steps.
-pub(crate) fn run_conducted(
+///
+/// # Errors
+/// As [`run_commanded`].
+pub fn run_conducted(
     cluster: &Cluster,
     scenario: &Scenario,
     settings: LaboratorySettings,

@@ -5,6 +5,7 @@ use std::fmt::{self, Write as _};
 use serde::{Deserialize, Serialize};
 use understudy_cluster::Cluster;
 use understudy_journal::Members;
+use understudy_scenarios::write;
 use understudy_simulator::Tally;
 use understudy_wire::Mode;
 
@@ -12,7 +13,6 @@ use super::coverage::CoverageRow;
 use super::kind::Phase;
 use super::minimise::Violating;
 use super::{Count, InjectionPlan};
-use crate::write::write;
 
 /// Version of `campaign.json`.
 const FORMAT: u32 = 1;

@@ -9,7 +9,7 @@ use understudy_wire::{Member, Time};
 use super::CampaignPlan;
 use super::lives::{Lives, Order, Run};
 use super::seen::{Deadlines, Seen, of_station};
-use crate::terms::parts;
+use understudy_simulator::parts;
 
 /// Cycles that the cluster gets to come into step.
 const PATIENCE_CYCLES: u64 = 10_000;
