@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""The bill of materials of a binary for a target, as CycloneDX 1.5 in JSON.
+"""Writes the bill of materials of a binary for a target, as CycloneDX 1.5 in JSON.
 
     deployment/bill_of_materials.py x86_64-unknown-linux-musl [understudy] > understudy.cdx.json
 
-Every crate that is compiled into the binary, by the lock file: name, version, licence, checksum of its source and who needs whom.
-Build scripts and macros that only run while it is built have the scope `excluded`.
+It lists every crate compiled into the binary according to the lock file, with its name, version, licence, source
+checksum and dependencies. Build scripts and macros, which run only during the build, have the scope `excluded`.
 """
 
 import json
@@ -18,7 +18,7 @@ def metadata(target: str) -> dict:
 
 
 def reached(nodes: dict, root: str, kinds: set) -> set:
-    """The packages that `root` needs by dependencies of these kinds."""
+    """Return the packages that `root` requires through dependencies of these kinds."""
     found, waiting = set(), [root]
     while waiting:
         package = waiting.pop()

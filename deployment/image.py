@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""A container image, as an OCI layout in a tar file: static binaries, and nothing else that runs.
+"""Makes a container image as an OCI layout in a tar file. It contains static binaries and no other programs.
 
     deployment/image.py VERSION ARCHITECTURE COMMIT FILE NAME=BINARY...
 
-ARCHITECTURE is a name of Go: amd64 or arm64. `podman load`, `docker load` and `skopeo copy oci-archive:FILE` read it;
-no container engine is needed to make it. SOURCE_DATE_EPOCH dates its files. The format is that of the OCI image
-specification, with `manifest.json` of `docker save` next to it for engines that read only that.
+ARCHITECTURE is amd64 or arm64, as in Go. `podman load`, `docker load` and `skopeo copy oci-archive:FILE` read the
+image, and no container engine is needed to make it. SOURCE_DATE_EPOCH is the date of its files. The format is that of the OCI
+image specification. `manifest.json` of `docker save` is included for engines that read only this file.
 """
 
 import gzip
@@ -19,7 +19,7 @@ import time
 from pathlib import Path
 
 USER = 7450
-"""The number of the user `understudy` in the image; compose.yaml and docs/how-to/install.md name it."""
+"""Number of the user `understudy` in the image, also used in compose.yaml and docs/how-to/install.md."""
 
 EPOCH = int(os.environ.get("SOURCE_DATE_EPOCH", "0"))
 KEYS = "var/lib/understudy"
@@ -27,7 +27,7 @@ JOURNALS = "var/log/understudy"
 
 
 class Archive:
-    """A tar file in memory whose bytes depend on nothing but its content."""
+    """A tar file in memory whose bytes depend on its content only."""
 
     def __init__(self) -> None:
         self.buffer = io.BytesIO()

@@ -1,16 +1,15 @@
 #!/bin/sh
-# Everything that can be installed without a build, from one commit, for Linux on x86-64 and aarch64. Publishes nothing;
-# needs no root.
+# Makes all release packages from one commit, for Linux on x86-64 and aarch64. Publishes nothing and needs no root.
 #
 #   deployment/release.sh [DIRECTORY] [TARGET...]
 #
 # For each target: static binaries of `understudy` and `understudy-opcua` with their bills of materials, a Python wheel,
-# a Debian package and a container image. For all: the cell of compose.yaml, and SHA256SUMS. Without targets both are
-# built. docs/how-to/install.md describes them.
+# a Debian package and a container image. For all targets: the cell of compose.yaml, and SHA256SUMS. The default is both
+# targets. docs/how-to/install.md describes the packages.
 #
-# The C parts (ring) need a C compiler for musl: Zig (`pip install ziglang`) has it for both, musl-gcc (Debian:
-# musl-tools) for this machine's own. Rust brings the linker and the C library: Zig's own has an allocator on which a
-# thread waits by spinning, and one in real time then waits for ever for one that is not.
+# The C parts (ring) need a C compiler for musl: Zig (`pip install ziglang`) for both targets, or musl-gcc (Debian:
+# musl-tools) for the target of this machine. The linker and the C library are those of Rust. The allocator of Zig's C
+# library uses spin locks, on which a real-time thread can wait indefinitely for a thread of lower priority.
 set -eu
 cd "$(dirname "$0")/.."
 umask 022
@@ -22,9 +21,9 @@ out=${1:-release}
 version=$(sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
 mkdir -p "${CARGO_TARGET_DIR:-target}"
 target_directory=$(cd "${CARGO_TARGET_DIR:-target}" && pwd)
-# Packages are made here and appear in the directory of the release when all of them are complete.
+# Packages are made here and moved to the release directory when all of them are complete.
 work=$target_directory/release-packages
-# The same commit gives the same bytes, wherever it is built.
+# The same commit gives the same bytes on every machine.
 remapped="--remap-path-prefix=$PWD=. --remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}=cargo"
 
 refuse() {
@@ -32,12 +31,12 @@ refuse() {
     exit 1
 }
 
-# Compilers under the names that a build asks for, and what musl has in its C library and others beside it.
+# Makes compilers under the names that the build requires, and an empty libdl, which is part of the C library in musl.
 prepare() {
     tools=$target_directory/release-tools/$1
     mkdir -p "$tools"
     if python3 -m ziglang version > /dev/null 2>&1; then
-        # Zig knows the target by a name of its own.
+        # Zig has another name for the target.
         cat > "$tools/cc" << END
 #!/bin/sh
 for argument; do
@@ -71,7 +70,7 @@ build() {
         name="$work/$binary-$version-$1"
         cp "$target_directory/$1/release/$binary" "$name"
         python3 deployment/bill_of_materials.py "$1" "$package" > "$name.cdx.json"
-        # A static binary needs no interpreter.
+        # A static binary has no interpreter.
         if readelf --program-headers "$name" | grep -q INTERP; then
             refuse "$name is not static"
         fi
@@ -110,12 +109,12 @@ debian_package() {
     sed "s/@version@/$version/; s/@architecture@/$2/; s/@size@/$size/" deployment/deb/control > "$tree/DEBIAN/control"
     install -m 755 deployment/deb/postinst deployment/deb/prerm deployment/deb/postrm "$tree/DEBIAN"
     chmod 755 "$tree"
-    # More threads compress to other bytes.
+    # The number of threads changes the compressed bytes.
     DPKG_DEB_THREADS_MAX=1 dpkg-deb --root-owner-group --build "$tree" "$work/understudy_${version}_$2.deb" > /dev/null
     rm -rf "$tree"
 }
 
-# The press cell with an address for each member, and its services.
+# Makes the press cell with an address for each member, and its services.
 cell() {
     folder=$(mktemp -d)
     cp examples/press-cell/*.ladder "$folder"

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""A Python wheel that installs static binaries as commands: `pip install ./understudy-*.whl` gives `understudy`.
+"""Makes a Python wheel that installs static binaries as commands: `pip install ./understudy-*.whl` gives `understudy`.
 
     deployment/wheel.py VERSION ARCHITECTURE DIRECTORY NAME=BINARY... [BILL_OF_MATERIALS...]
 
 The binaries are static, so one wheel serves glibc and musl, and every Python 3. It has no dependencies.
-SOURCE_DATE_EPOCH dates its files. The formats are those of packaging.python.org: "Binary distribution format", PEP 639
-(licences), PEP 770 (bills of materials).
+SOURCE_DATE_EPOCH is the date of its files. The formats are those of packaging.python.org: "Binary distribution
+format", PEP 639 (licences), PEP 770 (bills of materials).
 """
 
 import base64

@@ -1,12 +1,14 @@
-"""A tank behind a Modbus TCP device, simulated with pymodbus (3.16.1), a library that Understudy shares nothing with.
+"""A tank behind a Modbus TCP device, simulated with pymodbus (3.16.1), which is independent of Understudy.
 
     python3 device.py [PORT]
 
-Coil 0 is the valve: the level rises while it is set and falls otherwise. Discrete inputs 0 and 1 are "below the lower mark" and
-"above the upper mark", bit 0 of holding register 10 is the operator's switch, bit 3 of holding register 20 is a lamp.
+Coil 0 is the valve: the level rises while it is set and falls otherwise. Discrete inputs 0 and 1 are "below the lower
+mark" and "above the upper mark". Bit 0 of holding register 10 is the operator's switch, and bit 3 of holding register 20
+is a lamp.
 
-A word on standard input changes its mood: `refuse` answers with exceptions, `silent` does not answer at all, `well` answers
-again. It ends with standard input. On standard output it says `ready`, and then `level L valve V lamp P` whenever the valve moves.
+A word on standard input selects the behaviour: `refuse` answers with exceptions, `silent` does not answer, `well`
+answers normally. The device ends at the end of standard input. It prints `ready` to standard output, and
+`level L valve V lamp P` when the valve changes.
 """
 
 import asyncio
@@ -22,19 +24,19 @@ VALVE, SWITCH, LAMP = 0, 10, 20
 
 
 class Tank:
-    """The plant, and the mood of the device before it."""
+    """The plant, and the behaviour of its device."""
 
     def __init__(self):
-        self.mood = "well"
+        self.behaviour = "well"
         self.level = 0
         self.valve = False
         self.lamp = False
 
     async def answer(self, function, start, address, count, registers, values):
-        """pymodbus calls it for each request before it answers."""
-        while self.mood == "silent":
+        """Called by pymodbus for each request before the answer."""
+        while self.behaviour == "silent":
             await asyncio.sleep(STEP_SECONDS)
-        if self.mood == "refuse":
+        if self.behaviour == "refuse":
             return ExcCodes.DEVICE_FAILURE
         if function == 2:
             registers[0] = (self.level < LOWER) | (self.level > UPPER) << 1
@@ -73,7 +75,7 @@ async def main():
     print("ready", flush=True)
     loop = asyncio.get_running_loop()
     while line := await loop.run_in_executor(None, sys.stdin.readline):
-        tank.mood = line.strip()
+        tank.behaviour = line.strip()
     flowing.cancel()
     await server.shutdown()
 

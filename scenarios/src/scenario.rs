@@ -4,6 +4,7 @@
 //! every understudy speaks for all programs. So the same file means the same on a slow host, a fast one and in the simulator.
 
 use std::collections::BTreeMap;
+use std::num::NonZeroU64;
 use std::ops::Range;
 
 use serde::Serialize;
@@ -64,6 +65,26 @@ impl Scenario {
             self.expect.protected = false;
         }
         self.cycles = cycles;
+        self
+    }
+
+    /// The same in 1/`divisor` of its cycles: every step and every expectation comes that much earlier, and a plant has to finish that
+    /// much fewer parts.
+    #[must_use]
+    pub fn compressed(mut self, divisor: NonZeroU64) -> Self {
+        let earlier = |cycle: &mut u64| *cycle /= divisor;
+        earlier(&mut self.cycles);
+        self.steps
+            .iter_mut()
+            .for_each(|step| earlier(&mut step.at_cycle));
+        for during in &mut self.expect.during {
+            earlier(&mut during.from);
+            earlier(&mut during.to);
+        }
+        self.expect.finished.values_mut().for_each(earlier);
+        if divisor.get() > 1 {
+            self.title += &format!(", in 1/{divisor} of its cycles");
+        }
         self
     }
 }

@@ -1,10 +1,10 @@
 //! Plants that act on each other, as processes of their own: the main burner burns over the flame of the pilot burner.
 
-use super::{PERIOD, answer, empty_folder, no_orphan, one_at_a_time};
+use super::{PERIOD, answer, empty_folder, no_orphan, some_at_a_time};
 
 #[test]
 fn the_main_burner_lights_at_the_flame_of_the_pilot_burner() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let out = empty_folder("boiler");
     let cluster = "examples/boiler/cluster.toml";
     // The purge takes 5 s, the rest of lighting less than one.

@@ -11,7 +11,7 @@ const MEASURE: [&str; 9] = [
 /// A busy host may cost a failure, never the account of it: what was measured stands beside the model, and nobody is left.
 #[test]
 fn stations_are_killed_until_the_system_fails_and_the_journals_give_an_outlook() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let out = empty_folder("measure_real");
     let times = [
         "--mtbf",
@@ -66,7 +66,7 @@ fn stations_are_killed_until_the_system_fails_and_the_journals_give_an_outlook()
 
 #[test]
 fn an_interrupted_campaign_leaves_what_was_measured_and_no_orphan() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let out = empty_folder("measure_interrupted");
     let times = [
         "--mtbf",

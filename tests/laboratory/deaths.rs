@@ -8,7 +8,7 @@ use std::time::Instant;
 use nix::sys::signal::Signal;
 use serde_json::Value;
 
-use super::shared::{DEADLINE, answer, empty_folder, one_at_a_time};
+use super::shared::{DEADLINE, answer, empty_folder, some_at_a_time};
 use super::{PRESS_CELL, no_orphan, running, running_with, signal};
 
 /// The journal of a run that is being written.
@@ -76,7 +76,7 @@ fn code(document: &Value) -> &str {
 
 #[test]
 fn every_kind_of_member_is_killed_from_outside_and_started_again_by_an_operator() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let out = empty_folder("members");
     let (mut child, mut errors) = running(&out, &[]);
     let run = fs::canonicalize(out.join("latest")).expect("a run");
@@ -167,7 +167,7 @@ fn killed(name: &str, more: &[&str]) -> (Option<i32>, String, bool) {
 
 #[test]
 fn only_the_verdict_of_a_scenario_that_did_not_ask_for_the_death_differs() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let (status, text, again) = killed("undisturbed", &["--cycles", "200"]);
     assert_eq!(status, Some(0), "{text}");
     assert!(!again, "nothing starts it unasked");

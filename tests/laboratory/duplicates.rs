@@ -10,7 +10,7 @@ use serde_json::Value;
 use understudy_bus::free_addresses;
 
 use super::deaths::{Records, is};
-use super::shared::{empty_folder, one_at_a_time, understudy};
+use super::shared::{empty_folder, some_at_a_time, understudy};
 use super::{PERIOD, PRESS_CELL, no_orphan, running, signal};
 
 /// A second robot beside that of a run: with a copy of its keys, at an address of its own.
@@ -88,7 +88,7 @@ type Wanted<'a> = (&'a str, &'a dyn Fn(&Value) -> bool);
 
 /// A run with a copy of its robot, until `wanted` came; its records, and its summary.
 fn with_copy(name: &str, period: &str, wanted: &[Wanted<'_>]) -> Vec<Value> {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let out = empty_folder(name);
     let folder = empty_folder(&format!("{name}_copy"));
     let (mut child, _errors) = running(&out, &["--security", "keys"]);

@@ -10,7 +10,7 @@ use std::time::Instant;
 use serde_json::Value;
 use understudy_testing::skip;
 
-use super::{DEADLINE, answer, empty_folder, no_orphan, one_at_a_time, running_cluster, signal};
+use super::{DEADLINE, answer, empty_folder, no_orphan, running_cluster, signal, some_at_a_time};
 
 /// What the device is written for.
 const PYMODBUS: &str = "3.16.1";
@@ -98,7 +98,7 @@ fn cluster(out: &Path, port: u16) -> PathBuf {
 
 #[test]
 fn a_device_of_another_project_is_driven_while_its_controller_is_dead() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let out = empty_folder("modbus");
     let Some(mut device) = Device::start(None) else {
         return;
@@ -145,7 +145,7 @@ fn wait_for(journal: &Path, from: usize, what: &str, test: impl Fn(&Value) -> bo
 
 #[test]
 fn a_device_that_refuses_is_silent_or_gone_means_fail_safe_and_comes_back() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let out = empty_folder("modbus_troubles");
     let Some(mut device) = Device::start(None) else {
         return;

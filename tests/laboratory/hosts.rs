@@ -9,7 +9,7 @@ use serde_json::Value;
 use understudy_testing::skip;
 
 use super::shared::DEADLINE;
-use super::{PERIOD, PRESS_CELL, answer, check, empty_folder, no_orphan, one_at_a_time, running};
+use super::{PERIOD, PRESS_CELL, answer, check, empty_folder, no_orphan, running, some_at_a_time};
 
 /// Whether this machine lets the tests make namespaces; where not, says why.
 fn permitted(name: &str) -> bool {
@@ -106,7 +106,7 @@ fn a_killed_laboratory_leaves_no_host() {
     if !permitted("killed_hosts") {
         return;
     }
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let out = empty_folder("killed_hosts");
     let (mut child, _errors) = running(&out, &["--hosts", "netns"]);
     let own = fs::read_link("/proc/self/ns/net").expect("a Linux");
@@ -134,7 +134,7 @@ fn a_killed_laboratory_leaves_no_host() {
 
 #[test]
 fn stations_join_where_a_tenth_of_all_frames_is_lost() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let out = empty_folder("join");
     let arguments = [
         "bench", "join", "--trials", "2", "--link", "udp", "--period", PERIOD, "--out",
@@ -155,7 +155,7 @@ fn stations_join_where_a_tenth_of_all_frames_is_lost() {
 
 #[test]
 fn every_role_is_killed_and_nothing_is_wrong() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let out = empty_folder("kills");
     let arguments = [
         "bench", "kills", "--kills", "4", "--link", "udp", "--period", PERIOD, "--out",

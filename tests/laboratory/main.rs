@@ -29,7 +29,7 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
 
-use shared::{DEADLINE, answer, empty_folder, one_at_a_time, understudy};
+use shared::{DEADLINE, answer, empty_folder, one_at_a_time, some_at_a_time, understudy};
 
 const PRESS_CELL: &str = "examples/press-cell/cluster.toml";
 /// Its deadline is long beside the delays of a busy machine.
@@ -66,7 +66,7 @@ fn processes() -> BTreeSet<String> {
 
 /// What a run over plain UDP came to. Cycles in which a machine that other programs share stood still are counted apart.
 fn check(name: &str, scenario: &str, more: &[&str]) -> Value {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let out = empty_folder(name);
     let arguments = [
         "lab",
@@ -178,7 +178,7 @@ fn a_remote_io_that_is_started_again_adopts_its_history() {
 
 #[test]
 fn the_demo_at_a_shorter_length() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let out = empty_folder("demo");
     let arguments = ["demo", "--cycles", "250", "--period", PERIOD, "--out"];
     let (status, document, errors) =
@@ -248,7 +248,7 @@ fn signal(process: u32, signal: Signal) {
 
 #[test]
 fn an_interrupted_run_leaves_its_results_and_no_orphan() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let out = empty_folder("interrupted");
     let (mut child, _errors) = running(&out, &[]);
     signal(child.id(), Signal::SIGINT);
@@ -267,7 +267,7 @@ fn an_interrupted_run_leaves_its_results_and_no_orphan() {
 
 #[test]
 fn a_killed_laboratory_leaves_no_orphan_and_the_next_run_cleans_up() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let out = empty_folder("killed");
     let (mut child, _errors) = running(&out, &[]);
     let run = fs::canonicalize(out.join("latest")).expect("a run");
@@ -310,7 +310,7 @@ fn process_of(out: &Path, name: &str) -> u32 {
 
 #[test]
 fn a_port_in_use_is_said_plainly_and_everything_is_stopped() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let out = empty_folder("port");
     let taken = UdpSocket::bind("127.0.0.1:0").expect("a free port");
     let port = taken.local_addr().expect("an address").port();

@@ -12,7 +12,7 @@ use serde_json::json;
 use understudy_bus::free_addresses;
 
 use super::crowd::{Device, cluster, count, until};
-use super::{Running, answer, empty_folder, one_at_a_time, text};
+use super::{Running, answer, empty_folder, some_at_a_time, text};
 
 /// All members of the cluster, as processes, and its device.
 struct Plant {
@@ -120,7 +120,7 @@ fn is_said(journal: &Path, what: &str) -> bool {
 
 #[test]
 fn an_old_image_of_another_configuration_shuts_nobody_out() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let plant = Plant::start("old_image");
     let image = plant.copy_of_the_controller(["period = \"20ms\"", "period = \"30ms\""]);
     let remote_io = plant.journal("valve-io");
@@ -135,7 +135,7 @@ fn an_old_image_of_another_configuration_shuts_nobody_out() {
 
 #[test]
 fn two_processes_of_one_controller_are_named_and_the_controller_is_heard_again() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let plant = Plant::start("duplicate");
     let image = plant.copy_of_the_controller(["", ""]);
     let remote_io = plant.journal("valve-io");
@@ -154,7 +154,7 @@ fn two_processes_of_one_controller_are_named_and_the_controller_is_heard_again()
 
 #[test]
 fn a_second_remote_io_on_one_device_is_an_alarm() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let plant = Plant::start("second_remote_io");
     let remote_io = plant.journal("valve-io");
     assert_eq!(count(&remote_io, "field-contested"), 0);

@@ -3,11 +3,11 @@
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 
-use super::{addressed_cell, answer, codes, empty_folder, one_at_a_time, text};
+use super::{addressed_cell, answer, codes, empty_folder, some_at_a_time, text};
 
 #[test]
 fn keys_are_made_listed_revoked_and_made_again() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let folder = empty_folder("life_of_keys");
     let cluster = addressed_cell(&folder);
     let keys = folder.join("keys");
@@ -55,7 +55,7 @@ fn keys_are_made_listed_revoked_and_made_again() {
 
 #[test]
 fn a_member_without_its_own_keys_does_not_start() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let folder = empty_folder("wrong_keys");
     let cluster = addressed_cell(&folder);
     let keys = folder.join("keys");

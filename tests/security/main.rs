@@ -19,7 +19,7 @@ mod systemd;
 use serde_json::Value;
 
 use shared::deployed::{Running, addressed_cell, text};
-use shared::{DEADLINE, answer, empty_folder, one_at_a_time, understudy};
+use shared::{DEADLINE, answer, empty_folder, one_at_a_time, some_at_a_time, understudy};
 
 fn codes(document: &Value) -> Vec<&str> {
     let failures = document["failures"].as_array().expect("a list");

@@ -8,7 +8,8 @@ use std::process::Stdio;
 use std::time::Instant;
 
 use super::{
-    DEADLINE, Running, addressed_cell, answer, codes, empty_folder, one_at_a_time, text, understudy,
+    DEADLINE, Running, addressed_cell, answer, codes, empty_folder, some_at_a_time, text,
+    understudy,
 };
 
 fn doctor<'a>(document: &'a serde_json::Value, check: &str, health: &str) -> Vec<&'a str> {
@@ -22,7 +23,7 @@ fn doctor<'a>(document: &'a serde_json::Value, check: &str, health: &str) -> Vec
 
 #[test]
 fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let folder = empty_folder("operator");
     let cluster = addressed_cell(&folder);
     let keys = folder.join("keys");
@@ -121,7 +122,7 @@ fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
 /// It runs, because its own list is an old one; the others have the new one.
 #[test]
 fn a_member_whose_keys_were_revoked_is_named_and_not_heard() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let folder = empty_folder("revoked_member");
     let cluster = addressed_cell(&folder);
     let keys = folder.join("keys");
@@ -161,7 +162,7 @@ fn a_member_whose_keys_were_revoked_is_named_and_not_heard() {
 /// What systemd is told, of a member that runs and of one that stands still.
 #[test]
 fn signs_of_life_come_from_a_cycle_that_runs() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let folder = empty_folder("watchdog");
     let cluster = addressed_cell(&folder);
     let path = std::env::temp_dir().join(format!("understudy-{}.notify", std::process::id()));
@@ -205,7 +206,7 @@ fn copy(from: &Path, to: &Path) {
 
 #[test]
 fn doctor_names_what_is_wrong_with_its_remedy() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let folder = empty_folder("doctor");
     let cluster = addressed_cell(&folder);
     let keys = folder.join("keys");

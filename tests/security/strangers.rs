@@ -17,7 +17,7 @@ use understudy_wire::{
     encode,
 };
 
-use super::{DEADLINE, addressed_cell, answer, empty_folder, one_at_a_time, text};
+use super::{DEADLINE, addressed_cell, answer, empty_folder, some_at_a_time, text};
 
 const SCENARIO: &str = r#"
 title = "a stranger in the place of the dead understudy"
@@ -69,7 +69,7 @@ fn offers(heard: &[u8], kept: &[Vec<u8>]) -> Vec<Vec<u8>> {
 
 #[test]
 fn a_stranger_moves_nothing_and_the_journal_names_what_he_did() {
-    let _one = one_at_a_time();
+    let _one = some_at_a_time();
     let folder = empty_folder("stranger");
     let cluster = addressed_cell(&folder);
     let scenario = folder.join("stranger.toml");

@@ -7,7 +7,7 @@ pub(crate) mod page;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 use std::time::Duration;
 
 use serde_json::Value;
@@ -15,11 +15,17 @@ use serde_json::Value;
 /// Whatever is waited for comes within this time, on a busy machine too.
 pub(crate) const DEADLINE: Duration = Duration::from_secs(90);
 
-/// Two clusters at once on two processors would measure each other, and one could find the ports of the other free.
-static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+/// Clusters of several tests run side by side: their processes wait most of the time, and each laboratory takes ports of its own.
+static CLUSTERS: RwLock<()> = RwLock::new(());
 
-pub(crate) fn one_at_a_time() -> MutexGuard<'static, ()> {
-    ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner)
+/// For a test that measures, or fills the machine: no other cluster runs meanwhile.
+pub(crate) fn one_at_a_time() -> RwLockWriteGuard<'static, ()> {
+    CLUSTERS.write().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// For a test whose cluster keeps its times beside others.
+pub(crate) fn some_at_a_time() -> RwLockReadGuard<'static, ()> {
+    CLUSTERS.read().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// An empty folder of a test's own.

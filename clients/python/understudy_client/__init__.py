@@ -1,4 +1,4 @@
-"""Reads what `understudy gateway zenoh` says of a run: states, values, margin, events. It cannot write."""
+"""Client of `understudy gateway zenoh`: reads the states, values, remaining redundancy and events of a run."""
 
 from .client import Client, Event, Program
 

@@ -1,4 +1,4 @@
-"""The keys and documents are described in docs/zenoh-keys.md."""
+"""Client of a Zenoh gateway. docs/zenoh-keys.md describes the keys and documents."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ import zenoh
 
 @dataclass(frozen=True)
 class Program:
-    """A program at its remote I/O."""
+    """The process image of a program at its remote I/O."""
 
     name: str
-    #: `direct`, `reconstructed`, `held` or `fail-safe`; None before the first deadline.
+    #: Source of the applied outputs: `direct`, `reconstructed`, `held` or `fail-safe`; None before the first deadline.
     source: str | None
     inputs: dict[str, bool] | None
     outputs: dict[str, bool] | None
-    #: Deadlines by source.
+    #: Number of deadlines by source.
     deadlines: dict[str, int]
 
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened in the run."""
+    """An event of the run."""
 
     number: int
     cycle: int
@@ -40,7 +40,7 @@ class Event:
 class Client:
     """A connection to a gateway, such as `Client("127.0.0.1:7447")`; a context manager.
 
-    Where the gateway shows several clusters to one network, `cluster` chooses.
+    `cluster` selects a cluster if the network has gateways of several clusters.
     """
 
     def __init__(self, address: str, cluster: str = "*", timeout: float = 5.0):
@@ -59,11 +59,11 @@ class Client:
         self.close()
 
     def close(self) -> None:
-        """Ends the connection."""
+        """Close the connection."""
         self._session.close()
 
     def _get(self, key: str) -> dict[str, Any]:
-        """The newest documents by the ends of their keys."""
+        """Return the newest documents, by the last parts of their keys."""
         replies = self._session.get(f"{self._root}/{key}", timeout=self._timeout)
         found = {}
         for reply in replies:
@@ -75,43 +75,43 @@ class Client:
     def _one(self, key: str) -> Any:
         found = self._get(key)
         if key not in found:
-            raise LookupError(f"the gateway has said nothing of `{key}` yet")
+            raise LookupError(f"the gateway has not published `{key}` yet")
         return found[key]
 
     def run(self) -> dict[str, Any]:
-        """How far the run is: `run`, `cycle`, `period_us`, `mode`, `timing`."""
+        """Return the state of the run: `run`, `cycle`, `period_us`, `mode`, `timing`."""
         return self._one("run")
 
     def stations(self) -> list[dict[str, Any]]:
-        """Every station with its `name` and `state`."""
+        """Return all stations, each with its `name` and `state`."""
         return self._one("stations")
 
     def margin(self) -> dict[str, Any]:
-        """Which further failures would be masked: `survives`, `singles`, `pairs`."""
+        """Return the remaining redundancy (further failures that would be masked): `survives`, `singles`, `pairs`."""
         return self._one("margin")
 
     def alarms(self) -> list[dict[str, Any]]:
-        """Alarms that are open."""
+        """Return the open alarms."""
         return self._one("alarms")
 
     def programs(self) -> dict[str, Program]:
-        """Every program by its name, with its values."""
+        """Return all programs by name, with their values."""
         return {
             key.removeprefix("programs/"): _program(key, document)
             for key, document in sorted(self._get("programs/*").items())
         }
 
     def program(self, name: str) -> Program:
-        """One of them."""
+        """Return one program."""
         return _program(f"programs/{name}", self._one(f"programs/{name}"))
 
     def events(self) -> Iterator[Event]:
-        """Events from now on, without end."""
+        """Yield each new event, without end."""
         for _, document in self._follow("events"):
             yield Event(**{field: document[field] for field in Event.__dataclass_fields__})
 
     def values(self, name: str) -> Iterator[Program]:
-        """A program whenever it changes, without end."""
+        """Yield a program after each change, without end."""
         for key, document in self._follow(f"programs/{name}"):
             yield _program(key, document)
 
@@ -122,7 +122,7 @@ class Client:
             try:
                 samples.put_nowait(sample)
             except queue.Full:
-                pass  # Who reads so slowly misses the newest.
+                pass  # A slow reader misses the newest samples.
 
         subscriber = self._session.declare_subscriber(f"{self._root}/{key}", take)
         try:
