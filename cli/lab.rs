@@ -7,6 +7,7 @@ use std::time::SystemTime;
 use clap::{Args, ValueEnum};
 use understudy_cluster::Cluster;
 use understudy_journal::{JOURNAL_LIMIT_BYTES, JournalState, RunDirectory};
+use understudy_member::link_kind;
 use understudy_network::Share;
 use understudy_processes::{
     Afterwards, Deaths, HostKind, LaboratoryError, LaboratorySettings, NetworkSettings,
@@ -17,7 +18,7 @@ use understudy_scenarios::{ResultsError, Scenario, Summary, World, write_results
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
-use crate::overrides::{OverrideArguments, link_kind, parse_size};
+use crate::overrides::{OverrideArguments, parse_size};
 use crate::proxy::ImpairmentArguments;
 use crate::run::{answer, circumstances, command_line, machine, verdict};
 use crate::wakefulness;

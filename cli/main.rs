@@ -25,7 +25,6 @@ mod endurance;
 mod excerpt;
 mod explain;
 mod failover;
-mod field;
 mod files;
 mod gateway;
 mod help;

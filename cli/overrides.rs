@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use understudy_bus::LinkKind;
-use understudy_cluster::{Cluster, Link, Overrides, Security};
+use understudy_cluster::{Link, Overrides, Security};
 use understudy_wire::Mode;
 
 #[derive(Debug, Clone, Default, Args)]
@@ -127,14 +127,6 @@ impl OverrideArguments {
             self.mode.and_then(|mode| mode.to_possible_value()),
         );
         arguments
-    }
-}
-
-/// What carries the frames of a cluster.
-pub(crate) fn link_kind(cluster: &Cluster) -> LinkKind {
-    match cluster.link() {
-        Link::Udp => LinkKind::Udp,
-        Link::Zenoh => LinkKind::Zenoh,
     }
 }
 
