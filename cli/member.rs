@@ -74,19 +74,33 @@ pub(crate) struct PlantArguments {
 }
 
 pub(crate) fn run_station(arguments: &Arguments) -> Answer {
-    run(arguments, understudy_member::run_station)
+    let station = |member: Member| matches!(member, Member::Station(_));
+    let wanted = (station as fn(Member) -> bool, "station", "understudy node");
+    run(arguments, wanted, understudy_member::run_station)
 }
 
 pub(crate) fn run_remote_io(arguments: &Arguments) -> Answer {
-    run(arguments, understudy_member::run_remote_io)
+    let remote_io = |member: Member| matches!(member, Member::RemoteIo(_));
+    let wanted = (
+        remote_io as fn(Member) -> bool,
+        "remote I/O",
+        "understudy remote-io",
+    );
+    run(arguments, wanted, understudy_member::run_remote_io)
 }
 
 pub(crate) fn run_plant(arguments: &Arguments) -> Answer {
-    run(arguments, understudy_member::run_plant)
+    let plant = |member: Member| matches!(member, Member::Plant(_));
+    let wanted = (plant as fn(Member) -> bool, "plant", "understudy plant");
+    run(arguments, wanted, understudy_member::run_plant)
 }
+
+/// A test of the member's kind, its word, and the command that runs it.
+type Wanted = (fn(Member) -> bool, &'static str, &'static str);
 
 fn run(
     arguments: &Arguments,
+    (is_wanted, wanted, command): Wanted,
     member: fn(&Cluster, &MemberOptions) -> Result<(), MemberError>,
 ) -> Answer {
     let (cluster, _) = match files::cluster(&arguments.cluster, arguments.overrides.overrides()) {
@@ -95,7 +109,16 @@ fn run(
     };
     restart_for_zenoh(link_kind(&cluster));
     let done = find(&cluster, &arguments.name)
-        .and_then(|_| arguments.options(&cluster))
+        .and_then(|member| {
+            let name = arguments.name.clone();
+            let wrong = MemberError::WrongKind {
+                name,
+                wanted,
+                command,
+            };
+            is_wanted(member).then_some(()).ok_or(failed(&wrong))
+        })
+        .and_then(|()| arguments.options(&cluster))
         .and_then(|options| member(&cluster, &options).map_err(|error| failed(&error)));
     match done {
         Ok(()) => Answer::done("", json!(null)),
