@@ -3,14 +3,16 @@
 use std::fmt::Write as _;
 
 use serde::Serialize;
+use understudy_campaigns::{JOIN_CYCLES, Joined, Target, Trouble, TroubleRow, join_trial};
+use understudy_member::link_kind;
 use understudy_network::Share;
-use understudy_scenarios::{JOIN_CYCLES, Joined, Target, Trouble, TroubleRow, join_trial};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
-use crate::overrides::link_kind;
-use crate::run::demo::PressCell;
-use crate::run::lab::RunArguments;
+use crate::demo::{PressCell};
+use crate::lab::{RunArguments};
+use crate::run::demo::{PressCell};
+use crate::run::lab::{RunArguments};
 
 /// What is lost in `bench join` where nobody says otherwise.
 const LOSS: f64 = 0.1;

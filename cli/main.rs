@@ -13,7 +13,6 @@ mod deployment;
 mod endurance;
 mod excerpt;
 mod failover;
-mod field;
 mod files;
 mod inspect;
 mod kind;

@@ -6,8 +6,8 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use understudy_bus::LinkKind;
 use understudy_cluster::{Cluster, Link, Overrides, Security};
-use understudy_cycle::Mode;
-use understudy_text::duration::parse_positive;
+use understudy_cycle::{Mode};
+use understudy_text::duration::{parse_positive};
 
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct OverrideArguments {
@@ -128,14 +128,6 @@ impl OverrideArguments {
             self.mode.and_then(|mode| mode.to_possible_value()),
         );
         arguments
-    }
-}
-
-/// Link of a cluster.
-pub(crate) fn link_kind(cluster: &Cluster) -> LinkKind {
-    match cluster.link() {
-        Link::Udp => LinkKind::Udp,
-        Link::Zenoh => LinkKind::Zenoh,
     }
 }
 

@@ -7,6 +7,7 @@ mod prediction;
 use crate::commands::{Group, command};
 use clap::{Args, ValueEnum};
 use serde_json::{Map, Value, json};
+use understudy_campaigns::{options_of, set_unequal};
 use understudy_cluster::{Cluster, Overrides};
 use understudy_journal::time_name;
 use understudy_reliability::{
@@ -15,7 +16,7 @@ use understudy_reliability::{
     report_data,
 };
 use understudy_scenarios::{options_of, set_unequal};
-use understudy_text::Report;
+use understudy_text::{Report};
 
 pub(crate) fn group() -> Group {
     Group {

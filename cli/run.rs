@@ -9,10 +9,6 @@ pub(crate) mod simulate;
 pub(crate) mod wakefulness;
 
 use crate::commands::{Group, command};
-use serde::Serialize;
-use understudy_cluster::Cluster;
-use understudy_cycle::Mode;
-use understudy_scenarios::{Circumstances, Summary, Table, World};
 
 pub(crate) fn group() -> Group {
     Group {

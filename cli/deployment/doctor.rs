@@ -12,12 +12,13 @@ use understudy_bus::doctor::{Finding, Health, examine_machine, examine_peers, ex
 use understudy_bus::{BusError, Endpoints, Guard};
 use understudy_cluster::{Cluster, Security};
 use understudy_keys::{Date, KeysError, MemberKeys};
+use understudy_member::link_kind;
 use understudy_wire::Member;
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
-use crate::overrides::{OverrideArguments, link_kind};
+use crate::overrides::OverrideArguments;
 use fix::Fixed;
 
 /// Check whether this machine is ready for a member of a cluster

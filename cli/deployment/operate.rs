@@ -6,10 +6,11 @@ use std::time::{Duration, SystemTime};
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use understudy_bus::{Call, Request, TlsKeys};
+use understudy_bus::{Call, Request};
 use understudy_cluster::Overrides;
 use understudy_journal::{Command, OperatorAction, Refusal};
-use understudy_keys::{Date, OperatorKeys, TlsFiles};
+use understudy_keys::{Date, OperatorKeys};
+use understudy_member::tls_keys;
 use understudy_view::{Run, find_running_of};
 use understudy_wire::{Cycle, StateChoice};
 
@@ -201,13 +202,4 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
     let text = call.ask(&request).map_err(failed)?;
     let result = serde_json::from_str(&text).unwrap_or_else(|_| json!({ "text": text }));
     Ok(Answer::done(text, result))
-}
-
-/// Paths of the key files.
-pub(crate) fn tls_keys(tls: &TlsFiles) -> TlsKeys {
-    TlsKeys {
-        authority: tls.authority.clone(),
-        certificate: tls.certificate.clone(),
-        private_key: tls.private_key.clone(),
-    }
 }

@@ -9,6 +9,7 @@ use understudy_attach::{AttachError, Attached, find};
 use understudy_cluster::{Cluster, Security};
 use understudy_journal::{RunDirectory, keep_cluster};
 use understudy_keys::{Date, OperatorKeys};
+use understudy_member::tls_keys;
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;

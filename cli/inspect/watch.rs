@@ -8,7 +8,8 @@ use clap::Args;
 use serde::Serialize;
 use understudy_cluster::Cluster;
 use understudy_journal::{Commander, Commands, RunDirectory, commands};
-use understudy_scenarios::{LaboratoryError, MAXIMUM_CYCLES, Scenario};
+use understudy_processes::LaboratoryError;
+use understudy_scenarios::{MAXIMUM_CYCLES, Scenario};
 use understudy_view::{Run, find_running};
 use understudy_watch::{Certificate, Commanding, Logins, Served, Settings, WatchError, serve};
 

@@ -5,12 +5,13 @@ use std::path::PathBuf;
 use std::time::{Duration, SystemTime};
 
 use clap::Args;
-use understudy_cluster::Cluster;
-use understudy_reliability::{Hours, Options};
-use understudy_scenarios::{
-    LaboratoryError, Measured, Planned, Progress, Question, QuestionError, RealCampaign, Speed,
-    hold_against_model, plan_campaign, run_campaign, run_real_campaign,
+use understudy_campaigns::{
+    Measured, Planned, Question, QuestionError, RealCampaign, Speed, hold_against_model,
+    plan_campaign, run_campaign, run_real_campaign,
 };
+use understudy_cluster::Cluster;
+use understudy_processes::{LaboratoryError, Progress};
+use understudy_reliability::{Hours, Options};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::Value;
-use understudy_cycle::Mode;
-use understudy_journal::records;
+use understudy_campaigns::{look_ahead, observe_journal};
+use understudy_cycle::{Mode};
+use understudy_journal::{records};
 use understudy_scenarios::{look_ahead, observe_journal};
 
 use crate::answer::{Answer, Status};

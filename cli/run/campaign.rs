@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
 use understudy_bus::interruption;
-use understudy_scenarios::{
+use understudy_campaigns::{
     Findings, InjectionPlan, Kind, MAXIMUM_RUN_CYCLES, MINIMUM_RUN_CYCLES, Property, Shard, inject,
     merge, picture,
 };

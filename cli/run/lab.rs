@@ -7,20 +7,25 @@ use std::time::SystemTime;
 use clap::{Args, ValueEnum};
 use understudy_cluster::Cluster;
 use understudy_journal::{JOURNAL_LIMIT_BYTES, JournalState, RunDirectory};
+use understudy_member::link_kind;
 use understudy_network::Share;
-use understudy_scenarios::{
+use understudy_processes::{
     Afterwards, Deaths, HostKind, LaboratoryError, LaboratorySettings, NetworkSettings,
-    ResultsError, Scenario, Summary, World, run_commanded, write_results,
+    run_commanded,
 };
+use understudy_scenarios::{ResultsError, Scenario, Summary, World, write_results};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
+use crate::{wakefulness};
 use crate::inspect::watch::{BesideArguments, Page};
 use crate::overrides::{OverrideArguments, link_kind, parse_size};
+use crate::proxy::{ImpairmentArguments};
+use crate::run::{answer, circumstances, command_line, machine, verdict, wakefulness};
 use crate::run::outcome::{answer, circumstances, command_line, machine};
-use crate::run::wakefulness;
-use crate::tools::proxy::ImpairmentArguments;
+use crate::tools::proxy::{ImpairmentArguments};
+use crate::watch::{BesideArguments, Page};
 
 /// Run a cluster and a scenario on processes of this machine
 #[derive(Debug, Args)]

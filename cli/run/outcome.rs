@@ -5,11 +5,11 @@ use std::path::Path;
 
 use serde::Serialize;
 use understudy_cluster::Cluster;
+use understudy_cycle::Mode;
+use understudy_member::link_kind;
 use understudy_scenarios::{Circumstances, Summary, Table, World};
-use understudy_wire::Mode;
 
 use crate::answer::{Answer, Status, shell_line};
-use crate::overrides::link_kind;
 
 pub(crate) fn circumstances(
     cluster: &Cluster,

@@ -118,8 +118,10 @@ struct OpenCycle {
 /// The account of one run.
 #[derive(Debug, Clone)]
 pub struct Account {
-    pub(crate) terms: Terms,
-    pub(crate) cycles: u64,
+    /// What it knows of the cluster.
+    pub terms: Terms,
+    /// Cycles that are judged, from the origin on.
+    pub cycles: u64,
     numbering: Numbering,
     open: BTreeMap<i64, OpenCycle>,
     closed_up_to: Option<i64>,
@@ -140,7 +142,8 @@ pub struct Account {
     pub(crate) refused: Vec<(String, String)>,
     /// Records that members could not write, because their journals were too slow.
     pub(crate) unwritten: BTreeMap<Member, u64>,
-    pub(crate) interrupted: bool,
+    /// Whether the run was asked to end early.
+    pub interrupted: bool,
     /// Whether everybody was synchronised in the last cycle of the scenario.
     pub(crate) protected: bool,
     pub(crate) records: u64,
@@ -420,7 +423,8 @@ impl Account {
                 let told = newest.and_then(|newest| self.since_origin(newest));
                 self.cycles = self.cycles.min(told.unwrap_or(0));
             }
-            RunEvent::Started { .. }
+            RunEvent::Journal { .. }
+            | RunEvent::Started { .. }
             | RunEvent::Origin { .. }
             | RunEvent::Commanded { .. }
             | RunEvent::Acknowledged(_)

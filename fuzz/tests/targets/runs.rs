@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use understudy_campaigns::{Findings, merge};
 use understudy_journal::records;
-use understudy_scenarios::{Findings, merge};
 use understudy_view::{Bounds, Model};
 
 use crate::attack::attack;

@@ -3,6 +3,7 @@
 use std::io;
 use std::net::SocketAddr;
 
+use understudy_journal::JOURNAL_VERSION;
 use understudy_wire::ConfigurationHash;
 
 /// Why a cluster elsewhere cannot be looked at.
@@ -33,6 +34,18 @@ pub enum AttachError {
         theirs: String,
         /// Configuration of the file.
         ours: ConfigurationHash,
+    },
+    /// A member is of another version of this program.
+    #[error(
+        "U0535: {name} at {address} reports version {found} of the journal, and this program reads version {JOURNAL_VERSION}: use the understudy that it runs"
+    )]
+    OtherVersion {
+        /// Which member said so first.
+        name: String,
+        /// Where it listens.
+        address: SocketAddr,
+        /// Version of its records.
+        found: u32,
     },
     /// Its members take no calls.
     #[error(
@@ -79,6 +92,7 @@ impl AttachError {
             Self::Nobody { .. } => "U0561",
             Self::NotAdmitted { .. } => "U0562",
             Self::OtherConfiguration { .. } => "U0563",
+            Self::OtherVersion { .. } => "U0535",
             Self::NoKeys => "U0564",
             Self::System { .. } => "U0565",
         }

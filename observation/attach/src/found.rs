@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use understudy_bus::{BusError, Call, Peer, Request, TlsKeys};
 use understudy_cluster::{Cluster, Security};
+use understudy_journal::check_version;
 use understudy_wire::{ClusterHash, ConfigurationHash};
 
 use crate::error::{AttachError, Unheard};
@@ -41,6 +42,8 @@ pub(crate) enum Vain {
     NotAdmitted(String),
     /// It runs something else.
     Other(String),
+    /// Its records have another version.
+    Version(u32),
 }
 
 impl Vain {
@@ -48,6 +51,7 @@ impl Vain {
         match self {
             Self::Nobody(reason) | Self::NotAdmitted(reason) => reason,
             Self::Other(theirs) => format!("it runs configuration {theirs}"),
+            Self::Version(found) => format!("it reports version {found} of the journal"),
         }
     }
 }
@@ -111,6 +115,13 @@ fn why_nobody(called: Vec<(Peer, Result<Call, Vain>)>, ours: ConfigurationHash) 
                     ours,
                 };
             }
+            Err(Vain::Version(found)) => {
+                return AttachError::OtherVersion {
+                    name,
+                    address,
+                    found,
+                };
+            }
             Err(Vain::Nobody(reason)) => silent.push(unheard(reason)),
             Err(Vain::NotAdmitted(reason)) => strange.push(unheard(reason)),
             Ok(_) => {}
@@ -139,12 +150,21 @@ impl Line {
             let reason = "it believes the certificate, and does not answer its holder";
             Vain::NotAdmitted(reason.to_owned())
         })?;
-        if theirs == self.configuration.to_string() {
-            Ok(call)
-        } else {
-            Err(Vain::Other(theirs))
+        if theirs != self.configuration.to_string() {
+            return Err(Vain::Other(theirs));
         }
+        let status = call.ask(&Request::Status).unwrap_or_default();
+        let version = version_of(&status);
+        check_version(version).map_err(|wrong| Vain::Version(wrong.found))?;
+        Ok(call)
     }
+}
+
+/// Version of the records of a member, from what it said when it was ready.
+fn version_of(status: &str) -> u32 {
+    let ready: Option<serde_json::Value> = serde_json::from_str(status).ok();
+    let version = ready.and_then(|ready| ready["version"].as_u64());
+    version.map_or(1, |version| u32::try_from(version).unwrap_or(u32::MAX))
 }
 
 fn words_of(error: &std::io::Error) -> String {

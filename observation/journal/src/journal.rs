@@ -14,6 +14,7 @@ use serde::Serialize;
 
 use crate::record::Record;
 use crate::segments::{Segments, segments_of};
+use crate::version::{WrongVersion, check_header, journal_header};
 
 /// Where records go.
 #[derive(Debug)]
@@ -36,13 +37,23 @@ pub struct JournalState {
 impl Journal {
     /// A journal in a new file, of `limit_bytes` at most: the oldest records go when it is full.
     pub fn create(path: &Path, limit_bytes: u64) -> io::Result<Self> {
-        Segments::create(path, limit_bytes).map(Self::new)
+        Segments::create(path, limit_bytes).map(Self::of_headed)
     }
 }
 
 impl<W: Write> Journal<W> {
     /// A journal in any writer.
-    pub fn new(writer: W) -> Self {
+    pub fn new(mut writer: W) -> Self {
+        let headed = writer.write_all(&journal_header());
+        let mut journal = Self::of_headed(writer);
+        if let Err(error) = headed {
+            journal.stop(&error);
+        }
+        journal
+    }
+
+    /// A journal in a writer that writes the header itself.
+    fn of_headed(writer: W) -> Self {
         Self {
             writer: Some(writer),
             state: JournalState::default(),
@@ -93,6 +104,9 @@ pub enum JournalError {
     /// The text could not be read.
     #[error("the journal cannot be read: {0}")]
     Read(#[from] io::Error),
+    /// It is of another version.
+    #[error(transparent)]
+    Version(#[from] WrongVersion),
     /// A line is no record.
     #[error("line {line} is no record: {reason}")]
     Line {
@@ -122,14 +136,32 @@ pub fn records_of(
         .flat_map(|file| records(BufReader::new(file))))
 }
 
-/// The records of a journal, in order.
+/// The records of one file of a journal after its header, in order. A file of another version has none: the only item is the error.
 pub fn records(journal: impl BufRead) -> impl Iterator<Item = Result<Record, JournalError>> {
-    journal.lines().enumerate().map(|(index, line)| {
-        serde_json::from_str(&line?).map_err(|reason| JournalError::Line {
-            line: index + 1,
-            reason,
+    let mut refused = false;
+    journal
+        .lines()
+        .enumerate()
+        .filter_map(move |(index, line)| {
+            if refused {
+                return None;
+            }
+            let line = match line {
+                Ok(line) => line,
+                Err(error) => return Some(Err(error.into())),
+            };
+            if index == 0 {
+                let wrong = check_header(line.as_bytes()).err();
+                refused = wrong.is_some();
+                return wrong.map(|wrong| Err(wrong.into()));
+            }
+            Some(
+                serde_json::from_str(&line).map_err(|reason| JournalError::Line {
+                    line: index + 1,
+                    reason,
+                }),
+            )
         })
-    })
 }
 
 #[cfg(test)]
@@ -164,6 +196,16 @@ mod tests {
         assert_eq!(state.records + state.lost, 10);
         assert!(state.records > 0 && state.lost > 0);
         assert_eq!(state.stopped_by.as_deref(), Some("no storage space"));
+    }
+
+    #[test]
+    fn a_journal_of_another_version_is_refused_once() {
+        let record = "{\"at_ns\":7,\"name\":\"laboratory\",\"member\":null,\"event\":{\"event\":\"finished\"}}\n";
+        let read: Vec<_> = records(record.repeat(3).as_bytes()).collect();
+        assert!(matches!(
+            read.as_slice(),
+            [Err(JournalError::Version(WrongVersion { found: 1 }))]
+        ));
     }
 
     #[test]

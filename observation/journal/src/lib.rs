@@ -16,6 +16,7 @@ mod rules;
 mod run_directory;
 mod segments;
 mod source;
+mod version;
 mod writer;
 
 pub use clock::monotonic_ns;
@@ -33,5 +34,7 @@ pub use rules::{Process, SourceCounts, is_blocked, is_provable};
 pub use run_directory::{KEYS, RunDirectory, RunDirectoryError, time_name};
 pub use segments::{Segments, closed_segments, segments_of};
 pub use source::{SOURCES, source_word};
+pub use understudy_bus::JOURNAL_VERSION;
 pub use understudy_simulator::Action;
+pub use version::{WrongVersion, check_header, check_journal, check_version, journal_header};
 pub use writer::{Writing, writing};

@@ -44,6 +44,11 @@ pub enum Happening {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "kebab-case")]
 pub enum RunEvent {
+    /// The first record of each file of a journal.
+    Journal {
+        /// Version of the records that follow.
+        version: u32,
+    },
     /// A member was started, for the first time or again.
     Started {
         /// Who.

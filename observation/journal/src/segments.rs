@@ -5,11 +5,15 @@
 //!   └ the oldest that is left                      └ written now
 //! ```
 //!
+//! Each segment begins with the header that says the version of the journal.
+//!
 //! Invariant: all segments together have at most the limit, but for the line that is being written; no line is in two segments.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+
+use crate::version::journal_header;
 
 /// Segments of one file, the one that is written now included.
 const SEGMENTS: u64 = 8;
@@ -41,11 +45,12 @@ impl Segments {
             fs::rename(path, closed_path(path, next))?;
             next += 1;
         }
+        let (writer, written) = open(path)?;
         let segments = Self {
             path: path.to_owned(),
             segment_bytes: limit_bytes.max(LEAST_LIMIT) / SEGMENTS,
-            writer: open(path)?,
-            written: 0,
+            writer,
+            written,
             at_line_start: true,
             next,
         };
@@ -58,8 +63,7 @@ impl Segments {
         fs::rename(&self.path, closed_path(&self.path, self.next))?;
         self.next += 1;
         self.remove_oldest()?;
-        self.writer = open(&self.path)?;
-        self.written = 0;
+        (self.writer, self.written) = open(&self.path)?;
         Ok(())
     }
 
@@ -104,13 +108,17 @@ pub fn segments_of(path: &Path) -> io::Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-fn open(path: &Path) -> io::Result<BufWriter<File>> {
+/// A new file with its header, and the bytes of it.
+fn open(path: &Path) -> io::Result<(BufWriter<File>, u64)> {
     let file = OpenOptions::new()
         .create(true)
         .write(true)
         .truncate(true)
         .open(path)?;
-    Ok(BufWriter::with_capacity(1 << 16, file))
+    let mut writer = BufWriter::with_capacity(1 << 16, file);
+    let header = journal_header();
+    writer.write_all(&header)?;
+    Ok((writer, header.len() as u64))
 }
 
 /// `journal.jsonl` and 7 become `journal.000007.jsonl`.
@@ -177,6 +185,7 @@ mod tests {
             .collect();
         assert!(text.is_empty() || text.ends_with('\n'));
         text.lines()
+            .filter(|line| line.as_bytes() != journal_header().trim_ascii_end())
             .map(|line| line.trim_end_matches('x').parse().expect("a number"))
             .collect()
     }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use understudy_journal::KeptError;
+use understudy_journal::{KeptError, WrongVersion};
 
 /// A question that has no answer.
 #[derive(Debug, thiserror::Error)]
@@ -25,6 +25,14 @@ pub enum ViewError {
         path: PathBuf,
         /// Why.
         reason: String,
+    },
+    /// The journal is of another version.
+    #[error("U0534: {}: {wrong}", path.display())]
+    Version {
+        /// Which file.
+        path: PathBuf,
+        /// The version that it has.
+        wrong: WrongVersion,
     },
     /// No program has an output of this name.
     #[error("U0573: no program has an output `{name}`; {hint}")]
@@ -92,6 +100,7 @@ impl ViewError {
             Self::NoRun { .. } => "U0570",
             Self::Kept(KeptError::NotKept { .. }) => "U0571",
             Self::Kept(_) | Self::Journal { .. } => "U0572",
+            Self::Version { .. } => "U0534",
             Self::NoOutput { .. } => "U0573",
             Self::SeveralOutputs { .. } => "U0574",
             Self::NoCycle { .. } => "U0575",

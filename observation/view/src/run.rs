@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use serde_json::Value;
 use understudy_cluster::Cluster;
-use understudy_journal::{Commander, Writing, kept_cluster, segments_of, writing};
+use understudy_journal::{
+    Commander, JournalError, Writing, check_journal, kept_cluster, segments_of, writing,
+};
 use understudy_wire::{Cycle, Epoch, Moment};
 
 use crate::error::ViewError;
@@ -121,9 +123,17 @@ impl Run {
     /// A run in a directory, finished or not.
     ///
     /// # Errors
-    /// There is none, or it does not contain its cluster.
+    /// There is none, its journal has another version, or it does not contain its cluster.
     pub fn open(path: &Path) -> Result<Self, ViewError> {
         let path = find_run(path)?;
+        let journal = path.join(JOURNAL);
+        // What else is wrong with it is said by who follows it.
+        if let Err(JournalError::Version(wrong)) = check_journal(&journal) {
+            return Err(ViewError::Version {
+                path: journal,
+                wrong,
+            });
+        }
         let cluster = Arc::new(kept_cluster(&path)?);
         Ok(Self { path, cluster })
     }

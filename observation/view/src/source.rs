@@ -8,7 +8,7 @@ mod progress;
 
 use std::path::{Path, PathBuf};
 
-use understudy_journal::Record;
+use understudy_journal::{Record, WrongVersion};
 
 use channel::Channel;
 pub use channel::Feed;
@@ -26,6 +26,9 @@ pub enum Trouble {
         /// Why.
         reason: String,
     },
+    /// The journal is of another version.
+    #[error(transparent)]
+    Version(#[from] WrongVersion),
     /// A line is no record; it is left out.
     #[error("a line of the journal is no record: {reason}")]
     Line {

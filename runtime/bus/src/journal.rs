@@ -21,6 +21,13 @@ use crate::host::Summary;
 use crate::link::LinkKind;
 use crate::rights::Rights;
 
+/// Version of the journal: what its records are called and hold. Journals of version 1 do not say theirs.
+pub const JOURNAL_VERSION: u32 = 2;
+
+fn first_version() -> u32 {
+    1
+}
+
 /// Records that wait to be written, at most: some seconds of a member at 10 ms.
 pub const JOURNAL_RECORDS: usize = 4096;
 
@@ -53,6 +60,9 @@ pub enum Noted<E> {
 pub enum HostEvent {
     /// It listens, and its cycle starts.
     Ready {
+        /// Version of the records that it reports.
+        #[serde(default = "first_version")]
+        version: u32,
         /// Process id.
         process: u32,
         /// Where it listens.
@@ -418,6 +428,7 @@ mod tests {
         };
         let records = [
             record(Noted::Host(HostEvent::Ready {
+                version: JOURNAL_VERSION,
                 process: 4711,
                 address: ([127, 0, 0, 1], 7450).into(),
                 link: LinkKind::Zenoh,

@@ -48,7 +48,8 @@ pub use guard::{Guard, Keys, NewLife};
 pub use host::{Host, Summary};
 pub use interruption::interruption;
 pub use journal::{
-    EventSink, HostEvent, JOURNAL_RECORDS, Journal, JournalSender, Noted, Record, RefusedAs,
+    EventSink, HostEvent, JOURNAL_RECORDS, JOURNAL_VERSION, Journal, JournalSender, Noted, Record,
+    RefusedAs,
 };
 pub use link::{Link, LinkCounters, LinkKind, NoSuchLink, Reopening, ZENOH_PORT_OFFSET};
 pub use member::{MemberSettings, run_member};

@@ -18,7 +18,7 @@ use crate::error::BusError;
 use crate::field::FieldDriver;
 use crate::guard::Guard;
 use crate::host::{Host, Summary};
-use crate::journal::{EventSink, HostEvent, JOURNAL_RECORDS, Journal, Noted};
+use crate::journal::{EventSink, HostEvent, JOURNAL_RECORDS, JOURNAL_VERSION, Journal, Noted};
 use crate::link::LinkKind;
 use crate::observer::Observer;
 use crate::orders::{Order, orders};
@@ -107,6 +107,7 @@ where
         rights.lock();
     }
     let ready = HostEvent::Ready {
+        version: JOURNAL_VERSION,
         process: std::process::id(),
         address: link.address(),
         link: kind,

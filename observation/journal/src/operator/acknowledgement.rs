@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::clock::monotonic_ns;
 use crate::record::{Record, RunEvent};
+use crate::version::check_journal;
 use crate::writer::WriterLock;
 
 /// Which alarm, and who has seen it.
@@ -32,10 +33,9 @@ pub(super) fn append(run: &Path, acknowledgement: &Acknowledgement) -> io::Resul
     let Some(_lock) = WriterLock::take(run)? else {
         return Ok(false);
     };
-    let mut journal = OpenOptions::new()
-        .read(true)
-        .append(true)
-        .open(run.join("journal.jsonl"))?;
+    let path = run.join("journal.jsonl");
+    check_journal(&path).map_err(io::Error::other)?;
+    let mut journal = OpenOptions::new().read(true).append(true).open(path)?;
     let event = RunEvent::Acknowledged(acknowledgement.clone());
     let mut line = serde_json::to_vec(&Record::of_run(monotonic_ns(), event))?;
     line.push(b'\n');

@@ -164,6 +164,7 @@ mod tests {
     use super::*;
     use crate::journal::records_of;
     use crate::record::{Happening, RunEvent};
+    use crate::version::journal_header;
     use crate::writer::WriterLock;
 
     fn folder(name: &str) -> PathBuf {
@@ -239,7 +240,8 @@ mod tests {
         let run = folder("over");
         let journal = run.join("journal.jsonl");
         // Its writer was killed in the middle of a line.
-        std::fs::write(&journal, "{\"at_ns\":1,\"na").expect("written");
+        let begun = [journal_header().as_slice(), b"{\"at_ns\":1,\"na"].concat();
+        std::fs::write(&journal, begun).expect("written");
         let there = Commander::of_run(run.clone());
         let writer = WriterLock::take(&run).expect("a file");
         assert_eq!(there.acknowledge_and_wait(seen()), Err(Refusal::Busy));

@@ -132,6 +132,11 @@ pub(super) fn host(event: &HostEvent, names: &Members) -> Words {
 pub(super) fn run(event: &RunEvent, members: &Members) -> Words {
     use Level::{Alarm, Info, Notice, Warning};
     match event {
+        RunEvent::Journal { version } => (
+            "journal",
+            Info,
+            format!("the journal has version {version}"),
+        ),
         RunEvent::Started { member } => (
             "started",
             Notice,

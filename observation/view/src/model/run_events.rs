@@ -54,7 +54,7 @@ impl Model {
             RunEvent::Detached { member, .. } => {
                 self.changes.push(cycle, Change::Detached(*member));
             }
-            RunEvent::Commanded { .. } => {}
+            RunEvent::Journal { .. } | RunEvent::Commanded { .. } => {}
         }
         self.happened(record, cycle, None);
     }

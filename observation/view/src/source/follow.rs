@@ -13,8 +13,8 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
-use understudy_journal::{Record, closed_segments};
-use understudy_text::shortened;
+use understudy_journal::{Record, check_header, closed_segments};
+use understudy_text::{shortened};
 
 use super::Trouble;
 use super::progress::Progress;
@@ -51,6 +51,16 @@ struct Open {
     number: Option<u64>,
     /// Bytes read of it.
     read: u64,
+    header: Header,
+}
+
+/// What is known of the first line of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Header {
+    Unread,
+    Accepted,
+    /// The file is of another version, and its lines are left out.
+    Refused,
 }
 
 impl Open {
@@ -206,6 +216,7 @@ impl Follower {
                     inode,
                     number,
                     read: 0,
+                    header: Header::Unread,
                 });
                 Ok(true)
             }
@@ -312,6 +323,17 @@ impl Follower {
                 continue;
             }
             if !std::mem::take(&mut self.skipping) && self.line.len() > 1 {
+                if open.header != Header::Accepted {
+                    if let (Header::Unread, Err(wrong)) = (open.header, check_header(&self.line)) {
+                        open.header = Header::Refused;
+                        take(Err(wrong.into()));
+                        taken += 1;
+                    } else if open.header == Header::Unread {
+                        open.header = Header::Accepted;
+                    }
+                    self.line.clear();
+                    continue;
+                }
                 let record = serde_json::from_slice(&self.line);
                 // The message may quote the line.
                 take(record.map_err(|error: serde_json::Error| Trouble::Line {

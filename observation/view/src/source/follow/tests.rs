@@ -2,7 +2,7 @@ use std::io::Write;
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use understudy_journal::{Happening, RunEvent, Segments};
+use understudy_journal::{Happening, RunEvent, Segments, WrongVersion, journal_header};
 
 use super::*;
 
@@ -114,7 +114,7 @@ fn what_is_gone_is_said() {
 fn what_is_no_record_is_left_out() {
     let folder = folder("follow-bad");
     let path = folder.join("journal.jsonl");
-    let mut bytes = line(0);
+    let mut bytes = [journal_header(), line(0)].concat();
     bytes.extend(b"{\"at_ns\":1}\n\n\xff\xfe\n");
     bytes.extend(vec![b'x'; 3 * LONGEST_LINE]);
     bytes.push(b'\n');
@@ -123,6 +123,18 @@ fn what_is_no_record_is_left_out() {
     fs::write(&path, bytes).expect("written");
     let mut follower = Follower::new(&path);
     assert_eq!(taken(&mut follower), [Some(0), None, None, None, Some(1)]);
+    fs::remove_dir_all(folder).expect("it goes");
+}
+
+#[test]
+fn a_journal_of_another_version_is_refused_once() {
+    let folder = folder("follow-version");
+    let path = folder.join("journal.jsonl");
+    fs::write(&path, [line(0), line(1), line(2)].concat()).expect("written");
+    let mut found = Vec::new();
+    Follower::new(&path).poll(&mut |record| found.push(record));
+    let wrong = WrongVersion { found: 1 };
+    assert_eq!(found, [Err(Trouble::Version(wrong))]);
     fs::remove_dir_all(folder).expect("it goes");
 }
 

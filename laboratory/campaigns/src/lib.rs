@@ -1,0 +1,26 @@
+//! Campaigns: many runs that are drawn from a seed, in the simulator or on processes, and what they measure.
+//!
+//! Fault injection looks for a run that breaks a property and shrinks it ([`inject`]). A measurement lets stations fail and be repaired until a
+//! program is lost ([`run_campaign`], [`run_real_campaign`]). An outlook takes the same figures from the journal of a run ([`look_ahead`]).
+
+mod campaign;
+mod injection;
+mod joining;
+mod observed;
+mod outlook;
+mod troubles;
+
+pub use campaign::{
+    CampaignError, CampaignPlan, Found, Measured, OwnTime, Planned, Question, QuestionError,
+    RealCampaign, RealCampaignRun, Speed, hold_against_model, options_of, plan_campaign,
+    run_campaign, run_real_campaign, set_unequal,
+};
+pub use injection::{
+    CoverageRow, Deadlines, Failure, Findings, FindingsError, InjectionPlan, Kind,
+    MAXIMUM_FAILURES, MAXIMUM_RUN_CYCLES, MINIMUM_RUN_CYCLES, MergeError, NoShard, Phase,
+    PictureError, Property, Role, Shard, inject, merge, picture,
+};
+pub use joining::{JOIN_CYCLES, Joined, join_trial};
+pub use observed::{JournalView, ObservationError, observe_journal};
+pub use outlook::{JournalOutlook, look_ahead};
+pub use troubles::{Target, Trouble, TroubleRow};

@@ -1,0 +1,181 @@
+//! What the laboratory does when somebody commands.
+
+use understudy_journal::{Command, Commanded, OperatorAction, Refusal, RunEvent};
+use understudy_simulator::{Action, Fault};
+use understudy_wire::{Force, Member, ProgramId};
+
+use super::Laboratory;
+use crate::process::Process;
+
+impl Laboratory<'_> {
+    pub(super) async fn obey(&mut self, commanded: Commanded) {
+        let done = match commanded.action.clone() {
+            OperatorAction::Acknowledge(seen) => {
+                self.note(RunEvent::Acknowledged(seen));
+                self.show_journal();
+                Ok(())
+            }
+            OperatorAction::Command {
+                member,
+                command,
+                owner,
+                reason,
+            } => self.obey_command(member, command, owner, reason).await,
+        };
+        commanded.answer(done);
+    }
+
+    async fn obey_command(
+        &mut self,
+        member: Member,
+        command: Command,
+        owner: String,
+        reason: String,
+    ) -> Result<(), Refusal> {
+        // Whoever commands may make everybody stand still for as long as he wants.
+        self.commanded = true;
+        let refusal = self.too_early().or_else(|| self.refusal(member, &command));
+        let done = match refusal {
+            Some(refusal) => Err(refusal),
+            None => self.command(member, &command).await,
+        };
+        self.note(RunEvent::Commanded {
+            member,
+            command,
+            owner,
+            reason,
+            refused: done.as_ref().err().map(ToString::to_string),
+        });
+        done
+    }
+
+    /// Why no command is taken before the scenario is over, where that is so.
+    fn too_early(&self) -> Option<Refusal> {
+        let afterwards = self.afterwards.as_ref()?;
+        let refuses = afterwards.refuse_until_then && self.judged.is_none();
+        refuses.then_some(Refusal::ScenarioRuns(self.account.cycles))
+    }
+
+    /// Why a command cannot be done now.
+    fn refusal(&self, member: Member, command: &Command) -> Option<Refusal> {
+        let name = || self.name(member);
+        let process = self.processes.get(&member);
+        let running = self.is_running(member);
+        let still = process.is_some_and(Process::is_suspended);
+        let already = |is| Refusal::Already { name: name(), is };
+        let wrong = |needs| Refusal::WrongMember {
+            name: name(),
+            needs,
+        };
+        let remote_io = matches!(member, Member::RemoteIo(_));
+        match command {
+            Command::Restart if running => Some(Refusal::Running(name())),
+            Command::Restart => None,
+            Command::Isolate | Command::Rejoin if matches!(member, Member::Plant(_)) => {
+                Some(wrong("a plant stays with its remote I/O"))
+            }
+            Command::Isolate | Command::Rejoin => None,
+            Command::Release
+            | Command::Choose { .. }
+            | Command::Force(_)
+            | Command::Unforce { .. }
+                if !remote_io =>
+            {
+                Some(wrong("it is for remote I/Os"))
+            }
+            _ if !running => Some(Refusal::Down(name())),
+            Command::Stop if still => Some(already("stands still")),
+            Command::Continue if !still => Some(already("runs")),
+            Command::Force(force) => self.force_refusal(member, force),
+            _ => None,
+        }
+    }
+
+    fn force_refusal(&self, member: Member, force: &Force) -> Option<Refusal> {
+        let Member::RemoteIo(ProgramId(program)) = member else {
+            return None;
+        };
+        let signals = self.account.terms.signals.get(usize::from(program))?;
+        let (inputs, outputs) = (signals.inputs.len(), signals.outputs.len());
+        Refusal::of_force(&self.name(member), force, inputs, outputs)
+    }
+
+    async fn command(&mut self, member: Member, command: &Command) -> Result<(), Refusal> {
+        let line = |word: &str, value: Result<String, serde_json::Error>| {
+            value.map(|value| format!("{word} {value}"))
+        };
+        let action = match command {
+            Command::Kill => Action::Crash,
+            Command::Restart => Action::Restart,
+            Command::Stop => Action::Stop,
+            Command::Continue => Action::Continue,
+            Command::Release => Action::Release,
+            Command::Choose { choice } => Action::Choose { choice: *choice },
+            Command::Isolate => return self.cut_all(member, true).await,
+            Command::Rejoin => return self.cut_all(member, false).await,
+            Command::Force(force) => {
+                return self
+                    .tell(member, line("force", serde_json::to_string(force)))
+                    .await;
+            }
+            Command::Unforce { signal } => {
+                return self
+                    .tell(member, line("unforce", serde_json::to_string(signal)))
+                    .await;
+            }
+        };
+        self.act(member, action).await
+    }
+
+    async fn act(&mut self, member: Member, action: Action) -> Result<(), Refusal> {
+        let step = Fault {
+            at_cycle: self.account.cycle().map_or(0, |cycle| cycle + 1),
+            phase: 0.0,
+            member,
+            action,
+        };
+        let done = self.do_step(&step).await;
+        done.map_err(|error| self.system(member, error))
+    }
+
+    async fn cut_all(&mut self, member: Member, cut: bool) -> Result<(), Refusal> {
+        let all: Vec<Member> = self.account.terms.members.iter().map(|(p, _)| p).collect();
+        let stations_only = matches!(member, Member::RemoteIo(_));
+        let others = all.into_iter().filter(|&other| match other {
+            Member::Station(_) => other != member,
+            Member::RemoteIo(_) => !stations_only,
+            Member::Plant(_) => false,
+        });
+        for other in others {
+            for (from, to) in [(member, other), (other, member)] {
+                let action = if cut {
+                    Action::Cut { to }
+                } else {
+                    Action::Heal { to }
+                };
+                self.act(from, action).await?;
+            }
+        }
+        Ok(())
+    }
+
+    async fn tell(
+        &mut self,
+        member: Member,
+        line: Result<String, serde_json::Error>,
+    ) -> Result<(), Refusal> {
+        let told = match (line, self.processes.get_mut(&member)) {
+            (Ok(line), Some(process)) => process.command(&line).await,
+            (Err(error), _) => Err(error.into()),
+            (_, None) => Err(std::io::ErrorKind::NotFound.into()),
+        };
+        told.map_err(|error| self.system(member, error))
+    }
+
+    fn system(&self, member: Member, error: impl std::fmt::Display) -> Refusal {
+        Refusal::System {
+            name: self.name(member),
+            reason: error.to_string(),
+        }
+    }
+}

@@ -1,0 +1,269 @@
+//! The processes of a run: they are started, heard, disturbed and ended here.
+
+use std::collections::BTreeSet;
+use std::process::ExitStatus;
+use std::time::{Duration, Instant};
+
+use tokio::process::Command;
+use tokio::sync::mpsc::Receiver;
+use understudy_bus::{Cuts, HostEvent, ZENOH_RUNTIME};
+use understudy_journal::{Happening, Record, RunEvent, check_version};
+use understudy_scenarios::action_word;
+use understudy_simulator::{Action, Fault};
+use understudy_wire::Member;
+
+use super::{Deaths, Laboratory, Progress};
+use crate::error::LaboratoryError;
+use crate::process::{Process, Said, Saying};
+
+/// How long a process may take to end by itself.
+const END_PATIENCE: Duration = Duration::from_secs(3);
+
+impl Laboratory<'_> {
+    pub(super) async fn start(&mut self, member: Member) -> Result<(), LaboratoryError> {
+        let name = self.name(member);
+        let mut command = Command::new(&self.settings.program);
+        command
+            .arg(match member {
+                Member::Station(_) => "node",
+                Member::RemoteIo(_) => "remote-io",
+                Member::Plant(_) => "plant",
+            })
+            .arg(&self.settings.cluster_file)
+            .args(["--name", &name])
+            .arg("--endpoints")
+            .args(self.site.endpoints(member))
+            .arg("--in-laboratory")
+            .args(self.keys.arguments(&name))
+            .args(&self.settings.arguments)
+            .env(ZENOH_RUNTIME.0, ZENOH_RUNTIME.1);
+        let life = self
+            .lives
+            .entry(member)
+            .and_modify(|life| *life += 1)
+            .or_insert(1);
+        let start = || Process::start(member, *life, command, self.sender.clone());
+        let process = self.site.at(member, start)?;
+        let mut process = process.map_err(|source| LaboratoryError::Start {
+            name,
+            program: self.settings.program.clone(),
+            source,
+        })?;
+        if let Some(cuts) = self.cuts.get(&member) {
+            cut(&mut process, cuts).await;
+        }
+        self.processes.insert(member, process);
+        self.recovery.started(member);
+        self.note(RunEvent::Started { member });
+        Ok(())
+    }
+
+    pub(super) fn is_running(&self, member: Member) -> bool {
+        self.processes.get(&member).is_some_and(Process::is_running)
+    }
+
+    /// Starts a member that has ended unexpectedly.
+    pub(super) async fn restart(&mut self, member: Member) {
+        let step = Fault {
+            at_cycle: self.account.cycle().map_or(0, |cycle| cycle + 1),
+            phase: 0.0,
+            member,
+            action: Action::Restart,
+        };
+        if let Err(error) = self.do_step(&step).await {
+            let after = self.recovery.ended(member, Instant::now());
+            self.show_step(format!("{error}; again in {after:?}"));
+        }
+    }
+
+    /// A line for whoever watches the run.
+    fn show_step(&mut self, what: String) {
+        let cycle = self.account.cycle().unwrap_or(0);
+        (self.watch)(Progress::Step { cycle, what });
+    }
+
+    pub(super) async fn hear(&mut self, said: Said) -> Result<(), LaboratoryError> {
+        let Said { member, life, what } = said;
+        match what {
+            Saying::Line(line) => self.read(member, &line),
+            Saying::End(lines) => {
+                let Some(process) = self.processes.get_mut(&member) else {
+                    return Ok(());
+                };
+                if process.life() != life || !process.is_running() {
+                    return Ok(());
+                }
+                let status = process.end(END_PATIENCE).await;
+                self.died(member, life, status, lines)
+            }
+        }
+    }
+
+    /// A member has ended unexpectedly.
+    fn died(
+        &mut self,
+        member: Member,
+        life: u32,
+        status: Option<ExitStatus>,
+        lines: Vec<String>,
+    ) -> Result<(), LaboratoryError> {
+        let how = status.map_or("it closed its output".to_owned(), |it| it.to_string());
+        self.note(RunEvent::Ended {
+            member,
+            how: how.clone(),
+            said: lines.clone(),
+        });
+        self.show_journal();
+        // A member that says itself why it cannot work keeps the run from beginning; what a signal does comes from outside.
+        let refused = status.is_some_and(|status| status.code().is_some());
+        let never_worked = life == 1 && !self.ready.contains(&member) && refused;
+        if never_worked || self.settings.deaths == Deaths::EndTheRun {
+            let name = self.name(member);
+            return Err(LaboratoryError::Ended { name, how, lines });
+        }
+        let name = self.name(member);
+        let back = match self.settings.deaths {
+            Deaths::Restarted => {
+                let after = self.recovery.ended(member, Instant::now());
+                format!("it is started again in {after:?}")
+            }
+            _ => format!(
+                "start it again with `understudy operate {} --name {name} restart`",
+                self.directory.display()
+            ),
+        };
+        self.show_step(format!("{name} ended unexpectedly ({how}): {back}"));
+        Ok(())
+    }
+
+    fn read(&mut self, member: Member, line: &str) -> Result<(), LaboratoryError> {
+        let Ok(record) = serde_json::from_str::<Record>(line) else {
+            return Err(LaboratoryError::Record {
+                name: self.name(member),
+                line: line.chars().take(200).collect(),
+            });
+        };
+        if let Happening::Host(HostEvent::Ready {
+            rights, version, ..
+        }) = &record.event
+        {
+            check_version(*version).map_err(|wrong| LaboratoryError::Version {
+                name: self.name(member),
+                found: wrong.found,
+            })?;
+            self.ready.insert(member);
+            self.machine.extend(rights.lacking.iter().cloned());
+        }
+        self.take(&record);
+        Ok(())
+    }
+
+    pub(super) async fn do_step(&mut self, step: &Fault) -> Result<(), LaboratoryError> {
+        let name = self.name(step.member);
+        let running = self.is_running(step.member);
+        let cannot = match step.action {
+            Action::Restart if running => Some("it runs already"),
+            Action::Crash
+            | Action::Stop
+            | Action::Continue
+            | Action::Release
+            | Action::Choose { .. }
+                if !running =>
+            {
+                Some("it has ended")
+            }
+            _ => None,
+        };
+        if let Some(why) = cannot {
+            // Only after a member ended unexpectedly, or an operator acted: scenarios are checked for it.
+            self.show_step(format!("no {} of {name}: {why}", action_word(step.action)));
+            return Ok(());
+        }
+        let done = match (step.action, self.processes.get_mut(&step.member)) {
+            (Action::Restart, _) => {
+                self.start(step.member).await?;
+                Ok(())
+            }
+            (Action::Cut { to }, _) => self.cut(step.member, to, true).await,
+            (Action::Heal { to }, _) => self.cut(step.member, to, false).await,
+            (Action::Crash, Some(process)) => process.crash().await,
+            (Action::Stop, Some(process)) => process.stop(),
+            (Action::Continue, Some(process)) => process.go_on(),
+            (Action::Release, Some(process)) => process.command("release").await,
+            (Action::Choose { choice }, Some(process)) => {
+                let line = serde_json::to_string(&choice).map(|it| format!("choose {it}"));
+                process.command(&line.unwrap_or_default()).await
+            }
+            // Refused before the run began.
+            _ => Err(std::io::ErrorKind::Unsupported.into()),
+        };
+        done.map_err(|source| LaboratoryError::Step {
+            action: action_word(step.action),
+            name: name.clone(),
+            source,
+        })?;
+        self.note(RunEvent::Fault {
+            action: step.action,
+            member: step.member,
+            asked: step.at_cycle,
+        });
+        (self.watch)(Progress::Step {
+            cycle: step.at_cycle,
+            what: format!("{} {name}", action_word(step.action)),
+        });
+        Ok(())
+    }
+
+    /// No frame of one member counts for another any more, or each does again.
+    async fn cut(&mut self, from: Member, to: Member, is_cut: bool) -> std::io::Result<()> {
+        if self.site.cut(from, to, is_cut)? {
+            return Ok(());
+        }
+        let cuts = self.cuts.entry(to).or_default();
+        cuts.set(from, is_cut);
+        if let Some(process) = self.processes.get_mut(&to) {
+            cut(process, cuts).await;
+        }
+        Ok(())
+    }
+
+    /// Everybody ends: asked first, then made to.
+    pub(super) async fn end(&mut self, receiver: &mut Receiver<Said>) {
+        for process in self.processes.values_mut() {
+            process.ask_to_end().await;
+        }
+        let deadline = tokio::time::Instant::now() + END_PATIENCE;
+        let mut living: BTreeSet<(Member, u32)> = self
+            .processes
+            .values()
+            .filter(|process| !process.has_ended())
+            .map(|process| (process.member(), process.life()))
+            .collect();
+        // What they still say belongs to the journal, and they only end when somebody listens.
+        while !living.is_empty() {
+            match tokio::time::timeout_at(deadline, receiver.recv()).await {
+                Ok(Some(said)) => match said.what {
+                    Saying::Line(line) => {
+                        // The run is over; a last line that is cut is none of its failures.
+                        let _ = self.read(said.member, &line);
+                    }
+                    Saying::End(_) => {
+                        living.remove(&(said.member, said.life));
+                    }
+                },
+                Ok(None) | Err(_) => break,
+            }
+        }
+        for (_, mut process) in std::mem::take(&mut self.processes) {
+            process.end(Duration::from_millis(100)).await;
+        }
+    }
+}
+
+/// Tells a member of which others it shall drop the frames.
+async fn cut(process: &mut Process, cuts: &Cuts) {
+    // Two numbers are always writable as JSON.
+    let cuts = serde_json::to_string(cuts).unwrap_or_default();
+    // One that has ended meanwhile is told when it starts again.
+    let _ = process.command(&format!("cut {cuts}")).await;
+}

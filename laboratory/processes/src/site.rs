@@ -1,0 +1,390 @@
+//! Where the members of a laboratory run, and what lies between them.
+//!
+//! | hosts | links | a cut is made by |
+//! |---|---|---|
+//! | this machine's loopback interface | direct | the receiver, which drops the frames |
+//! | one network namespace for each station, and for each remote I/O with its plant | the bridge between them | `nft` |
+//! | either | through the proxy, where the links are impaired | the receiver |
+//!
+//! Frames pass through the proxy, a thread of this process, only where the links lose, delay or change what they carry: a laboratory that
+//! is suspended must not stop its plants because an operator may cut a link. With the proxy each member is told of addresses at which it
+//! stands for the member's peers, one for each pair and direction, and knows nothing of it.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::path::{Path, PathBuf};
+
+use understudy_bus::{Endpoints, LinkKind, Peer};
+use understudy_cluster::Cluster;
+use understudy_journal::RunDirectory;
+use understudy_network::{Hosts, Impairment, NetworkError, Proxy, Route, Share, Transport};
+use understudy_scenarios::Scenario;
+use understudy_simulator::Network;
+use understudy_wire::{Member, ProgramId};
+
+use crate::error::LaboratoryError;
+
+/// The port of the first member of a host.
+const FIRST_PORT: u16 = 7450;
+
+/// On which hosts the members run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum HostKind {
+    /// All on this machine, on its loopback interface.
+    #[default]
+    Loopback,
+    /// One network namespace for each station, and one for each remote I/O with its plant.
+    Namespaces,
+}
+
+/// What lies between the members.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct NetworkSettings {
+    /// Where they run.
+    pub hosts: HostKind,
+    /// What every link does in every direction; in place of the scenario's where it does anything.
+    pub impairment: Impairment,
+    /// What the fates of datagrams come from.
+    pub seed: u64,
+}
+
+/// Where everybody is.
+#[derive(Debug)]
+pub(super) struct Site {
+    members: Vec<Member>,
+    endpoints: BTreeMap<Member, PathBuf>,
+    hosts: Option<Hosts>,
+    host_of: BTreeMap<Member, usize>,
+    proxy: Option<Proxy>,
+    /// From whom to whom, and the place of the route in the proxy.
+    routes: BTreeMap<(Member, Member), usize>,
+    /// The address of each route that a member is given for another member's.
+    stand_ins: Vec<SocketAddr>,
+    impairment: Impairment,
+}
+
+impl Site {
+    /// Makes what is needed, and writes down where everybody is.
+    pub(super) fn prepare(
+        cluster: &Cluster,
+        scenario: &Scenario,
+        link: LinkKind,
+        settings: NetworkSettings,
+        directory: &RunDirectory,
+    ) -> Result<Self, LaboratoryError> {
+        let system = |what| move |source| LaboratoryError::System { what, source };
+        let members: Vec<Member> = cluster.members().collect();
+        let impairment = if settings.impairment.is_none() {
+            scenario.network.map_or(settings.impairment, impairment_of)
+        } else {
+            settings.impairment
+        };
+        let host_of = hosts_of(&members);
+        let mut hosts = match settings.hosts {
+            HostKind::Loopback => None,
+            HostKind::Namespaces => Some(Hosts::build(&host_names(cluster, &host_of))?),
+        };
+        let addresses = match &hosts {
+            None => loopback_addresses(cluster)
+                .map_err(system("free ports of the loopback interface"))?,
+            Some(hosts) => namespace_addresses(&members, &host_of, hosts),
+        };
+        let peers: Vec<Peer> = members
+            .iter()
+            .zip(addresses)
+            .filter_map(|(&member, address)| {
+                Some(Peer {
+                    member,
+                    name: cluster.member_name(member)?.to_owned(),
+                    address,
+                })
+            })
+            .collect();
+        let list = directory.file("endpoints.json");
+        write_list(&list, &peers).map_err(system("to write endpoints.json"))?;
+        let mut site = Self {
+            endpoints: members
+                .iter()
+                .map(|&member| (member, list.clone()))
+                .collect(),
+            members,
+            hosts: None,
+            host_of,
+            proxy: None,
+            routes: BTreeMap::new(),
+            stand_ins: Vec::new(),
+            impairment,
+        };
+        let only_loss = impairment
+            == Impairment {
+                loss: impairment.loss,
+                ..Impairment::default()
+            };
+        match &mut hosts {
+            Some(hosts) if only_loss => {
+                let pairs = site.pairs_of_hosts();
+                hosts.lose(&pairs, impairment.loss)?;
+            }
+            None if impairment.is_none() => {}
+            _ => {
+                let feeds = feeds(cluster);
+                site.route(cluster, &feeds, link, &peers, hosts.as_ref(), settings.seed)?;
+                site.write_views(&peers, directory)
+                    .map_err(system("to write the endpoints of each member"))?;
+            }
+        }
+        site.hosts = hosts;
+        Ok(site)
+    }
+
+    /// Starts something where the member runs.
+    pub(super) fn at<T>(
+        &self,
+        member: Member,
+        work: impl FnOnce() -> T,
+    ) -> Result<T, NetworkError> {
+        match (&self.hosts, self.host_of.get(&member)) {
+            (Some(hosts), Some(&host)) => hosts.within(host, work),
+            _ => Ok(work()),
+        }
+    }
+
+    /// The file in which the member finds the others.
+    pub(super) fn endpoints(&self, member: Member) -> Option<&Path> {
+        self.endpoints.get(&member).map(PathBuf::as_path)
+    }
+
+    /// Lets no frame of one member through to another any more, or each again. False where nothing between them can do that, so that the
+    /// receiver has to drop them.
+    pub(super) fn cut(&mut self, from: Member, to: Member, cut: bool) -> io::Result<bool> {
+        let places = (self.host_of.get(&from), self.host_of.get(&to));
+        match (&mut self.hosts, &self.proxy, places) {
+            (Some(hosts), None, (Some(&from), Some(&to))) if from != to => {
+                let done = hosts.cut(&[(from, to)], cut);
+                done.map(|()| true).map_err(io::Error::other)
+            }
+            _ => Ok(false),
+        }
+    }
+
+    /// What a reader of the results should know.
+    pub(super) fn describe(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        if let Some(hosts) = &self.hosts {
+            let count = hosts.hosts().len();
+            notes.push(format!(
+                "{count} hosts, each a network namespace of its own"
+            ));
+            if self.proxy.is_none() && !self.impairment.loss.is_never() {
+                notes.push(format!("nft loses {} on every link", self.impairment.loss));
+            }
+        }
+        if let Some(proxy) = &self.proxy {
+            let counters = proxy.counters();
+            notes.push(format!(
+                "the links pass through the proxy: {} came, {} passed, {} were lost on purpose",
+                counters.came, counters.passed, counters.lost
+            ));
+        }
+        notes
+    }
+
+    /// One route for each pair and direction that has something to say.
+    fn route(
+        &mut self,
+        cluster: &Cluster,
+        feeds: &[(ProgramId, ProgramId)],
+        link: LinkKind,
+        peers: &[Peer],
+        hosts: Option<&Hosts>,
+        seed: u64,
+    ) -> Result<(), LaboratoryError> {
+        let host = hosts.map_or(Ipv4Addr::LOCALHOST, |_| Hosts::SWITCH);
+        let mut routes: Vec<Route> = Vec::new();
+        for first in peers {
+            let own = Endpoints::new(
+                cluster.agreement().cluster,
+                first.member,
+                peers.to_vec(),
+                feeds.to_vec(),
+            );
+            let own = own.map_err(LaboratoryError::Endpoints)?;
+            for second in peers {
+                // A session goes both ways, and is opened by the later of the two.
+                let opens = link == LinkKind::Udp || second.member < first.member;
+                if !opens || !own.talks_with(second.member) {
+                    continue;
+                }
+                self.routes
+                    .insert((first.member, second.member), routes.len());
+                routes.push(Route {
+                    listen: SocketAddr::new(IpAddr::V4(host), 0),
+                    to: link
+                        .frames_address(second.address)
+                        .map_err(LaboratoryError::Endpoints)?,
+                    transport: match link {
+                        LinkKind::Zenoh => Transport::Tcp,
+                        LinkKind::Udp => Transport::Udp,
+                    },
+                    forth: self.impairment,
+                    back: self.impairment,
+                });
+            }
+        }
+        let free = understudy_bus::free_addresses(routes.len()).map_err(|source| {
+            LaboratoryError::System {
+                what: "free ports for the proxy",
+                source,
+            }
+        })?;
+        for (route, free) in routes.iter_mut().zip(free) {
+            let stands_for = SocketAddr::new(IpAddr::V4(host), free.port());
+            let frames = link.frames_address(stands_for);
+            route.listen = frames.map_err(LaboratoryError::Endpoints)?;
+            self.stand_ins.push(stands_for);
+        }
+        let start = || Proxy::start(&routes, seed);
+        let proxy = match hosts {
+            Some(hosts) => hosts.in_switch(start)??,
+            None => start()?,
+        };
+        self.proxy = Some(proxy);
+        Ok(())
+    }
+
+    /// What each member is told of the others.
+    fn write_views(&mut self, peers: &[Peer], directory: &RunDirectory) -> io::Result<()> {
+        let folder = directory.file("endpoints");
+        std::fs::create_dir_all(&folder)?;
+        for own in peers {
+            let view: Vec<Peer> = peers
+                .iter()
+                .map(|peer| {
+                    let route = self.routes.get(&(own.member, peer.member));
+                    let stands_for = route.and_then(|&route| self.stand_ins.get(route));
+                    Peer {
+                        address: stands_for.copied().unwrap_or(peer.address),
+                        ..peer.clone()
+                    }
+                })
+                .collect();
+            let path = folder.join(format!("{}.json", own.name));
+            write_list(&path, &view)?;
+            self.endpoints.insert(own.member, path);
+        }
+        Ok(())
+    }
+
+    fn pairs_of_hosts(&self) -> Vec<(usize, usize)> {
+        let count = self
+            .members
+            .iter()
+            .filter_map(|member| self.host_of.get(member));
+        let count = count.max().map_or(0, |last| last + 1);
+        let pairs = (0..count).flat_map(|from| (0..count).map(move |to| (from, to)));
+        pairs.filter(|(from, to)| from != to).collect()
+    }
+}
+
+/// The same as the simulator's network, but that jitter keeps the order.
+fn impairment_of(network: Network) -> Impairment {
+    let share = |share: f64| Share::new(share.clamp(0.0, 1.0)).unwrap_or_default();
+    Impairment {
+        loss: share(network.loss),
+        delay: network.latency + network.jitter / 2,
+        jitter: network.jitter / 2,
+        duplicate: share(network.duplicate),
+        corrupt: share(network.corruption),
+        ..Impairment::default()
+    }
+}
+
+/// A station has a host of its own; a plant stands beside its remote I/O.
+fn hosts_of(members: &[Member]) -> BTreeMap<Member, usize> {
+    let mut host_of = BTreeMap::new();
+    for &member in members {
+        let beside = match member {
+            Member::Plant(program) => host_of.get(&Member::RemoteIo(program)).copied(),
+            Member::Station(_) | Member::RemoteIo(_) => None,
+        };
+        let next = host_of.values().max().map_or(0, |last: &usize| last + 1);
+        host_of.insert(member, beside.unwrap_or(next));
+    }
+    host_of
+}
+
+fn host_names(cluster: &Cluster, host_of: &BTreeMap<Member, usize>) -> Vec<String> {
+    let count = host_of.values().max().map_or(0, |last| last + 1);
+    let first = |host| host_of.iter().find(|(_, found)| **found == host);
+    (0..count)
+        .filter_map(first)
+        .filter_map(|(&member, _)| cluster.member_name(member))
+        .map(str::to_owned)
+        .collect()
+}
+
+/// From the cluster file, or free ones of the loopback interface.
+fn loopback_addresses(cluster: &Cluster) -> io::Result<Vec<SocketAddr>> {
+    let known: Vec<Option<SocketAddr>> = cluster
+        .members()
+        .map(|member| cluster.address(member))
+        .collect();
+    let lacking = known.iter().filter(|address| address.is_none()).count();
+    let mut free = understudy_bus::free_addresses(lacking)?.into_iter();
+    Ok(known
+        .into_iter()
+        .filter_map(|address| address.or_else(|| free.next()))
+        .collect())
+}
+
+fn namespace_addresses(
+    members: &[Member],
+    host_of: &BTreeMap<Member, usize>,
+    hosts: &Hosts,
+) -> Vec<SocketAddr> {
+    let mut used: BTreeMap<usize, u16> = BTreeMap::new();
+    members
+        .iter()
+        .filter_map(|member| {
+            let host = *host_of.get(member)?;
+            let port = used.entry(host).or_insert(FIRST_PORT);
+            *port += 1;
+            let address = hosts.hosts().get(host)?.address();
+            Some((address, *port - 1).into())
+        })
+        .collect()
+}
+
+fn feeds(cluster: &Cluster) -> Vec<(ProgramId, ProgramId)> {
+    let plants = cluster.plants().iter().enumerate();
+    plants
+        .filter_map(|(fed, place)| Some((place.as_ref()?.fed_by?, ProgramId(fed as u8))))
+        .collect()
+}
+
+fn write_list(path: &Path, peers: &[Peer]) -> io::Result<()> {
+    let text = serde_json::to_string_pretty(peers)?;
+    std::fs::write(path, text + "\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use understudy_wire::StationId;
+
+    use super::*;
+
+    #[test]
+    fn a_plant_stands_beside_its_remote_io() {
+        let members = [
+            Member::Station(StationId(0)),
+            Member::Station(StationId(1)),
+            Member::RemoteIo(ProgramId(0)),
+            Member::RemoteIo(ProgramId(1)),
+            Member::Plant(ProgramId(1)),
+        ];
+        let host_of = hosts_of(&members);
+        let places: Vec<usize> = members.iter().map(|member| host_of[member]).collect();
+        assert_eq!(places, [0, 1, 2, 3, 3]);
+    }
+}

@@ -1,0 +1,146 @@
+//! When the steps of a scenario are due, by the cycles that the remote I/Os report.
+//!
+//! A step at cycle t is meant to be felt first by cycle t. It is armed when cycle t-1 was decided, which its remote I/Os do at the
+//! deadline, and done at once, or later by its phase. Where no cycle is reported any more (nobody is there to pace, or no
+//! remote I/O to report), the period counts on.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use understudy_journal::Record;
+use understudy_scenarios::Scenario;
+use understudy_simulator::Fault;
+
+use super::Conductor;
+
+/// Periods without a report after which the clock counts.
+const SILENT_PERIODS: u32 = 20;
+
+/// Share of the period between a deadline and the next cycle.
+const DEADLINE_TO_NEXT_CYCLE: f64 = 0.35;
+
+#[derive(Debug)]
+pub(super) struct Steps {
+    period: Duration,
+    waiting: VecDeque<Fault>,
+    /// In the order of their times.
+    armed: Vec<(Instant, Fault)>,
+    newest: Option<(u64, Instant)>,
+}
+
+impl Steps {
+    pub(super) fn new(scenario: &Scenario, period: Duration) -> Self {
+        Self {
+            period,
+            waiting: scenario.steps.iter().copied().collect(),
+            armed: Vec::new(),
+            newest: None,
+        }
+    }
+}
+
+impl Conductor for Steps {
+    fn hear(&mut self, _: &Record, _: Instant) {}
+
+    fn follow(&mut self, cycle: Option<u64>, now: Instant) {
+        let Some(cycle) = cycle else {
+            return;
+        };
+        if self.newest.is_none_or(|(newest, _)| newest < cycle) {
+            self.newest = Some((cycle, now));
+        }
+        let Some((newest, since)) = self.newest else {
+            return;
+        };
+        let silent = now.duration_since(since);
+        let counted = if silent > self.period * SILENT_PERIODS {
+            newest + (silent.as_nanos() / self.period.as_nanos()) as u64
+        } else {
+            newest
+        };
+        while let Some(step) = self.waiting.front()
+            && step.at_cycle <= counted + 1
+        {
+            let after = if step.phase > 0.0 {
+                self.period.mul_f64(DEADLINE_TO_NEXT_CYCLE + step.phase)
+            } else {
+                Duration::ZERO
+            };
+            self.armed.push((now + after, *step));
+            self.waiting.pop_front();
+        }
+        self.armed.sort_by_key(|(due, _)| *due);
+    }
+
+    fn next_due(&self) -> Option<Instant> {
+        self.armed.first().map(|(due, _)| *due)
+    }
+
+    fn take_due(&mut self, now: Instant) -> Option<Fault> {
+        let due = self.next_due()?;
+        (due <= now).then(|| self.armed.remove(0).1)
+    }
+
+    fn wait_for_time(&self) -> bool {
+        !self.waiting.is_empty() || !self.armed.is_empty()
+    }
+
+    fn is_over(&self, _: Instant) -> bool {
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use understudy_simulator::Action;
+    use understudy_wire::{Member, StationId};
+
+    use super::*;
+
+    const PERIOD: Duration = Duration::from_millis(10);
+
+    fn steps(steps: &[(u64, f64)]) -> Steps {
+        let scenario = Scenario {
+            title: String::new(),
+            cycles: 1000,
+            steps: steps
+                .iter()
+                .map(|&(at_cycle, phase)| Fault {
+                    at_cycle,
+                    phase,
+                    member: Member::Station(StationId(0)),
+                    action: Action::Crash,
+                })
+                .collect(),
+            ..Scenario::default()
+        };
+        Steps::new(&scenario, PERIOD)
+    }
+
+    #[test]
+    fn a_step_is_due_when_the_cycle_before_it_was_decided() {
+        let now = Instant::now();
+        let mut steps = steps(&[(5, 0.0), (7, 0.5)]);
+        steps.follow(None, now);
+        steps.follow(Some(3), now);
+        assert_eq!(steps.take_due(now), None);
+        steps.follow(Some(4), now);
+        assert_eq!(steps.take_due(now).map(|step| step.at_cycle), Some(5));
+        steps.follow(Some(6), now);
+        assert_eq!(steps.take_due(now), None, "by its phase it is later");
+        let later = now + PERIOD.mul_f64(0.86);
+        assert_eq!(steps.take_due(later).map(|step| step.at_cycle), Some(7));
+        assert!(!steps.wait_for_time());
+    }
+
+    #[test]
+    fn the_period_counts_on_where_nobody_reports() {
+        let now = Instant::now();
+        let mut steps = steps(&[(100, 0.0)]);
+        steps.follow(Some(50), now);
+        steps.follow(Some(50), now + PERIOD * 10);
+        assert_eq!(steps.take_due(now + PERIOD * 10), None);
+        steps.follow(Some(50), now + PERIOD * 49);
+        assert!(steps.take_due(now + PERIOD * 49).is_some());
+    }
+}

@@ -1,0 +1,118 @@
+//! The version of a journal: the first record of each of its files says it.
+//!
+//! ```text
+//! {"at_ns":0,"name":"laboratory","member":null,"event":{"event":"journal","version":2}}
+//! ```
+//!
+//! Invariant: no record of another version is read. Journals that were written before they had a version have other events and keys, and
+//! count as version 1.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read as _};
+use std::path::Path;
+
+use serde::Deserialize;
+use understudy_bus::JOURNAL_VERSION;
+
+use crate::journal::JournalError;
+use crate::record::{Record, RunEvent};
+use crate::segments::segments_of;
+
+/// Bytes of the first line, at most.
+const LONGEST_HEADER: u64 = 4096;
+
+/// A journal that this program does not read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the journal has version {found}{}, and this program reads version {JOURNAL_VERSION}: read it with the understudy that wrote it, or repeat the run",
+    if *.found == 1 { " (it does not say one)" } else { "" }
+)]
+pub struct WrongVersion {
+    /// The version of the journal.
+    pub found: u32,
+}
+
+#[derive(Deserialize)]
+struct First {
+    event: Header,
+}
+
+#[derive(Deserialize)]
+struct Header {
+    event: String,
+    version: u32,
+}
+
+/// The line that each file of a journal begins with. Its time is 0: it belongs to the file and to no moment of the run.
+pub fn journal_header() -> Vec<u8> {
+    let version = JOURNAL_VERSION;
+    let record = Record::of_run(0, RunEvent::Journal { version });
+    let mut line = serde_json::to_vec(&record).unwrap_or_default();
+    line.push(b'\n');
+    line
+}
+
+/// Whether the first line of a file of a journal is that of a version that can be read.
+///
+/// # Errors
+/// [`WrongVersion`].
+pub fn check_header(line: &[u8]) -> Result<(), WrongVersion> {
+    let first = serde_json::from_slice::<First>(line).ok();
+    let header = first.map(|first| first.event);
+    let header = header.filter(|header| header.event == "journal");
+    check_version(header.map_or(1, |header| header.version))
+}
+
+/// Whether records of a version can be read.
+///
+/// # Errors
+/// [`WrongVersion`].
+pub fn check_version(found: u32) -> Result<(), WrongVersion> {
+    if found == JOURNAL_VERSION {
+        Ok(())
+    } else {
+        Err(WrongVersion { found })
+    }
+}
+
+/// Whether a journal with its older segments can be read. A file that is empty yet says nothing.
+///
+/// # Errors
+/// [`JournalError`].
+pub fn check_journal(path: &Path) -> Result<(), JournalError> {
+    for segment in segments_of(path)? {
+        let file = match File::open(segment) {
+            // The oldest segment may go at any time.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+            file => file?,
+        };
+        let mut line = Vec::new();
+        BufReader::new(file.take(LONGEST_HEADER)).read_until(b'\n', &mut line)?;
+        if line.ends_with(b"\n") {
+            check_header(&line)?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_this_version_is_read() {
+        let check = |line: &str, expected: Result<(), u32>| {
+            let checked = check_header(line.as_bytes()).map_err(|wrong| wrong.found);
+            assert_eq!(checked, expected, "{line}");
+        };
+        let header = String::from_utf8(journal_header()).expect("text");
+        check(&header, Ok(()));
+        check(&header.replace(":2}", ":3}"), Err(3));
+        check(
+            r#"{"at_ns":1,"name":"laboratory","party":null,"event":{"event":"started","party":{"station":0}}}"#,
+            Err(1),
+        );
+        check("", Err(1));
+        check("{\"at_ns\"", Err(1));
+    }
+}

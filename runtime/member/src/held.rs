@@ -1,0 +1,86 @@
+//! The keys that a member holds while it runs.
+
+use std::sync::Arc;
+use std::time::SystemTime;
+
+use understudy_bus::{Admitted, ChannelSettings, Guard, NewLife, TlsKeys, hold_back_signals};
+use understudy_cluster::{Cluster, Security};
+use understudy_keys::{Date, MemberKeys, RevocationWatch, TlsFiles};
+use understudy_wire::Member;
+
+use crate::error::MemberError;
+use crate::run::MemberOptions;
+
+/// What a member seals and opens with, and what follows its list of revoked keys.
+pub(crate) struct Held {
+    pub(crate) guard: Guard,
+    pub(crate) channel: Option<ChannelSettings>,
+    _watch: Option<RevocationWatch>,
+}
+
+pub(crate) fn read_keys(
+    options: &MemberOptions,
+    cluster: &Cluster,
+    member: Member,
+) -> Result<Held, MemberError> {
+    let folder = match (&options.keys, cluster.security()) {
+        (_, Security::Off) => {
+            return Ok(Held {
+                guard: Guard::Off,
+                channel: None,
+                _watch: None,
+            });
+        }
+        (None, Security::Keys) => {
+            return Err(MemberError::NoKeys);
+        }
+        (Some(folder), Security::Keys) => folder,
+    };
+    let now = Date::of(SystemTime::now());
+    // Whoever follows the list of revoked keys is a thread.
+    hold_back_signals()?;
+    let keys = MemberKeys::load(folder, cluster, member, now);
+    let keys = keys.map_err(MemberError::Keys)?;
+    let keys = Arc::new(keys);
+    let seal = keys.begin_life(now);
+    let watch = keys.watch();
+    match (seal, watch) {
+        (Ok(seal), Ok(watch)) => Ok(Held {
+            guard: Guard::with_keys(seal, keys.opener()).with_lives(new_life(&keys)),
+            // In a laboratory standard input is the operator.
+            channel: (!options.in_laboratory).then(|| channel(keys, cluster)),
+            _watch: Some(watch),
+        }),
+        (Err(error), _) | (_, Err(error)) => Err(MemberError::Keys(vec![error])),
+    }
+}
+
+/// A life of now, noted where the lives before it are.
+fn new_life(keys: &Arc<MemberKeys>) -> NewLife {
+    let keys = Arc::clone(keys);
+    Arc::new(move || {
+        let life = keys.begin_life(Date::of(SystemTime::now()));
+        life.map_err(|error| error.to_string())
+    })
+}
+
+fn channel(keys: Arc<MemberKeys>, cluster: &Cluster) -> ChannelSettings {
+    let tls = keys.tls().clone();
+    ChannelSettings {
+        keys: tls_keys(&tls),
+        admitted: Box::new(move || {
+            let (operators, members) = keys.admitted();
+            Admitted { operators, members }
+        }),
+        configuration: cluster.canonical_text().to_owned(),
+    }
+}
+
+/// The files of a holder of keys, as the link takes them.
+pub fn tls_keys(tls: &TlsFiles) -> TlsKeys {
+    TlsKeys {
+        authority: tls.authority.clone(),
+        certificate: tls.certificate.clone(),
+        private_key: tls.private_key.clone(),
+    }
+}

@@ -1,0 +1,19 @@
+//! One member of a cluster, put together from its file: machine, link, keys, field and journal.
+//!
+//! ```text
+//!   cluster file ──► machine (station, remote I/O, plant) ─┐
+//!   list of addresses ──► endpoints ───────────────────────┤
+//!   folder of keys ──► guard, operators' channel ──────────┼─► understudy_bus::run_member ──► journal
+//!   device ──► field driver ───────────────────────────────┘
+//! ```
+
+mod error;
+mod field;
+mod held;
+mod peers;
+mod run;
+
+pub use error::MemberError;
+pub use held::tls_keys;
+pub use peers::{addressed_peers, find_member, listed_peers};
+pub use run::{MemberOptions, link_kind, restart_for_zenoh, run_plant, run_remote_io, run_station};

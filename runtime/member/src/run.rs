@@ -1,0 +1,192 @@
+//! Stations, remote I/Os and plants as the process that this is.
+
+use std::io;
+use std::os::unix::process::CommandExt;
+use std::path::PathBuf;
+use std::process::Command;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use serde::Serialize;
+use understudy_bus::{
+    Commands, Endpoints, FieldDriver, LinkKind, MemberSettings, NoField, NoObserver, Peer,
+    SimulatedField, ZENOH_RUNTIME, run_member,
+};
+use understudy_cluster::{Cluster, Link};
+use understudy_journal::Segments;
+use understudy_node::Station;
+use understudy_plant::PlantMachine;
+use understudy_remote_io::RemoteIo;
+use understudy_wire::{Epoch, Image, Machine, Member, ProgramId, Time};
+
+use crate::error::MemberError;
+use crate::field::Equipment;
+use crate::held::read_keys;
+use crate::peers::find_member;
+
+/// What a member is told besides its cluster.
+#[derive(Debug, Clone)]
+pub struct MemberOptions {
+    /// Its name.
+    pub name: String,
+    /// All members and their addresses.
+    pub peers: Vec<Peer>,
+    /// The folder of its keys.
+    pub keys: Option<PathBuf>,
+    /// Whether it ends with standard input and with the process that started it.
+    pub in_laboratory: bool,
+    /// Whether it asks for real-time rights.
+    pub real_time: bool,
+    /// The file of its journal in place of standard output.
+    pub journal: Option<PathBuf>,
+    /// Bytes of that file and its segments, at most.
+    pub journal_limit: u64,
+}
+
+/// Runs a controller or an understudy until it is told to end.
+///
+/// # Errors
+/// [`MemberError`].
+pub fn run_station(cluster: &Cluster, options: &MemberOptions) -> Result<(), MemberError> {
+    let wrong = || wrong_kind(options, "station", "understudy node");
+    let member = find_member(cluster, &options.name)?;
+    let Member::Station(station) = member else {
+        return Err(wrong());
+    };
+    let settings = cluster.station_settings(station, epoch_of_the_clock());
+    let machine = Station::new(Time::default(), settings.ok_or_else(wrong)?);
+    run(cluster, options, member, machine, Box::new(NoField))
+}
+
+/// Runs a remote I/O until it is told to end.
+///
+/// # Errors
+/// [`MemberError`].
+pub fn run_remote_io(cluster: &Cluster, options: &MemberOptions) -> Result<(), MemberError> {
+    let wrong = || wrong_kind(options, "remote I/O", "understudy remote-io");
+    let member = find_member(cluster, &options.name)?;
+    let Member::RemoteIo(program) = member else {
+        return Err(wrong());
+    };
+    let settings = cluster.remote_io_settings(program).ok_or_else(wrong)?;
+    let field = field_of(options, cluster, program, settings.fail_safe.clone())?;
+    let machine = RemoteIo::new(Time::default(), settings);
+    run(cluster, options, member, machine, field)
+}
+
+/// Runs a simulated plant until it is told to end.
+///
+/// # Errors
+/// [`MemberError`].
+pub fn run_plant(cluster: &Cluster, options: &MemberOptions) -> Result<(), MemberError> {
+    let wrong = || wrong_kind(options, "plant", "understudy plant");
+    let member = find_member(cluster, &options.name)?;
+    let Member::Plant(program) = member else {
+        return Err(wrong());
+    };
+    let settings = cluster.plant_settings(program).ok_or_else(wrong)?;
+    let machine = PlantMachine::new(settings, Time::default());
+    run(cluster, options, member, machine, Box::new(NoField))
+}
+
+fn wrong_kind(options: &MemberOptions, wanted: &'static str, command: &'static str) -> MemberError {
+    MemberError::WrongKind {
+        name: options.name.clone(),
+        wanted,
+        command,
+    }
+}
+
+/// The device of a remote I/O where it has one, and its simulated plant otherwise.
+fn field_of(
+    options: &MemberOptions,
+    cluster: &Cluster,
+    program: ProgramId,
+    fail_safe: Image,
+) -> Result<Box<dyn FieldDriver>, MemberError> {
+    let agreement = cluster.agreement();
+    let remote_io = cluster.remote_ios().get(program.index());
+    let Some(device) = remote_io.and_then(|remote_io| remote_io.field.clone()) else {
+        return Ok(Box::new(SimulatedField::new(program, agreement.clone())));
+    };
+    let period = agreement.schedule.period();
+    let equipment = Equipment::start(device, fail_safe, period, options.real_time);
+    Ok(Box::new(equipment.map_err(MemberError::Device)?))
+}
+
+fn run<M>(
+    cluster: &Cluster,
+    options: &MemberOptions,
+    member: Member,
+    machine: M,
+    field: Box<dyn FieldDriver>,
+) -> Result<(), MemberError>
+where
+    M: Machine + Send,
+    M::Event: Serialize + Send + 'static,
+{
+    let neighbours = cluster.neighbours();
+    let peers = options.peers.clone();
+    let endpoints = Endpoints::new(cluster.agreement().cluster, member, peers, neighbours);
+    let endpoints = endpoints.map_err(MemberError::Endpoints)?;
+    let keys = read_keys(options, cluster, member)?;
+    let settings = MemberSettings {
+        endpoints,
+        link: link_kind(cluster),
+        guard: keys.guard,
+        channel: keys.channel,
+        field,
+        observer: Box::new(NoObserver),
+        commands: if options.in_laboratory {
+            Commands::ReadAndEndWithInput
+        } else {
+            Commands::Read
+        },
+        ends_with_parent: options.in_laboratory,
+        real_time: options.real_time,
+    };
+    let output: Box<dyn io::Write + Send> = match &options.journal {
+        None => Box::new(io::stdout()),
+        Some(path) => {
+            let segments = Segments::create(path, options.journal_limit);
+            Box::new(segments.map_err(|source| MemberError::Journal {
+                path: path.clone(),
+                source,
+            })?)
+        }
+    };
+    // Its last record has said the summary already.
+    run_member(machine, settings, output)?;
+    Ok(())
+}
+
+/// What carries the frames of a cluster.
+pub fn link_kind(cluster: &Cluster) -> LinkKind {
+    match cluster.link() {
+        Link::Udp => LinkKind::Udp,
+        Link::Zenoh => LinkKind::Zenoh,
+    }
+}
+
+/// Starts this program again with the environment that Zenoh needs: it takes the number of its threads from there, and only when a process
+/// starts. To be called before anything else is started, which would be lost.
+pub fn restart_for_zenoh(link: LinkKind) {
+    let (variable, value) = ZENOH_RUNTIME;
+    if link == LinkKind::Udp || std::env::var_os(variable).is_some() {
+        return;
+    }
+    if let Ok(program) = std::env::current_exe() {
+        // It only comes back where it fails; then Zenoh has more threads than it needs, and works.
+        let _ = Command::new(program)
+            .args(std::env::args_os().skip(1))
+            .env(variable, value)
+            .exec();
+    }
+}
+
+/// Later than any epoch that the cluster has had.
+fn epoch_of_the_clock() -> Epoch {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    Epoch(since.map_or(1, |since| {
+        u64::try_from(since.as_micros()).unwrap_or(u64::MAX)
+    }))
+}
