@@ -8,8 +8,7 @@ use codespan_reporting::diagnostic::Diagnostic as Drawn;
 use codespan_reporting::term::termcolor::{BufferedStandardStream, ColorChoice};
 use codespan_reporting::term::{self, Config};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use understudy_processes::{Progress};
-use understudy_scenarios::{Progress};
+use understudy_processes::Progress;
 use understudy_text::{Diagnostic, Lines, Report, Severity};
 
 use crate::answer::{Answer, Envelope, Status, shown};

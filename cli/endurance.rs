@@ -9,10 +9,8 @@ use understudy_network::Share;
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
-use crate::demo::{PressCell};
-use crate::lab::{RunArguments};
-use crate::run::demo::{PressCell};
-use crate::run::lab::{RunArguments};
+use crate::run::demo::PressCell;
+use crate::run::lab::RunArguments;
 
 /// What is lost in `bench join` where nobody says otherwise.
 const LOSS: f64 = 0.1;

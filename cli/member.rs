@@ -10,14 +10,7 @@ use understudy_member::{
     MemberError, MemberOptions, addressed_peers, find_member, link_kind, listed_peers,
     restart_for_zenoh,
 };
-use understudy_cluster::{Cluster, Security, why_unreachable};
-use understudy_cycle::{Machine};
-use understudy_journal::{Segments};
-use understudy_keys::{Date, MemberKeys, RevocationWatch};
-use understudy_node::{Station};
-use understudy_plant::{PlantMachine};
-use understudy_remote_io::{RemoteIo};
-use understudy_wire::{Epoch, Image, Member, ProgramId, Time};
+use understudy_wire::Member;
 
 use crate::answer::{Answer, Status};
 use crate::files;
@@ -149,7 +142,7 @@ impl Arguments {
 
 fn failed(error: &MemberError) -> Answer {
     if let MemberError::Keys(errors) = error {
-        return crate::keys::failed(errors);
+        return crate::deployment::keys::failed(errors);
     }
     let status = if error.is_of_input() {
         Status::BadInput

@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use understudy_bus::LinkKind;
-use understudy_cluster::{Cluster, Link, Overrides, Security};
-use understudy_cycle::{Mode};
-use understudy_text::duration::{parse_positive};
+use understudy_cluster::{Link, Overrides, Security};
+use understudy_cycle::Mode;
+use understudy_text::duration::parse_positive;
 
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct OverrideArguments {

@@ -5,18 +5,6 @@ mod outlook;
 mod prediction;
 
 use crate::commands::{Group, command};
-use clap::{Args, ValueEnum};
-use serde_json::{Map, Value, json};
-use understudy_campaigns::{options_of, set_unequal};
-use understudy_cluster::{Cluster, Overrides};
-use understudy_journal::time_name;
-use understudy_reliability::{
-    Answer as Calculated, Assessment, CommonCauseConvention, Hours, Options, Provenance,
-    ReliabilityError, SharedPart, UnequalBoxes, answer_chain, calculate, read_chain, report,
-    report_data,
-};
-use understudy_scenarios::{options_of, set_unequal};
-use understudy_text::{Report};
 
 pub(crate) fn group() -> Group {
     Group {

@@ -18,12 +18,10 @@ use understudy_text::duration::parse_positive;
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::deployment::catalogue;
+use crate::files;
 use crate::programs::verify::patience::Patience;
-use crate::run::command_line;
 use crate::run::outcome::command_line;
-use crate::verify::patience::Patience;
-use crate::{catalogue, files};
-use programs::{Programs, period};
+use programs::Programs;
 
 /// Select controllers for programs, understudies and remote I/Os
 #[derive(Debug, Args)]

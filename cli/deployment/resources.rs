@@ -10,9 +10,8 @@ use understudy_allocation::{Resources, instructions};
 use understudy_ladder::{Program, from_circuit};
 use understudy_text::duration::parse_positive;
 
-use crate::allocate::programs::Programs;
 use crate::answer::Answer;
-use crate::deployment::allocate::programs::{Programs, period};
+use crate::deployment::allocate::programs::Programs;
 
 /// Calculate the controller resources that programs require
 #[derive(Debug, Args)]

@@ -13,7 +13,6 @@ use understudy_member::tls_keys;
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
-use crate::deployment::operate::tls_keys;
 use crate::member::peers;
 
 /// Access to a running cluster.

@@ -7,9 +7,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::Value;
 use understudy_campaigns::{look_ahead, observe_journal};
-use understudy_cycle::{Mode};
-use understudy_journal::{records};
-use understudy_scenarios::{look_ahead, observe_journal};
+use understudy_cycle::Mode;
+use understudy_journal::records;
 
 use crate::answer::{Answer, Status};
 use crate::reliability::prediction::{Times, refused};

@@ -6,15 +6,15 @@ use std::time::SystemTime;
 
 use clap::{Args, ValueEnum};
 use serde_json::{Map, Value, json};
+use understudy_campaigns::{options_of, set_unequal};
 use understudy_cluster::{Cluster, Overrides};
-use understudy_diagnostic::Report;
 use understudy_journal::time_name;
 use understudy_reliability::{
     Answer as Calculated, Assessment, CommonCauseConvention, Hours, Options, Provenance,
     ReliabilityError, SharedPart, UnequalBoxes, answer_chain, calculate, read_chain, report,
     report_data,
 };
-use understudy_scenarios::{options_of, set_unequal};
+use understudy_text::Report;
 
 use crate::answer::{Answer, Status};
 use crate::files;

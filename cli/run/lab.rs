@@ -18,14 +18,11 @@ use understudy_scenarios::{ResultsError, Scenario, Summary, World, write_results
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
-use crate::{wakefulness};
 use crate::inspect::watch::{BesideArguments, Page};
-use crate::overrides::{OverrideArguments, link_kind, parse_size};
-use crate::proxy::{ImpairmentArguments};
-use crate::run::{answer, circumstances, command_line, machine, verdict, wakefulness};
+use crate::overrides::{OverrideArguments, parse_size};
 use crate::run::outcome::{answer, circumstances, command_line, machine};
-use crate::tools::proxy::{ImpairmentArguments};
-use crate::watch::{BesideArguments, Page};
+use crate::run::wakefulness;
+use crate::tools::proxy::ImpairmentArguments;
 
 /// Run a cluster and a scenario on processes of this machine
 #[derive(Debug, Args)]

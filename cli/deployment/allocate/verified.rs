@@ -9,9 +9,7 @@ use understudy_logic::Circuit;
 use understudy_logic::bdd::Diagrams;
 use understudy_parity::generate;
 use understudy_text::{Report, has_errors};
-use understudy_verification::program::{
-    Answer as Proof, Bounds, Conclusion, Lamp, OutputFinding, Subject,
-};
+use understudy_verification::program::{Bounds, Conclusion, Subject};
 use understudy_verification::property::{Properties, not_of_one_scan, read};
 use understudy_verification::prove_parity_while;
 

@@ -6,11 +6,10 @@
 
 use std::collections::BTreeMap;
 
-use understudy_journal::{Happening, JournalError, Record, RunEvent};
+use understudy_journal::{Happening, JournalError, Process, Record, RunEvent, is_provable};
 use understudy_reliability::Observed;
 use understudy_wire::{Member, ProgramId, Source, StationId};
 
-use understudy_journal::{Happening, JournalError, Process, Record, RunEvent, is_provable};
 /// Nanoseconds of an hour.
 const HOUR_NS: f64 = 3.6e12;
 

@@ -12,11 +12,12 @@ use understudy_bus::{
     SimulatedField, ZENOH_RUNTIME, run_member,
 };
 use understudy_cluster::{Cluster, Link};
+use understudy_cycle::Machine;
 use understudy_journal::Segments;
 use understudy_node::Station;
 use understudy_plant::PlantMachine;
 use understudy_remote_io::RemoteIo;
-use understudy_wire::{Epoch, Image, Machine, Member, ProgramId, Time};
+use understudy_wire::{Epoch, Image, Member, ProgramId, Time};
 
 use crate::error::MemberError;
 use crate::field::Equipment;

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
 use understudy_journal::{Record, check_header, closed_segments};
-use understudy_text::{shortened};
+use understudy_text::shortened;
 
 use super::Trouble;
 use super::progress::Progress;
