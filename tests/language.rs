@@ -134,9 +134,9 @@ fn prose_of_markdown(text: &str) -> String {
         if !inside && !fence {
             // What is between backticks is code; a code that continues on the next line is left in.
             let parts: Vec<&str> = line.split('`').collect();
-            let odd = parts.len() % 2 == 0;
+            let is_open = parts.len().is_multiple_of(2);
             for (index, part) in parts.iter().enumerate() {
-                let is_code = index % 2 == 1 && !(odd && index + 1 == parts.len());
+                let is_code = index % 2 == 1 && !(is_open && index + 1 == parts.len());
                 prose.push_str(if is_code { "`" } else { part });
             }
         }
