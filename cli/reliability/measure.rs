@@ -36,7 +36,7 @@ transfer states is measured and added to the repair time of the model, and the r
 I/O becomes fail-safe because no station holds the state of its program; in paper mode, at the second failure. Equal arguments and seeds
 give equal simulated campaigns.
 
-Exit status: 1 if the model is outside of the 95 % confidence interval, which happens by chance in one of twenty campaigns.")]
+Exit status: 1 if the model is outside of the 95 % confidence interval, as happens to a correct model in one of twenty campaigns.")]
 pub(crate) struct Arguments {
     /// Cluster file
     #[arg(value_name = "CLUSTER.toml")]

@@ -233,7 +233,7 @@ mod tests {
         check("10000", Err("write 10000h for hours"));
         check("", Err("such as 10000h"));
         check("h", Err("\"\" is not a number"));
-        check("3 weeks", Err("\"weeks\" is no unit"));
+        check("3 weeks", Err("\"weeks\" is not a unit"));
         check("12½h", Err("\"12½\" is not a number"));
         check("½", Err("no unit"));
         check("0h", Err("0h is 0 hours"));

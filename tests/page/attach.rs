@@ -83,7 +83,7 @@ fn a_laboratory_of_another_process_is_looked_at_and_commanded() {
     let first = page(CELL, &runs, &COMMON);
     synchronised(&first);
     let second = page(CELL, &runs, &[&COMMON[..], &["--allow-commands"]].concat());
-    assert!(second.said.contains("it runs already"), "{}", second.said);
+    assert!(second.said.contains("already running"), "{}", second.said);
     synchronised(&second);
     assert_eq!(give(&first, "robot", &json!({ "command": "kill" })).0, 403);
     let force =

@@ -121,7 +121,7 @@ mod tests {
         let table = check(&[0, 0, 0, 0, 0, 1], Some(2));
         assert_eq!(
             table,
-            "scan 0 1 2 3 4 5\na    . . . . . 1\nafter scan 5 all goes on as from scan 2, for ever\n"
+            "scan 0 1 2 3 4 5\na    . . . . . 1\nafter scan 5 the run repeats from scan 2 indefinitely\n"
         );
     }
 

@@ -114,11 +114,7 @@ fn an_assumption_that_fails_is_named() {
     let bunched: Vec<f64> = (0..20)
         .map(|k| 2_000.0 * f64::from(1 + k / 6) + f64::from(k))
         .collect();
-    assert!(
-        doubts(bunched)
-            .iter()
-            .any(|doubt| doubt.contains("bunches"))
-    );
+    assert!(doubts(bunched).iter().any(|doubt| doubt.contains("bursts")));
 }
 
 #[test]

@@ -201,7 +201,9 @@ fn a_journal_without_a_whole_cluster_or_with_a_broken_line_says_so() {
     };
     let headed = [understudy_journal::journal_header(), b"{}\n{}\n".to_vec()].concat();
     assert_eq!(code(&headed), "U0532");
-    assert_eq!(code(b"{}\n{}\n"), "U0534");
+    assert_eq!(code(b"{}\n{}\n"), "U0532");
+    let first = br#"{"at_ns":1,"name":"laboratory","party":null,"event":{"event":"finished"}}"#;
+    assert_eq!(code(first), "U0534");
 }
 
 #[test]
