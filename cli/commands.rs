@@ -34,9 +34,13 @@ pub(crate) struct Group {
 pub(crate) struct Entry {
     name: &'static str,
     parser: Command,
-    bind: Box<dyn Fn(&ArgMatches) -> Result<Bound, clap::Error>>,
+    bind: Bind,
 }
 
+/// Reads the arguments of a command.
+type Bind = Box<dyn Fn(&ArgMatches) -> Result<Bound, clap::Error>>;
+
+/// A command with its arguments.
 type Bound = Box<dyn FnOnce(&mut Console) -> Answer>;
 
 impl Group {

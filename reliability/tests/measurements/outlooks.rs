@@ -114,7 +114,11 @@ fn an_assumption_that_fails_is_named() {
     let bunched: Vec<f64> = (0..20)
         .map(|k| 2_000.0 * f64::from(1 + k / 6) + f64::from(k))
         .collect();
-    assert!(doubts(bunched).iter().any(|doubt| doubt.contains("bursts")));
+    assert!(
+        doubts(bunched)
+            .iter()
+            .any(|doubt| doubt.contains("clustered"))
+    );
 }
 
 #[test]

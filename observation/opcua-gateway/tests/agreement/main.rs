@@ -1,6 +1,11 @@
 //! Every viewer shows the same: on random journals the page, `top`, Prometheus, Modbus and OPC UA agree in every fact that they share, and
 //! with a naive fold of the records.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "the age of a record is not compared"
+)]
+
 mod dice;
 mod facts;
 mod naive;

@@ -83,10 +83,10 @@ impl Model {
                 let text = describe(record, &self.members).text;
                 self.alarms.raise(subject, cycle, text);
             }
-            StationEvent::Readmitted { .. } => {
-                if self.changes.now().excluded_from(station).is_empty() {
-                    self.alarms.over(&subject, cycle);
-                }
+            StationEvent::Readmitted { .. }
+                if self.changes.now().excluded_from(station).is_empty() =>
+            {
+                self.alarms.over(&subject, cycle);
             }
             _ => {}
         }

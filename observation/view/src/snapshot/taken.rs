@@ -69,10 +69,7 @@ impl Picture<'_> {
         let master = self
             .cycle
             .and_then(|cycle| model.cycle_master(self.standing, cycle));
-        let timing = model
-            .timings()
-            .filter(|timing| timing.cycle <= cycle)
-            .next_back();
+        let timing = model.timings().rfind(|timing| timing.cycle <= cycle);
         Snapshot {
             cluster: model.cluster().name().to_owned(),
             run: self.run(),
