@@ -178,6 +178,30 @@ fn a_library_with_one_home_is_named_nowhere_else() {
     }
 }
 
+#[test]
+fn every_path_that_is_named_exists() {
+    let texts = [ARCHITECTURE, include_str!("../CONTRIBUTING.md")];
+    let tops: Vec<&str> = floors()
+        .keys()
+        .filter_map(|folder| folder.split('/').next())
+        .chain(["docs", "examples", "deployment"])
+        .collect();
+    let mut named = 0;
+    for path in texts
+        .iter()
+        .flat_map(|text| text.split('`').skip(1).step_by(2))
+    {
+        let is_a_path = path.split_once('/').is_some_and(|(top, rest)| {
+            tops.contains(&top) && !rest.contains(['{', '*', ' ', '?']) && !rest.contains("NAME")
+        });
+        if is_a_path {
+            assert!(root().join(path).exists(), "`{path}` does not exist");
+            named += 1;
+        }
+    }
+    assert!(named > 50, "{named} paths are named");
+}
+
 /// Shows each line of code below a folder; answers with their number. Comments and tests are not code of the product.
 fn lines_of_code(folder: &Path, show: &mut dyn FnMut(&Path, &str)) -> usize {
     let mut shown = 0;

@@ -155,12 +155,12 @@ pub fn records(journal: impl BufRead) -> impl Iterator<Item = Result<Record, Jou
                 reason,
             };
             if index == 0 {
-                let wrong = match is_of_a_journal(&line) {
-                    Ok(()) => check_header(line.as_bytes()).map_err(JournalError::from),
-                    Err(reason) => Err(no_record(reason)),
-                };
-                refused = wrong.is_err();
-                return wrong.err().map(Err);
+                if let Err(reason) = is_of_a_journal(&line) {
+                    return Some(Err(no_record(reason)));
+                }
+                let wrong = check_header(line.as_bytes()).err();
+                refused = wrong.is_some();
+                return wrong.map(|wrong| Err(wrong.into()));
             }
             Some(serde_json::from_str(&line).map_err(no_record))
         })
