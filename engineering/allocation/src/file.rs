@@ -1,7 +1,7 @@
 //! Catalogue files: a model a line (`vendor,model,...,digital_inputs,...`), or a figure a line (`...,figure,value,source`).
 //!
 //! The first is what people type; a line's figures share its source. The second keeps a source for every figure and has the figures of
-//! families too; it is what [`write`] writes, and [`read`] of it gives the same catalogue again. The header says which of the two a
+//! families too; it is what [`write()`] writes, and [`read`] of it gives the same catalogue again. The header says which of the two a
 //! file is. Both are described in `docs/reference/catalogue.md`.
 
 mod long;

@@ -2,7 +2,7 @@
 //!
 //! | operation | what it makes |
 //! |---|---|
-//! | [`Automaton::new`] | `create` |
+//! | `Automaton::new` | `create` |
 //! | [`selfloop`] | events that pass an automaton by |
 //! | [`sync`], [`meet`] | products: private events pass the others by, or are forbidden |
 //! | [`trim`] | what is reachable and from where a marked state can be reached |

@@ -66,7 +66,7 @@ pub fn find_run(path: &Path) -> Result<PathBuf, ViewError> {
 /// The newest run of a cluster below a directory of runs: of one with the same configuration, or at least the same name.
 ///
 /// # Errors
-/// [`ViewError::NoRun`] where none of the newest [`LOOKED_AT`] is.
+/// [`ViewError::NoRun`] where none of the newest `LOOKED_AT` is.
 pub fn find_run_of(runs: &Path, cluster: &Cluster) -> Result<Run, ViewError> {
     let mut folders: Vec<PathBuf> = std::fs::read_dir(runs)
         .into_iter()

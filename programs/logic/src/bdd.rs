@@ -2,7 +2,7 @@
 //!
 //! The diagrams are those of the library `oxidd`; no other module names its types. They are the plain ones: with complemented edges
 //! version 0.13 keeps f ⊕ g and f ⊕ ¬g in the same place of its cache, where they evict each other, and sums, of which parity is
-//! made, take exponential time. What is bounded is the number of nodes alive at once. Recursion is as deep as there are variables; past [`SHALLOW`] of them the work is done on the
+//! made, take exponential time. What is bounded is the number of nodes alive at once. Recursion is as deep as there are variables; past `SHALLOW` of them the work is done on the
 //! deep stack that the library keeps for it.
 
 mod reorder;
