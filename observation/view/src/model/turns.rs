@@ -86,13 +86,10 @@ impl Model {
         self.turns.by_moment.insert(moment, turns);
     }
 
-    /// Σ h(j)(x(j), u(j)) over the members of a word, where all of them are known.
+    /// Sum (9) that the samples yield for the mask of a word, if the outputs of all its programs are known.
     fn sum_of(&self, word: &Word, moment: Moment) -> Option<Image> {
-        let mut sum = Image::default();
-        for program in word.mask.iter() {
-            sum.add(self.history(program)?.truth_of(moment)?);
-        }
-        Some(sum)
+        let truth_of = |program| self.history(program)?.truth_of(moment);
+        Some(understudy_parity::sum(word.mask, truth_of)?.sum)
     }
 
     fn compared(&mut self, station: StationId, moment: Moment, wrong: Option<String>) {
