@@ -28,7 +28,7 @@ use crate::error::LaboratoryError;
 /// The port of the first member of a host.
 const FIRST_PORT: u16 = 7450;
 
-/// On which hosts the members run.
+/// Hosts that the members run on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum HostKind {
     /// All on this machine, on its loopback interface.

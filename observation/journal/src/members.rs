@@ -21,7 +21,7 @@ impl Members {
         Self(members)
     }
 
-    /// In order.
+    /// Members with their names, in ascending order.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (Member, &str)> {
         self.0.iter().map(|(member, name)| (*member, name.as_str()))
     }

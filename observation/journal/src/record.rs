@@ -132,7 +132,7 @@ impl Record {
         }
     }
 
-    /// Of a member.
+    /// Record of a member.
     pub fn of_member(at_ns: u64, member: Member, members: &Members, event: Happening) -> Self {
         Self {
             at_ns,

@@ -68,9 +68,9 @@ pub fn is_blocked(missing: Missing) -> bool {
 /// Deadlines of a program by the source of the applied outputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct SourceCounts {
-    /// From the controller itself.
+    /// Outputs received from the controller.
     pub direct: u64,
-    /// From a parity word.
+    /// Outputs reconstructed from a parity word.
     pub reconstructed: u64,
     /// The last provable outputs.
     pub held: u64,

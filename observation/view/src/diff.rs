@@ -27,7 +27,7 @@ pub enum Differing {
 pub struct Difference {
     /// From the origins of the runs.
     pub cycle: i64,
-    /// Of which program or member.
+    /// Program or member that differs.
     pub name: String,
     /// What.
     pub what: Differing,

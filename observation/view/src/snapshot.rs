@@ -288,10 +288,10 @@ pub struct OutcomeSnapshot {
 pub struct TimingSnapshot {
     /// The cycle.
     pub cycle: i64,
-    /// From the first sample to the last turn.
+    /// Time from the first sample to the last turn.
     pub token_us: f64,
-    /// From the last turn to the deadline.
+    /// Time from the last turn to the deadline.
     pub margin_us: f64,
-    /// From the start of the cycle before.
+    /// Time from the start of the previous cycle to the start of this one.
     pub cycle_us: Option<f64>,
 }
