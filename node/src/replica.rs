@@ -8,7 +8,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use understudy_logic::Scratch;
+use understudy_executable::Scratch;
 use understudy_wire::{
     Body, Digest, Frame, Holding, Image, Lineage, Moment, ProgramId, Recalled, Sample, StationId,
     Transfer,
@@ -95,9 +95,9 @@ impl Replica {
             copy: None,
             past: VecDeque::with_capacity(history),
             step: Step {
-                state: Image::zero(program.scan.register_count()),
-                inputs: Image::zero(program.scan.input_count()),
-                outputs: Image::zero(program.scan.output_count()),
+                state: Image::zero(program.executable.state_count()),
+                inputs: Image::zero(program.executable.input_count()),
+                outputs: Image::zero(program.executable.output_count()),
                 after: None,
             },
             unfollowed: None,
@@ -164,7 +164,7 @@ impl Replica {
         let Some(inputs) = sample.history.last() else {
             return;
         };
-        if inputs.width() == program.scan.input_count() {
+        if inputs.width() == program.executable.input_count() {
             // Outputs of the first sample may have been proved in this station's earlier life.
             let witnessed = match &self.recalled {
                 Some((Some(heard), known)) => known.witnessed || *heard < moment,
@@ -208,7 +208,7 @@ impl Replica {
 
     /// Takes what another station has heard, where this one has heard nothing.
     pub(crate) fn is_told(&mut self, program: &Program, recalled: &Recalled) {
-        if self.recalled.is_none() && recalled.inputs.width() == program.scan.input_count() {
+        if self.recalled.is_none() && recalled.inputs.width() == program.executable.input_count() {
             let recalled = Recalled {
                 witnessed: false,
                 ..recalled.clone()
@@ -236,7 +236,7 @@ impl Replica {
         };
         let moment = frame.header.moment;
         if sample.history.len() > self.history
-            || sample.history[0].width() != program.scan.input_count()
+            || sample.history[0].width() != program.executable.input_count()
         {
             return Followed::Lost;
         }
@@ -268,7 +268,10 @@ impl Replica {
         }
         let genesis = Lineage::genesis(program.hash, sample.born);
         if let Some(place) = lineages.iter().position(|&lineage| lineage == genesis) {
-            let initial = Image::from_words(program.scan.register_count(), program.scan.initial());
+            let initial = Image::from_words(
+                program.executable.state_count(),
+                program.executable.initial(),
+            );
             self.past.clear();
             self.copy = Some(Copied {
                 born: sample.born,
@@ -299,7 +302,7 @@ impl Replica {
     ) -> bool {
         if self.standing != Standing::Lost
             || transfer.hash != program.hash
-            || transfer.state.width() != program.scan.register_count()
+            || transfer.state.width() != program.executable.state_count()
         {
             return false;
         }
@@ -464,7 +467,7 @@ impl Replica {
         copy.state.digest = Digest::of(&copy.state.bits);
         self.step.state.clone_from(&copy.state.bits);
         self.step.inputs.clone_from(inputs);
-        program.scan.step(
+        program.executable.step(
             scratch,
             copy.state.bits.words_mut(),
             inputs.words(),

@@ -3,16 +3,16 @@
 use std::sync::Arc;
 
 use understudy_cycle::Agreement;
-use understudy_logic::Scan;
+use understudy_executable::Executable;
 use understudy_wire::{Epoch, ProgramHash, ProgramId, StationId};
 
 /// One of the cluster's programs, compiled.
 #[derive(Debug, Clone)]
 pub struct Program {
-    /// Of its circuit.
+    /// Of its canonical text.
     pub hash: ProgramHash,
     /// Its f and h.
-    pub scan: Scan,
+    pub executable: Executable,
 }
 
 /// A station's own settings.
@@ -26,7 +26,7 @@ pub struct Settings {
     pub programs: Arc<[Program]>,
     /// The generated parity controller, which an understudy evaluates in [`understudy_cycle::Mode::Paper`]. It publishes no parity
     /// word in that mode where this is absent.
-    pub generated: Option<Arc<Scan>>,
+    pub generated: Option<Arc<Executable>>,
     /// The epoch that it starts when nobody is there: later than any that the cluster has had (the wall clock at start serves).
     pub epoch: Epoch,
 }

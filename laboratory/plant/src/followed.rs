@@ -1,5 +1,6 @@
 //! What a terminal of a plant follows: a sensor of its neighbour.
 
+use smallvec::SmallVec;
 use understudy_wire::{Field, Moment, ProgramId};
 
 /// Where a terminal of a plant follows another plant, in the order of the names given to [`crate::Plant::following`].
@@ -7,8 +8,18 @@ use understudy_wire::{Field, Moment, ProgramId};
 pub struct Followed {
     /// The plant that is followed, by its program.
     pub from: ProgramId,
-    /// The bit of u(from) that its sensor drives.
+    /// The first bit of u(from) that its sensor drives.
     pub sensor: usize,
+    /// How many bits its sensor drives.
+    pub bits: usize,
+}
+
+impl Followed {
+    /// What the sensor shows, bit by bit.
+    pub fn shown(self, field: &Field) -> SmallVec<[bool; 1]> {
+        let bits = self.sensor..self.sensor + self.bits;
+        bits.map(|bit| field.sensors.get(bit)).collect()
+    }
 }
 
 /// What was heard of a followed plant. Lost frames cost nothing but time: each one says the whole truth.
@@ -27,12 +38,12 @@ impl Hearing {
         followed: Followed,
         moment: Moment,
         field: &Field,
-    ) -> Option<bool> {
+    ) -> Option<SmallVec<[bool; 1]>> {
         let old = moment.epoch == self.heard.epoch && moment.cycle < self.heard.cycle;
         if old && moment != Moment::default() {
             return None;
         }
         self.heard = moment;
-        Some(field.sensors.get(followed.sensor))
+        Some(followed.shown(field))
     }
 }

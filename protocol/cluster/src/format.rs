@@ -53,7 +53,7 @@ pub(crate) enum Kind {
         default: bool,
     },
     /// A table from names to `true` or `false`.
-    Bits,
+    Values,
     /// A table from names to names.
     Names,
     /// A table whose keys depend on the model.
@@ -219,8 +219,8 @@ pub(crate) static REMOTE_IO: Section = Section {
         ),
         key(
             "fail_safe",
-            Kind::Bits,
-            "fail-safe values after that, by the name of the output, such as `{ grip = true }`; `false` for all others",
+            Kind::Values,
+            "fail-safe values after that, by the name of the output, such as `{ grip = true, heating = 12.5 }`; `false` or 0 for all others",
         ),
         key(
             "release",
@@ -453,7 +453,9 @@ impl Kind {
                 let quoted: Vec<String> = words.iter().map(|word| format!("\"{word}\"")).collect();
                 quoted.join(" or ")
             }
-            Self::Bits => "a table from names to true or false, such as { grip = true }".into(),
+            Self::Values => {
+                "a table from names to values, such as { grip = true, heating = 12.5 }".into()
+            }
             Self::Names => "a table from names to names in quotes".into(),
             Self::Parameters => "a table, [plant.parameters]".into(),
             Self::Device => "a table, [remote_io.field]".into(),
