@@ -41,9 +41,19 @@ pub(crate) struct Replica {
     step: Step,
     /// The last sample that could not be followed, for replaying it onto a state that is given later.
     unfollowed: Option<Arc<Frame>>,
-    /// What the newest sample said, and its cycle; of no cycle where another station told it.
-    recalled: Option<(Option<Moment>, Recalled)>,
+    remembered: Remembered,
     history: usize,
+}
+
+/// The newest sample of the program that this station remembers, for a remote I/O that has lost its memory.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+enum Remembered {
+    /// None.
+    Nothing,
+    /// None of its own; what another station remembers.
+    Relayed(Recalled),
+    /// The sample that this station received in that cycle.
+    Received(Moment, Recalled),
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -101,7 +111,7 @@ impl Replica {
                 after: None,
             },
             unfollowed: None,
-            recalled: None,
+            remembered: Remembered::Nothing,
             history,
         }
     }
@@ -166,9 +176,9 @@ impl Replica {
         };
         if inputs.width() == program.scan.input_count() {
             // Outputs of the first sample may have been proved in this station's earlier life.
-            let witnessed = match &self.recalled {
-                Some((Some(heard), known)) => known.witnessed || *heard < moment,
-                _ => false,
+            let witnessed = match &self.remembered {
+                Remembered::Received(received, known) => known.witnessed || *received < moment,
+                Remembered::Nothing | Remembered::Relayed(_) => false,
             };
             let recalled = Recalled {
                 program: self.id,
@@ -178,7 +188,7 @@ impl Replica {
                 accounted_for: sample.gone,
                 inputs: inputs.clone(),
             };
-            self.recalled = Some((Some(moment), recalled));
+            self.remembered = Remembered::Received(moment, recalled);
         }
     }
 
@@ -192,14 +202,14 @@ impl Replica {
         theirs: Option<&Recalled>,
         (now, silent_after): (Moment, u32),
     ) {
-        let Some((Some(heard), recalled)) = &mut self.recalled else {
+        let Remembered::Received(received, recalled) = &mut self.remembered else {
             return;
         };
         let theirs = theirs.filter(|theirs| theirs.witnessed);
-        if stepped > *heard {
+        if stepped > *received {
             recalled.accounted_for.remove(station);
         } else if let Some(theirs) = theirs
-            && now >= heard.plus(u64::from(silent_after))
+            && now >= received.plus(u64::from(silent_after))
         {
             recalled.accounted_for.insert(station);
             recalled.applied = recalled.applied.max(theirs.applied);
@@ -208,19 +218,24 @@ impl Replica {
 
     /// Takes what another station has heard, where this one has heard nothing.
     pub(crate) fn is_told(&mut self, program: &Program, recalled: &Recalled) {
-        if self.recalled.is_none() && recalled.inputs.width() == program.scan.input_count() {
+        if self.remembered == Remembered::Nothing
+            && recalled.inputs.width() == program.scan.input_count()
+        {
             let recalled = Recalled {
                 witnessed: false,
                 ..recalled.clone()
             };
-            self.recalled = Some((None, recalled));
+            self.remembered = Remembered::Relayed(recalled);
         }
     }
 
     /// What the newest sample said, where none was heard in the cycle `moment`.
     pub(crate) fn recalled(&self, moment: Moment) -> Option<&Recalled> {
-        let (heard, recalled) = self.recalled.as_ref()?;
-        (*heard != Some(moment)).then_some(recalled)
+        match &self.remembered {
+            Remembered::Nothing => None,
+            Remembered::Relayed(recalled) => Some(recalled),
+            Remembered::Received(received, recalled) => (*received != moment).then_some(recalled),
+        }
     }
 
     /// Follows the sample of `moment`, a frame whose body is `sample`.
@@ -347,7 +362,9 @@ impl Replica {
             .copy
             .as_ref()
             .filter(|_| self.standing == Standing::Proven)?;
-        if let Some((_, recalled)) = &mut self.recalled {
+        if let Remembered::Relayed(recalled) | Remembered::Received(_, recalled) =
+            &mut self.remembered
+        {
             recalled.accounted_for.remove(to);
         }
         Some(Transfer {

@@ -14,6 +14,8 @@
 mod pacing;
 mod relay;
 mod repair;
+#[cfg(test)]
+mod tests;
 mod turn;
 
 use std::hash::{Hash, Hasher};
@@ -40,8 +42,7 @@ pub struct Station {
     scratch: Scratch,
     cycle: CycleNotes,
     started: Time,
-    /// Whether this station starts the cycles.
-    is_cycle_master: bool,
+    pacing: Pacing,
     wanted: ProgramSet,
     /// Stations that asked to join in the last cycle; they pace only when nobody who speaks does.
     joining: StationSet,
@@ -53,11 +54,42 @@ pub struct Station {
     awaited: ProgramSet,
 }
 
+/// Who starts the cycles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Pacing {
+    /// Not known yet: the station has just started and is in no cycle.
+    Listening,
+    /// Another station.
+    Following,
+    /// This station, until it receives the Sync of another one.
+    CycleMaster,
+}
+
+/// The token of the current cycle.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+enum Token {
+    /// This station has not published in this cycle.
+    #[default]
+    Awaited,
+    /// This station has published its turn.
+    Passed,
+}
+
+/// The rest of the current cycle, in which stations ask for states.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+enum Rest {
+    /// It has not begun.
+    #[default]
+    Ahead,
+    /// It has begun: this station has asked for the states that it lacks.
+    Begun,
+}
+
 /// What a station remembers of the current cycle only.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 struct CycleNotes {
-    published: bool,
-    asked: bool,
+    token: Token,
+    rest: Rest,
     /// The turns of controllers that said their outputs.
     said: SmallVec<[Said; 2]>,
     /// Whose states differ from equal ones of this station.
@@ -99,7 +131,7 @@ impl Station {
             scratch: Scratch::default(),
             cycle: CycleNotes::default(),
             started: now,
-            is_cycle_master: false,
+            pacing: Pacing::Listening,
             wanted: ProgramSet::EMPTY,
             joining: StationSet::EMPTY,
             differed: SmallVec::new(),
@@ -159,8 +191,9 @@ impl Station {
             Arrival::Begins(anchor) => {
                 self.close_cycle();
                 self.member.clock.begin(now, frame.header.moment, anchor);
-                let pacer = matches!(frame.body, Body::Sync);
-                self.is_cycle_master &= !pacer;
+                if self.pacing == Pacing::Listening || frame.body == Body::Sync {
+                    self.pacing = Pacing::Following;
+                }
             }
         }
         match (&frame.body, frame.header.sender) {
@@ -237,7 +270,7 @@ impl Station {
         let first = others.into_iter().flatten().fold(Time(u64::MAX), Time::min);
         // Nobody paces before the cycle is over.
         let end = self.member.clock.anchor() + self.settings.agreement.schedule.period();
-        if self.member.clock.moment().is_some() && first <= end {
+        if self.pacing != Pacing::Listening && first <= end {
             return first;
         }
         first.min(self.paces_at())
@@ -266,7 +299,7 @@ impl Hash for Station {
             scratch: _,
             cycle,
             started,
-            is_cycle_master,
+            pacing,
             wanted,
             joining,
             differed,
@@ -274,7 +307,7 @@ impl Hash for Station {
             awaited,
         } = self;
         (member, replicas).hash(hasher);
-        (cycle, started, is_cycle_master, wanted).hash(hasher);
+        (cycle, started, pacing, wanted).hash(hasher);
         (joining, differed, lacked, awaited).hash(hasher);
     }
 }

@@ -5,7 +5,7 @@
 
 use understudy_wire::{Body, StationSet, Time};
 
-use super::{CycleNotes, Station};
+use super::{CycleNotes, Pacing, Station, Token};
 use crate::event::Event;
 
 impl Station {
@@ -14,7 +14,7 @@ impl Station {
         let Some(moment) = self.member.clock.moment() else {
             return;
         };
-        if self.cycle.published {
+        if self.cycle.token == Token::Passed {
             self.member.attendance.heard(self.own());
         }
         self.member.close_cycle();
@@ -35,7 +35,7 @@ impl Station {
         let agreement = &self.settings.agreement;
         let (schedule, own) = (&agreement.schedule, self.own());
         let lower = StationSet::first(own.index());
-        if self.member.clock.moment().is_none() {
+        if self.pacing == Pacing::Listening {
             let listens = schedule.period() * agreement.listen_cycles;
             return self.started + listens + schedule.guard() * u32::from(own.0);
         }
@@ -64,8 +64,8 @@ impl Station {
             .member
             .clock
             .pace(now, self.settings.epoch, anchor, schedule.period());
-        if !self.is_cycle_master {
-            self.is_cycle_master = true;
+        if self.pacing != Pacing::CycleMaster {
+            self.pacing = Pacing::CycleMaster;
             self.report(Event::BecameCycleMaster { moment });
         }
         self.member.send_cyclic(now, Body::Sync);

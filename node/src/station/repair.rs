@@ -5,7 +5,7 @@
 
 use understudy_wire::{Body, Join, ProgramSet, StationId, Time, Transfer};
 
-use super::Station;
+use super::{Pacing, Rest, Station};
 use crate::event::Event;
 use crate::replica::{Replica, Standing};
 
@@ -60,7 +60,7 @@ impl Station {
     }
 
     pub(super) fn ask(&mut self) {
-        self.cycle.asked = true;
+        self.cycle.rest = Rest::Begun;
         let Some(moment) = self.member.clock.moment() else {
             return;
         };
@@ -86,6 +86,6 @@ impl Station {
 
     pub(super) fn asks_at(&self) -> Option<Time> {
         let due = self.member.clock.anchor() + self.settings.agreement.schedule.rest();
-        (self.member.clock.moment().is_some() && !self.cycle.asked).then_some(due)
+        (self.pacing != Pacing::Listening && self.cycle.rest == Rest::Ahead).then_some(due)
     }
 }

@@ -8,7 +8,7 @@ use understudy_wire::{
     Holding, Moment, ProgramId, ProgramSet, StationId, StationSet, Time, Turn, Word,
 };
 
-use super::{Said, Station};
+use super::{Said, Station, Token};
 use crate::event::Event;
 use crate::replica::{Replica, Standing};
 use crate::{generated, words};
@@ -95,7 +95,7 @@ impl Station {
         let Some(moment) = self.member.clock.moment() else {
             return;
         };
-        if self.cycle.published || !self.speaks() {
+        if self.cycle.token == Token::Passed || !self.speaks() {
             return;
         }
         let due = self.speaks_by(moment);
@@ -148,7 +148,7 @@ impl Station {
     }
 
     pub(super) fn speak(&mut self, now: Time, moment: Moment) {
-        self.cycle.published = true;
+        self.cycle.token = Token::Passed;
         let words = self.words(moment);
         self.report(Event::Published {
             moment,
@@ -195,7 +195,7 @@ impl Station {
 
     pub(super) fn speaks_at(&self) -> Option<Time> {
         let moment = self.member.clock.moment()?;
-        let may = !self.cycle.published && self.speaks();
+        let may = self.cycle.token == Token::Awaited && self.speaks();
         may.then(|| self.speaks_by(moment))
     }
 
