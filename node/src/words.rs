@@ -1,14 +1,15 @@
-//! What a station says of a cycle: its parity words, each with a mask.
+//! The parity words of a station in one cycle, each with a mask.
 //!
-//! A controller has one word, y(i) over its own program. An understudy, which speaks last and so knows who was silent, says
+//! A controller has one word, y(i) over its own program. An understudy publishes last, so it knows which controllers it
+//! has not received. It publishes
 //!
 //! ```text
-//! one word over all programs that published for themselves        Σ h(j)(x(j), u(j)), (9) when nobody was silent
-//! one word for each program whose controller was silent       h(j)(x(j), u(j))
+//! one word over all programs whose controllers were received      Σ h(j)(x(j), u(j)), (9) when all were received
+//! one word for each program whose controller was not received     h(j)(x(j), u(j))
 //! ```
 //!
-//! A controller that said something else than the understudy would counts as silent here: its program gets a word of its own, so
-//! that its remote I/O can tell the two apart, and no other program is touched by a value fault.
+//! A controller whose outputs differ from those of the understudy counts as not received: its program gets a word of
+//! its own, so that its remote I/O can compare both, and a value fault affects no other program.
 //! A program of which it does not know this cycle's output is in no word, instead of spoiling one.
 
 use smallvec::SmallVec;
@@ -23,8 +24,8 @@ pub fn of_controller(program: ProgramId, outputs: &Image) -> SmallVec<[Word; 2]>
     }]
 }
 
-/// The parity words of an understudy that knows the outputs of `known` (those that `outputs_of` answers for), in a cluster of
-/// the programs `all`, where the controllers of `published` have published the same outputs in this cycle.
+/// The parity words of an understudy that knows the outputs of `known` (those that `outputs_of` answers for), in a
+/// cluster of the programs `all`, where the controllers of `published` have published the same outputs in this cycle.
 ///
 /// In the paper's mode an understudy publishes this sum as the output of the generated parity controller.
 pub fn of_understudy<'a>(
@@ -40,11 +41,11 @@ pub fn of_understudy<'a>(
         Mode::Paper => SmallVec::new(),
         Mode::Full => {
             let together = known.and(published);
-            let silent = known.without(published);
+            let others = known.without(published);
             let first = (!together.is_empty()).then_some(together);
             first
                 .into_iter()
-                .chain(silent.iter().map(ProgramSet::only))
+                .chain(others.iter().map(ProgramSet::only))
                 .filter_map(sum)
                 .collect()
         }
@@ -55,9 +56,10 @@ pub fn of_understudy<'a>(
 mod tests {
     use super::*;
 
-    /// Every cluster of three programs: whoever was silent, every known output can be had from the words and the turns.
+    /// Every cluster of three programs: whichever controllers are not received, the words and the turns give every
+    /// known output.
     #[test]
-    fn no_silence_spoils_a_word() {
+    fn no_erasure_spoils_a_word() {
         let outputs: Vec<Image> = [0b101_u64, 0b11, 0b1]
             .iter()
             .zip([3, 2, 1])

@@ -1,7 +1,8 @@
-//! Which terminal of a model is which signal of its controller.
+//! Binding of a model's terminals to the signals of its controller.
 //!
-//! A terminal without an entry in [`Signals`] is bound to the signal of its own name. Every sensor has to be an input of the
-//! controller and every actuator an output, but for those that follow another plant; an input that no sensor drives stays 0.
+//! A terminal without an entry in [`Signals`] is bound to the signal of its own name. Every sensor must be an input of
+//! the controller and every actuator an output, except those that follow another plant; an input that no sensor drives
+//! stays 0.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
@@ -10,17 +11,17 @@ use understudy_logic::Circuit;
 
 use crate::model::{Direction, Terminals};
 
-/// From the name of a model's terminal to the name of the controller's signal, where the two differ.
+/// Names of the controller's signals by the name of the model's terminal, where the two differ.
 pub type Signals = BTreeMap<String, String>;
 
-/// Why a model and its controller do not fit; the last two are no obstacle.
+/// Reason why a model and its controller do not fit; the last two are warnings.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum BindingProblem {
     /// The model has no such terminal.
     UnknownTerminal {
-        /// As in [`Signals`].
+        /// Name in [`Signals`].
         terminal: String,
-        /// All that there are.
+        /// All terminals of the model.
         known: Arc<[String]>,
     },
     /// The controller has no input or no output of this name.
@@ -29,16 +30,16 @@ pub enum BindingProblem {
         terminal: String,
         /// Whether the model drives it or is driven by it.
         direction: Direction,
-        /// What it is bound to.
+        /// Signal that it is bound to.
         signal: String,
-        /// The inputs, or the outputs, that the controller has.
+        /// The inputs, or the outputs, of the controller.
         known: Arc<[String]>,
     },
     /// Two sensors are bound to one input of the controller.
     DrivenTwice {
         /// The second of the two.
         terminal: String,
-        /// What both are bound to.
+        /// Input that both are bound to.
         signal: String,
     },
     /// A terminal that follows another plant is bound to a signal of the controller too.
@@ -58,26 +59,26 @@ pub enum BindingProblem {
     },
 }
 
-/// What moves an actuator.
+/// Source of an actuator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Driver {
     /// A bit of y(i).
     Output(usize),
-    /// What another plant shows, by its number in `follows`.
+    /// A sensor of another plant, by its number in `follows`.
     Neighbour(usize),
 }
 
-/// Of each sensor, its place in u(i); of each actuator, what moves it.
+/// Place in u(i) of each sensor; source of each actuator.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Binding {
     pub(crate) sensors: Vec<usize>,
     pub(crate) actuators: Vec<Driver>,
-    /// Bits of u(i).
+    /// Width of u(i) in bits.
     pub(crate) inputs: usize,
 }
 
 impl Binding {
-    /// Finds every problem; the binding is there when none of them is an obstacle.
+    /// Finds every problem; returns the binding unless one of them is an error.
     pub(crate) fn new(
         terminals: &Terminals,
         controller: &Circuit,
@@ -151,7 +152,7 @@ impl Binding {
             let unbound = unbound.filter(|(place, _)| !places.contains(place));
             unbound.map(|(_, name)| name.clone()).collect::<Vec<_>>()
         };
-        // Where something does not fit, what is left over is only its other side.
+        // Where a name does not fit, the unbound signal is only the other side of the same problem.
         if fits {
             for input in unbound(&inputs, &sensors) {
                 if !terminals.always_zero.contains(&input) {

@@ -1,9 +1,10 @@
-//! A plant that is itself a ladder program, because its author knows ladders.
+//! A plant model that is itself a ladder program.
 //!
-//! Its inputs bear the names of the controller's outputs, its outputs those of the controller's inputs; a scan of it is one
-//! cycle of the plant. Besides, where they are declared: the input `part_arrives` is 1 for one scan for each part that the feeding
-//! plant hands over (parts that come together follow each other every other scan, so that each is an edge); the outputs `finished`, `handed_over` and
-//! `plant_fault` are counted at their rising edges. Without `finished`, what is handed over counts as finished.
+//! Its inputs have the names of the controller's outputs, its outputs those of the controller's inputs; a scan of it is
+//! one cycle of the plant. In addition, where they are declared: the input `part_arrives` is 1 for one scan for each
+//! part that the feeding plant hands over (parts that come together follow each other every other scan, so that each is
+//! an edge); the outputs `finished`, `handed_over` and `plant_fault` are counted at their rising edges. Without
+//! `finished`, parts that are handed over count as finished.
 
 use std::hash::{Hash, Hasher};
 
@@ -43,9 +44,9 @@ pub(crate) struct LadderModel {
     state: Image,
     inputs: Image,
     outputs: Image,
-    /// Of each actuator, its place among the inputs.
+    /// Place among the inputs of each actuator.
     actuator_places: Vec<usize>,
-    /// Of each sensor, its place among the outputs.
+    /// Place among the outputs of each sensor.
     sensor_places: Vec<usize>,
     part_arrives: Option<usize>,
     queue: u64,
@@ -54,7 +55,7 @@ pub(crate) struct LadderModel {
     plant_fault: Counter,
 }
 
-/// Two of one program that hash alike go on alike.
+/// Two of one program that hash alike behave alike.
 impl Hash for LadderModel {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
         (&self.state, &self.inputs, &self.outputs, self.queue).hash(hasher);
@@ -71,7 +72,8 @@ struct Counter {
 }
 
 impl Counter {
-    /// What is 1 from the start is no edge: `outputs` are those that the plant shows before its first scan.
+    /// An output that is 1 from the start is not an edge: `outputs` are those that the plant shows before its first
+    /// scan.
     fn of(circuit: &Circuit, name: &str, outputs: &Image) -> Self {
         let mut names = circuit.outputs().iter();
         let place = names.position(|output| output.name == name);

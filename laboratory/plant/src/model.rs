@@ -12,21 +12,21 @@ use crate::ladder_model::{self, LadderModel};
 use crate::press::{self, Press, PressParameters};
 use crate::robot::{self, Robot, RobotParameters};
 
-/// Where a moving part is at its far end.
+/// Position of a moving part at its far end.
 pub(crate) const SHOWN: u16 = 1000;
 
-/// The inside of a plant. Shapes: `actuators` and `sensors` as long as its [`Terminals`].
+/// Behaviour of a plant. Shapes: `actuators` and `sensors` as long as its [`Terminals`].
 pub(crate) trait Model {
-    /// One cycle, in which `arrived` parts came from the plant that feeds this one.
+    /// Steps one cycle, in which `arrived` parts came from the plant that feeds this one.
     fn step(&mut self, actuators: &[bool], arrived: u64);
-    /// What its sensors see now.
+    /// Current values of its sensors.
     fn sensors(&self, sensors: &mut [bool]);
     fn counts(&self) -> Counts;
-    /// 0 to [`SHOWN`] each.
+    /// Positions of its moving parts, 0 to [`SHOWN`] each.
     fn positions(&self) -> SmallVec<[u16; 4]>;
 }
 
-/// Since the start of the plant; none ever falls.
+/// Counts since the start of the plant; none ever falls.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub(crate) struct Counts {
     pub(crate) handed_over: u64,
@@ -34,7 +34,7 @@ pub(crate) struct Counts {
     pub(crate) plant_faults: u64,
 }
 
-/// Which model, with all that it needs.
+/// Kind of a model, with its parameters.
 #[derive(Debug, Clone)]
 pub enum ModelKind {
     /// The arm of section V.
@@ -45,7 +45,7 @@ pub enum ModelKind {
     Ladder(Box<Circuit>),
 }
 
-/// Whether a terminal is seen or driven by the controller.
+/// Direction of a terminal, as seen from the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Direction {
@@ -55,14 +55,14 @@ pub enum Direction {
     Actuator,
 }
 
-/// The names by which a model is bound to a controller.
+/// Names by which a model is bound to a controller.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Terminals {
-    /// What it shows.
+    /// Its sensors.
     pub sensors: Vec<String>,
-    /// What moves it.
+    /// Its actuators.
     pub actuators: Vec<String>,
-    /// Inputs that its controller may have and that are 0 as long as nobody is there to press them.
+    /// Inputs that its controller may have for push buttons: 0 in the model.
     pub always_zero: Vec<String>,
     /// Its moving parts, in the order of [`Field::positions`].
     pub positions: Vec<String>,
@@ -102,7 +102,7 @@ impl ModelKind {
         }
     }
 
-    /// Whether parts from another plant change anything in it.
+    /// Whether parts from another plant have an effect.
     pub fn takes_parts(&self) -> bool {
         match self {
             Self::Robot(_) | Self::Press(_) => true,
@@ -113,7 +113,7 @@ impl ModelKind {
         }
     }
 
-    /// Whether it ever hands parts over to a plant that it feeds.
+    /// Whether it hands parts over to a plant that it feeds.
     pub fn hands_over(&self) -> bool {
         match self {
             Self::Robot(_) | Self::Press(_) => true,
@@ -125,12 +125,12 @@ impl ModelKind {
     }
 }
 
-/// A plant in its initial state and later.
+/// A plant.
 #[derive(Debug, Clone)]
 pub struct Plant {
     inside: Inside,
     binding: Binding,
-    /// What it follows, as it last saw that.
+    /// Last known values of the sensors that it follows.
     seen: Vec<bool>,
     actuators: Vec<bool>,
     sensors: Vec<bool>,
@@ -144,7 +144,7 @@ enum Inside {
     Ladder(Box<LadderModel>),
 }
 
-/// Two of one binding that hash alike go on alike.
+/// Two of one binding that hash alike behave alike.
 impl Hash for Plant {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
         (&self.inside, &self.seen, &self.actuators, &self.sensors).hash(hasher);
@@ -172,7 +172,7 @@ impl Inside {
 impl Plant {
     /// Binds a model to the signals of `controller`; `fed` where its parts come from another plant.
     ///
-    /// Answers with every problem; the plant is there unless one of them is an obstacle.
+    /// Returns every problem; the plant is there unless one of them is an error.
     pub fn new(
         kind: &ModelKind,
         controller: &Circuit,
@@ -183,7 +183,7 @@ impl Plant {
     }
 
     /// As [`Self::new`], where the actuators `follows` follow other plants and not the controller. They are 0 until
-    /// [`Self::see`] says otherwise.
+    /// [`Self::see`] sets them.
     pub fn following(
         kind: &ModelKind,
         controller: &Circuit,
@@ -208,14 +208,15 @@ impl Plant {
         (plant, problems)
     }
 
-    /// From now on what is followed under this number shows `on`; a number that there is not is ignored.
+    /// Sets the followed sensor with this number; an unknown number is ignored.
     pub fn see(&mut self, number: usize, on: bool) {
         if let Some(seen) = self.seen.get_mut(number) {
             *seen = on;
         }
     }
 
-    /// One cycle under y(i), in which `arrived` parts came from the plant that feeds this one. Answers with what it shows then.
+    /// Steps one cycle with y(i), in which `arrived` parts came from the plant that feeds this one. Returns the new
+    /// field.
     ///
     /// Outputs past the width of `outputs` count as 0.
     pub fn step(&mut self, outputs: &Image, arrived: u64) -> Field {
@@ -229,7 +230,7 @@ impl Plant {
         self.show()
     }
 
-    /// What it shows now.
+    /// Its current sensors and counts.
     pub fn field(&self) -> Field {
         self.clone().show()
     }

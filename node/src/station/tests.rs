@@ -1,4 +1,4 @@
-//! Pacing, token and repair of one station, with every other member played by the test.
+//! Role, token and repair of one station, with every other member played by the test.
 
 mod states;
 
@@ -264,8 +264,8 @@ fn the_next_rank_takes_over() {
     insta::assert_snapshot!(check(1, &script));
 }
 
-/// A controller publishes after its predecessor, in its own slot where that is not received, and at the last call where its sample is
-/// not received.
+/// A controller publishes after its predecessor, in its own slot where that is not received, and at the last call where
+/// its sample is not received.
 #[test]
 fn a_controller_publishes_after_its_predecessor_or_in_its_slot() {
     let script = [

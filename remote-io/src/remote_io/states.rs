@@ -1,7 +1,7 @@
 //! The table of a remote I/O: each reachable named state, with each input, and the state that follows.
 //!
-//! The states are found from a remote I/O that has just started, breadth first. The drawing in `docs/pictures/remote-io.dot`
-//! is made from the same table.
+//! The states are found from a remote I/O that has just started, breadth first. The drawing in
+//! `docs/pictures/remote-io.dot` is made from the same table.
 
 use std::sync::Arc;
 use std::time::Duration;

@@ -1,13 +1,13 @@
 //! The table of a station: each reachable named state, with each input, and the state that follows.
 //!
-//! The states are found from a controller that has just started, breadth first. The drawing in `docs/pictures/station.dot` is
-//! made from the same table.
+//! The states are found from a controller that has just started, breadth first. The drawing in
+//! `docs/pictures/station.dot` is made from the same table.
 
 use understudy_testing::states::Table;
 
 use super::*;
 use crate::replica::Standing;
-use crate::station::Pacing;
+use crate::station::Role;
 
 const OWN: u8 = 1;
 /// Cycles of one input: more than the history of a sample, the shadow mode and `listen_cycles` last.
@@ -117,17 +117,17 @@ impl Bench {
             self.wait(end.since(self.now));
         }
         let before = self.moment();
-        while self.station.pacing == Pacing::CycleMaster && self.moment() == before {
+        while self.station.role == Role::CycleMaster && self.moment() == before {
             self.wake();
         }
     }
 
     /// The cycle of the next frame of another member.
     fn next(&self) -> Moment {
-        match self.station.pacing {
-            Pacing::Listening => moment(100),
-            Pacing::Following => self.moment().plus(1),
-            Pacing::CycleMaster => self.moment(),
+        match self.station.role {
+            Role::Listening => moment(100),
+            Role::Following => self.moment().plus(1),
+            Role::CycleMaster => self.moment(),
         }
     }
 
@@ -147,8 +147,8 @@ impl Bench {
         let anchor = self.station.member.clock.anchor();
         let end = (anchor + PERIOD).max(self.now);
         self.wait(end.since(self.now));
-        let next = match self.station.pacing {
-            Pacing::CycleMaster => self.moment().plus(1),
+        let next = match self.station.role {
+            Role::CycleMaster => self.moment().plus(1),
             _ => self.next(),
         };
         let sent = sent(Sent::Sync(0), 1, OWN).expect("it is sent");
@@ -197,7 +197,7 @@ impl Bench {
             (Standing::Proven, _) => "Proven",
             (Standing::Excluded, _) => "Excluded",
         };
-        format!("{:?}, {standing}", self.station.pacing)
+        format!("{:?}, {standing}", self.station.role)
     }
 }
 
