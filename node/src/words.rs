@@ -24,10 +24,25 @@ pub fn of_controller(program: ProgramId, outputs: &Image) -> SmallVec<[Word; 2]>
     }]
 }
 
-/// The parity words of an understudy that knows the outputs of `known` (those that `outputs_of` answers for), in a
-/// cluster of the programs `all`, where the controllers of `published` have published the same outputs in this cycle.
-///
-/// In the paper's mode an understudy publishes this sum as the output of the generated parity controller.
+/// The masks of the parity words of an understudy that knows the outputs of `known`, in a cluster of the programs `all`,
+/// where the controllers of `published` have published the same outputs in this cycle.
+pub(crate) fn masks_of_understudy(
+    mode: Mode,
+    all: ProgramSet,
+    known: ProgramSet,
+    published: ProgramSet,
+) -> SmallVec<[ProgramSet; 2]> {
+    let (together, others) = match mode {
+        Mode::Full => (known.and(published), known.without(published)),
+        Mode::Paper if known == all => (all, ProgramSet::EMPTY),
+        Mode::Paper => (ProgramSet::EMPTY, ProgramSet::EMPTY),
+    };
+    let first = (!together.is_empty()).then_some(together);
+    let others = others.iter().map(ProgramSet::only);
+    first.into_iter().chain(others).collect()
+}
+
+/// The parity words of an understudy, as sums of the outputs that `outputs_of` returns for the programs of `known`.
 pub fn of_understudy<'a>(
     mode: Mode,
     all: ProgramSet,
@@ -35,21 +50,10 @@ pub fn of_understudy<'a>(
     published: ProgramSet,
     outputs_of: impl Fn(ProgramId) -> Option<&'a Image>,
 ) -> SmallVec<[Word; 2]> {
-    let sum = |mask: ProgramSet| understudy_parity::sum(mask, &outputs_of);
-    match mode {
-        Mode::Paper if known == all => sum(all).into_iter().collect(),
-        Mode::Paper => SmallVec::new(),
-        Mode::Full => {
-            let together = known.and(published);
-            let others = known.without(published);
-            let first = (!together.is_empty()).then_some(together);
-            first
-                .into_iter()
-                .chain(others.iter().map(ProgramSet::only))
-                .filter_map(sum)
-                .collect()
-        }
-    }
+    let masks = masks_of_understudy(mode, all, known, published).into_iter();
+    masks
+        .filter_map(|mask| understudy_parity::sum(mask, &outputs_of))
+        .collect()
 }
 
 #[cfg(test)]

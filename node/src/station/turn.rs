@@ -136,7 +136,8 @@ impl Station {
         }
         for place in 0..self.replicas.len() {
             let replica = &self.replicas[place];
-            if let Some((lineage, state)) = replica.state().filter(|_| replica.may_publish(moment)) {
+            if let Some((lineage, state)) = replica.state().filter(|_| replica.may_publish(moment))
+            {
                 let event = Event::Holds {
                     moment,
                     program: replica.id(),
@@ -178,20 +179,21 @@ impl Station {
         }
         let all = ProgramSet::first(agreement.schedule.controllers());
         let known = known.map(Replica::id).collect();
-        match (agreement.mode, &self.settings.generated) {
-            (Mode::Full, _) => {
-                words::of_understudy(Mode::Full, all, known, self.confirmed(), |program| {
-                    let replica = self.replicas.iter().find(|replica| replica.id() == program);
-                    replica.map(Replica::outputs)
-                })
-            }
-            (Mode::Paper, Some(scan)) if known == all => {
+        let masks = words::masks_of_understudy(agreement.mode, all, known, self.confirmed());
+        let outputs_of = |program| {
+            let replica = self.replicas.iter().find(|replica| replica.id() == program);
+            replica.map(Replica::outputs)
+        };
+        let word_of = |mask| match agreement.mode {
+            Mode::Full => understudy_parity::sum(mask, outputs_of),
+            Mode::Paper => {
+                let generated = self.settings.generated.as_ref()?;
                 let steps = self.replicas.iter().map(Replica::last_step);
-                let sum = generated::outputs(scan, &mut self.scratch, steps);
-                sum.into_iter().map(|sum| Word { mask: all, sum }).collect()
+                let sum = generated::outputs(generated, &mut self.scratch, steps)?;
+                Some(Word { mask, sum })
             }
-            (Mode::Paper, _) => SmallVec::new(),
-        }
+        };
+        masks.into_iter().filter_map(word_of).collect()
     }
 
     pub(super) fn publishes_at(&self) -> Option<Time> {
