@@ -6,8 +6,8 @@
 //! y(N+1)(t) = h(N+1)(x(N+1)(t), u(N+1)(t))                   (8)
 //! ```
 //!
-//! Samples arrive, are replayed and become void program by program, and a state is transferred program by program. So the
-//! replicas hold x(N+1) from cycle to cycle, and the generated circuit is evaluated on it in each turn.
+//! Samples arrive, are replayed and become void program by program, and a state is transferred program by program. So
+//! the replicas hold x(N+1) from cycle to cycle, and the generated circuit is evaluated on it in each turn.
 
 use understudy_executable::{Executable, Scratch};
 use understudy_wire::Image;

@@ -1,7 +1,8 @@
-//! Which terminal of a model is which signal of its controller.
+//! Binding of a model's terminals to the signals of its controller.
 //!
-//! A terminal without an entry in [`Signals`] is bound to the signal of its own name. Every sensor has to be an input of the
-//! controller and every actuator an output, but for those that follow another plant; an input that no sensor drives stays 0.
+//! A terminal without an entry in [`Signals`] is bound to the signal of its own name. Every sensor must be an input of
+//! the controller and every actuator an output, except those that follow another plant; an input that no sensor drives
+//! stays 0.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
@@ -11,17 +12,17 @@ use understudy_typed::{Elementary, Point, Points};
 
 use crate::model::{Direction, Terminal, Terminals};
 
-/// From the name of a model's terminal to the name of the controller's signal, where the two differ.
+/// Names of the controller's signals by the name of the model's terminal, where the two differ.
 pub type Signals = BTreeMap<String, String>;
 
-/// Why a model and its controller do not fit; the last two are no obstacle.
+/// Reason why a model and its controller do not fit; the last two are warnings.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum BindingProblem {
     /// The model has no such terminal.
     UnknownTerminal {
-        /// As in [`Signals`].
+        /// Name in [`Signals`].
         terminal: String,
-        /// All that there are.
+        /// All terminals of the model.
         known: Arc<[String]>,
     },
     /// The controller has no input or no output of this name.
@@ -30,9 +31,9 @@ pub enum BindingProblem {
         terminal: String,
         /// Whether the model drives it or is driven by it.
         direction: Direction,
-        /// What it is bound to.
+        /// Signal that it is bound to.
         signal: String,
-        /// The inputs, or the outputs, that the controller has.
+        /// The inputs, or the outputs, of the controller.
         known: Arc<[String]>,
     },
     /// A terminal and the signal that it is bound to are of different types.
@@ -48,7 +49,7 @@ pub enum BindingProblem {
     DrivenTwice {
         /// The second of the two.
         terminal: String,
-        /// What both are bound to.
+        /// Input that both are bound to.
         signal: String,
     },
     /// A terminal that follows another plant is bound to a signal of the controller too.
@@ -68,12 +69,12 @@ pub enum BindingProblem {
     },
 }
 
-/// What moves an actuator.
+/// Source of an actuator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Driver {
     /// Bits of y(i), from this one on.
     Output(usize),
-    /// What another plant shows, by its number in `follows`.
+    /// A sensor of another plant, by its number in `follows`.
     Neighbour(usize),
 }
 
@@ -87,7 +88,7 @@ pub(crate) struct Binding {
 }
 
 impl Binding {
-    /// Finds every problem; the binding is there when none of them is an obstacle.
+    /// Finds every problem; returns the binding unless one of them is an error.
     pub(crate) fn new(
         terminals: &Terminals,
         controller: &Interface,
@@ -166,7 +167,7 @@ impl Binding {
             let unbound = unbound.filter(|point| !places.contains(&(point.bit as usize)));
             unbound.map(|point| point.name.clone()).collect::<Vec<_>>()
         };
-        // Where something does not fit, what is left over is only its other side.
+        // Where a name does not fit, the unbound signal is only the other side of the same problem.
         if fits {
             for input in unbound(inputs, &sensors) {
                 if !terminals.always_zero.contains(&input) {

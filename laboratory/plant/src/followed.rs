@@ -1,12 +1,12 @@
-//! What a terminal of a plant follows: a sensor of its neighbour.
+//! A terminal that follows a sensor of another plant.
 
 use smallvec::SmallVec;
 use understudy_wire::{Field, Moment, ProgramId};
 
-/// Where a terminal of a plant follows another plant, in the order of the names given to [`crate::Plant::following`].
+/// Source of a following terminal, in the order of the names given to [`crate::Plant::following`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Followed {
-    /// The plant that is followed, by its program.
+    /// Program of the plant that is followed.
     pub from: ProgramId,
     /// The first bit of u(from) that its sensor drives.
     pub sensor: usize,
@@ -22,17 +22,17 @@ impl Followed {
     }
 }
 
-/// What was heard of a followed plant. Lost frames cost nothing but time: each one says the whole truth.
+/// Last received state of a followed plant. Lost frames cost time only: each frame carries the whole state.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Hearing {
     heard: Moment,
 }
 
 impl Hearing {
-    /// What the sensor shows, where this frame is no older than the last one.
+    /// Value of the sensor, where this frame is not older than the last one.
     ///
-    /// Cycles order frames within an epoch only. A frame of another epoch counts as new, also of an older one, because epochs
-    /// are given up; and one without a moment is of a plant that has just started.
+    /// Cycles order frames within an epoch only. A frame of another epoch counts as new, also of an older one, because
+    /// epochs are given up; and one without a moment is of a plant that has just started.
     pub(crate) fn hear(
         &mut self,
         followed: Followed,

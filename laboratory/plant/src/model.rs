@@ -13,21 +13,21 @@ use crate::press::{self, Press, PressParameters};
 use crate::program_model::{self, ProgramModel};
 use crate::robot::{self, Robot, RobotParameters};
 
-/// Where a moving part is at its far end.
+/// Position of a moving part at its far end.
 pub(crate) const SHOWN: u16 = 1000;
 
 /// The inside of a plant. Shapes: `actuators` and `sensors` have the bits of its [`Terminals`], one behind the other.
 pub(crate) trait Model {
-    /// One cycle, in which `arrived` parts came from the plant that feeds this one.
+    /// Steps one cycle, in which `arrived` parts came from the plant that feeds this one.
     fn step(&mut self, actuators: &[bool], arrived: u64);
-    /// What its sensors see now.
+    /// Current values of its sensors.
     fn sensors(&self, sensors: &mut [bool]);
     fn counts(&self) -> Counts;
-    /// 0 to [`SHOWN`] each.
+    /// Positions of its moving parts, 0 to [`SHOWN`] each.
     fn positions(&self) -> SmallVec<[u16; 4]>;
 }
 
-/// Since the start of the plant; none ever falls.
+/// Counts since the start of the plant; none ever falls.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub(crate) struct Counts {
     pub(crate) handed_over: u64,
@@ -35,7 +35,7 @@ pub(crate) struct Counts {
     pub(crate) plant_faults: u64,
 }
 
-/// Which model, with all that it needs.
+/// Kind of a model, with its parameters.
 #[derive(Debug, Clone)]
 pub enum ModelKind {
     /// The arm of section V.
@@ -68,7 +68,7 @@ where
     }
 }
 
-/// Whether a terminal is seen or driven by the controller.
+/// Direction of a terminal, as seen from the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Direction {
@@ -149,7 +149,7 @@ impl ModelKind {
         }
     }
 
-    /// Whether parts from another plant change anything in it.
+    /// Whether parts from another plant have an effect.
     pub fn takes_parts(&self) -> bool {
         match self {
             Self::Robot(_) | Self::Press(_) => true,
@@ -160,7 +160,7 @@ impl ModelKind {
         }
     }
 
-    /// Whether it ever hands parts over to a plant that it feeds.
+    /// Whether it hands parts over to a plant that it feeds.
     pub fn hands_over(&self) -> bool {
         match self {
             Self::Robot(_) | Self::Press(_) => true,
@@ -172,7 +172,7 @@ impl ModelKind {
     }
 }
 
-/// A plant in its initial state and later.
+/// A plant.
 #[derive(Debug, Clone)]
 pub struct Plant {
     inside: Inside,
@@ -191,7 +191,7 @@ enum Inside {
     Program(Box<ProgramModel>),
 }
 
-/// Two of one binding that hash alike go on alike.
+/// Two of one binding that hash alike behave alike.
 impl Hash for Plant {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
         (&self.inside, &self.seen, &self.actuators, &self.sensors).hash(hasher);
@@ -219,7 +219,7 @@ impl Inside {
 impl Plant {
     /// Binds a model to the signals of `controller`; `fed` where its parts come from another plant.
     ///
-    /// Answers with every problem; the plant is there unless one of them is an obstacle.
+    /// Returns every problem; the plant is there unless one of them is an error.
     pub fn new(
         kind: &ModelKind,
         controller: &Interface,
@@ -230,7 +230,7 @@ impl Plant {
     }
 
     /// As [`Self::new`], where the actuators `follows` follow other plants and not the controller. They are 0 until
-    /// [`Self::see`] says otherwise.
+    /// [`Self::see`] sets them.
     pub fn following(
         kind: &ModelKind,
         controller: &Interface,
@@ -264,7 +264,8 @@ impl Plant {
         }
     }
 
-    /// One cycle under y(i), in which `arrived` parts came from the plant that feeds this one. Answers with what it shows then.
+    /// Steps one cycle with y(i), in which `arrived` parts came from the plant that feeds this one. Returns the new
+    /// field.
     ///
     /// Outputs past the width of `outputs` count as 0.
     pub fn step(&mut self, outputs: &Image, arrived: u64) -> Field {
@@ -283,7 +284,7 @@ impl Plant {
         self.show()
     }
 
-    /// What it shows now.
+    /// Its current sensors and counts.
     pub fn field(&self) -> Field {
         self.clone().show()
     }

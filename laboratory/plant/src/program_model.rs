@@ -1,9 +1,10 @@
 //! A plant that is itself a program, because its author knows how to write one.
 //!
-//! Its inputs bear the names of the controller's outputs, its outputs those of the controller's inputs; a scan of it is one
-//! cycle of the plant. Besides, where they are declared: the input `part_arrives` is 1 for one scan for each part that the feeding
-//! plant hands over (parts that come together follow each other every other scan, so that each is an edge); the outputs `finished`, `handed_over` and
-//! `plant_fault` are counted at their rising edges. Without `finished`, what is handed over counts as finished.
+//! Its inputs have the names of the controller's outputs, its outputs those of the controller's inputs; a scan of it is
+//! one cycle of the plant. In addition, where they are declared: the input `part_arrives` is 1 for one scan for each
+//! part that the feeding plant hands over (parts that come together follow each other every other scan, so that each is
+//! an edge); the outputs `finished`, `handed_over` and `plant_fault` are counted at their rising edges. Without
+//! `finished`, parts that are handed over count as finished.
 
 use std::hash::{Hash, Hasher};
 

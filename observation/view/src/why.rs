@@ -9,6 +9,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_journal::source_word;
 use understudy_ladder::Program;
+use understudy_parity::reconstruct;
 use understudy_text::spelling::suggestion;
 use understudy_wire::{Member, ProgramId, Source, StationId};
 
@@ -221,19 +222,20 @@ impl Model {
         let turns = self.sent_turns(step.moment);
         let turn = turns.iter().find(|turn| turn.station == station)?;
         let word = turn.words.iter().find(|word| word.mask.contains(program))?;
-        let mut sum = word.sum.clone();
-        let mut others = Vec::new();
-        for other in word.mask.iter().filter(|other| *other != program) {
-            let own = StationId(other.0);
-            let turn = turns.iter().find(|turn| turn.station == own);
-            let published = turn.and_then(|turn| turn.words.first())?;
-            sum.add(&published.sum);
-            others.push(Addend {
-                published_by: self.members.name(Member::Station(own)).to_owned(),
-                outputs: published.sum.to_string(),
-            });
-        }
-        let sum = sum.narrowed(driven.outputs.width()).unwrap_or(sum);
+        let published = |other: ProgramId| {
+            let turn = turns
+                .iter()
+                .find(|turn| turn.station == StationId(other.0))?;
+            turn.words.first().map(|word| &word.sum)
+        };
+        let sum = reconstruct(word, program, driven.outputs.width(), published).ok()?;
+        let others = word.mask.iter().filter(|other| *other != program);
+        let others = others.filter_map(|other| {
+            Some(Addend {
+                published_by: self.program_name(other).to_owned(),
+                outputs: published(other)?.to_string(),
+            })
+        });
         let not_received = (0..self.cluster.agreement().schedule.stations() as u8)
             .map(StationId)
             .filter(|station| !driven.heard.contains(*station))
@@ -247,7 +249,7 @@ impl Model {
                 .map(|member| self.program_name(member).to_owned())
                 .collect(),
             word: word.sum.to_string(),
-            others,
+            others: others.collect(),
             lineage: sampled.map_or_else(String::new, |sampled| sampled.after.to_string()),
             proved: sampled.is_some_and(|sampled| sampled.outputs == sum),
             sum: sum.to_string(),
