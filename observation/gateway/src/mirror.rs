@@ -137,6 +137,8 @@ fn named(points: &Points, bits: Option<&str>) -> Option<Map<String, Value>> {
 
 #[cfg(test)]
 mod tests {
+    use understudy_typed::Elementary;
+
     use super::*;
 
     #[test]
@@ -150,8 +152,11 @@ mod tests {
 
     #[test]
     fn signals_stand_by_their_names() {
-        let found = named(&["a", "b"], Some("10")).map(Value::Object);
-        assert_eq!(found, Some(json!({ "a": true, "b": false })));
-        assert_eq!(named(&["a"], None), None);
+        let mut points = Points::default();
+        points.push("a", Elementary::Bool, 0);
+        points.push("b", Elementary::Sint, 0);
+        let found = named(&points, Some("1000000011111111")).map(Value::Object);
+        assert_eq!(found, Some(json!({ "a": true, "b": -1 })));
+        assert_eq!(named(&points, None), None);
     }
 }

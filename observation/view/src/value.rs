@@ -80,7 +80,7 @@ mod tests {
             .iter()
             .filter_map(|point| value_of(point, &bits))
             .collect();
-        let expected = [true.into(), (-5).into(), 12.1.into(), u64::MAX.into()];
+        let expected: [Value; 4] = [true.into(), (-5).into(), 12.1.into(), u64::MAX.into()];
         assert_eq!(found, expected);
         let last = points.iter().next_back().expect("a point");
         assert_eq!(value_of(last, &bits[1..]), None);
