@@ -8,17 +8,21 @@
 //! x, u and y are images of bits as those of a circuit are, so everything that carries, adds and compares images holds for numbers too: a
 //! point is a name, a type and a range of bits ([`Point`]).
 
+mod fault;
 mod form;
 mod image;
 mod operation;
 mod types;
 
+pub use self::fault::{Cause, Fault};
 pub use self::form::{
     Argument, Branch, Call, Case, Expression, ExpressionKind, For, Index, Initial, Place, Program,
     Root, Routine, RoutineId, RoutineKind, Statement, StatementKind, Task, Variable,
 };
 pub use self::image::{Point, Points};
-pub use self::operation::{Comparison, Operation, RealFunction, TextOperation};
+pub use self::operation::{
+    Comparison, Operand, Operation, RealFunction, Signature, TextOperand, TextOperation,
+};
 pub use self::types::{
     Array, Elementary, Enumeration, EnumerationId, Field, Structure, StructureId, Type,
 };
