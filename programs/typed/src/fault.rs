@@ -161,9 +161,8 @@ impl Fault {
         let routine = self
             .routine
             .map_or(0, |routine| u64::from(routine.0 & 0xff_ffff) + 1);
-        state[0] = u64::from(self.cause.code())
-            | (routine & 0xff_ffff) << 8
-            | u64::from(self.line) << 32;
+        state[0] =
+            u64::from(self.cause.code()) | (routine & 0xff_ffff) << 8 | u64::from(self.line) << 32;
         let [first, second] = self.cause.values();
         (state[1], state[2]) = (first, second);
     }
@@ -195,7 +194,10 @@ impl Fault {
                 format!("index {index} is outside the array, whose last index is {bound}")
             }
             Cause::NoSuchOperand { number, count } => {
-                format!("MUX selects input {number}, but the inputs are 0 to {}", count.saturating_sub(1))
+                format!(
+                    "MUX selects input {number}, but the inputs are 0 to {}",
+                    count.saturating_sub(1)
+                )
             }
             Cause::TextTooLong { length, capacity } => {
                 format!("a text of {length} bytes does not fit into STRING[{capacity}]")
