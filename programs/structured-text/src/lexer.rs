@@ -13,6 +13,8 @@ use understudy_text::{Diagnostic, MAXIMUM_FINDINGS};
 
 use crate::syntax::Literal;
 
+pub(crate) use moment::calendar;
+
 /// What one lexeme is.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Lexeme<'a> {
@@ -78,9 +80,23 @@ const MAXIMUM_LEXEMES: usize = 4 << 20;
 
 /// Pragmas that no execution depends on, by their first word. `S7_…` belongs to them.
 const PRAGMAS: [&str; 17] = [
-    "attribute", "info", "warning", "error", "text", "region", "endregion", "warnings",
-    "analysis", "link_always", "linkalways", "flow", "external", "externalaccessible",
-    "externalvisible", "externalwritable", "instructionlist",
+    "attribute",
+    "info",
+    "warning",
+    "error",
+    "text",
+    "region",
+    "endregion",
+    "warnings",
+    "analysis",
+    "link_always",
+    "linkalways",
+    "flow",
+    "external",
+    "externalaccessible",
+    "externalvisible",
+    "externalwritable",
+    "instructionlist",
 ];
 
 /// Pragmas that choose which statements are compiled, by their first word.
@@ -323,11 +339,16 @@ impl<'a> Lexer<'a> {
             '0'..='9' => return self.number(start),
             '%' => {
                 self.place += 1;
-                self.take_while(|next| next.is_ascii_alphanumeric() || ".*_".contains(next));
+                // Behind a point it is a part, which further points follow.
+                let is_part = self.text[..start].ends_with('.');
+                let others = if is_part { "" } else { ".*_" };
+                self.take_while(|next| next.is_ascii_alphanumeric() || others.contains(next));
                 return Lexeme::Address(self.since(start));
             }
             '\'' | '"' => return self.quoted(character, start),
-            '#' if self.rest()[1..].starts_with(|next: char| is_word_start(next) || next == '"') => {
+            '#' if self.rest()[1..]
+                .starts_with(|next: char| is_word_start(next) || next == '"') =>
+            {
                 self.place += 1;
                 self.has_local_marks = true;
                 return match self.rest().starts_with('"') {
