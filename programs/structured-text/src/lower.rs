@@ -124,6 +124,8 @@ struct Lowering<'a> {
     /// Which routines each routine calls, and where it first does.
     calls: Vec<Vec<(u32, Range<usize>)>>,
     scope: Scope,
+    /// The file has no PROGRAM.
+    is_library: bool,
     nesting: u32,
     /// The length of the expressions around this one.
     length: usize,
@@ -173,6 +175,7 @@ impl<'a> Lowering<'a> {
             queue: Vec::new(),
             calls: Vec::new(),
             scope: Scope::default(),
+            is_library: false,
             nesting: 0,
             length: 0,
             silent: 0,

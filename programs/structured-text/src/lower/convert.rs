@@ -218,7 +218,12 @@ impl Lowering<'_> {
                 return Some(fold::convert(value, target));
             }
         }
-        match fit(from, target) {
+        let is_constant = matches!(value.kind, ExpressionKind::Constant(_));
+        let fit = match fit(from, target) {
+            Fit::No if is_constant && from.is_real() && target.is_real() => Fit::Rounded,
+            fit => fit,
+        };
+        match fit {
             Fit::Whole => {}
             Fit::Sign => {
                 let message = format!("{found} becomes {target}: the bits stay, the number may change");

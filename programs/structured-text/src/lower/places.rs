@@ -354,8 +354,7 @@ impl Lowering<'_> {
             Some(Class::Local | Class::Temporary | Class::Static) => {
                 let message = format!("`{}` is an internal variable of the block", shown(path));
                 let help = "declare it as VAR_INPUT of the block, and give it in the call";
-                self.error_with("U1044", message, path.span.clone(), help);
-                return None;
+                self.warn("U1081", message, path.span.clone(), help);
             }
             Some(Class::Output) => {
                 let message = format!("`{}` is an output, which the block writes itself", shown(path));

@@ -228,7 +228,9 @@ impl<'a> Lowering<'a> {
         let is_program = |unit: &&Unit| unit.kind == UnitKind::Program;
         let programs: Vec<&Unit> = file.units.iter().filter(is_program).collect();
         if programs.is_empty() {
-            if options.program.is_some() || file.units.is_empty() {
+            self.is_library = true;
+            let is_empty = file.units.is_empty() && file.types.is_empty() && file.globals.is_empty();
+            if options.program.is_some() || is_empty {
                 let message = "the file has no PROGRAM";
                 self.error_with("U1051", message, 0..0, "add a PROGRAM that calls its blocks");
             }
@@ -439,7 +441,10 @@ impl<'a> Lowering<'a> {
 
     /// Lowers each unit of a file without a PROGRAM by itself.
     fn library(&mut self, file: &'a File) -> Vec<String> {
-        let mut checked = Vec::new();
+        let types = file.types.iter().map(|definition| &definition.name);
+        let globals = file.globals.iter().map(|declaration| &declaration.name);
+        let names = types.chain(globals);
+        let mut checked: Vec<String> = names.map(|name| name.as_str().to_owned()).collect();
         for unit in &file.units {
             let index = self.unit_names[&unit.name.key()];
             let class = (unit.kind == UnitKind::FunctionBlock).then_some(index);
