@@ -2,8 +2,11 @@
 //! program form of `understudy-typed` (`lower`).
 
 mod lexer;
+mod library;
+pub mod lower;
 pub mod parser;
 pub mod print;
 pub mod syntax;
 
+pub use lower::{Lowered, Options, lower};
 pub use parser::parse;
