@@ -17,6 +17,7 @@ mod machine;
 mod operation;
 mod scan;
 mod types;
+mod validate;
 mod visit;
 
 pub use self::cost::Cost;
@@ -34,3 +35,4 @@ pub use self::operation::{
 pub use self::types::{
     Array, Elementary, Enumeration, EnumerationId, Field, Structure, StructureId, Type,
 };
+pub use self::validate::Violation;

@@ -5,7 +5,7 @@ use super::place::{Location, calls};
 use crate::form::{Expression, ExpressionKind};
 use crate::machine::instruction::{Application, Code, TextSource};
 use crate::operation::{Comparison, Operation};
-use crate::types::{Elementary, Type};
+use crate::types::Elementary;
 
 /// The instruction for a comparison, and whether its operands are exchanged.
 pub(super) struct Compared {
@@ -352,9 +352,4 @@ pub(super) fn comparing(comparison: Comparison, of: Elementary) -> Compared {
         Comparison::GreaterOrEqual => (less_or_equal, true),
     };
     Compared { code, is_exchanged }
-}
-
-/// Whether a type has no parts.
-pub(super) fn is_elementary(of: &Type) -> bool {
-    of.elementary().is_some()
 }

@@ -1,28 +1,32 @@
-//! Pacing, token and repair of one station, with every other member played by the test.
+//! Role, token and repair of one station, with every other member played by the test.
+
+mod states;
 
 use std::fmt::Write as _;
 use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_cycle::{Agreement, Input, Machine, Mode, Output, Schedule};
-use understudy_logic::{Circuit, CircuitBuilder, Scan};
-use understudy_node::{Event, Program, Settings, Station};
+use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
     Lineage, Member, Moment, ProgramHash, ProgramId, ProgramSet, StationId, StationSet, Time, Word,
 };
+
+use super::Station;
+use crate::{Event, Program, Settings};
 
 const PERIOD: Duration = Duration::from_millis(10);
 const CYCLE_US: u64 = 10_000;
 const CONTROLLERS: usize = 2;
 const UNDERSTUDY: u8 = 2;
 
-/// What another member sends, in the cycle of its time.
+/// What another member sends.
 #[derive(Debug, Clone, Copy)]
 enum Sent {
     /// A station starts the cycle.
     Sync(u8),
-    /// A remote I/O samples; its history starts in the first cycle that is given.
+    /// A remote I/O sends its sample; its history starts in the cycle that is given.
     Sample(u8, u64),
     /// A controller publishes its own output, of a history from the first cycle.
     Turn(u8),
@@ -74,7 +78,7 @@ fn state_before(born: u64, cycle: u64) -> Image {
     Image::from_bits([(cycle - born) % 2 == 1])
 }
 
-fn settings(rank: u8) -> Settings {
+fn settings(rank: u8, shadow_cycles: u32) -> Settings {
     let agreement = Agreement {
         cluster: ClusterHash(1),
         configuration: ConfigurationHash(2),
@@ -82,12 +86,12 @@ fn settings(rank: u8) -> Settings {
         mode: Mode::Full,
         history: 2,
         flag_after: 2,
-        shadow_cycles: 1,
+        shadow_cycles,
         listen_cycles: 2,
     };
     let programs = (0..CONTROLLERS as u8).map(|program| Program {
         hash: hash(program),
-        scan: Scan::new(&circuit()),
+        executable: (&circuit()).into(),
     });
     Settings {
         station: StationId(rank),
@@ -98,13 +102,14 @@ fn settings(rank: u8) -> Settings {
     }
 }
 
-fn frame(sent: Sent, cycle: u64, to: u8) -> Option<Arc<Frame>> {
+/// What is sent after the samples before that of `cycle`, to the station of rank `to`, and its sender.
+fn sent(what: Sent, cycle: u64, to: u8) -> Option<(Member, Body)> {
     let station = |rank| Member::Station(StationId(rank));
-    let (sender, body) = match sent {
+    Some(match what {
         Nothing => return None,
         Sync(rank) => (station(rank), Body::Sync),
         Sample(program, born) => {
-            let oldest = (cycle - 1).max(born);
+            let oldest = cycle.saturating_sub(1).max(born);
             let after = lineage(program, born, cycle + 1);
             let sample = understudy_wire::Sample {
                 born: moment(born),
@@ -164,15 +169,18 @@ fn frame(sent: Sent, cycle: u64, to: u8) -> Option<Arc<Frame>> {
             };
             (station(rank), Body::Transfer(transfer))
         }
-    };
+    })
+}
+
+fn frame(moment: Moment, (sender, body): (Member, Body)) -> Arc<Frame> {
     let header = Header {
         cluster: ClusterHash(1),
         configuration: ConfigurationHash(2),
-        moment: moment(cycle),
+        moment,
         sender,
         alone: false,
     };
-    Some(Arc::new(Frame { header, body }))
+    Arc::new(Frame { header, body })
 }
 
 fn describe(output: Output<Event>) -> Option<String> {
@@ -208,7 +216,7 @@ fn describe(output: Output<Event>) -> Option<String> {
 /// What the station of `rank` does, with the time in microseconds, where the others send `script`: (cycle, microseconds
 /// after its start, what is sent).
 fn check(rank: u8, script: &[(u64, u64, Sent)]) -> String {
-    let mut station = Station::new(Time(0), settings(rank));
+    let mut station = Station::new(Time(0), settings(rank, 1));
     let mut text = String::new();
     let mut drain = |station: &mut Station, now: Time| {
         while let Some(output) = station.poll_output() {
@@ -217,14 +225,15 @@ fn check(rank: u8, script: &[(u64, u64, Sent)]) -> String {
             }
         }
     };
-    for &(cycle, after_us, sent) in script {
+    for &(cycle, after_us, what) in script {
         let now = Time((cycle * CYCLE_US + after_us) * 1000);
         while station.wakeup() <= now {
             let due = station.wakeup();
             station.handle_input(due, Input::Wakeup);
             drain(&mut station, due);
         }
-        if let Some(frame) = frame(sent, cycle, rank) {
+        if let Some(sent) = sent(what, cycle, rank) {
+            let frame = frame(moment(cycle), sent);
             station.handle_input(now, Input::Frame(&frame));
             drain(&mut station, now);
         }
@@ -255,8 +264,8 @@ fn the_next_rank_takes_over() {
     insta::assert_snapshot!(check(1, &script));
 }
 
-/// A controller publishes after its predecessor, in its own slot where that is not received, and at the last call where its sample is
-/// not received.
+/// A controller publishes after its predecessor, in its own slot where that is not received, and at the last call where
+/// its sample is not received.
 #[test]
 fn a_controller_publishes_after_its_predecessor_or_in_its_slot() {
     let script = [

@@ -1,21 +1,22 @@
 //! Where one cycle ends and the next begins.
 //!
-//! The cycle master is the lowest-ranked living station. Every other one waits a guard time for each that comes before it, so that the
-//! next rank takes over when the cycle master is silent; two that pace at once start the same cycle, which harms nobody.
+//! The cycle master is the lowest-ranked living station. Every other one waits a guard time for each that comes before
+//! it, so that the next rank takes over when the cycle master is not received; two that start the same cycle at once do
+//! no harm.
 
 use understudy_wire::{Body, StationSet, Time};
 
-use super::{CycleNotes, Station};
+use super::{CycleNotes, Role, Station, Token};
 use crate::event::Event;
 
 impl Station {
-    /// Ends the current cycle: flags, and copies that have proved themselves.
+    /// Ends the current cycle: updates the flags, and the replicas in shadow mode.
     pub(super) fn close_cycle(&mut self) {
         let Some(moment) = self.member.clock.moment() else {
             return;
         };
-        if self.cycle.published {
-            self.member.attendance.heard(self.own());
+        if self.cycle.token == Token::Passed {
+            self.member.attendance.receive_turn(self.own());
         }
         self.member.close_cycle();
         for replica in &mut self.replicas {
@@ -30,18 +31,19 @@ impl Station {
         self.cycle = CycleNotes::default();
     }
 
-    /// When this station starts the next cycle if nobody else does: each living one of lower rank is given a guard time.
-    pub(super) fn paces_at(&self) -> Time {
+    /// Time at which this station starts the next cycle if no other one does: a guard time later for each living lower
+    /// rank.
+    pub(super) fn starts_cycle_at(&self) -> Time {
         let agreement = &self.settings.agreement;
         let (schedule, own) = (&agreement.schedule, self.own());
         let lower = StationSet::first(own.index());
-        if self.member.clock.moment().is_none() {
+        if self.role == Role::Listening {
             let listens = schedule.period() * agreement.listen_cycles;
             return self.started + listens + schedule.guard() * u32::from(own.0);
         }
         let all = StationSet::first(schedule.stations());
         let living = all.without(self.member.flagged());
-        let first = if self.speaks() {
+        let first = if self.publishes() {
             living.and(lower)
         } else {
             living
@@ -51,9 +53,10 @@ impl Station {
         self.member.clock.anchor() + schedule.period() + schedule.guard() * first.len() as u32
     }
 
-    pub(super) fn pace(&mut self, now: Time, planned: Time) {
+    pub(super) fn start_cycle(&mut self, now: Time, planned: Time) {
         self.close_cycle();
-        // A cycle master keeps to its plan, so that late wake-ups do not add up; one that is far behind starts from now.
+        // A cycle master keeps to its plan, so that late wake-ups do not add up; one that is far behind starts from
+        // now.
         let schedule = &self.settings.agreement.schedule;
         let anchor = if now.since(planned) < schedule.guard() {
             planned
@@ -64,8 +67,8 @@ impl Station {
             .member
             .clock
             .pace(now, self.settings.epoch, anchor, schedule.period());
-        if !self.is_cycle_master {
-            self.is_cycle_master = true;
+        if self.role != Role::CycleMaster {
+            self.role = Role::CycleMaster;
             self.report(Event::BecameCycleMaster { moment });
         }
         self.member.send_cyclic(now, Body::Sync);

@@ -1,14 +1,14 @@
-//! Which living stations hold which state of one program: the controller of the program and every understudy.
+//! The states of one program that living stations hold: its controller and every understudy.
 //!
-//! Living means heard in the last few cycles, speaking or asking to join.
+//! A station is living if a turn or a join of it was received in the last few cycles.
 
 use understudy_cycle::Agreement;
 use understudy_wire::{Holding, Image, ProgramId, Recalled, StationId, StationSet};
 
 /// One entry for each station that can hold the program's state.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(crate) struct Witnesses {
-    entries: Vec<Witness>,
+pub(crate) struct Holders {
+    entries: Vec<Holder>,
     living_for: u32,
     /// Cycles of silence after which a station cannot come back without a state from another one.
     gone_after: u32,
@@ -19,16 +19,16 @@ pub(crate) struct Witnesses {
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-struct Witness {
+struct Holder {
     station: StationId,
     holding: Option<Holding>,
     /// What it recalls of this remote I/O's last sample.
     recalled: Option<Recalled>,
-    /// Cycles since it was heard; `u32::MAX` for never.
+    /// Cycles since it was received; `u32::MAX` for never.
     silent: u32,
 }
 
-impl Witnesses {
+impl Holders {
     /// For `program` in a cluster of `agreement`; a station that is silent for `flag_after` cycles lives no more.
     pub(crate) fn new(program: ProgramId, agreement: &Agreement) -> Self {
         let schedule = &agreement.schedule;
@@ -39,7 +39,7 @@ impl Witnesses {
         let entries = [own]
             .into_iter()
             .chain(understudies)
-            .map(|station| Witness {
+            .map(|station| Holder {
                 station,
                 holding: None,
                 recalled: None,
@@ -55,7 +55,7 @@ impl Witnesses {
         }
     }
 
-    /// A station has said what it holds of this program, and what it recalls of its last sample.
+    /// Takes the state that a station holds of this program, and what it recalls of the last sample.
     pub(crate) fn note(
         &mut self,
         station: StationId,
@@ -68,7 +68,7 @@ impl Witnesses {
             .find(|entry| entry.station == station)
         {
             entry.holding = holding.copied();
-            // A station that has restarted recalls nothing of what it said before.
+            // A station that has restarted recalls nothing of its earlier life.
             entry.recalled = recalled.cloned();
             entry.silent = 0;
             self.recalled_gone.remove(station);
@@ -95,18 +95,19 @@ impl Witnesses {
             .or(self.recalled_gone)
     }
 
-    /// Whether no output can have been applied that came of a newer state than `holding`, as far as living stations recall: each
-    /// station that could have proved one lives and has received samples in this life, or is accounted for by one that does, and
-    /// none recalls a newer applied sample.
+    /// Whether no output can have been applied that came of a newer state than `holding`, as far as living stations
+    /// recall: each station that could have proved one lives and has received samples in this life, or is accounted for
+    /// by one that does, and none recalls a newer applied sample.
     ///
-    /// What remains: a remote I/O and a station that were cut off together from all others, and lost their memory together.
+    /// What remains: a remote I/O and a station that were cut off together from all others, and lost their memory
+    /// together.
     pub(crate) fn covers_all_applied(&self, holding: &Holding) -> bool {
         let recalling = || {
             let living = self.entries.iter().filter(|entry| self.lives(entry));
             living.filter_map(|entry| Some((entry.station, entry.recalled.as_ref()?)))
         };
-        let witnesses = recalling().filter(|(_, recalled)| recalled.witnessed);
-        let accounted_for = witnesses.fold(StationSet::EMPTY, |all, (station, recalled)| {
+        let first_hand = recalling().filter(|(_, recalled)| recalled.witnessed);
+        let accounted_for = first_hand.fold(StationSet::EMPTY, |all, (station, recalled)| {
             all.or(StationSet::only(station)).or(recalled.accounted_for)
         });
         let all = self.entries.iter();
@@ -123,9 +124,9 @@ impl Witnesses {
         let living = self.entries.iter().filter(|entry| self.lives(entry));
         let recalled = living.filter_map(|entry| entry.recalled.as_ref());
         let gone = recalled.fold(StationSet::EMPTY, |gone, one| gone.or(one.accounted_for));
-        let heard = self.entries.iter().filter(|entry| entry.silent < u32::MAX);
-        let heard: StationSet = heard.map(|entry| entry.station).collect();
-        self.recalled_gone = gone.without(heard);
+        let received = self.entries.iter().filter(|entry| entry.silent < u32::MAX);
+        let received: StationSet = received.map(|entry| entry.station).collect();
+        self.recalled_gone = gone.without(received);
     }
 
     /// Whether a station lives.
@@ -139,17 +140,17 @@ impl Witnesses {
         self.entries.iter().map(|entry| entry.station)
     }
 
-    /// Whether anybody lives who could hold the state.
-    pub(crate) fn anybody(&self) -> bool {
+    /// Whether a station lives that could hold the state.
+    pub(crate) fn any_living(&self) -> bool {
         self.entries.iter().any(|entry| self.lives(entry))
     }
 
-    /// Whether all who could hold the state live.
-    pub(crate) fn everybody(&self) -> bool {
+    /// Whether all stations that could hold the state live.
+    pub(crate) fn all_living(&self) -> bool {
         self.entries.iter().all(|entry| self.lives(entry))
     }
 
-    /// Whom this remote I/O had excluded, as any living station recalls it.
+    /// Stations that this remote I/O had excluded, as living stations recall them.
     pub(crate) fn excluded(&self) -> StationSet {
         let living = self.entries.iter().filter(|entry| self.lives(entry));
         let recalled = living.filter_map(|entry| entry.recalled.as_ref());
@@ -162,7 +163,7 @@ impl Witnesses {
         entry.recalled.as_ref().map(|recalled| &recalled.inputs)
     }
 
-    /// What the living hold.
+    /// States that living stations hold.
     pub(crate) fn holdings(&self) -> impl Iterator<Item = (StationId, &Holding)> + Clone {
         self.entries
             .iter()
@@ -170,7 +171,8 @@ impl Witnesses {
             .filter_map(|entry| Some((entry.station, entry.holding.as_ref()?)))
     }
 
-    /// Those who hold the state that was stepped last, where they hold different ones: nobody can say which the plant has seen.
+    /// Stations that hold the state that was stepped last, where they hold different ones: it is not known which of
+    /// them the applied outputs came from.
     pub(crate) fn disputed(&self) -> Option<StationSet> {
         let (_, newest) = self.newest()?;
         let equal = self
@@ -194,7 +196,7 @@ impl Witnesses {
         })
     }
 
-    fn lives(&self, entry: &Witness) -> bool {
+    fn lives(&self, entry: &Holder) -> bool {
         entry.silent <= self.living_for
     }
 }
