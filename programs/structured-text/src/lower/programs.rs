@@ -3,13 +3,17 @@
 use std::rc::Rc;
 
 use understudy_text::spelling;
-use understudy_typed::{Elementary, Root, Task, Type, Variable as Shown};
+use understudy_typed::{
+    Elementary, Root, Routine as Lowered, RoutineId, RoutineKind, Statement, StatementKind, Task,
+    Type, Variable as Shown,
+};
 
-use crate::syntax::{Class, Declaration, File, Name, Span, Unit, UnitKind};
+use crate::syntax::{Argument, Class, Declaration, File, Name, Span, Unit, UnitKind};
 
-use super::blocks::{Block, Key};
+use super::blocks::{Block, Key, Routine};
 use super::images::initial;
 use super::names::{Owner, Symbol, Variable};
+use super::places::{load, place};
 use super::types::{Resolved, TypeState};
 use super::{DEFAULT_PERIOD, Lowering, Options};
 
@@ -20,6 +24,8 @@ struct Instance<'a> {
     /// Nanoseconds, and how urgent it is.
     interval: Option<i64>,
     priority: i64,
+    /// What its inputs and outputs are connected to.
+    connections: &'a [Argument],
 }
 
 impl<'a> Lowering<'a> {
@@ -295,6 +301,7 @@ impl<'a> Lowering<'a> {
             unit: index,
             interval: None,
             priority: 0,
+            connections: &[],
         };
         if let Some(chosen) = options.program {
             let found = programs.iter().find(|program| program.name.is(chosen));
@@ -340,6 +347,7 @@ impl<'a> Lowering<'a> {
             };
             let mut instance = whole(unit, self.unit_names[&unit.name.key()]);
             instance.name = &declared.name;
+            instance.connections = &declared.connections;
             instance.priority = i64::MAX;
             if let Some(name) = &declared.task {
                 let Some(task) = file.tasks.iter().find(|task| task.name == *name) else {
@@ -404,8 +412,9 @@ impl<'a> Lowering<'a> {
             return;
         };
         self.program.initial.extend(initial(&block.image, own));
+        let connected = self.connected(instance, &routine, &block);
         self.program.tasks.push(Task {
-            routine: routine.id,
+            routine: connected.unwrap_or(routine.id),
             own,
             every,
         });
@@ -413,10 +422,68 @@ impl<'a> Lowering<'a> {
             true => format!("{}.", instance.name),
             false => String::new(),
         };
-        self.program_variables(&block, own, &prefix);
+        self.program_variables(&block, own, &prefix, instance.connections);
     }
 
-    fn program_variables(&mut self, block: &Block, own: u32, prefix: &str) {
+    /// A routine that copies what the program is connected to, before and behind its body.
+    fn connected(
+        &mut self,
+        instance: &Instance<'a>,
+        routine: &Routine,
+        block: &Block,
+    ) -> Option<RoutineId> {
+        if instance.connections.is_empty() {
+            return None;
+        }
+        let id = RoutineId(self.program.routines.len() as u32);
+        self.scope.symbols = Some(Rc::default());
+        self.scope.routine = id.0;
+        let whole = place(Root::Own(0), block.of.clone());
+        let name = instance.name.as_str();
+        let bound = self.bind(
+            name,
+            &routine.parameters,
+            instance.connections,
+            &instance.name.span(),
+        );
+        let mut body = Vec::new();
+        let line = self.line(&instance.name.span());
+        if let Some(bound) = bound {
+            for (at, value) in &bound.given {
+                let parameter = &routine.parameters[*at];
+                let to = place(Root::Own(parameter.slot), parameter.of.clone());
+                let value = self.expression(value, &parameter.of);
+                let kind = value.map(|value| StatementKind::Assign(to, value));
+                body.extend(kind.map(|kind| Statement { line, kind }));
+            }
+            let kind = StatementKind::Invoke(routine.id, whole);
+            body.push(Statement { line, kind });
+            for (at, path, negated) in &bound.taken {
+                let parameter = &routine.parameters[*at];
+                let value = load(place(Root::Own(parameter.slot), parameter.of.clone()));
+                let kind = self.take_output(value, path, *negated);
+                body.extend(kind.map(|kind| Statement { line, kind }));
+            }
+        }
+        self.scope = super::names::Scope::default();
+        self.calls.push(vec![(routine.id.0, instance.name.span())]);
+        self.program.routines.push(Lowered {
+            name: name.to_owned(),
+            kind: RoutineKind::Block,
+            frame: (self.program.frames, 0),
+            initial: Vec::new(),
+            body,
+        });
+        Some(id)
+    }
+
+    fn program_variables(
+        &mut self,
+        block: &Block,
+        own: u32,
+        prefix: &str,
+        connections: &[Argument],
+    ) {
         for name in &block.order {
             let Some(member) = block.members.get(name) else {
                 continue;
@@ -424,6 +491,10 @@ impl<'a> Lowering<'a> {
             let Symbol::Variable(variable) = &member.symbol else {
                 continue;
             };
+            // Memories that no person declared, as of charts.
+            if variable.name.contains('.') {
+                continue;
+            }
             let parameter = block
                 .parameters
                 .iter()
@@ -435,7 +506,14 @@ impl<'a> Lowering<'a> {
                 _ => continue,
             };
             let shown = format!("{prefix}{}", variable.name);
-            if matches!(variable.root, Root::Own(_))
+            let is_connected = connections.iter().any(|connection| match connection {
+                Argument::Given(name, _) | Argument::Taken { from: name, .. } => {
+                    name.is(&variable.name)
+                }
+                Argument::Placed(_) => false,
+            });
+            if !is_connected
+                && matches!(variable.root, Root::Own(_))
                 && let Class::Input | Class::Output = member.class
             {
                 self.point(&shown, variable, slot, member.class == Class::Input);
