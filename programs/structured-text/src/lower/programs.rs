@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use understudy_text::spelling;
 use understudy_typed::{
-    Elementary, Root, Routine as Lowered, RoutineId, RoutineKind, Statement, StatementKind, Task, Type,
+    Root, Routine as Lowered, RoutineId, RoutineKind, Statement, StatementKind, Task, Type,
     Variable as Shown,
 };
 
@@ -14,7 +14,7 @@ use super::blocks::{Block, Key, Routine};
 use super::images::initial;
 use super::names::{Owner, Symbol, Variable};
 use super::places::{load, place};
-use super::types::{Resolved, TypeState};
+use super::types::TypeState;
 use super::{DEFAULT_PERIOD, Lowering, Options};
 
 /// A PROGRAM that is run.
@@ -103,130 +103,14 @@ impl<'a> Lowering<'a> {
                 name: name.to_owned(),
                 of: variable.of.clone(),
                 slot,
-                address: declaration.address.as_ref().map(|found| found.as_str().to_owned()),
+                address: declaration
+                    .address
+                    .as_ref()
+                    .map(|found| found.as_str().to_owned()),
                 description: declaration.description.clone(),
                 is_retained: declaration.retained,
             });
         }
-    }
-
-    /// A variable at an address: `%I` is an input point, `%Q` an output point, `%M` memory.
-    pub(super) fn located(&mut self, declaration: &Declaration, resolved: &Resolved) -> Symbol {
-        let Some(address) = &declaration.address else {
-            return Symbol::Faulty;
-        };
-        let name = &declaration.name;
-        let key = normal(address.as_str());
-        // An incomplete address is one of its own.
-        let key = match key.contains('*') {
-            true => format!("{key} {}", name.key()),
-            false => key,
-        };
-        if let Some(known) = self.addresses.get(&key).cloned() {
-            if let Symbol::Variable(first) = &known
-                && first.of != resolved.of
-            {
-                let (own, other) = (self.describe(&resolved.of), self.describe(&first.of));
-                let message = format!(
-                    "`{name}` is {own} at {address}, where `{}` is {other}",
-                    first.name
-                );
-                let found = understudy_text::Diagnostic::error("U1083", message, address.span());
-                let found = found.with_related(first.span.clone(), "declared here");
-                self.report(found.with_help("give both one type, or two addresses"));
-                return Symbol::Faulty;
-            }
-            return known;
-        }
-        let symbol = self
-            .at_address(name, address, resolved)
-            .unwrap_or(Symbol::Faulty);
-        self.addresses.insert(key, symbol.clone());
-        symbol
-    }
-
-    fn at_address(&mut self, name: &Name, address: &Name, resolved: &Resolved) -> Option<Symbol> {
-        let kind = address.as_str().chars().nth(1).map(|kind| kind.to_ascii_uppercase());
-        let is_input = kind == Some('I');
-        let is_point = is_input || kind == Some('Q');
-        if !is_point && kind != Some('M') {
-            let message = format!("`{address}` is not an address");
-            let help = "write an input such as %IX0.0, an output such as %QW3 or a memory such as %MD8";
-            self.error_with("U1083", message, address.span(), help);
-            return None;
-        }
-        let elementary = resolved.of.elementary();
-        if is_point && elementary.is_none() {
-            let found = self.describe(&resolved.of);
-            let message = format!("`{name}` at {address} is {found}; a point is one number, bit or time");
-            let help = "declare each element as a variable with an address of its own";
-            self.error_with("U1083", message, name.span(), help);
-            return None;
-        }
-        if let Some(of) = elementary {
-            self.fits_address(name, address, of);
-        }
-        let slot = self.state(resolved.of.slots(), &name.span())?;
-        self.program.initial.extend(initial(&resolved.image, slot));
-        if let Some(of) = elementary.filter(|_| is_point) {
-            let points = match is_input {
-                true => &mut self.program.inputs,
-                false => &mut self.program.outputs,
-            };
-            let mut shown = name.as_str().to_owned();
-            if points.iter().any(|point| point.name.eq_ignore_ascii_case(&shown)) {
-                shown = format!("{name} {address}");
-            }
-            points.push(shown, of, slot);
-        }
-        Some(Symbol::Variable(Rc::new(Variable {
-            name: name.as_str().to_owned(),
-            root: Root::Global(slot),
-            of: resolved.of.clone(),
-            class: Class::Local,
-            is_constant: false,
-            is_point: is_input,
-            span: name.span(),
-        })))
-    }
-
-    /// Warns where the size in an address is not that of the variable.
-    fn fits_address(&mut self, name: &Name, address: &Name, of: Elementary) {
-        let size = normal(address.as_str()).chars().nth(2);
-        let bits = match size {
-            Some('X') => 1,
-            Some('B') => 8,
-            Some('W') => 16,
-            Some('D') => 32,
-            Some('L') => 64,
-            _ => return,
-        };
-        if bits != of.bits() {
-            let message = format!("`{name}` is {of}, and {address} has {bits} bits");
-            let help = "the type counts: write the letter of its width, X, B, W, D or L";
-            self.warn("U1083", message, address.span(), help);
-        }
-    }
-
-    /// An address in a body.
-    pub(super) fn direct(&mut self, address: &Name) -> Symbol {
-        let key = normal(address.as_str());
-        if let Some(known) = self.addresses.get(&key) {
-            return known.clone();
-        }
-        let of = match key.chars().nth(2) {
-            Some('B') => Elementary::Byte,
-            Some('W') => Elementary::Word,
-            Some('D') => Elementary::Dword,
-            Some('L') => Elementary::Lword,
-            _ => Elementary::Bool,
-        };
-        let resolved: Resolved = Type::Elementary(of).into();
-        let symbol = self
-            .at_address(address, address, &resolved)
-            .unwrap_or(Symbol::Faulty);
-        self.addresses.insert(key, symbol.clone());
-        symbol
     }
 
     /// Lowers the programs that run; for a library its units, whose names are the answer.
@@ -235,10 +119,16 @@ impl<'a> Lowering<'a> {
         let programs: Vec<&Unit> = file.units.iter().filter(is_program).collect();
         if programs.is_empty() {
             self.is_library = true;
-            let is_empty = file.units.is_empty() && file.types.is_empty() && file.globals.is_empty();
+            let is_empty =
+                file.units.is_empty() && file.types.is_empty() && file.globals.is_empty();
             if options.program.is_some() || is_empty {
                 let message = "the file has no PROGRAM";
-                self.error_with("U1051", message, 0..0, "add a PROGRAM that calls its blocks");
+                self.error_with(
+                    "U1051",
+                    message,
+                    0..0,
+                    "add a PROGRAM that calls its blocks",
+                );
             }
             return self.library(file);
         }
@@ -246,7 +136,10 @@ impl<'a> Lowering<'a> {
         if instances.is_empty() {
             return Vec::new();
         }
-        let base = instances.iter().filter_map(|instance| instance.interval).min();
+        let base = instances
+            .iter()
+            .filter_map(|instance| instance.interval)
+            .min();
         self.program.period = options.period.or(base).unwrap_or(DEFAULT_PERIOD);
         let name = instances[0].name;
         self.program.name = match instances.len() {
@@ -354,7 +247,10 @@ impl<'a> Lowering<'a> {
     /// In every so many-th scan a task runs.
     fn every(&mut self, name: &Name, interval: i64, base: i64) -> u32 {
         let times = interval.checked_div(base).unwrap_or(0);
-        if base > 0 && interval % base == 0 && let Ok(times) = u32::try_from(times) {
+        if base > 0
+            && interval % base == 0
+            && let Ok(times) = u32::try_from(times)
+        {
             return times.max(1);
         }
         let shown = |nanoseconds: i64| format!("{} ms", nanoseconds as f64 / 1e6);
@@ -416,7 +312,12 @@ impl<'a> Lowering<'a> {
         self.scope.routine = id.0;
         let whole = place(Root::Own(0), block.of.clone());
         let name = instance.name.as_str();
-        let bound = self.bind(name, &routine.parameters, instance.connections, &instance.name.span());
+        let bound = self.bind(
+            name,
+            &routine.parameters,
+            instance.connections,
+            &instance.name.span(),
+        );
         let mut body = Vec::new();
         let line = self.line(&instance.name.span());
         if let Some(bound) = bound {
@@ -466,7 +367,10 @@ impl<'a> Lowering<'a> {
             if variable.name.contains('.') {
                 continue;
             }
-            let parameter = block.parameters.iter().find(|found| found.name == variable.name);
+            let parameter = block
+                .parameters
+                .iter()
+                .find(|found| found.name == variable.name);
             let slot = match (variable.root, parameter) {
                 (_, Some(parameter)) => own + parameter.slot,
                 (Root::Own(slot), None) => own + slot,
@@ -475,7 +379,9 @@ impl<'a> Lowering<'a> {
             };
             let shown = format!("{prefix}{}", variable.name);
             let is_connected = connections.iter().any(|connection| match connection {
-                Argument::Given(name, _) | Argument::Taken { from: name, .. } => name.is(&variable.name),
+                Argument::Given(name, _) | Argument::Taken { from: name, .. } => {
+                    name.is(&variable.name)
+                }
                 Argument::Placed(_) => false,
             });
             if !is_connected
@@ -498,7 +404,8 @@ impl<'a> Lowering<'a> {
     fn point(&mut self, name: &str, variable: &Variable, slot: u32, is_input: bool) {
         let Some(of) = variable.of.elementary() else {
             let found = self.describe(&variable.of);
-            let message = format!("`{name}` is a point of {found}; a point is one number, bit or time");
+            let message =
+                format!("`{name}` is a point of {found}; a point is one number, bit or time");
             let help = "declare each of its parts as an input or output, or use VAR";
             self.error_with("U1083", message, variable.span.clone(), help);
             return;
@@ -560,15 +467,6 @@ impl<'a> Lowering<'a> {
         let key = Key { owner, class, open };
         self.routine(key, &unit.name.span());
     }
-}
-
-/// An address in capitals, with the X that may be left out.
-fn normal(address: &str) -> String {
-    let mut key = address.to_ascii_uppercase();
-    if key.chars().nth(2).is_some_and(|digit| digit.is_ascii_digit()) {
-        key.insert(2, 'X');
-    }
-    key
 }
 
 fn variable(declaration: &Declaration, root: Root, of: &Type, is_point: bool) -> Symbol {
