@@ -1,23 +1,23 @@
 //! The plant's side: samples, selects or reconstructs, holds, and falls safe.
 //!
-//! [`RemoteIo`] is the only source of u(i) and the only place where y(i) is applied, and so the arbiter of program i: no
-//! agreement among the others is needed to mask a failure, and no two masters can drive one actuator.
+//! [`RemoteIo`] is the only source of u(i) and the only place where y(i) is applied, and so the arbiter of program i:
+//! no agreement among the others is needed to mask a failure, and no two masters can drive one actuator.
 
 mod channel;
 mod diagnosis;
 mod event;
 mod foresight;
 mod history;
+mod holders;
 mod remote_io;
 mod selection;
 mod settings;
 mod trust;
 mod votes;
-mod witnesses;
 
 pub use channel::Channel;
 pub use diagnosis::Diagnosis;
 pub use event::{Event, Lacking, LackingReason, Missing};
 pub use foresight::Foreseen;
 pub use remote_io::RemoteIo;
-pub use settings::{Release, Settings, StaleState, ValueFault};
+pub use settings::{Release, Settings, StaleState, StopPoints, ValueFault};

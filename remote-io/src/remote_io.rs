@@ -1,13 +1,13 @@
 //! The remote I/O of one program, the arbiter of its history.
 //!
 //! ```text
-//!   cycle starts ──► samples u(i), says it ──► hears turns ──► deadline: selects, drives y(i) ──► rest
-//!                                                              (or holds, then falls safe)
+//!   cycle starts ──► samples u(i), sends it ──► receives turns ──► deadline: selects, drives y(i) ──► rest
+//!                                                                  (or holds, then falls safe)
 //! ```
 //!
-//! It drives at every deadline, also when no cycle was started: then it holds, and falls safe after `hold_cycles`. What it knows of
-//! the history is one of three states ([`Knowledge`]), and proven outputs are applied on the proof alone or on the operator's
-//! release ([`Authority`]):
+//! It drives at every deadline, also when no cycle was started: then it holds, and falls safe after `hold_cycles`. What
+//! it knows of the history is one of three states ([`Knowledge`]), and proven outputs are applied on the proof alone or
+//! on the operator's release ([`Authority`]):
 //!
 //! ```text
 //!   Listening ── a living station holds a state ──────────────► Running from its lineage
@@ -18,7 +18,7 @@
 //!                a station returns with it, or the operator decides
 //! ```
 //!
-//! Invariant *Never back*: the history continues from a state before the floor only if the operator says so.
+//! Invariant *Never back*: the history continues from a state before the floor only if the operator chooses it.
 
 mod deadline;
 mod forcing;
@@ -40,10 +40,10 @@ use understudy_wire::{
 
 use crate::diagnosis::Diagnosing;
 use crate::event::{Event, Missing};
+use crate::holders::Holders;
 use crate::selection::Selection;
 use crate::settings::Settings;
 use crate::trust::Trust;
-use crate::witnesses::Witnesses;
 
 use forcing::Forcing;
 use knowledge::Knowledge;
@@ -54,7 +54,7 @@ use protection::Protection;
 pub struct RemoteIo {
     settings: Settings,
     member: Participant<Event>,
-    witnesses: Witnesses,
+    holders: Holders,
     knowledge: Knowledge,
     /// What the operator is asked.
     question: Option<Question>,
@@ -77,6 +77,7 @@ pub struct RemoteIo {
     missed: u32,
     applied: Option<Applied>,
     last_true: Option<Image>,
+    program: Execution,
     trust: Trust,
     /// Words and states that differed at the last deadline, with those who can be wrong.
     differed: Vec<(Option<ProgramId>, StationSet)>,
@@ -89,6 +90,17 @@ enum Authority {
     Proof,
     /// The operator: they are withheld until the release, after a cold start or a value fault.
     Operator,
+}
+
+/// Whether the program runs, as its proven outputs say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Execution {
+    /// It runs.
+    Running,
+    /// A program fault has stopped it, in all stations at once.
+    Stopped,
+    /// It is stopped, and the next sample resets it.
+    Restarting,
 }
 
 /// Where the next deadline is.
@@ -128,7 +140,7 @@ impl RemoteIo {
         member.clock.start(now);
         let mut remote_io = Self {
             member,
-            witnesses: Witnesses::new(settings.program, agreement),
+            holders: Holders::new(settings.program, agreement),
             knowledge: Knowledge::default(),
             question: None,
             authority: Authority::Proof,
@@ -144,6 +156,7 @@ impl RemoteIo {
             missed: 0,
             applied: None,
             last_true: None,
+            program: Execution::Running,
             trust: Trust::default(),
             differed: Vec::new(),
             settings,
@@ -180,7 +193,7 @@ impl RemoteIo {
             Arrival::Begins(anchor) => self.begin_cycle(now, frame.header.moment, anchor),
         }
         match &frame.body {
-            Body::Turn(turn) if self.member.attendance.heard(station) => {
+            Body::Turn(turn) if self.member.attendance.receive_turn(station) => {
                 self.note(station, &turn.holdings, &turn.recalled);
                 self.turns[station.index()] = Some(Arc::clone(frame));
             }
@@ -213,6 +226,10 @@ impl RemoteIo {
         }
         self.knowledge.pardon();
         self.diagnosing.release();
+        if self.program == Execution::Stopped {
+            self.program = Execution::Restarting;
+            self.report(Event::Released { moment });
+        }
         if self.authority == Authority::Operator || !self.trust.is_complete() {
             self.authority = Authority::Proof;
             self.trust.release();
@@ -226,7 +243,7 @@ impl RemoteIo {
         let recalled = recalled.iter().find(|recalled| {
             recalled.program == program && recalled.inputs.width() == self.settings.inputs
         });
-        self.witnesses.note(station, own, recalled);
+        self.holders.note(station, own, recalled);
         if let (Some(run), Some(holding)) = (self.knowledge.run_mut(), own)
             && let Some(place) = run.history.place(holding.lineage)
         {
@@ -250,7 +267,7 @@ impl RemoteIo {
 
     fn close_cycle(&mut self) {
         self.member.close_cycle();
-        self.witnesses.close_cycle();
+        self.holders.close_cycle();
         if let Some(run) = self.knowledge.run_mut() {
             run.sampled = false;
         }
@@ -288,7 +305,7 @@ impl Hash for RemoteIo {
         let Self {
             settings: _,
             member,
-            witnesses,
+            holders,
             knowledge,
             question,
             authority,
@@ -304,13 +321,14 @@ impl Hash for RemoteIo {
             missed,
             applied,
             last_true,
+            program,
             trust,
             differed,
         } = self;
-        (member, witnesses, knowledge, question, authority).hash(hasher);
+        (member, holders, knowledge, question, authority).hash(hasher);
         (sensors, field, diagnosing, diagnosed, forcing).hash(hasher);
         (looked, protection, turns, deadline, missed, applied).hash(hasher);
-        (last_true, trust, differed).hash(hasher);
+        (last_true, program, trust, differed).hash(hasher);
     }
 }
 

@@ -4,19 +4,19 @@ use understudy_cycle::Output;
 use understudy_wire::{Image, Moment, Source, Time};
 
 use super::knowledge::Run;
-use super::{Applied, Authority, Deadline, Question, RemoteIo};
+use super::{Applied, Authority, Deadline, Execution, Question, RemoteIo};
 use crate::event::{Event, Missing};
 use crate::history::History;
-use crate::selection::{Heard, Selection};
+use crate::selection::{Received, Selection};
 use crate::settings::ValueFault;
 use crate::trust::Accusation;
 
 impl RemoteIo {
-    /// The deadline of a cycle that was started. What was heard is worth nothing when it comes a period late.
+    /// The deadline of a cycle that was started. Turns that were received are discarded if it comes a period late.
     pub(super) fn decide(&mut self, now: Time) {
         let late = now.since(self.decides_at()) > self.settings.agreement.schedule.period();
         self.deadline = Deadline::Passed { idle: 0 };
-        let heard = Heard {
+        let received = Received {
             turns: &self.turns,
             controllers: self.settings.agreement.schedule.controllers(),
             mode: self.settings.agreement.mode,
@@ -37,7 +37,7 @@ impl RemoteIo {
             Some(Run { history, .. }) => {
                 let (truth, answer) = (history.head(), settings.value_fault);
                 let (selected, found) =
-                    heard.select(settings.program, truth, width, &mut self.trust, answer);
+                    received.select(settings.program, truth, width, &mut self.trust, answer);
                 accusation = found;
                 let selection = match self.authority {
                     Authority::Proof => selected,
@@ -46,6 +46,7 @@ impl RemoteIo {
                 (selection, Some(self.field_sampled(history)))
             }
         };
+        let selection = self.unless_stopped(selection);
         let moment = self.moment();
         if let Some(Accusation { accused, located }) = accusation {
             self.report(Event::ValueFault {
@@ -65,8 +66,25 @@ impl RemoteIo {
         self.watch_protection();
     }
 
-    fn heard(&self) -> Heard<'_> {
-        Heard {
+    /// Outputs that the stations have proved and that a stopped program gives: they are those before its fault, and only held as such.
+    fn unless_stopped(&mut self, selection: Selection) -> Selection {
+        let (Some(stop), Selection::Direct(outputs) | Selection::Reconstructed(outputs, _)) =
+            (self.settings.stop, &selection)
+        else {
+            return selection;
+        };
+        if !outputs.get(stop.stopped) {
+            self.program = Execution::Running;
+            return selection;
+        }
+        if self.program == Execution::Running {
+            self.program = Execution::Stopped;
+        }
+        Selection::Missing(Missing::ProgramFault)
+    }
+
+    fn received(&self) -> Received<'_> {
+        Received {
             turns: &self.turns,
             controllers: self.settings.agreement.schedule.controllers(),
             mode: self.settings.agreement.mode,
@@ -75,8 +93,8 @@ impl RemoteIo {
 
     /// Reports words and states of any program that do not agree, when they begin to differ.
     fn report_differences(&mut self, moment: Moment) {
-        let syndromes: Vec<_> = self.heard().syndromes().collect();
-        let states = self.heard().digest_differences();
+        let syndromes: Vec<_> = self.received().syndromes().collect();
+        let states = self.received().digest_differences();
         let before = std::mem::take(&mut self.differed);
         for (syndrome, accused) in syndromes {
             self.differed.push((None, accused));
@@ -147,7 +165,10 @@ impl RemoteIo {
             source,
             outputs: outputs.clone(),
         });
-        let driven = self.forcing.outputs(&outputs);
+        let mut driven = self.forcing.outputs(&outputs);
+        if let Some(stop) = self.settings.stop {
+            driven.set(stop.stopped, self.program != Execution::Running);
+        }
         self.member.put(Output::Drive(driven));
         self.report(Event::Applied {
             moment,
@@ -160,7 +181,7 @@ impl RemoteIo {
         });
     }
 
-    /// The next deadline: of this cycle, or of one that nobody has started in time.
+    /// The next deadline: of this cycle, or of one that no station has started in time.
     pub(super) fn decides_at(&self) -> Time {
         let schedule = &self.settings.agreement.schedule;
         let deadline = self.member.clock.anchor() + schedule.deadline();

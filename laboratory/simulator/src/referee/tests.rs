@@ -33,6 +33,7 @@ fn referee() -> Referee {
         hash: ProgramHash(5),
         inputs: 1,
         channels: Vec::new(),
+        stop: None,
         diagnosis: None,
         hold_cycles: 2,
         fail_safe: Image::zero(1),
@@ -40,7 +41,7 @@ fn referee() -> Referee {
         value_fault: ValueFault::Hold,
         stale_state: StaleState::Operator,
     };
-    Referee::new(&settings, Scan::new(&circuit))
+    Referee::new(&settings, (&circuit).into())
 }
 
 fn moment(cycle: u64) -> Moment {
