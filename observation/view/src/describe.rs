@@ -28,7 +28,6 @@ macro_rules! descriptions {
         }
     };
 }
-use descriptions;
 
 mod members;
 mod processes;

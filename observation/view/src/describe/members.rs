@@ -6,7 +6,7 @@ use understudy_plant::Event as PlantEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason, ValueFault};
 use understudy_wire::{Member, Moment, ProgramSet, SignalPlace, StationId, StationSet, Word};
 
-use super::{Words, descriptions, list, program_name, programs, source_text, stations};
+use super::{Words, list, program_name, programs, source_text, stations};
 
 descriptions! { station: StationEvent, members;
     Published { words, .. } => "published" Info format!("publishes {}", words_text(words, members));

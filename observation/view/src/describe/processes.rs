@@ -4,7 +4,7 @@ use understudy_bus::HostEvent;
 use understudy_journal::{Action, Members, RunEvent};
 use understudy_wire::{Member, StateChoice};
 
-use super::{Words, descriptions};
+use super::Words;
 
 descriptions! { host: HostEvent, members;
     Ready { process, address, .. } => "ready" Info format!("listens as process {process} at {address}");
