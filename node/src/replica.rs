@@ -8,7 +8,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use understudy_logic::Scratch;
+use understudy_executable::Scratch;
 use understudy_wire::{
     Body, Digest, Frame, Holding, Image, Lineage, Moment, ProgramId, Recalled, Sample, StationId,
     Transfer,
@@ -106,9 +106,9 @@ impl Replica {
             held: None,
             past: VecDeque::with_capacity(history),
             step: Step {
-                state: Image::zero(program.scan.register_count()),
-                inputs: Image::zero(program.scan.input_count()),
-                outputs: Image::zero(program.scan.output_count()),
+                state: Image::zero(program.executable.state_count()),
+                inputs: Image::zero(program.executable.input_count()),
+                outputs: Image::zero(program.executable.output_count()),
                 after: None,
             },
             unfollowed: None,
@@ -175,7 +175,7 @@ impl Replica {
         let Some(inputs) = sample.history.last() else {
             return;
         };
-        if inputs.width() == program.scan.input_count() {
+        if inputs.width() == program.executable.input_count() {
             // Outputs of the first sample may have been proved in this station's earlier life.
             let witnessed = match &self.remembered {
                 Remembered::Received(received, known) => known.witnessed || *received < moment,
@@ -220,7 +220,7 @@ impl Replica {
     /// Takes what another station remembers, where this one has received no sample.
     pub(crate) fn take_recalled(&mut self, program: &Program, recalled: &Recalled) {
         if self.remembered == Remembered::Nothing
-            && recalled.inputs.width() == program.scan.input_count()
+            && recalled.inputs.width() == program.executable.input_count()
         {
             let recalled = Recalled {
                 witnessed: false,
@@ -252,7 +252,7 @@ impl Replica {
         };
         let moment = frame.header.moment;
         if sample.history.len() > self.history
-            || sample.history[0].width() != program.scan.input_count()
+            || sample.history[0].width() != program.executable.input_count()
         {
             return Followed::Lost;
         }
@@ -284,7 +284,10 @@ impl Replica {
         }
         let genesis = Lineage::genesis(program.hash, sample.born);
         if let Some(place) = lineages.iter().position(|&lineage| lineage == genesis) {
-            let initial = Image::from_words(program.scan.register_count(), program.scan.initial());
+            let initial = Image::from_words(
+                program.executable.state_count(),
+                program.executable.initial(),
+            );
             self.past.clear();
             self.held = Some(Held {
                 born: sample.born,
@@ -315,7 +318,7 @@ impl Replica {
     ) -> bool {
         if self.standing != Standing::Lost
             || transfer.hash != program.hash
-            || transfer.state.width() != program.scan.register_count()
+            || transfer.state.width() != program.executable.state_count()
         {
             return false;
         }
@@ -485,7 +488,7 @@ impl Replica {
         held.state.digest = Digest::of(&held.state.bits);
         self.step.state.clone_from(&held.state.bits);
         self.step.inputs.clone_from(inputs);
-        program.scan.step(
+        program.executable.step(
             scratch,
             held.state.bits.words_mut(),
             inputs.words(),

@@ -3,16 +3,16 @@
 use std::sync::Arc;
 
 use understudy_cycle::Agreement;
-use understudy_logic::Scan;
+use understudy_executable::Executable;
 use understudy_wire::{Epoch, ProgramHash, ProgramId, StationId};
 
 /// Compiled program of the cluster.
 #[derive(Debug, Clone)]
 pub struct Program {
-    /// Hash of its circuit.
+    /// Hash of its canonical text.
     pub hash: ProgramHash,
     /// Its f and h, (1) and (2).
-    pub scan: Scan,
+    pub executable: Executable,
 }
 
 /// Configuration of one station.
@@ -24,9 +24,9 @@ pub struct Settings {
     pub agreement: Arc<Agreement>,
     /// All programs of the cluster, in order; a controller runs its own, an understudy all of them.
     pub programs: Arc<[Program]>,
-    /// The generated parity controller, which an understudy evaluates in [`understudy_cycle::Mode::Paper`]. It
-    /// publishes no parity word in that mode where this is absent.
-    pub generated: Option<Arc<Scan>>,
+    /// The generated parity controller, which an understudy evaluates in [`understudy_cycle::Mode::Paper`]. It publishes no parity
+    /// word in that mode where this is absent.
+    pub generated: Option<Arc<Executable>>,
     /// Epoch that it founds when it receives no other member: later than any earlier one of the cluster, such as the
     /// wall clock at its start.
     pub epoch: Epoch,

@@ -23,7 +23,7 @@ use std::sync::Arc;
 
 use smallvec::SmallVec;
 use understudy_cycle::{Arrival, Input, Machine, Output, Participant};
-use understudy_logic::Scratch;
+use understudy_executable::Scratch;
 use understudy_wire::{
     Body, ConfigurationHash, Digest, Frame, Holding, Image, Lineage, Member, Moment, ProgramId,
     ProgramSet, Recalled, Sample, StationId, StationSet, Time,

@@ -1,5 +1,6 @@
 //! A terminal that follows a sensor of another plant.
 
+use smallvec::SmallVec;
 use understudy_wire::{Field, Moment, ProgramId};
 
 /// Source of a following terminal, in the order of the names given to [`crate::Plant::following`].
@@ -7,8 +8,18 @@ use understudy_wire::{Field, Moment, ProgramId};
 pub struct Followed {
     /// Program of the plant that is followed.
     pub from: ProgramId,
-    /// The bit of u(from) that its sensor drives.
+    /// The first bit of u(from) that its sensor drives.
     pub sensor: usize,
+    /// How many bits its sensor drives.
+    pub bits: usize,
+}
+
+impl Followed {
+    /// What the sensor shows, bit by bit.
+    pub fn shown(self, field: &Field) -> SmallVec<[bool; 1]> {
+        let bits = self.sensor..self.sensor + self.bits;
+        bits.map(|bit| field.sensors.get(bit)).collect()
+    }
 }
 
 /// Last received state of a followed plant. Lost frames cost time only: each frame carries the whole state.
@@ -27,12 +38,12 @@ impl Hearing {
         followed: Followed,
         moment: Moment,
         field: &Field,
-    ) -> Option<bool> {
+    ) -> Option<SmallVec<[bool; 1]>> {
         let old = moment.epoch == self.heard.epoch && moment.cycle < self.heard.cycle;
         if old && moment != Moment::default() {
             return None;
         }
         self.heard = moment;
-        Some(field.sensors.get(followed.sensor))
+        Some(followed.shown(field))
     }
 }

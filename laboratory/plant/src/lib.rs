@@ -15,16 +15,16 @@ mod binding;
 mod event;
 mod feeder;
 mod followed;
-mod ladder_model;
 mod machine;
 mod model;
 mod press;
+mod program_model;
 mod robot;
 
 pub use binding::{BindingProblem, Signals};
 pub use event::{Event, Pace};
 pub use followed::Followed;
 pub use machine::{PlantMachine, Settings, WATCHDOG_CYCLES};
-pub use model::{Direction, ModelKind, Plant, Terminals};
+pub use model::{Direction, ModelKind, Plant, PlantProgram, Terminal, Terminals};
 pub use press::PressParameters;
 pub use robot::RobotParameters;

@@ -151,9 +151,9 @@ impl PlantMachine {
         let follows = self.settings.follows.iter().zip(&mut self.hearings);
         for (number, (followed, hearing)) in follows.enumerate() {
             if followed.from == program
-                && let Some(on) = hearing.hear(*followed, moment, field)
+                && let Some(shown) = hearing.hear(*followed, moment, field)
             {
-                self.settings.plant.see(number, on);
+                self.settings.plant.see(number, &shown);
             }
         }
     }

@@ -4,18 +4,19 @@ use std::hash::{Hash, Hasher};
 
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
-use understudy_logic::Circuit;
+use understudy_executable::{Executable, Interface};
+use understudy_typed::Elementary;
 use understudy_wire::{Field, Image};
 
 use crate::binding::{Binding, BindingProblem, Driver, Signals};
-use crate::ladder_model::{self, LadderModel};
 use crate::press::{self, Press, PressParameters};
+use crate::program_model::{self, ProgramModel};
 use crate::robot::{self, Robot, RobotParameters};
 
 /// Position of a moving part at its far end.
 pub(crate) const SHOWN: u16 = 1000;
 
-/// Behaviour of a plant. Shapes: `actuators` and `sensors` as long as its [`Terminals`].
+/// The inside of a plant. Shapes: `actuators` and `sensors` have the bits of its [`Terminals`], one behind the other.
 pub(crate) trait Model {
     /// Steps one cycle, in which `arrived` parts came from the plant that feeds this one.
     fn step(&mut self, actuators: &[bool], arrived: u64);
@@ -41,8 +42,30 @@ pub enum ModelKind {
     Robot(RobotParameters),
     /// The press of section V.
     Press(PressParameters),
-    /// A ladder program, lowered with the period of the cluster.
-    Ladder(Box<Circuit>),
+    /// A program, for the period of the cluster.
+    Program(Box<PlantProgram>),
+}
+
+/// A program that is a plant.
+#[derive(Debug, Clone)]
+pub struct PlantProgram {
+    /// Compiled.
+    pub executable: Executable,
+    /// Its inputs, which are actuators, and its outputs, which are sensors.
+    pub interface: Interface,
+}
+
+impl<'a, P> From<&'a P> for PlantProgram
+where
+    Executable: From<&'a P>,
+    Interface: From<&'a P>,
+{
+    fn from(program: &'a P) -> Self {
+        Self {
+            executable: program.into(),
+            interface: program.into(),
+        }
+    }
 }
 
 /// Direction of a terminal, as seen from the controller.
@@ -55,14 +78,37 @@ pub enum Direction {
     Actuator,
 }
 
-/// Names by which a model is bound to a controller.
+/// A sensor or an actuator of a model.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Terminal {
+    /// Its name.
+    pub name: String,
+    /// What it shows, or what moves it.
+    pub of: Elementary,
+}
+
+impl Terminal {
+    /// One that is on or off.
+    fn bit(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            of: Elementary::Bool,
+        }
+    }
+
+    pub(crate) fn bits(&self) -> usize {
+        self.of.bits() as usize
+    }
+}
+
+/// The names by which a model is bound to a controller.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Terminals {
-    /// Its sensors.
-    pub sensors: Vec<String>,
-    /// Its actuators.
-    pub actuators: Vec<String>,
-    /// Inputs that its controller may have for push buttons: 0 in the model.
+    /// What it shows.
+    pub sensors: Vec<Terminal>,
+    /// What moves it.
+    pub actuators: Vec<Terminal>,
+    /// Inputs that its controller may have and that are 0 as long as nobody is there to press them.
     pub always_zero: Vec<String>,
     /// Its moving parts, in the order of [`Field::positions`].
     pub positions: Vec<String>,
@@ -72,7 +118,7 @@ impl Terminals {
     /// Sensors, then actuators.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         let names = self.sensors.iter().chain(&self.actuators);
-        names.map(String::as_str)
+        names.map(|terminal| terminal.name.as_str())
     }
 }
 
@@ -80,22 +126,23 @@ impl ModelKind {
     /// The names by which it is bound.
     pub fn terminals(&self) -> Terminals {
         let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
+        let bits = |names: &[&str]| names.iter().map(|name| Terminal::bit(name)).collect();
         match self {
             Self::Robot(_) => Terminals {
-                sensors: names(&robot::SENSORS),
-                actuators: names(&robot::ACTUATORS),
+                sensors: bits(&robot::SENSORS),
+                actuators: bits(&robot::ACTUATORS),
                 always_zero: names(&["stop"]),
                 positions: names(&robot::POSITIONS),
             },
             Self::Press(_) => Terminals {
-                sensors: names(&press::SENSORS),
-                actuators: names(&press::ACTUATORS),
+                sensors: bits(&press::SENSORS),
+                actuators: bits(&press::ACTUATORS),
                 always_zero: names(&["stop"]),
                 positions: names(&press::POSITIONS),
             },
-            Self::Ladder(circuit) => Terminals {
-                sensors: ladder_model::sensors(circuit),
-                actuators: ladder_model::actuators(circuit),
+            Self::Program(program) => Terminals {
+                sensors: program_model::sensors(&program.interface.outputs),
+                actuators: program_model::actuators(&program.interface.inputs),
                 always_zero: Vec::new(),
                 positions: Vec::new(),
             },
@@ -106,9 +153,9 @@ impl ModelKind {
     pub fn takes_parts(&self) -> bool {
         match self {
             Self::Robot(_) | Self::Press(_) => true,
-            Self::Ladder(circuit) => {
-                let mut inputs = circuit.inputs().iter();
-                inputs.any(|input| input == ladder_model::PART_ARRIVES)
+            Self::Program(program) => {
+                let mut inputs = program.interface.inputs.names();
+                inputs.any(|input| input == program_model::PART_ARRIVES)
             }
         }
     }
@@ -117,9 +164,9 @@ impl ModelKind {
     pub fn hands_over(&self) -> bool {
         match self {
             Self::Robot(_) | Self::Press(_) => true,
-            Self::Ladder(circuit) => {
-                let mut outputs = circuit.outputs().iter();
-                outputs.any(|output| output.name == ladder_model::HANDED_OVER)
+            Self::Program(program) => {
+                let mut outputs = program.interface.outputs.names();
+                outputs.any(|output| output == program_model::HANDED_OVER)
             }
         }
     }
@@ -130,8 +177,8 @@ impl ModelKind {
 pub struct Plant {
     inside: Inside,
     binding: Binding,
-    /// Last known values of the sensors that it follows.
-    seen: Vec<bool>,
+    /// What it follows, as it last saw that, bit by bit.
+    seen: Vec<SmallVec<[bool; 1]>>,
     actuators: Vec<bool>,
     sensors: Vec<bool>,
     position_names: Vec<String>,
@@ -141,7 +188,7 @@ pub struct Plant {
 enum Inside {
     Robot(Robot),
     Press(Press),
-    Ladder(Box<LadderModel>),
+    Program(Box<ProgramModel>),
 }
 
 /// Two of one binding that hash alike behave alike.
@@ -156,7 +203,7 @@ impl Inside {
         match self {
             Self::Robot(robot) => robot,
             Self::Press(press) => press,
-            Self::Ladder(ladder) => ladder.as_ref(),
+            Self::Program(program) => program.as_ref(),
         }
     }
 
@@ -164,7 +211,7 @@ impl Inside {
         match self {
             Self::Robot(robot) => robot,
             Self::Press(press) => press,
-            Self::Ladder(ladder) => ladder.as_mut(),
+            Self::Program(program) => program.as_mut(),
         }
     }
 }
@@ -175,7 +222,7 @@ impl Plant {
     /// Returns every problem; the plant is there unless one of them is an error.
     pub fn new(
         kind: &ModelKind,
-        controller: &Circuit,
+        controller: &Interface,
         signals: &Signals,
         fed: bool,
     ) -> (Option<Self>, Vec<BindingProblem>) {
@@ -186,7 +233,7 @@ impl Plant {
     /// [`Self::see`] sets them.
     pub fn following(
         kind: &ModelKind,
-        controller: &Circuit,
+        controller: &Interface,
         signals: &Signals,
         follows: &[String],
         fed: bool,
@@ -197,21 +244,23 @@ impl Plant {
             inside: match kind {
                 ModelKind::Robot(parameters) => Inside::Robot(Robot::new(parameters.clone(), fed)),
                 ModelKind::Press(parameters) => Inside::Press(Press::new(parameters.clone(), fed)),
-                ModelKind::Ladder(circuit) => Inside::Ladder(Box::new(LadderModel::new(circuit))),
+                ModelKind::Program(program) => {
+                    Inside::Program(Box::new(ProgramModel::new(program)))
+                }
             },
-            seen: vec![false; follows.len()],
-            actuators: vec![false; binding.actuators.len()],
-            sensors: vec![false; binding.sensors.len()],
+            seen: vec![SmallVec::new(); follows.len()],
+            actuators: vec![false; binding.actuators.iter().map(|(_, bits)| bits).sum()],
+            sensors: vec![false; binding.sensors.iter().map(|(_, bits)| bits).sum()],
             position_names: terminals.positions,
             binding,
         });
         (plant, problems)
     }
 
-    /// Sets the followed sensor with this number; an unknown number is ignored.
-    pub fn see(&mut self, number: usize, on: bool) {
+    /// From now on what is followed under this number shows these bits; a number that there is not is ignored.
+    pub fn see(&mut self, number: usize, shown: &[bool]) {
         if let Some(seen) = self.seen.get_mut(number) {
-            *seen = on;
+            *seen = SmallVec::from_slice(shown);
         }
     }
 
@@ -220,11 +269,16 @@ impl Plant {
     ///
     /// Outputs past the width of `outputs` count as 0.
     pub fn step(&mut self, outputs: &Image, arrived: u64) -> Field {
-        for (actuator, &driver) in self.actuators.iter_mut().zip(&self.binding.actuators) {
-            *actuator = match driver {
-                Driver::Output(place) => outputs.get(place),
-                Driver::Neighbour(number) => self.seen[number],
-            };
+        let mut actuators = self.actuators.iter_mut();
+        for &(driver, bits) in &self.binding.actuators {
+            for (bit, actuator) in actuators.by_ref().take(bits).enumerate() {
+                *actuator = match driver {
+                    Driver::Output(place) => outputs.get(place + bit),
+                    Driver::Neighbour(number) => {
+                        self.seen[number].get(bit).copied().unwrap_or_default()
+                    }
+                };
+            }
         }
         self.inside.model_mut().step(&self.actuators, arrived);
         self.show()
@@ -244,8 +298,11 @@ impl Plant {
         let model = self.inside.model();
         model.sensors(&mut self.sensors);
         let mut sensors = Image::zero(self.binding.inputs);
-        for (&sensor, &place) in self.sensors.iter().zip(&self.binding.sensors) {
-            sensors.set(place, sensor);
+        let mut shown = self.sensors.iter();
+        for &(place, bits) in &self.binding.sensors {
+            for (bit, &sensor) in shown.by_ref().take(bits).enumerate() {
+                sensors.set(place + bit, sensor);
+            }
         }
         let counts = model.counts();
         Field {

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use proptest::prelude::*;
-use understudy_logic::{Circuit, CircuitBuilder, Scan};
+use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_wire::{
     ClusterHash, ConfigurationHash, Cycle, Epoch, Header, Member, ProgramHash, StationId,
     StationSet,
@@ -33,7 +33,7 @@ fn shift_register() -> Circuit {
 fn program() -> Program {
     Program {
         hash: HASH,
-        scan: Scan::new(&shift_register()),
+        executable: (&shift_register()).into(),
     }
 }
 

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_cycle::{Agreement, Input, Machine, Mode, Output, Schedule};
-use understudy_logic::{Circuit, CircuitBuilder, Scan};
+use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
     Lineage, Member, Moment, ProgramHash, ProgramId, ProgramSet, StationId, StationSet, Time, Word,
@@ -91,7 +91,7 @@ fn settings(rank: u8, shadow_cycles: u32) -> Settings {
     };
     let programs = (0..CONTROLLERS as u8).map(|program| Program {
         hash: hash(program),
-        scan: Scan::new(&circuit()),
+        executable: (&circuit()).into(),
     });
     Settings {
         station: StationId(rank),

@@ -9,7 +9,6 @@
 //! Numbers of 32 bits take two registers, the upper half first. Addresses are those on the wire, from 0.
 
 use understudy_cluster::Cluster;
-use understudy_logic::Circuit;
 use understudy_view::{RunState, Snapshot, StationState};
 
 use crate::error::GatewayError;
@@ -119,10 +118,6 @@ impl RegisterMap {
     pub fn new(cluster: &Cluster) -> Result<Self, GatewayError> {
         let programs = cluster.controllers();
         let mut places = Vec::new();
-        let outputs = |circuit: &Circuit| -> Vec<String> {
-            let outputs = circuit.outputs().iter();
-            outputs.map(|output| output.name.clone()).collect()
-        };
         for (area, meaning) in [
             (Area::DiscreteInput, "input, as last sampled"),
             (Area::Coil, "output, as driven"),
@@ -131,8 +126,8 @@ impl RegisterMap {
                 .iter()
                 .flat_map(|program| {
                     let signals = match area {
-                        Area::DiscreteInput => program.circuit.inputs().to_vec(),
-                        _ => outputs(&program.circuit),
+                        Area::DiscreteInput => program.interface.inputs.bit_names(),
+                        _ => program.interface.outputs.bit_names(),
                     };
                     let named = move |signal| format!("{}.{signal}", program.name);
                     signals.into_iter().map(named)
@@ -184,8 +179,8 @@ impl RegisterMap {
             }
         }
         let widths = programs.iter().map(|program| {
-            let circuit = &program.circuit;
-            (circuit.inputs().len(), circuit.outputs().len())
+            let interface = &program.interface;
+            (interface.inputs.width(), interface.outputs.width())
         });
         Ok(Self {
             places,

@@ -27,6 +27,8 @@ pub enum Kind {
     Int64,
     /// A number.
     UInt64,
+    /// A number with a fraction.
+    Double,
     /// A text.
     String,
     /// A list of texts.
@@ -40,6 +42,7 @@ impl Kind {
             Self::Boolean => "Boolean",
             Self::Int64 => "Int64",
             Self::UInt64 => "UInt64",
+            Self::Double => "Double",
             Self::String => "String",
             Self::Strings => "String[]",
         }
@@ -50,6 +53,7 @@ impl Kind {
             Self::Boolean => DataTypeId::Boolean,
             Self::Int64 => DataTypeId::Int64,
             Self::UInt64 => DataTypeId::UInt64,
+            Self::Double => DataTypeId::Double,
             Self::String | Self::Strings => DataTypeId::String,
         }
     }

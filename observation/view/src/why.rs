@@ -8,6 +8,7 @@ mod text;
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_journal::source_word;
+use understudy_ladder::Program;
 use understudy_parity::reconstruct;
 use understudy_text::spelling::suggestion;
 use understudy_wire::{Member, ProgramId, Source, StationId};
@@ -121,8 +122,8 @@ impl Model {
     ) -> Result<Why, ViewError> {
         let step = &history.steps()[place];
         let controller = &self.cluster.controllers()[program.index()];
-        let outputs = controller.circuit.outputs();
-        let output = outputs.iter().position(|output| output.name == name);
+        let output = controller.interface.outputs.find(name);
+        let output = output.map(|output| output.bit as usize);
         let source = step.driven.as_ref().map(|driven| driven.source);
         // What is held was true in an earlier cycle; the fail-safe values were never computed.
         let explained = match source {
@@ -130,7 +131,12 @@ impl Model {
             Some(Source::FailSafe) if output.is_some() => None,
             _ => Some(place),
         };
-        let mut explainer = Explainer::new(self, history, &controller.program);
+        let ladder = controller.ladder().ok_or_else(|| ViewError::NoState {
+            cycle: step.cycle,
+            program: controller.name.clone(),
+            reason: "only a ladder can be evaluated".to_owned(),
+        })?;
+        let mut explainer = Explainer::new(self, history, ladder);
         let because = match explained {
             None => None,
             Some(explained) => Some(explainer.root(name, explained)?),
@@ -175,7 +181,7 @@ impl Model {
         for (place, controller) in controllers.iter().enumerate() {
             let prefix = format!("{}.", controller.name);
             let name = asked.strip_prefix(&prefix).unwrap_or(asked);
-            for signal in controller.program.writable() {
+            for signal in controller.ladder().into_iter().flat_map(Program::writable) {
                 known.push(signal.name.to_string());
                 let address = signal.address.as_ref().map(ToString::to_string);
                 if signal.name.as_str() == name || address.as_deref() == Some(name) {

@@ -257,6 +257,8 @@ pub struct ProgramInstance {
     pub task: Option<Name>,
     /// The PROGRAM that it is one of.
     pub of: Name,
+    /// What its inputs and outputs are connected to: `(in := a, q => b)`.
+    pub connections: Vec<Argument>,
 }
 
 /// One statement.

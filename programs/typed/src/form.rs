@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use crate::image::Points;
 use crate::operation::Operation;
-use crate::types::{Enumeration, Structure, Type};
+use crate::types::{Elementary, Enumeration, Structure, Type};
 
 /// Index of a [`Routine`] in its program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -38,9 +38,9 @@ pub struct Program {
     pub tasks: Vec<Task>,
     /// Variables of the programs and the global ones, in the order in which people see them; parts are found through their types.
     pub variables: Vec<Variable>,
-    /// u.
+    /// u; the last one is the reset, where [`Program::seal_points`] was called.
     pub inputs: Points,
-    /// y.
+    /// y; the last one is the fault, where [`Program::seal_points`] was called.
     pub outputs: Points,
     /// Slots of the state, with its header.
     pub state: u32,
@@ -54,6 +54,26 @@ impl Program {
     /// Slots at the start of the state that no variable has: the fault (0 while the program runs; see [`crate::fault`]), two values that explain it,
     /// and the number of scans since the start.
     pub const HEADER: u32 = 4;
+
+    /// The name of the input that restarts a program after a fault: the state becomes the initial one, and the scan runs as the first. It
+    /// has no effect while the program runs.
+    pub const RESET: &str = "program.reset";
+
+    /// The name of the output that is TRUE while the program is stopped by a fault.
+    pub const FAULT: &str = "program.fault";
+
+    /// Appends the two points that every program has, [`Program::RESET`] and [`Program::FAULT`], both of type BOOL, unless they are there. A front end
+    /// calls it after the declared points.
+    ///
+    /// They stand at slot 0, which no variable has: the input there is the reset and is not stored, the output there is whether slot 0 holds a fault.
+    pub fn seal_points(&mut self) {
+        if self.inputs.iter().all(|point| point.slot != 0) {
+            self.inputs.push(Self::RESET, Elementary::Bool, 0);
+        }
+        if self.outputs.iter().all(|point| point.slot != 0) {
+            self.outputs.push(Self::FAULT, Elementary::Bool, 0);
+        }
+    }
 
     /// The routine of an id.
     ///
@@ -128,7 +148,7 @@ pub struct Routine {
     pub kind: RoutineKind,
     /// Its frame: the first slot, counted from the start of all frames, and how many. No two routines share one.
     pub frame: (u32, u32),
-    /// What of the frame is not 0 when a call begins, slots counted from the start of all frames.
+    /// What of the frame is not 0 when a call, an invocation or a task begins, slots counted from the start of all frames.
     pub initial: Vec<Initial>,
     /// What it does.
     pub body: Vec<Statement>,
@@ -146,9 +166,11 @@ pub struct Statement {
 /// What a statement does.
 #[derive(Debug, Clone)]
 pub enum StatementKind {
-    /// `place := value`, of equal types; aggregates are copied, a text too long for its place is a fault.
+    /// `place := value`, of types that are stored alike; aggregates are copied, a text too long for its place is a fault. The value
+    /// is evaluated before the indices of the place.
     Assign(Place, Expression),
-    /// Stores the address of the second into the slot of the first, for [`Root::OwnReference`].
+    /// Stores the address of the second into the slot of the first, for [`Root::OwnReference`]. The first is the slot itself, found as any
+    /// place, with the type of the variable that it refers to. The address is found before the slot.
     Bind(Place, Place),
     /// Runs the body of a block on the instance at a place.
     Invoke(RoutineId, Place),
@@ -192,7 +214,7 @@ pub struct Case {
 
 /// `FOR counter := from TO to BY by DO body END_FOR`
 ///
-/// `from` is assigned first; `to` and `by` are evaluated once, in that order. A turn is made while the counter has not passed `to` in the direction of `by`. The step behind a turn
+/// Indices of the counter are evaluated first, once. `from` is assigned then; `to` and `by` are evaluated once, in that order. A turn is made while the counter has not passed `to` in the direction of `by`. The step behind a turn
 /// ends the loop where it would leave the counter's type. Where `by` is 0, no turn passes `to`: the budget ends it.
 #[derive(Debug, Clone)]
 pub struct For {
@@ -209,6 +231,9 @@ pub struct For {
 }
 
 /// Where a place is counted from.
+///
+/// An address is the number of a bit: 64 · slot + bit, the slots of the frames behind those of the state. A reference whose slot holds
+/// 0, or what is no address of its type, is a fault when it is used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Root {
     /// This slot of the state.
@@ -230,12 +255,55 @@ pub struct Place {
     pub root: Root,
     /// Slots from there, of the structures' parts and of constant indices.
     pub offset: u32,
-    /// Bits from there, of a constant index into a packed array: a multiple of the element's width.
+    /// Bits from there, of a constant index into a packed array: a multiple of the element's width, less than 64.
     pub bit: u32,
+    /// It is an element of an array of an elementary type, so other elements may lie in its slot.
+    pub is_packed: bool,
     /// What is added for the indices that are computed.
     pub indices: Vec<Index>,
     /// What lies there.
     pub of: Type,
+}
+
+impl Place {
+    /// A variable.
+    pub fn new(root: Root, of: Type) -> Self {
+        Self {
+            root,
+            offset: 0,
+            bit: 0,
+            is_packed: false,
+            indices: Vec::new(),
+            of,
+        }
+    }
+
+    /// Bits from its root to the end of what it may mean, whatever the values of its indices; saturates.
+    pub(crate) fn reach(&self) -> u64 {
+        let size = match self.of.elementary() {
+            Some(elementary) => u64::from(elementary.bits()),
+            None => self.of.slots().saturating_mul(64),
+        };
+        let first = 64 * u64::from(self.offset) + u64::from(self.bit);
+        let indices = self.indices.iter().map(|index| {
+            let last = index.high.abs_diff(index.low);
+            last.saturating_mul(index.stride)
+        });
+        indices.fold(first.saturating_add(size), u64::saturating_add)
+    }
+
+    /// The slot at the place, for an address that it holds.
+    pub(crate) fn holder(&self) -> Self {
+        Self {
+            of: Type::Elementary(Elementary::Lword),
+            ..self.clone()
+        }
+    }
+
+    /// Whether it is found through an address that is stored.
+    pub(crate) fn is_by_reference(&self) -> bool {
+        matches!(self.root, Root::OwnReference(_) | Root::FrameReference(_))
+    }
 }
 
 /// An index that is computed.
@@ -279,8 +347,9 @@ pub enum ExpressionKind {
 
 /// A call in an expression.
 ///
-/// Arguments are evaluated from left to right; then the frame is set to its initial content and the arguments are stored; then the body runs; then
-/// the outputs are copied; then the result is read.
+/// The instance, the arguments and the places that take the outputs are evaluated, in this order and from left to right; then the frame is set to its
+/// initial content and the arguments are stored; then the body runs; then the outputs are copied; then the result is read.
+/// Places of the routine have no computed indices; [`Root::Own`] means the instance there.
 #[derive(Debug, Clone)]
 pub struct Call {
     /// What is called.

@@ -60,6 +60,35 @@ impl Points {
         });
     }
 
+    /// The point of a name.
+    pub fn find(&self, name: &str) -> Option<&Point> {
+        self.points.iter().find(|point| point.name == name)
+    }
+
+    /// The names of all points, in order.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.points.iter().map(|point| point.name.as_str())
+    }
+
+    /// A name for each bit of the image: that of its point where it is a BOOL, else `NAME.0` for its lowest bit and so on; empty for a bit of no
+    /// point.
+    pub fn bit_names(&self) -> Vec<String> {
+        let mut names = vec![String::new(); self.width()];
+        for point in &self.points {
+            let first = point.bit as usize;
+            for (place, name) in names[first..][..point.of.bits() as usize]
+                .iter_mut()
+                .enumerate()
+            {
+                *name = match point.of {
+                    Elementary::Bool => point.name.clone(),
+                    _ => format!("{}.{place}", point.name),
+                };
+            }
+        }
+        names
+    }
+
     /// Bits of the image.
     pub fn width(&self) -> usize {
         self.width as usize

@@ -3,6 +3,15 @@
 //! Every operation has one result, whatever the processor: integers wrap; reals are IEEE 754, rounded to nearest even, never evaluated
 //! wider, with one NaN; transcendental functions come from `libm`. Stored values are zero-extended ([`crate::types`]).
 
+mod apply;
+pub(crate) mod number_text;
+pub(crate) mod real;
+mod signature;
+mod text;
+
+pub use self::signature::{Operand, Signature};
+pub use self::text::TextOperand;
+
 use crate::types::Elementary;
 
 /// What is done with operands. The type is that of the operands and of the result, unless something else is said.
@@ -14,17 +23,17 @@ pub enum Operation {
     Subtract(Elementary),
     /// a · b: integers, reals, times (as integers).
     Multiply(Elementary),
-    /// a / b: integers towards 0, reals; an integer divisor of 0 is a fault.
+    /// a / b: integers and times towards 0, reals; a divisor of 0 is a fault, but of reals.
     Divide(Elementary),
-    /// a − (a / b) · b of integers; a divisor of 0 is a fault.
+    /// a − (a / b) · b of integers and times; a divisor of 0 is a fault.
     Modulo(Elementary),
     /// −a: integers, reals, times.
     Negate(Elementary),
-    /// |a|: integers, reals.
+    /// |a|: integers, reals, times; the least number of a signed type stays as it is.
     Absolute(Elementary),
-    /// The least, any type but texts; of reals as the comparison `a < b` says, so NaN is taken only where it stands first.
+    /// The least of two or more, any type but texts; of reals as the comparison `a < b` says, so NaN is taken only where it stands first.
     Minimum(Elementary),
-    /// The greatest.
+    /// The greatest of two or more, as the comparison `a > b` says.
     Maximum(Elementary),
     /// aᵇ of reals.
     Power(Elementary),
@@ -52,8 +61,8 @@ pub enum Operation {
     Select(Elementary),
     /// a is a LINT: the operand of that number among those behind it, from 0; another number is a fault.
     Multiplex(Elementary),
-    /// From one type to another: between integers, bit strings and times the number wraps; an integer becomes the nearest real, a real the nearest integer (half to even, saturating, NaN
-    /// becomes 0); to BOOL whether it is not 0; from BOOL 0 or 1. Between times and reals the number is one of nanoseconds.
+    /// From one type to another: between integers, bit strings and times the number wraps; an integer becomes the nearest real,
+    /// a real the nearest integer (half to even, saturating, NaN becomes 0); to BOOL whether it is not 0; from BOOL 0 or 1. Between times and reals the number is one of nanoseconds.
     Convert(Elementary, Elementary),
     /// From a real to an integer, towards 0; saturating, NaN becomes 0.
     Truncate(Elementary, Elementary),
@@ -81,7 +90,7 @@ pub enum Operation {
     FromBcd(Elementary, Elementary),
     /// The decimal digits of an unsigned integer in the nibbles of a bit string.
     ToBcd(Elementary, Elementary),
-    /// TIME from the start to this scan: the number of scans times the period. No operands.
+    /// TIME from the start to this scan: the number of scans before it times the period. No operands.
     Elapsed,
     /// An operation on texts.
     Text(TextOperation),
@@ -160,7 +169,8 @@ pub enum TextOperation {
     Compare(Comparison),
     /// The second where the first, a BOOL, is FALSE, else the third.
     Select,
-    /// A number as it is written: integers and bit strings in decimal, BOOL as `TRUE` and `FALSE`, reals in the shortest form that reads back to the same, TIME as `T#1s500ms`.
+    /// A number as it is written: integers and bit strings in decimal, BOOL as `TRUE` and `FALSE`, reals in the shortest form
+    /// that reads back to the same (`1.5`, `1.0E21`, `INF`), TIME as `T#1s500ms`, dates as `D#2024-02-29`.
     From(Elementary),
     /// A number as it is read from the start of a text, blanks before it left out; what is none is 0.
     To(Elementary),

@@ -53,7 +53,7 @@ pub(crate) enum Kind {
         default: bool,
     },
     /// A table from names to `true` or `false`.
-    Bits,
+    Values,
     /// A table from names to names.
     Names,
     /// A table whose keys depend on the model.
@@ -168,7 +168,7 @@ pub(crate) static REMOTE_IO: Section = Section {
         required controller: Kind::Text, "whose";
         key name: Kind::Name, "names it; `<controller>-io` where absent";
         key hold_cycles: count(0, MANY_CYCLES, 3), "cycles for which the last proven outputs are held when no output can be proved";
-        key fail_safe: Kind::Bits, "fail-safe values after that, by the name of the output, such as `{ grip = true }`; `false` for all others";
+        key fail_safe: Kind::Values, "fail-safe values after that, by the name of the output, such as `{ grip = true, heating = 12.5 }`; `false` or 0 for all others";
         key release: word(&RELEASES), "how the outputs are released after a cold start of the program";
         key value_fault: word(&VALUE_FAULTS), "the applied outputs while two stations publish different outputs of one history and there is no majority: `hold`, the last proven outputs and then the fail-safe ones, until the stations agree or the operator releases them; `alarm`, the outputs of the controller itself; `fail-safe`, the fail-safe outputs at once, until the operator releases them";
         key stale_state: word(&STALE_STATES), "reaction when living stations hold only states that are older than the newest applied output: `operator`, the outputs are held, then fail-safe, until the operator chooses the older state or a cold start; `cold`, the program starts from its initial state";
@@ -288,7 +288,9 @@ impl Kind {
                 let quoted: Vec<String> = words.iter().map(|word| format!("\"{word}\"")).collect();
                 quoted.join(" or ")
             }
-            Self::Bits => "a table from names to true or false, such as { grip = true }".into(),
+            Self::Values => {
+                "a table from names to values, such as { grip = true, heating = 12.5 }".into()
+            }
             Self::Names => "a table from names to names in quotes".into(),
             Self::Parameters => "a table, [plant.parameters]".into(),
             Self::Device => "a table, [remote_io.field]".into(),

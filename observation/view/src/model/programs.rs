@@ -107,15 +107,17 @@ impl Model {
 
     /// Whether the images of a report are as wide as those of the program: a journal of other programs does not belong to this cluster.
     fn fits(&self, place: usize, event: &RemoteIoEvent) -> bool {
-        let circuit = &self.cluster.controllers()[place].circuit;
-        let inputs = |image: &Image| image.width() == circuit.inputs().len();
+        let interface = &self.cluster.controllers()[place].interface;
+        let inputs = |image: &Image| image.width() == interface.inputs.width();
         match event {
             RemoteIoEvent::Sampled {
                 inputs: sampled, ..
             } => inputs(sampled),
             RemoteIoEvent::Applied {
                 sampled, outputs, ..
-            } => sampled.as_ref().is_none_or(inputs) && outputs.width() == circuit.outputs().len(),
+            } => {
+                sampled.as_ref().is_none_or(inputs) && outputs.width() == interface.outputs.width()
+            }
             _ => true,
         }
     }

@@ -1,4 +1,4 @@
-//! A plant model that is itself a ladder program.
+//! A plant that is itself a program, because its author knows how to write one.
 //!
 //! Its inputs have the names of the controller's outputs, its outputs those of the controller's inputs; a scan of it is
 //! one cycle of the plant. In addition, where they are declared: the input `part_arrives` is 1 for one scan for each
@@ -9,44 +9,60 @@
 use std::hash::{Hash, Hasher};
 
 use smallvec::SmallVec;
-use understudy_logic::{Circuit, Scan, Scratch};
+use understudy_executable::{Executable, Scratch};
+use understudy_typed::{Point, Points};
 use understudy_wire::Image;
 
-use crate::model::{Counts, Model};
+use crate::model::{Counts, Model, PlantProgram, Terminal};
 
 pub(crate) const PART_ARRIVES: &str = "part_arrives";
 pub(crate) const FINISHED: &str = "finished";
 pub(crate) const HANDED_OVER: &str = "handed_over";
 pub(crate) const PLANT_FAULT: &str = "plant_fault";
 
+const COUNTED: [&str; 3] = [FINISHED, HANDED_OVER, PLANT_FAULT];
+
+fn is_actuator(point: &&Point) -> bool {
+    point.name != PART_ARRIVES
+}
+
+fn is_sensor(point: &&Point) -> bool {
+    !COUNTED.contains(&point.name.as_str())
+}
+
+fn terminal(point: &Point) -> Terminal {
+    Terminal {
+        name: point.name.clone(),
+        of: point.of,
+    }
+}
+
 /// The inputs that the controller drives: all but `part_arrives`.
-pub(crate) fn actuators(circuit: &Circuit) -> Vec<String> {
-    let names = circuit.inputs().iter();
-    names
-        .filter(|name| *name != PART_ARRIVES)
-        .cloned()
-        .collect()
+pub(crate) fn actuators(inputs: &Points) -> Vec<Terminal> {
+    inputs.iter().filter(is_actuator).map(terminal).collect()
 }
 
 /// The outputs that the controller senses: all but those that are counted.
-pub(crate) fn sensors(circuit: &Circuit) -> Vec<String> {
-    let names = circuit.outputs().iter().map(|output| &output.name);
-    names
-        .filter(|name| ![FINISHED, HANDED_OVER, PLANT_FAULT].contains(&name.as_str()))
-        .cloned()
-        .collect()
+pub(crate) fn sensors(outputs: &Points) -> Vec<Terminal> {
+    outputs.iter().filter(is_sensor).map(terminal).collect()
+}
+
+/// The bits of points, one behind the other.
+fn bits<'a>(points: impl Iterator<Item = &'a Point>) -> Vec<usize> {
+    let bits = points.flat_map(|point| point.bit..point.bit + point.of.bits());
+    bits.map(|bit| bit as usize).collect()
 }
 
 #[derive(Debug, Clone)]
-pub(crate) struct LadderModel {
-    scan: Scan,
+pub(crate) struct ProgramModel {
+    executable: Executable,
     scratch: Scratch,
     state: Image,
     inputs: Image,
     outputs: Image,
-    /// Place among the inputs of each actuator.
+    /// Of each bit of an actuator, its place among the inputs.
     actuator_places: Vec<usize>,
-    /// Place among the outputs of each sensor.
+    /// Of each bit of a sensor, its place among the outputs.
     sensor_places: Vec<usize>,
     part_arrives: Option<usize>,
     queue: u64,
@@ -55,8 +71,8 @@ pub(crate) struct LadderModel {
     plant_fault: Counter,
 }
 
-/// Two of one program that hash alike behave alike.
-impl Hash for LadderModel {
+/// Two of one program that hash alike go on alike.
+impl Hash for ProgramModel {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
         (&self.state, &self.inputs, &self.outputs, self.queue).hash(hasher);
         (&self.finished, &self.handed_over, &self.plant_fault).hash(hasher);
@@ -72,11 +88,9 @@ struct Counter {
 }
 
 impl Counter {
-    /// An output that is 1 from the start is not an edge: `outputs` are those that the plant shows before its first
-    /// scan.
-    fn of(circuit: &Circuit, name: &str, outputs: &Image) -> Self {
-        let mut names = circuit.outputs().iter();
-        let place = names.position(|output| output.name == name);
+    /// What is 1 from the start is no edge: `outputs` are those that the plant shows before its first scan.
+    fn of(points: &Points, name: &str, outputs: &Image) -> Self {
+        let place = points.find(name).map(|point| point.bit as usize);
         Self {
             place,
             last: place.is_some_and(|place| outputs.get(place)),
@@ -94,41 +108,31 @@ impl Counter {
     }
 }
 
-impl LadderModel {
+impl ProgramModel {
     /// Before its first scan a plant shows the outputs of a scan with all inputs 0, without having stepped.
-    pub(crate) fn new(circuit: &Circuit) -> Self {
-        let scan = Scan::new(circuit);
-        let mut state = Image::zero(scan.register_count());
-        state.words_mut().copy_from_slice(scan.initial());
-        let inputs = Image::zero(scan.input_count());
-        let mut outputs = Image::zero(scan.output_count());
+    pub(crate) fn new(program: &PlantProgram) -> Self {
+        let executable = program.executable.clone();
+        let (reads, shows) = (&program.interface.inputs, &program.interface.outputs);
+        let mut state = Image::zero(executable.state_count());
+        state.words_mut().copy_from_slice(executable.initial());
+        let inputs = Image::zero(executable.input_count());
+        let mut outputs = Image::zero(executable.output_count());
         let mut scratch = Scratch::default();
-        scan.step(
+        executable.step(
             &mut scratch,
             state.clone().words_mut(),
             inputs.words(),
             outputs.words_mut(),
         );
-        let places = |kept: &dyn Fn(&str) -> bool, names: &mut dyn Iterator<Item = &String>| {
-            let places = names.enumerate().filter(|(_, name)| kept(name));
-            places.map(|(place, _)| place).collect::<Vec<_>>()
-        };
-        let counted = [FINISHED, HANDED_OVER, PLANT_FAULT];
         Self {
-            actuator_places: places(&|name| name != PART_ARRIVES, &mut circuit.inputs().iter()),
-            sensor_places: places(
-                &|name| !counted.contains(&name),
-                &mut circuit.outputs().iter().map(|output| &output.name),
-            ),
-            part_arrives: circuit
-                .inputs()
-                .iter()
-                .position(|name| name == PART_ARRIVES),
+            actuator_places: bits(reads.iter().filter(is_actuator)),
+            sensor_places: bits(shows.iter().filter(is_sensor)),
+            part_arrives: reads.find(PART_ARRIVES).map(|point| point.bit as usize),
             queue: 0,
-            finished: Counter::of(circuit, FINISHED, &outputs),
-            handed_over: Counter::of(circuit, HANDED_OVER, &outputs),
-            plant_fault: Counter::of(circuit, PLANT_FAULT, &outputs),
-            scan,
+            finished: Counter::of(shows, FINISHED, &outputs),
+            handed_over: Counter::of(shows, HANDED_OVER, &outputs),
+            plant_fault: Counter::of(shows, PLANT_FAULT, &outputs),
+            executable,
             scratch,
             state,
             inputs,
@@ -137,7 +141,7 @@ impl LadderModel {
     }
 }
 
-impl Model for LadderModel {
+impl Model for ProgramModel {
     fn step(&mut self, actuators: &[bool], arrived: u64) {
         for (&place, &actuator) in self.actuator_places.iter().zip(actuators) {
             self.inputs.set(place, actuator);
@@ -148,7 +152,7 @@ impl Model for LadderModel {
             self.inputs.set(place, pulse);
             self.queue -= u64::from(pulse);
         }
-        self.scan.step(
+        self.executable.step(
             &mut self.scratch,
             self.state.words_mut(),
             self.inputs.words(),
