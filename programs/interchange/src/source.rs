@@ -4,6 +4,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_ladder::Program as Ladder;
+use understudy_structured_text::lower::{Options, lower};
+use understudy_structured_text::parser;
 use understudy_text::{Diagnostic, has_errors};
 use understudy_typed::Program as Typed;
 
@@ -27,6 +29,18 @@ pub fn read_source(name: &str, text: &str, period: Duration) -> (Option<Source>,
     if Format::of(name, text) != Some(Format::StructuredText) {
         return (None, parsed.diagnostics);
     }
-    let _ = period;
-    (None, parsed.diagnostics)
+    // What no ladder can hold may be a program with numbers.
+    let (file, mut diagnostics) = parser::parse(text);
+    let options = Options {
+        text,
+        program: None,
+        period: i64::try_from(period.as_nanos()).ok(),
+    };
+    let lowered = lower(&file, &options);
+    diagnostics.extend(lowered.diagnostics);
+    let program = lowered.program.filter(|_| !has_errors(&diagnostics));
+    (
+        program.map(|program| Source::Typed(Arc::new(program))),
+        diagnostics,
+    )
 }

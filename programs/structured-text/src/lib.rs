@@ -2,7 +2,10 @@
 //! (`lower`).
 
 mod lexer;
+mod library;
+pub mod lower;
 pub mod parser;
 pub mod syntax;
 
+pub use lower::{Lowered, Options, lower};
 pub use parser::parse;

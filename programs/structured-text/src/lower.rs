@@ -34,7 +34,7 @@ use crate::syntax::{File, Unit};
 
 use self::blocks::{Block, Key, Routine};
 use self::constants::ConstantState;
-use self::names::{Scope, Symbol};
+use self::names::{Owner, Scope, Symbol};
 use self::types::{StructureInfo, TypeState};
 
 /// The state of a program takes at most so many slots: 256 KiB.
@@ -117,13 +117,13 @@ struct Lowering<'a> {
     global_declarations: HashMap<String, &'a crate::syntax::Declaration>,
     /// Variables at addresses.
     addresses: HashMap<String, Symbol>,
-    constants: HashMap<(Option<usize>, String), ConstantState>,
+    constants: HashMap<(Option<Owner>, String), ConstantState>,
     routines: HashMap<Key, Rc<Routine>>,
     /// Bodies that are still to be lowered.
     queue: Vec<(Key, Rc<Routine>)>,
     /// Which routines each routine calls, and where it first does.
     calls: Vec<Vec<(u32, Range<usize>)>>,
-    scope: Scope<'a>,
+    scope: Scope,
     nesting: u32,
     /// The length of the expressions around this one.
     length: usize,
@@ -189,6 +189,7 @@ impl<'a> Lowering<'a> {
         }
         let is_whole = checked.is_empty() && !understudy_text::has_errors(&self.diagnostics);
         let is_whole = is_whole && !self.program.tasks.is_empty();
+        self.program.seal_points();
         Lowered {
             program: is_whole.then_some(self.program),
             checked,

@@ -51,13 +51,7 @@ pub(super) fn load(place: Place) -> Expression {
 }
 
 pub(super) fn place(root: Root, of: Type) -> Place {
-    Place {
-        root,
-        offset: 0,
-        bit: 0,
-        indices: Vec::new(),
-        of,
-    }
+    Place::new(root, of)
 }
 
 impl Lowering<'_> {
@@ -339,6 +333,7 @@ impl Lowering<'_> {
         }
         target.place.offset += (bits / 64) as u32;
         target.place.bit = (bits % 64) as u32;
+        target.place.is_packed = array.element.elementary().is_some();
         target.place.of = array.element.clone();
         Some(())
     }

@@ -58,7 +58,7 @@ impl Compiler<'_> {
     /// `to` := an elementary value. It is written last, so the expression may read it.
     pub(super) fn into(&mut self, expression: &Expression, to: u32) {
         match &expression.kind {
-            ExpressionKind::Constant(_) => {
+            ExpressionKind::Constant(_) | ExpressionKind::Apply(Operation::Elapsed, _) => {
                 let value = self.operand(expression);
                 self.emit(Code::Move, to, value, 0);
             }
