@@ -1,10 +1,7 @@
 //! `cargo bench -p understudy-reliability`
 
 use divan::Bencher;
-use divan::counter::ItemsCount;
-use rand_pcg::Pcg64;
-use rand_pcg::rand_core::SeedableRng;
-use understudy_reliability::{ChainBuilder, Level, ThreeState, birth_death_mttf, simulate};
+use understudy_reliability::{ChainBuilder, Level, birth_death_mttf};
 
 fn main() {
     divan::main();
@@ -49,14 +46,4 @@ fn duplex_of_a_million_states_as_a_chain(bencher: Bencher<'_, '_>) {
     }
     let chain = builder.build().expect("a chain");
     bencher.bench(|| chain.mttf().expect("a mean"));
-}
-
-/// Times to failure of the three-state model.
-#[divan::bench]
-fn three_state_paths(bencher: Bencher<'_, '_>) {
-    let model = ThreeState::new(3, FAILURE_RATE, REPAIR_RATE).expect("a model");
-    let mut random = Pcg64::seed_from_u64(1);
-    bencher
-        .counter(ItemsCount::new(1_000_000_u32))
-        .bench_local(|| simulate(&model, 1_000_000, None, 0.95, &mut random).expect("a mean"));
 }

@@ -1,7 +1,7 @@
 //! Estimates with exact intervals: chi-squared for mean times, Clopper-Pearson for proportions.
 
 use serde::Serialize;
-use statrs::distribution::{Beta, ChiSquared, ContinuousCDF};
+use statrs::distribution::{Beta, ChiSquared, ContinuousCDF, Normal};
 
 use crate::error::ReliabilityError;
 use crate::quantity::Probability;
@@ -150,6 +150,12 @@ pub(crate) fn significance(confidence: f64) -> Result<f64, ReliabilityError> {
         });
     }
     Ok(1.0 - confidence)
+}
+
+/// Number of standard errors by which a two-sided interval extends to each side.
+pub(crate) fn normal_quantile(confidence: f64) -> Result<f64, ReliabilityError> {
+    let alpha = significance(confidence)?;
+    Ok(Normal::standard().inverse_cdf(1.0 - alpha / 2.0))
 }
 
 /// The quantile of the chi-squared law.

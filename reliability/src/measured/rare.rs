@@ -10,8 +10,7 @@
 use rand::{Rng, RngExt};
 use serde::Serialize;
 
-use super::estimate::Interval;
-use super::simulate::normal_quantile;
+use super::estimate::{Interval, normal_quantile};
 use crate::chain::Chain;
 use crate::error::ReliabilityError;
 
