@@ -43,7 +43,7 @@ pub const MAXIMUM_TEXT_BYTES: usize = 64 << 20;
 /// Findings of one text, at most; the rest is not looked for.
 const MAXIMUM_FINDINGS: usize = 200;
 
-/// What was read.
+/// The result of reading a chain.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadChain {
     /// The chain, if it is valid.

@@ -10,7 +10,6 @@
 //! One function answers each question of the command line: [`calculate`], [`answer_chain`], [`assess`], [`outlook`], [`report_data`] with [`report`].
 
 mod answer;
-mod birth_death;
 mod boxes;
 mod campaign;
 mod chain;
@@ -34,7 +33,6 @@ mod system;
 mod transient;
 
 pub use answer::{Answer, Mission, calculate};
-pub use birth_death::{Level, birth_death_mttf};
 pub use boxes::{UNDERSTUDIES, UnequalBoxes};
 pub use campaign::{Assessment, Campaign, SystemFailure, assess};
 pub use chain::{Chain, ChainBuilder, MAXIMUM_STATES};

@@ -26,7 +26,7 @@ impl Interval {
     }
 }
 
-/// What ended the measurement.
+/// The end of a measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stopped {
@@ -83,7 +83,7 @@ pub fn mean_time(
 /// MTTF from the times of runs that ended in a failure and of those that were given up before one.
 ///
 /// # Errors
-/// As [`mean_time`], and a time that is negative or not finite.
+/// The errors of [`mean_time`], and a time that is negative or not finite.
 pub fn times_to_failure(
     failed_hours: &[f64],
     censored_hours: &[f64],

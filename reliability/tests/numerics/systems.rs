@@ -1,7 +1,7 @@
 use proptest::prelude::*;
 use understudy_reliability::{
-    AfterFailure, CommonCause, CommonCauseConvention, Level, MINIMUM_PROBABILITY, Options,
-    Probability, ReliabilityError, Rule, SharedPart, UnequalBoxes, birth_death_mttf,
+    AfterFailure, CommonCause, CommonCauseConvention, MINIMUM_PROBABILITY, Options, Probability,
+    ReliabilityError, Rule, SharedPart, UnequalBoxes,
 };
 
 use crate::support::{check, check_within, fixture, hours, kind, number, rows, system, whole};
@@ -54,17 +54,6 @@ fn lumped_groups_to_twelve_digits() {
         let chain = system.chain().expect("a chain");
         check(
             chain.mttf().expect("a mean"),
-            number(row, "mttf"),
-            &row.to_string(),
-        );
-        let (n, m) = (f64::from(groups), f64::from(boxes));
-        let direct = birth_death_mttf(groups as usize + 1, |k| Level {
-            up: (n - k as f64) * m * lambda,
-            down: (k as u32).min(crews) as f64 * mu,
-            lethal: k as f64 * (m - 1.0) * lambda,
-        });
-        check(
-            direct.expect("a mean"),
             number(row, "mttf"),
             &row.to_string(),
         );
