@@ -46,7 +46,10 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         Ok(read) => read,
         Err(answer) => return answer,
     };
-    let (text, result) = made(&cluster, arguments.form);
+    let (text, result) = match made(&cluster, arguments.form) {
+        Ok(made) => made,
+        Err(answer) => return answer,
+    };
     let answer = match &arguments.output {
         None => Answer::done(text, result),
         Some(path) => match files::write(path, &text) {
@@ -62,8 +65,8 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
 }
 
 /// Text and JSON of the controller.
-fn made(cluster: &Cluster, form: Form) -> (String, Value) {
-    let parity = cluster.parity();
+fn made(cluster: &Cluster, form: Form) -> Result<(String, Value), Answer> {
+    let parity = files::parity_of(cluster, "parity")?;
     let circuit = parity.circuit();
     let text = match form {
         Form::Ladder => print(&from_circuit(circuit)),
@@ -77,9 +80,9 @@ fn made(cluster: &Cluster, form: Form) -> (String, Value) {
             } else {
                 equations.to_text(Style::Symbols)
             };
-            return (text, value);
+            return Ok((text, value));
         }
     };
     let result = json!({ "text": text });
-    (text, result)
+    Ok((text, result))
 }

@@ -1,6 +1,7 @@
-//! What the tests of several crates share: skipped tests, random numbers and random programs.
+//! What the tests of several crates share: skipped tests, random numbers, random programs and tables of states.
 
 pub mod random;
+pub mod states;
 
 use std::fmt::Display;
 use std::fs::OpenOptions;

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use understudy_cycle::{Agreement, Mode, Schedule};
 use understudy_ladder::parse;
-use understudy_logic::{Circuit, Scan};
+use understudy_logic::Circuit;
 use understudy_plant::{ModelKind, Plant, PressParameters, RobotParameters, Signals};
 use understudy_simulator::Parts;
 use understudy_wire::{
@@ -45,13 +45,13 @@ pub(crate) fn line(programs: usize, mode: Mode, understudies: usize) -> Parts {
         .zip(1..)
         .map(|(circuit, hash)| understudy_node::Program {
             hash: ProgramHash(hash),
-            scan: Scan::new(circuit),
+            executable: (*circuit).into(),
         })
         .collect();
     let generated = (mode == Mode::Paper).then(|| {
         let generated =
             understudy_parity::generate(&circuits).expect("programs of different names");
-        Arc::new(Scan::new(generated.circuit()))
+        Arc::new(generated.circuit().into())
     });
     let stations = (0..circuits.len() + understudies).map(|rank| understudy_node::Settings {
         station: StationId(rank as u8),
@@ -68,11 +68,11 @@ pub(crate) fn line(programs: usize, mode: Mode, understudies: usize) -> Parts {
                 program: ProgramId(index),
                 agreement: Arc::clone(&agreement),
                 hash: program.hash,
-                inputs: program.scan.input_count(),
+                inputs: program.executable.input_count(),
                 channels: Vec::new(),
                 diagnosis: None,
                 hold_cycles: HOLD_CYCLES,
-                fail_safe: Image::zero(program.scan.output_count()),
+                fail_safe: Image::zero(program.executable.output_count()),
                 release: understudy_remote_io::Release::Automatic,
                 value_fault: understudy_remote_io::ValueFault::Hold,
                 stale_state: understudy_remote_io::StaleState::Operator,
@@ -83,7 +83,7 @@ pub(crate) fn line(programs: usize, mode: Mode, understudies: usize) -> Parts {
     ];
     let plants = circuits.iter().enumerate().map(|(program, circuit)| {
         let fed = program % 2 == 1;
-        Plant::new(&kinds[program % 2], circuit, &Signals::new(), fed).0
+        Plant::new(&kinds[program % 2], &(*circuit).into(), &Signals::new(), fed).0
     });
     let fed_by = (0..circuits.len() as u8).map(|program| match program % 2 {
         0 => None,
