@@ -27,7 +27,7 @@
 
 mod value;
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 use understudy_text::spelling::suggestion;
 
@@ -71,7 +71,7 @@ pub fn read_chain(name: &str, text: &str) -> ReadChain {
 #[derive(Default)]
 struct Reader {
     findings: Vec<Diagnostic>,
-    constants: HashMap<String, Constant>,
+    constants: BTreeMap<String, Constant>,
     states: Vec<(String, Range<usize>)>,
     places: HashMap<String, usize>,
     failures: Vec<bool>,

@@ -6,8 +6,8 @@ use std::collections::HashMap;
 
 use understudy_cluster::{Cluster, Overrides, press_cell};
 use understudy_cycle::Mode;
-use understudy_journal::{Happening, Members};
 use understudy_executable::Scratch;
+use understudy_journal::{Happening, Members};
 use understudy_node::Event as StationEvent;
 use understudy_parity::sum;
 use understudy_remote_io::Event as RemoteIoEvent;

@@ -177,9 +177,12 @@ impl<'t> Form<'t> {
 
     /// The time under `key`.
     pub(crate) fn time(&mut self, table: &DeTable, key: &str) -> Option<Duration> {
-        let value = self.value(key, table.get(key)?);
-        let time = value.time(Duration::ZERO..=duration::MAXIMUM, &mut self.diagnostics)?;
-        Some(time.value)
+        let value = table.get(key)?;
+        let time = duration::parse(&self.string(key, value)?);
+        if let Err(error) = &time {
+            self.error(self.codes.unknown_word, error.to_string(), value.span());
+        }
+        time.ok()
     }
 
     /// What `read` makes of each table of the list under `key`.

@@ -223,7 +223,12 @@ fn outputs(names: &[&str]) -> Image {
 /// Drives the arm by hand: each entry is what is on, and for how many cycles.
 fn check_arm(script: &[(&[&str], usize)], handed_over: u64, plant_faults: u64) {
     let kind = ModelKind::Robot(RobotParameters::default());
-    let (plant, _) = Plant::new(&kind, &(&robot(Reading::Working)).into(), &Signals::new(), false);
+    let (plant, _) = Plant::new(
+        &kind,
+        &(&robot(Reading::Working)).into(),
+        &Signals::new(),
+        false,
+    );
     let mut plant = plant.expect("it fits");
     for (names, cycles) in script {
         for _ in 0..*cycles {

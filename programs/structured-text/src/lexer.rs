@@ -78,9 +78,23 @@ const MAXIMUM_LEXEMES: usize = 4 << 20;
 
 /// Pragmas that no execution depends on, by their first word. `S7_…` belongs to them.
 const PRAGMAS: [&str; 17] = [
-    "attribute", "info", "warning", "error", "text", "region", "endregion", "warnings",
-    "analysis", "link_always", "linkalways", "flow", "external", "externalaccessible",
-    "externalvisible", "externalwritable", "instructionlist",
+    "attribute",
+    "info",
+    "warning",
+    "error",
+    "text",
+    "region",
+    "endregion",
+    "warnings",
+    "analysis",
+    "link_always",
+    "linkalways",
+    "flow",
+    "external",
+    "externalaccessible",
+    "externalvisible",
+    "externalwritable",
+    "instructionlist",
 ];
 
 /// Pragmas that choose which statements are compiled, by their first word.
@@ -327,7 +341,9 @@ impl<'a> Lexer<'a> {
                 return Lexeme::Address(self.since(start));
             }
             '\'' | '"' => return self.quoted(character, start),
-            '#' if self.rest()[1..].starts_with(|next: char| is_word_start(next) || next == '"') => {
+            '#' if self.rest()[1..]
+                .starts_with(|next: char| is_word_start(next) || next == '"') =>
+            {
                 self.place += 1;
                 self.has_local_marks = true;
                 return match self.rest().starts_with('"') {

@@ -28,8 +28,8 @@ use understudy_text::{Diagnostic, MAXIMUM_FINDINGS};
 
 use crate::lexer::{Lexeme, Lexemes, Placed, lex};
 use crate::syntax::{
-    Body, Declaration, Expression, ExpressionKind, File, Instruction, Literal, Name, Span, Statement,
-    TypeName,
+    Body, Declaration, Expression, ExpressionKind, File, Instruction, Literal, Name, Span,
+    Statement, TypeName,
 };
 
 /// The largest text.
@@ -40,16 +40,78 @@ pub const MAXIMUM_NESTING: usize = 64;
 
 /// Words of the language that no variable can have for its name.
 const KEYWORDS: [&str; 72] = [
-    "AND", "AND_THEN", "ARRAY", "AT", "BY", "CASE", "CONFIGURATION", "CONSTANT", "CONTINUE", "DO",
-    "ELSE", "ELSIF", "END_ACTION", "END_CASE", "END_CLASS", "END_CONFIGURATION", "END_FOR",
-    "END_FUNCTION", "END_FUNCTION_BLOCK", "END_IF", "END_INTERFACE", "END_METHOD", "END_NAMESPACE",
-    "END_PROGRAM", "END_PROPERTY", "END_REPEAT", "END_RESOURCE", "END_STEP", "END_STRUCT",
-    "END_TRANSITION", "END_TYPE", "END_UNION", "END_VAR", "END_WHILE", "EXIT", "FALSE", "FOR",
-    "FUNCTION", "FUNCTION_BLOCK", "IF", "INITIAL_STEP", "MOD", "NOT", "OF", "OR", "OR_ELSE",
-    "PROGRAM", "REPEAT", "RETURN", "STRUCT", "THEN", "TO", "TRUE", "TYPE", "UNTIL", "VAR",
-    "VAR_ACCESS", "VAR_CONFIG", "VAR_EXTERNAL", "VAR_GLOBAL", "VAR_INPUT", "VAR_INST", "VAR_IN_OUT",
-    "VAR_OUTPUT", "VAR_STAT", "VAR_TEMP", "WHILE", "XOR", "END_ORGANIZATION_BLOCK",
-    "END_DATA_BLOCK", "ORGANIZATION_BLOCK", "DATA_BLOCK",
+    "AND",
+    "AND_THEN",
+    "ARRAY",
+    "AT",
+    "BY",
+    "CASE",
+    "CONFIGURATION",
+    "CONSTANT",
+    "CONTINUE",
+    "DO",
+    "ELSE",
+    "ELSIF",
+    "END_ACTION",
+    "END_CASE",
+    "END_CLASS",
+    "END_CONFIGURATION",
+    "END_FOR",
+    "END_FUNCTION",
+    "END_FUNCTION_BLOCK",
+    "END_IF",
+    "END_INTERFACE",
+    "END_METHOD",
+    "END_NAMESPACE",
+    "END_PROGRAM",
+    "END_PROPERTY",
+    "END_REPEAT",
+    "END_RESOURCE",
+    "END_STEP",
+    "END_STRUCT",
+    "END_TRANSITION",
+    "END_TYPE",
+    "END_UNION",
+    "END_VAR",
+    "END_WHILE",
+    "EXIT",
+    "FALSE",
+    "FOR",
+    "FUNCTION",
+    "FUNCTION_BLOCK",
+    "IF",
+    "INITIAL_STEP",
+    "MOD",
+    "NOT",
+    "OF",
+    "OR",
+    "OR_ELSE",
+    "PROGRAM",
+    "REPEAT",
+    "RETURN",
+    "STRUCT",
+    "THEN",
+    "TO",
+    "TRUE",
+    "TYPE",
+    "UNTIL",
+    "VAR",
+    "VAR_ACCESS",
+    "VAR_CONFIG",
+    "VAR_EXTERNAL",
+    "VAR_GLOBAL",
+    "VAR_INPUT",
+    "VAR_INST",
+    "VAR_IN_OUT",
+    "VAR_OUTPUT",
+    "VAR_STAT",
+    "VAR_TEMP",
+    "WHILE",
+    "XOR",
+    "END_ORGANIZATION_BLOCK",
+    "END_DATA_BLOCK",
+    "ORGANIZATION_BLOCK",
+    "DATA_BLOCK",
 ];
 
 /// Whether no variable can be called so.
@@ -149,10 +211,7 @@ pub fn parse_initializer(text: &str) -> (Option<crate::syntax::Initializer>, Vec
     })
 }
 
-fn read<T: Absent>(
-    text: &str,
-    read: impl FnOnce(&mut Parser<'_>) -> T,
-) -> (T, Vec<Diagnostic>) {
+fn read<T: Absent>(text: &str, read: impl FnOnce(&mut Parser<'_>) -> T) -> (T, Vec<Diagnostic>) {
     if text.len() > MAXIMUM_TEXT_BYTES {
         let message = format!(
             "the text has {} bytes; at most {MAXIMUM_TEXT_BYTES} are read",
@@ -261,7 +320,9 @@ impl<'a> Parser<'a> {
     /// The comments above the lexeme.
     fn comments(&self) -> Vec<String> {
         let comments = self.placed().comments.as_deref();
-        comments.map(|comments| comments.above.clone()).unwrap_or_default()
+        comments
+            .map(|comments| comments.above.clone())
+            .unwrap_or_default()
     }
 
     /// The comment behind what was read last.
@@ -345,7 +406,11 @@ impl<'a> Parser<'a> {
                 format!("`{}`", written.escape_debug())
             }
         };
-        self.error("U1034", format!("expected {what}, found {found}"), self.span());
+        self.error(
+            "U1034",
+            format!("expected {what}, found {found}"),
+            self.span(),
+        );
     }
 
     fn need_end(&mut self, what: &str) {

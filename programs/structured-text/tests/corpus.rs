@@ -16,7 +16,10 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
         let path = entry.path();
         if path.is_dir() {
             sources(&path, found);
-        } else if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("st")) {
+        } else if path
+            .extension()
+            .is_some_and(|extension| extension.eq_ignore_ascii_case("st"))
+        {
             found.push(path);
         }
     }
@@ -45,11 +48,19 @@ fn the_corpus_is_read() {
             if index < 4 {
                 let place = lines.position(found.span.start);
                 let name = path.file_name().unwrap_or_default().to_string_lossy();
-                let _ = writeln!(table, "{name}:{place}: {:?} {} {}", found.severity, found.code, found.message);
+                let _ = writeln!(
+                    table,
+                    "{name}:{place}: {:?} {} {}",
+                    found.severity, found.code, found.message
+                );
             }
         }
     }
-    let _ = writeln!(table, "{whole} of {} files without an error; {codes:?}", files.len());
+    let _ = writeln!(
+        table,
+        "{whole} of {} files without an error; {codes:?}",
+        files.len()
+    );
     let list = std::env::var_os("UNDERSTUDY_TABLE");
     if let Some(list) = list {
         fs::write(list, &table).expect("a table");

@@ -83,7 +83,13 @@ pub(crate) fn line(programs: usize, mode: Mode, understudies: usize) -> Parts {
     ];
     let plants = circuits.iter().enumerate().map(|(program, circuit)| {
         let fed = program % 2 == 1;
-        Plant::new(&kinds[program % 2], &(*circuit).into(), &Signals::new(), fed).0
+        Plant::new(
+            &kinds[program % 2],
+            &(*circuit).into(),
+            &Signals::new(),
+            fed,
+        )
+        .0
     });
     let fed_by = (0..circuits.len() as u8).map(|program| match program % 2 {
         0 => None,

@@ -19,7 +19,9 @@ fn type_of(word: &str) -> Option<Elementary> {
         ("LW", Elementary::Lword),
         ("L", Elementary::Dint),
     ];
-    let short = short.iter().find(|(name, _)| word.eq_ignore_ascii_case(name));
+    let short = short
+        .iter()
+        .find(|(name, _)| word.eq_ignore_ascii_case(name));
     let named = || {
         let all = Elementary::ALL.into_iter();
         let mut plain = all.filter(|of| !of.is_time());
@@ -64,7 +66,8 @@ impl<'a> Lexer<'a> {
     }
 
     fn boolean(&mut self, start: usize) -> Lexeme<'a> {
-        let text = self.take_while(|next| next.is_ascii_alphanumeric() || next == '#' || next == '_');
+        let text =
+            self.take_while(|next| next.is_ascii_alphanumeric() || next == '#' || next == '_');
         match text.to_ascii_uppercase().as_str() {
             "TRUE" | "1" | "2#1" | "16#1" => literal(Literal::Boolean(true)),
             "FALSE" | "0" | "2#0" | "16#0" => literal(Literal::Boolean(false)),
@@ -81,10 +84,16 @@ impl<'a> Lexer<'a> {
         self.place += usize::from(signed);
         let text = match self.decimal() {
             Some(text) => text,
-            None => self.take_while(|next| next.is_ascii_digit() || next == '_').replace('_', ""),
+            None => self
+                .take_while(|next| next.is_ascii_digit() || next == '_')
+                .replace('_', ""),
         };
         self.no_tail(start).unwrap_or_else(|| {
-            let sign = if self.text[value..].starts_with('-') { "-" } else { "" };
+            let sign = if self.text[value..].starts_with('-') {
+                "-"
+            } else {
+                ""
+            };
             literal(Literal::Real {
                 text: format!("{sign}{text}"),
                 of: Some(of),
@@ -264,7 +273,11 @@ impl<'a> Lexer<'a> {
             return literal(Literal::Text { bytes, wide });
         };
         let end = std::mem::replace(&mut self.place, place);
-        let shown: String = self.rest().chars().take(if is_escape { 3 } else { 1 }).collect();
+        let shown: String = self
+            .rest()
+            .chars()
+            .take(if is_escape { 3 } else { 1 })
+            .collect();
         self.place += shown.len().min(end - place);
         let faulty = if is_escape {
             let message = format!(

@@ -65,7 +65,10 @@ pub(super) fn length(kind: Moment, text: &str) -> usize {
             (Moment::Duration, next) if next.is_ascii_alphabetic() => true,
             // Some dialects have spaces between the parts.
             (Moment::Duration, b' ') => {
-                let spaces = bytes[place..].iter().take_while(|next| **next == b' ').count();
+                let spaces = bytes[place..]
+                    .iter()
+                    .take_while(|next| **next == b' ')
+                    .count();
                 let next = place + spaces;
                 if place > 0 && bytes[place - 1].is_ascii_alphabetic() && is_digit(next) {
                     place = next;
@@ -89,7 +92,9 @@ pub(super) fn length(kind: Moment, text: &str) -> usize {
 /// The nanoseconds of a value, or what was expected of it.
 pub(super) fn nanoseconds(kind: Moment, text: &str) -> Result<i64, &'static str> {
     let form = match kind {
-        Moment::Duration => "numbers with their units, the larger first, such as `1m30s` or `-2.5ms`",
+        Moment::Duration => {
+            "numbers with their units, the larger first, such as `1m30s` or `-2.5ms`"
+        }
         Moment::Date => "a date such as `2026-11-23`",
         Moment::TimeOfDay => "a time of day such as `14:30:20.5`",
         Moment::DateAndTime => "a date and time such as `2026-11-23-14:30:20`",
@@ -189,7 +194,11 @@ pub(crate) fn calendar(days: i64) -> (i64, i64, i64) {
     let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
     let shifted = (5 * day_of_year + 2) / 153;
     let day = day_of_year - (153 * shifted + 2) / 5 + 1;
-    let month = if shifted < 10 { shifted + 3 } else { shifted - 9 };
+    let month = if shifted < 10 {
+        shifted + 3
+    } else {
+        shifted - 9
+    };
     let year = year_of_era + era * 400 + i64::from(month <= 2);
     (year, month, day)
 }

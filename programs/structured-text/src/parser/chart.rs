@@ -2,7 +2,9 @@
 
 use super::Parser;
 use crate::lexer::Lexeme;
-use crate::syntax::{Action, Association, Body, Chart, ChartStep, Expression, ExpressionKind, Name, Transition};
+use crate::syntax::{
+    Action, Association, Body, Chart, ChartStep, Expression, ExpressionKind, Name, Transition,
+};
 
 /// Qualifiers of actions.
 const QUALIFIERS: [&str; 12] = [
@@ -18,14 +20,12 @@ impl Parser<'_> {
         let follows_name = matches!(self.ahead(1), Lexeme::Word(_));
         self.at_word("INITIAL_STEP")
             || self.at_word("STEP") && follows_name && *self.ahead(2) == Lexeme::Sign(":")
-            || self.at_word("TRANSITION")
-                && (follows_name || *self.ahead(1) == Lexeme::Sign("("))
+            || self.at_word("TRANSITION") && (follows_name || *self.ahead(1) == Lexeme::Sign("("))
     }
 
     /// Whether a part of a chart begins here.
     fn at_part(&self) -> bool {
-        self.at_chart()
-            || self.at_word("ACTION") && matches!(self.ahead(1), Lexeme::Word(_))
+        self.at_chart() || self.at_word("ACTION") && matches!(self.ahead(1), Lexeme::Word(_))
     }
 
     pub(super) fn chart(&mut self) -> Chart {
@@ -85,7 +85,9 @@ impl Parser<'_> {
             return Some(association);
         }
         let qualifier = self.word().filter(|word| {
-            let is_known = QUALIFIERS.iter().any(|known| known.eq_ignore_ascii_case(word));
+            let is_known = QUALIFIERS
+                .iter()
+                .any(|known| known.eq_ignore_ascii_case(word));
             is_known && matches!(self.ahead(1), Lexeme::Sign("," | ")"))
         });
         if let Some(qualifier) = qualifier {
@@ -154,9 +156,16 @@ impl Parser<'_> {
     /// A condition in an instruction list.
     fn condition_of_instructions(&mut self) -> Expression {
         let span = self.span();
-        if matches!(self.body(&["END_TRANSITION"]), Body::Instructions(_) | Body::Statements(_)) {
+        if matches!(
+            self.body(&["END_TRANSITION"]),
+            Body::Instructions(_) | Body::Statements(_)
+        ) {
             let help = "write the condition behind `:=`, such as `:= a AND NOT b;`";
-            self.refuse("conditions in other languages are", span.clone(), Some(help));
+            self.refuse(
+                "conditions in other languages are",
+                span.clone(),
+                Some(help),
+            );
         }
         let kind = ExpressionKind::Faulty;
         Expression { kind, span }

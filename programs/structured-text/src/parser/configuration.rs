@@ -8,8 +8,16 @@ use crate::syntax::{Argument, Class, ExpressionKind, File, Literal, ProgramInsta
 
 /// Words at which a part of a configuration begins or ends.
 const PARTS: [&str; 10] = [
-    "VAR_GLOBAL", "VAR_ACCESS", "VAR_CONFIG", "RESOURCE", "TASK", "PROGRAM", "END_RESOURCE",
-    "END_CONFIGURATION", "FUNCTION_BLOCK", "CONFIGURATION",
+    "VAR_GLOBAL",
+    "VAR_ACCESS",
+    "VAR_CONFIG",
+    "RESOURCE",
+    "TASK",
+    "PROGRAM",
+    "END_RESOURCE",
+    "END_CONFIGURATION",
+    "FUNCTION_BLOCK",
+    "CONFIGURATION",
 ];
 
 impl Parser<'_> {
@@ -88,7 +96,11 @@ impl Parser<'_> {
             ExpressionKind::Literal(Literal::Time { nanoseconds, .. }) if nanoseconds >= 0 => {
                 Some(nanoseconds)
             }
-            _ if self.diagnostics.len() > before || matches!(found.kind, ExpressionKind::Faulty) => None,
+            _ if self.diagnostics.len() > before
+                || matches!(found.kind, ExpressionKind::Faulty) =>
+            {
+                None
+            }
             _ => {
                 let message = "the interval of a task is a positive duration";
                 let finding = Diagnostic::error("U1043", message, found.span);
@@ -149,7 +161,8 @@ impl Parser<'_> {
         let mut connections = Vec::new();
         self.skip();
         while !self.at_sign(")") && !self.at_sign(";") && !self.at_end() {
-            let is_task = matches!(self.ahead(1), Lexeme::Word(word) if word.eq_ignore_ascii_case("WITH"));
+            let is_task =
+                matches!(self.ahead(1), Lexeme::Word(word) if word.eq_ignore_ascii_case("WITH"));
             if is_task {
                 self.skip();
                 self.skip();

@@ -21,14 +21,28 @@ const BLOCKS: [(&str, Class); 10] = [
 
 /// Words behind the one that begins a block.
 const QUALIFIERS: [&str; 9] = [
-    "CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT", "PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL",
+    "CONSTANT",
+    "RETAIN",
+    "NON_RETAIN",
+    "PERSISTENT",
+    "PUBLIC",
+    "PRIVATE",
+    "PROTECTED",
+    "INTERNAL",
     "DB_SPECIFIC",
 ];
 
 /// Words at which a block of variables ends, the last ones where its END_VAR is missing.
 const ENDS: [&str; 9] = [
-    "END_VAR", "END_STRUCT", "END_UNION", "END_PROGRAM", "END_FUNCTION_BLOCK", "END_FUNCTION",
-    "END_METHOD", "END_TYPE", "END_CONFIGURATION",
+    "END_VAR",
+    "END_STRUCT",
+    "END_UNION",
+    "END_PROGRAM",
+    "END_FUNCTION_BLOCK",
+    "END_FUNCTION",
+    "END_METHOD",
+    "END_TYPE",
+    "END_CONFIGURATION",
 ];
 
 /// Names of one declaration, times the bytes of its type, at most: each name gets the type.

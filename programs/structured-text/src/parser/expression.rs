@@ -10,7 +10,14 @@ use crate::syntax::{
 
 /// Functions of other dialects that work on addresses or on memory made at run time.
 const REFUSED_FUNCTIONS: [&str; 9] = [
-    "ADR", "ADRINST", "BITADR", "INDEXOF", "REF", "__NEW", "__DELETE", "__QUERYINTERFACE",
+    "ADR",
+    "ADRINST",
+    "BITADR",
+    "INDEXOF",
+    "REF",
+    "__NEW",
+    "__DELETE",
+    "__QUERYINTERFACE",
     "__QUERYPOINTER",
 ];
 
@@ -126,7 +133,9 @@ impl Parser<'_> {
                 self.refuse(
                     "names of the global namespace, with a point in front, are",
                     span,
-                    Some("write the name without the point, and give a local variable another name"),
+                    Some(
+                        "write the name without the point, and give a local variable another name",
+                    ),
                 );
                 self.skip();
                 return self.operand_behind_point();

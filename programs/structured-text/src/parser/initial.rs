@@ -48,8 +48,8 @@ impl Parser<'_> {
             }
             return Some(Initializer::Array(elements, self.since(start)));
         }
-        let is_structure =
-            self.at_sign("(") && self.names_field(1) || self.at_word("STRUCT") && *self.ahead(1) == Lexeme::Sign("(");
+        let is_structure = self.at_sign("(") && self.names_field(1)
+            || self.at_word("STRUCT") && *self.ahead(1) == Lexeme::Sign("(");
         if !is_structure {
             return Some(Initializer::Value(self.expression()));
         }

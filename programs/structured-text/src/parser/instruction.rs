@@ -52,7 +52,12 @@ impl Parser<'_> {
                 .any(|alone| alone.eq_ignore_ascii_case(operator));
         }
         let is_operand = match &next.lexeme {
-            Lexeme::Word(word) => !is_keyword(word) || ["TRUE", "FALSE"].iter().any(|value| value.eq_ignore_ascii_case(word)),
+            Lexeme::Word(word) => {
+                !is_keyword(word)
+                    || ["TRUE", "FALSE"]
+                        .iter()
+                        .any(|value| value.eq_ignore_ascii_case(word))
+            }
             Lexeme::Literal(_) | Lexeme::Address(_) | Lexeme::Qualified(_) => true,
             Lexeme::Sign("-") => true,
             _ => false,

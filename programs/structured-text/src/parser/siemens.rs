@@ -4,9 +4,7 @@ use understudy_text::Diagnostic;
 
 use super::Parser;
 use crate::lexer::{Lexeme, Placed};
-use crate::syntax::{
-    Class, Declaration, File, Literal, Name, TypeKind, TypeName,
-};
+use crate::syntax::{Class, Declaration, File, Literal, Name, TypeKind, TypeName};
 
 /// Words that begin a unit or a type, which has a quoted name in SCL.
 const NAMED: [&str; 5] = [
@@ -47,10 +45,18 @@ impl Parser<'_> {
             return None;
         }
         let span = self.span();
-        let written = self.text[span.clone()].trim_start_matches('#').trim_matches('"');
+        let written = self.text[span.clone()]
+            .trim_start_matches('#')
+            .trim_matches('"');
         let mut name: String = written
             .chars()
-            .map(|next| if next.is_ascii_alphanumeric() { next } else { '_' })
+            .map(|next| {
+                if next.is_ascii_alphanumeric() {
+                    next
+                } else {
+                    '_'
+                }
+            })
             .take(crate::lexer::MAXIMUM_NAME_LENGTH)
             .collect();
         if !name.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_') {
@@ -68,7 +74,12 @@ impl Parser<'_> {
     /// `TITLE = …`, `VERSION : 0.1`, `AUTHOR : …` behind the name of a unit.
     pub(super) fn siemens_header(&mut self) {
         const HEADERS: [&str; 6] = [
-            "TITLE", "VERSION", "AUTHOR", "FAMILY", "NAME", "KNOW_HOW_PROTECT",
+            "TITLE",
+            "VERSION",
+            "AUTHOR",
+            "FAMILY",
+            "NAME",
+            "KNOW_HOW_PROTECT",
         ];
         while self.is_siemens && self.at_any(&HEADERS) {
             self.skip();

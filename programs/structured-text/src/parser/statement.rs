@@ -3,18 +3,44 @@
 use super::{Parser, is_keyword};
 use crate::lexer::Lexeme;
 use crate::syntax::{
-    Body, Expression, ExpressionKind, For, Label, Literal, Operator, Path, Statement,
-    StatementKind,
+    Body, Expression, ExpressionKind, For, Label, Literal, Operator, Path, Statement, StatementKind,
 };
 
 /// Words at which a list of statements ends.
 pub(super) const ENDS: [&str; 33] = [
-    "ACTION", "DATA_BLOCK", "ELSE", "ELSIF", "END_ACTION", "END_CASE", "END_CLASS",
-    "END_CONFIGURATION", "END_FOR", "END_FUNCTION", "END_FUNCTION_BLOCK", "END_IF",
-    "END_INTERFACE", "END_METHOD", "END_NAMESPACE", "END_ORGANIZATION_BLOCK", "END_PROGRAM",
-    "END_PROPERTY", "END_REPEAT", "END_RESOURCE", "END_STEP", "END_TRANSITION", "END_WHILE",
-    "FUNCTION", "FUNCTION_BLOCK", "METHOD", "ORGANIZATION_BLOCK", "PROGRAM", "PROPERTY",
-    "TYPE", "UNTIL", "CONFIGURATION", "VAR_GLOBAL",
+    "ACTION",
+    "DATA_BLOCK",
+    "ELSE",
+    "ELSIF",
+    "END_ACTION",
+    "END_CASE",
+    "END_CLASS",
+    "END_CONFIGURATION",
+    "END_FOR",
+    "END_FUNCTION",
+    "END_FUNCTION_BLOCK",
+    "END_IF",
+    "END_INTERFACE",
+    "END_METHOD",
+    "END_NAMESPACE",
+    "END_ORGANIZATION_BLOCK",
+    "END_PROGRAM",
+    "END_PROPERTY",
+    "END_REPEAT",
+    "END_RESOURCE",
+    "END_STEP",
+    "END_TRANSITION",
+    "END_WHILE",
+    "FUNCTION",
+    "FUNCTION_BLOCK",
+    "METHOD",
+    "ORGANIZATION_BLOCK",
+    "PROGRAM",
+    "PROPERTY",
+    "TYPE",
+    "UNTIL",
+    "CONFIGURATION",
+    "VAR_GLOBAL",
 ];
 
 /// Of [`ENDS`] those that can be names of variables too: they end statements where a name follows.
@@ -84,8 +110,13 @@ impl Parser<'_> {
         for ahead in 0..MAXIMUM_LABEL {
             match self.ahead(ahead) {
                 Lexeme::Sign(":") => return ahead > 0,
-                Lexeme::Word(word) if is_keyword(word) && !word.eq_ignore_ascii_case("TRUE")
-                    && !word.eq_ignore_ascii_case("FALSE") => return false,
+                Lexeme::Word(word)
+                    if is_keyword(word)
+                        && !word.eq_ignore_ascii_case("TRUE")
+                        && !word.eq_ignore_ascii_case("FALSE") =>
+                {
+                    return false;
+                }
                 Lexeme::Literal(_)
                 | Lexeme::Qualified(_)
                 | Lexeme::Word(_)

@@ -3,9 +3,7 @@
 use super::Parser;
 use super::declaration::Block;
 use crate::lexer::Lexeme;
-use crate::syntax::{
-    Class, Expression, Name, TypeDefinition, TypeKind, TypeName,
-};
+use crate::syntax::{Class, Expression, Name, TypeDefinition, TypeKind, TypeName};
 
 /// Types of which an enumeration can be.
 const INTEGERS: [&str; 12] = [
@@ -140,7 +138,11 @@ impl Parser<'_> {
     fn structure(&mut self) -> Option<TypeKind> {
         self.skip();
         if self.at_word("OVERLAP") {
-            self.refuse("`OVERLAP` is", self.span(), Some("use parts of words, such as `.%B1`"));
+            self.refuse(
+                "`OVERLAP` is",
+                self.span(),
+                Some("use parts of words, such as `.%B1`"),
+            );
             self.skip();
         }
         let block = Block {
@@ -164,9 +166,7 @@ impl Parser<'_> {
                 break;
             }
             let name = self.name("a value")?;
-            let value = self
-                .take_sign(":=")
-                .then(|| self.deeper(Self::expression));
+            let value = self.take_sign(":=").then(|| self.deeper(Self::expression));
             values.push((name, value));
             if !self.take_sign(",") {
                 break;

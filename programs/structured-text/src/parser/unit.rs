@@ -7,23 +7,49 @@ use crate::syntax::{Body, Class, File, Name, Statement, TypeKind, Unit, UnitKind
 
 /// Words that say who may use something, which are read past.
 const ACCESS: [&str; 7] = [
-    "PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL", "FINAL", "ABSTRACT", "OVERRIDE",
+    "PUBLIC",
+    "PRIVATE",
+    "PROTECTED",
+    "INTERNAL",
+    "FINAL",
+    "ABSTRACT",
+    "OVERRIDE",
 ];
 
 /// Words at which something of a file begins.
 const STARTS: [&str; 15] = [
-    "PROGRAM", "FUNCTION_BLOCK", "FUNCTION", "CLASS", "ORGANIZATION_BLOCK", "DATA_BLOCK", "TYPE",
-    "CONFIGURATION", "VAR_GLOBAL", "VAR_CONFIG", "VAR_ACCESS", "INTERFACE", "NAMESPACE", "USING",
+    "PROGRAM",
+    "FUNCTION_BLOCK",
+    "FUNCTION",
+    "CLASS",
+    "ORGANIZATION_BLOCK",
+    "DATA_BLOCK",
+    "TYPE",
+    "CONFIGURATION",
+    "VAR_GLOBAL",
+    "VAR_CONFIG",
+    "VAR_ACCESS",
+    "INTERFACE",
+    "NAMESPACE",
+    "USING",
     "END_NAMESPACE",
 ];
 
 /// Words that begin a unit, what it is, and the word that ends it.
 const UNITS: [(&str, UnitKind, &str); 5] = [
     ("PROGRAM", UnitKind::Program, "END_PROGRAM"),
-    ("FUNCTION_BLOCK", UnitKind::FunctionBlock, "END_FUNCTION_BLOCK"),
+    (
+        "FUNCTION_BLOCK",
+        UnitKind::FunctionBlock,
+        "END_FUNCTION_BLOCK",
+    ),
     ("FUNCTION", UnitKind::Function, "END_FUNCTION"),
     ("CLASS", UnitKind::FunctionBlock, "END_CLASS"),
-    ("ORGANIZATION_BLOCK", UnitKind::Program, "END_ORGANIZATION_BLOCK"),
+    (
+        "ORGANIZATION_BLOCK",
+        UnitKind::Program,
+        "END_ORGANIZATION_BLOCK",
+    ),
 ];
 
 impl Parser<'_> {
@@ -315,7 +341,11 @@ impl Parser<'_> {
         match self.body(&[end]) {
             Body::Statements(statements) => statements,
             Body::Chart(_) => {
-                self.refuse("a chart in an action is", span, Some("write it as a function block"));
+                self.refuse(
+                    "a chart in an action is",
+                    span,
+                    Some("write it as a function block"),
+                );
                 Vec::new()
             }
             Body::Instructions(_) => {
