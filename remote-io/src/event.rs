@@ -266,6 +266,8 @@ pub enum Missing {
     NotReleased,
     /// Stations disagree, and no majority exists.
     ValueFault,
+    /// A program fault has stopped the program, in all stations at once.
+    ProgramFault,
     /// Neither the controller nor a word of an understudy was received with the true lineage.
     NotSynchronised,
     /// A word was received, and another member of it was not.

@@ -20,4 +20,4 @@ pub use diagnosis::Diagnosis;
 pub use event::{Event, Lacking, LackingReason, Missing};
 pub use foresight::Foreseen;
 pub use remote_io::RemoteIo;
-pub use settings::{Release, Settings, StaleState, ValueFault};
+pub use settings::{Release, Settings, StaleState, StopPoints, ValueFault};

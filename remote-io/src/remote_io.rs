@@ -77,6 +77,7 @@ pub struct RemoteIo {
     missed: u32,
     applied: Option<Applied>,
     last_true: Option<Image>,
+    program: Execution,
     trust: Trust,
     /// Words and states that differed at the last deadline, with those who can be wrong.
     differed: Vec<(Option<ProgramId>, StationSet)>,
@@ -89,6 +90,17 @@ enum Authority {
     Proof,
     /// The operator: they are withheld until the release, after a cold start or a value fault.
     Operator,
+}
+
+/// Whether the program runs, as its proven outputs say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Execution {
+    /// It runs.
+    Running,
+    /// A program fault has stopped it, in all stations at once.
+    Stopped,
+    /// It is stopped, and the next sample resets it.
+    Restarting,
 }
 
 /// Where the next deadline is.
@@ -144,6 +156,7 @@ impl RemoteIo {
             missed: 0,
             applied: None,
             last_true: None,
+            program: Execution::Running,
             trust: Trust::default(),
             differed: Vec::new(),
             settings,
@@ -213,6 +226,10 @@ impl RemoteIo {
         }
         self.knowledge.pardon();
         self.diagnosing.release();
+        if self.program == Execution::Stopped {
+            self.program = Execution::Restarting;
+            self.report(Event::Released { moment });
+        }
         if self.authority == Authority::Operator || !self.trust.is_complete() {
             self.authority = Authority::Proof;
             self.trust.release();
@@ -304,13 +321,14 @@ impl Hash for RemoteIo {
             missed,
             applied,
             last_true,
+            program,
             trust,
             differed,
         } = self;
         (member, holders, knowledge, question, authority).hash(hasher);
         (sensors, field, diagnosing, diagnosed, forcing).hash(hasher);
         (looked, protection, turns, deadline, missed, applied).hash(hasher);
-        (last_true, trust, differed).hash(hasher);
+        (last_true, program, trust, differed).hash(hasher);
     }
 }
 

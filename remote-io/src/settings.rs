@@ -22,6 +22,8 @@ pub struct Settings {
     pub inputs: usize,
     /// Inputs whose channels report their own failure.
     pub channels: Vec<Channel>,
+    /// Where the program reports a program fault; `None` for a program that has none.
+    pub stop: Option<StopPoints>,
     /// Ladder that finds failed channels that do not report it.
     pub diagnosis: Option<Arc<Diagnosis>>,
     /// Cycles for which the last proven outputs are held.
@@ -34,6 +36,15 @@ pub struct Settings {
     pub value_fault: ValueFault,
     /// Reaction to a lost state.
     pub stale_state: StaleState,
+}
+
+/// The points by which a program with numbers reports a program fault.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct StopPoints {
+    /// Bit of y(i): a fault has stopped the program.
+    pub stopped: usize,
+    /// Bit of u(i): the program starts again from its initial state.
+    pub reset: usize,
 }
 
 /// Reaction where no living station can prove the state of the newest applied output, and one holds an older state.

@@ -106,6 +106,7 @@ fn settings() -> Settings {
         hash: ProgramHash(9),
         inputs: 2,
         channels: Vec::new(),
+        stop: None,
         diagnosis: None,
         hold_cycles: 2,
         fail_safe: Image::zero(1),

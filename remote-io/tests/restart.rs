@@ -45,6 +45,7 @@ fn run(held: [Held; 3], release: Release, released_at: u64, cycles: u64) -> Vec<
             hash: ProgramHash(1),
             inputs: 1,
             channels: Vec::new(),
+            stop: None,
             diagnosis: None,
             hold_cycles: 3,
             fail_safe: Image::zero(1),

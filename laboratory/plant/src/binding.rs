@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
 use understudy_executable::Interface;
-use understudy_typed::{Elementary, Point, Points};
+use understudy_typed::{Elementary, Point, Points, Program};
 
 use crate::model::{Direction, Terminal, Terminals};
 
@@ -164,6 +164,8 @@ impl Binding {
         let unbound = |points: &Points, places: &[usize]| {
             let places: HashSet<usize> = places.iter().copied().collect();
             let unbound = points.iter();
+            let implied = [Program::RESET, Program::FAULT];
+            let unbound = unbound.filter(|point| !implied.contains(&point.name.as_str()));
             let unbound = unbound.filter(|point| !places.contains(&(point.bit as usize)));
             unbound.map(|point| point.name.clone()).collect::<Vec<_>>()
         };

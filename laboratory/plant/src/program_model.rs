@@ -10,7 +10,7 @@ use std::hash::{Hash, Hasher};
 
 use smallvec::SmallVec;
 use understudy_executable::{Executable, Scratch};
-use understudy_typed::{Point, Points};
+use understudy_typed::{Point, Points, Program};
 use understudy_wire::Image;
 
 use crate::model::{Counts, Model, PlantProgram, Terminal};
@@ -20,10 +20,10 @@ pub(crate) const FINISHED: &str = "finished";
 pub(crate) const HANDED_OVER: &str = "handed_over";
 pub(crate) const PLANT_FAULT: &str = "plant_fault";
 
-const COUNTED: [&str; 3] = [FINISHED, HANDED_OVER, PLANT_FAULT];
+const COUNTED: [&str; 4] = [FINISHED, HANDED_OVER, PLANT_FAULT, Program::FAULT];
 
 fn is_actuator(point: &&Point) -> bool {
-    point.name != PART_ARRIVES
+    ![PART_ARRIVES, Program::RESET].contains(&point.name.as_str())
 }
 
 fn is_sensor(point: &&Point) -> bool {
@@ -69,13 +69,16 @@ pub(crate) struct ProgramModel {
     finished: Counter,
     handed_over: Counter,
     plant_fault: Counter,
+    /// A plant whose own program has stopped is broken.
+    program_fault: Counter,
 }
 
 /// Two of one program that hash alike go on alike.
 impl Hash for ProgramModel {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
         (&self.state, &self.inputs, &self.outputs, self.queue).hash(hasher);
-        (&self.finished, &self.handed_over, &self.plant_fault).hash(hasher);
+        (&self.finished, &self.handed_over).hash(hasher);
+        (&self.plant_fault, &self.program_fault).hash(hasher);
     }
 }
 
@@ -132,6 +135,7 @@ impl ProgramModel {
             finished: Counter::of(shows, FINISHED, &outputs),
             handed_over: Counter::of(shows, HANDED_OVER, &outputs),
             plant_fault: Counter::of(shows, PLANT_FAULT, &outputs),
+            program_fault: Counter::of(shows, Program::FAULT, &outputs),
             executable,
             scratch,
             state,
@@ -162,6 +166,7 @@ impl Model for ProgramModel {
             &mut self.finished,
             &mut self.handed_over,
             &mut self.plant_fault,
+            &mut self.program_fault,
         ] {
             counter.see(&self.outputs);
         }
@@ -181,7 +186,7 @@ impl Model for ProgramModel {
                 Some(_) => self.finished.count,
                 None => handed_over,
             },
-            plant_faults: self.plant_fault.count,
+            plant_faults: self.plant_fault.count + self.program_fault.count,
         }
     }
 

@@ -57,6 +57,7 @@ pub fn is_blocked(missing: Missing) -> bool {
         | Missing::StateLost
         | Missing::NotReleased
         | Missing::ValueFault
+        | Missing::ProgramFault
         | Missing::TooLate => true,
         Missing::NoCycle
         | Missing::NotSynchronised

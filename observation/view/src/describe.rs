@@ -91,6 +91,7 @@ pub(crate) fn missing_text(missing: Missing) -> &'static str {
         Missing::StateLost => "no living station can prove the program's state",
         Missing::NotReleased => "the operator has to release the outputs",
         Missing::ValueFault => "stations disagree and no majority exists",
+        Missing::ProgramFault => "a program fault has stopped the program",
         Missing::NotSynchronised => "no synchronised station published for it",
         Missing::TwoErasures => {
             "another output in the parity word's mask was not received (two erasures)"

@@ -2,19 +2,22 @@
 
 use understudy_logic::{Circuit, Scan};
 
-use understudy_typed::{Elementary, Points, Program};
+use understudy_typed::{Elementary, Machine, Points, Program};
 
 /// A compiled program; cheap to share, it holds no state.
 #[derive(Debug, Clone)]
 pub enum Executable {
     /// All Boolean.
     Circuit(Scan),
+    /// With numbers.
+    Machine(Machine),
 }
 
 /// Working memory of an [`Executable`], whichever; one per thread, reused.
 #[derive(Debug, Clone, Default)]
 pub struct Scratch {
     circuit: understudy_logic::Scratch,
+    machine: understudy_typed::Scratch,
 }
 
 impl From<&Circuit> for Executable {
@@ -23,11 +26,18 @@ impl From<&Circuit> for Executable {
     }
 }
 
+impl From<&Program> for Executable {
+    fn from(program: &Program) -> Self {
+        Self::Machine(Machine::new(program))
+    }
+}
+
 impl Executable {
     /// Width of u in bits.
     pub fn input_count(&self) -> usize {
         match self {
             Self::Circuit(scan) => scan.input_count(),
+            Self::Machine(machine) => machine.input_count(),
         }
     }
 
@@ -35,6 +45,7 @@ impl Executable {
     pub fn state_count(&self) -> usize {
         match self {
             Self::Circuit(scan) => scan.register_count(),
+            Self::Machine(machine) => machine.state_words() * 64,
         }
     }
 
@@ -42,6 +53,7 @@ impl Executable {
     pub fn output_count(&self) -> usize {
         match self {
             Self::Circuit(scan) => scan.output_count(),
+            Self::Machine(machine) => machine.output_count(),
         }
     }
 
@@ -49,6 +61,7 @@ impl Executable {
     pub fn initial(&self) -> &[u64] {
         match self {
             Self::Circuit(scan) => scan.initial(),
+            Self::Machine(machine) => machine.initial(),
         }
     }
 
@@ -65,6 +78,7 @@ impl Executable {
     ) {
         match self {
             Self::Circuit(scan) => scan.step(&mut scratch.circuit, state, inputs, outputs),
+            Self::Machine(machine) => machine.step(&mut scratch.machine, state, inputs, outputs),
         }
     }
 }

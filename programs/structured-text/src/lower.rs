@@ -34,7 +34,7 @@ use crate::syntax::{File, Unit};
 
 use self::blocks::{Block, Key, Routine};
 use self::constants::ConstantState;
-use self::names::{Scope, Symbol};
+use self::names::{Owner, Scope, Symbol};
 use self::types::{StructureInfo, TypeState};
 
 /// The state of a program takes at most so many slots: 256 KiB.
@@ -117,13 +117,15 @@ struct Lowering<'a> {
     global_declarations: HashMap<String, &'a crate::syntax::Declaration>,
     /// Variables at addresses.
     addresses: HashMap<String, Symbol>,
-    constants: HashMap<(Option<usize>, String), ConstantState>,
+    constants: HashMap<(Option<Owner>, String), ConstantState>,
     routines: HashMap<Key, Rc<Routine>>,
     /// Bodies that are still to be lowered.
     queue: Vec<(Key, Rc<Routine>)>,
     /// Which routines each routine calls, and where it first does.
     calls: Vec<Vec<(u32, Range<usize>)>>,
-    scope: Scope<'a>,
+    scope: Scope,
+    /// The file has no PROGRAM.
+    is_library: bool,
     nesting: u32,
     /// The length of the expressions around this one.
     length: usize,
@@ -173,6 +175,7 @@ impl<'a> Lowering<'a> {
             queue: Vec::new(),
             calls: Vec::new(),
             scope: Scope::default(),
+            is_library: false,
             nesting: 0,
             length: 0,
             silent: 0,
@@ -189,6 +192,7 @@ impl<'a> Lowering<'a> {
         }
         let is_whole = checked.is_empty() && !understudy_text::has_errors(&self.diagnostics);
         let is_whole = is_whole && !self.program.tasks.is_empty();
+        self.program.seal_points();
         Lowered {
             program: is_whole.then_some(self.program),
             checked,

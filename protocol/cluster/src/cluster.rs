@@ -14,7 +14,8 @@ use understudy_logic::Circuit;
 use understudy_node::Program;
 use understudy_parity::ParityController;
 use understudy_plant::{Followed, Plant};
-use understudy_remote_io::{Diagnosis, Release, StaleState, ValueFault};
+use understudy_remote_io::{Diagnosis, Release, StaleState, StopPoints, ValueFault};
+use understudy_typed::Program as TypedProgram;
 use understudy_wire::{Epoch, Image, Member, ProgramHash, ProgramId, StationId};
 
 /// What carries the frames.
@@ -80,6 +81,16 @@ impl Controller {
     /// The ladder, of a program that is Boolean.
     pub fn ladder(&self) -> Option<&LadderProgram> {
         self.code.ladder()
+    }
+
+    /// Where its program reports a program fault, of a program with numbers.
+    fn stop_points(&self) -> Option<StopPoints> {
+        let Interface { inputs, outputs } = &self.interface;
+        self.code.typed()?;
+        Some(StopPoints {
+            stopped: outputs.find(TypedProgram::FAULT)?.bit as usize,
+            reset: inputs.find(TypedProgram::RESET)?.bit as usize,
+        })
     }
 
     /// The circuit, of a program that is Boolean.
@@ -318,6 +329,7 @@ impl Cluster {
             channels: understudy_remote_io::Channel::of_inputs(
                 &controller.interface.inputs.bit_names(),
             ),
+            stop: controller.stop_points(),
             diagnosis: remote_io
                 .diagnosis
                 .as_ref()

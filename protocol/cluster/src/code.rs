@@ -64,7 +64,7 @@ impl Code {
     pub fn executable(&self) -> Executable {
         match self {
             Self::Ladder(_, circuit) => circuit.into(),
-            Self::Typed(_) => unreachable!(),
+            Self::Typed(program) => program.as_ref().into(),
         }
     }
 

@@ -4,7 +4,7 @@ use understudy_cycle::Output;
 use understudy_wire::{Image, Moment, Source, Time};
 
 use super::knowledge::Run;
-use super::{Applied, Authority, Deadline, Question, RemoteIo};
+use super::{Applied, Authority, Deadline, Execution, Question, RemoteIo};
 use crate::event::{Event, Missing};
 use crate::history::History;
 use crate::selection::{Received, Selection};
@@ -46,6 +46,7 @@ impl RemoteIo {
                 (selection, Some(self.field_sampled(history)))
             }
         };
+        let selection = self.unless_stopped(selection);
         let moment = self.moment();
         if let Some(Accusation { accused, located }) = accusation {
             self.report(Event::ValueFault {
@@ -63,6 +64,23 @@ impl RemoteIo {
         }
         self.apply(selection, sampled);
         self.watch_protection();
+    }
+
+    /// Outputs that the stations have proved and that a stopped program gives: they are those before its fault, and only held as such.
+    fn unless_stopped(&mut self, selection: Selection) -> Selection {
+        let (Some(stop), Selection::Direct(outputs) | Selection::Reconstructed(outputs, _)) =
+            (self.settings.stop, &selection)
+        else {
+            return selection;
+        };
+        if !outputs.get(stop.stopped) {
+            self.program = Execution::Running;
+            return selection;
+        }
+        if self.program == Execution::Running {
+            self.program = Execution::Stopped;
+        }
+        Selection::Missing(Missing::ProgramFault)
     }
 
     fn received(&self) -> Received<'_> {
@@ -147,7 +165,10 @@ impl RemoteIo {
             source,
             outputs: outputs.clone(),
         });
-        let driven = self.forcing.outputs(&outputs);
+        let mut driven = self.forcing.outputs(&outputs);
+        if let Some(stop) = self.settings.stop {
+            driven.set(stop.stopped, self.program != Execution::Running);
+        }
         self.member.put(Output::Drive(driven));
         self.report(Event::Applied {
             moment,

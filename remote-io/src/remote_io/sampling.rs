@@ -2,7 +2,7 @@
 
 use understudy_wire::{Body, Image, Moment, Sample, Source, Time};
 
-use super::RemoteIo;
+use super::{Execution, RemoteIo};
 use crate::channel;
 use crate::diagnosis::Observation;
 use crate::event::Event;
@@ -48,7 +48,13 @@ impl RemoteIo {
         };
         let moment = self.moment();
         self.see(moment, &sensors);
-        let inputs = self.forcing.inputs(&self.field);
+        let mut inputs = self.forcing.inputs(&self.field);
+        if let Some(stop) = self.settings.stop
+            && self.program == Execution::Restarting
+        {
+            inputs.set(stop.reset, true);
+            self.program = Execution::Stopped;
+        }
         let floor = self.knowledge.floor();
         let Some(run) = self.knowledge.run_mut() else {
             return;

@@ -91,6 +91,7 @@ impl Bench {
             hash: ProgramHash(1),
             inputs: 1,
             channels: Vec::new(),
+            stop: None,
             diagnosis: None,
             hold_cycles: 2,
             fail_safe: Image::zero(1),

@@ -74,6 +74,7 @@ pub(crate) fn parts(understudies: usize) -> Parts {
         hash: program.hash,
         inputs: 1,
         channels: Vec::new(),
+        stop: None,
         diagnosis: None,
         hold_cycles: 1,
         fail_safe: Image::zero(1),

@@ -33,6 +33,7 @@ fn referee() -> Referee {
         hash: ProgramHash(5),
         inputs: 1,
         channels: Vec::new(),
+        stop: None,
         diagnosis: None,
         hold_cycles: 2,
         fail_safe: Image::zero(1),

@@ -45,7 +45,7 @@ pub(crate) fn line(programs: usize, mode: Mode, understudies: usize) -> Parts {
         .zip(1..)
         .map(|(circuit, hash)| understudy_node::Program {
             hash: ProgramHash(hash),
-            executable: (*circuit).into(),
+            executable: circuit.into(),
         })
         .collect();
     let generated = (mode == Mode::Paper).then(|| {
@@ -70,6 +70,7 @@ pub(crate) fn line(programs: usize, mode: Mode, understudies: usize) -> Parts {
                 hash: program.hash,
                 inputs: program.executable.input_count(),
                 channels: Vec::new(),
+                stop: None,
                 diagnosis: None,
                 hold_cycles: HOLD_CYCLES,
                 fail_safe: Image::zero(program.executable.output_count()),
@@ -83,13 +84,7 @@ pub(crate) fn line(programs: usize, mode: Mode, understudies: usize) -> Parts {
     ];
     let plants = circuits.iter().enumerate().map(|(program, circuit)| {
         let fed = program % 2 == 1;
-        Plant::new(
-            &kinds[program % 2],
-            &(*circuit).into(),
-            &Signals::new(),
-            fed,
-        )
-        .0
+        Plant::new(&kinds[program % 2], &circuit.into(), &Signals::new(), fed).0
     });
     let fed_by = (0..circuits.len() as u8).map(|program| match program % 2 {
         0 => None,

@@ -5,7 +5,7 @@ use super::place::{Location, calls};
 use crate::form::{Expression, ExpressionKind};
 use crate::machine::instruction::{Application, Code, TextSource};
 use crate::operation::{Comparison, Operation};
-use crate::types::{Elementary, Type};
+use crate::types::Elementary;
 
 /// The instruction for a comparison, and whether its operands are exchanged.
 pub(super) struct Compared {
@@ -58,7 +58,7 @@ impl Compiler<'_> {
     /// `to` := an elementary value. It is written last, so the expression may read it.
     pub(super) fn into(&mut self, expression: &Expression, to: u32) {
         match &expression.kind {
-            ExpressionKind::Constant(_) => {
+            ExpressionKind::Constant(_) | ExpressionKind::Apply(Operation::Elapsed, _) => {
                 let value = self.operand(expression);
                 self.emit(Code::Move, to, value, 0);
             }
@@ -352,9 +352,4 @@ pub(super) fn comparing(comparison: Comparison, of: Elementary) -> Compared {
         Comparison::GreaterOrEqual => (less_or_equal, true),
     };
     Compared { code, is_exchanged }
-}
-
-/// Whether a type has no parts.
-pub(super) fn is_elementary(of: &Type) -> bool {
-    of.elementary().is_some()
 }
