@@ -53,7 +53,8 @@ pub enum Rule {
 pub enum CommonCauseConvention {
     /// Stations fail at λ; in addition, all of them fail together at β λ.
     Additive,
-    /// Stations fail at (1 - β) λ, and all of them together at β λ. In a large system this can *raise* the MTTF, because λ counts N times and β λ once.
+    /// Stations fail at (1 - β) λ, and all of them together at β λ. In a large system this can *raise* the MTTF, because λ counts N
+    /// times and β λ once.
     Split,
 }
 
