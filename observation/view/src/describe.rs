@@ -24,7 +24,7 @@ pub struct Description {
 }
 
 /// Every value of [`Description::event`].
-pub(crate) const EVENTS: [&str; 66] = [
+pub(crate) const EVENTS: [&str; 65] = [
     "acknowledged",
     "adopted",
     "adopted-lineage",
@@ -43,7 +43,6 @@ pub(crate) const EVENTS: [&str; 66] = [
     "duplicate-found",
     "duplicate-gone",
     "ended",
-    "exchange",
     "excluded",
     "fault",
     "field-contested",

@@ -120,11 +120,6 @@ pub(super) fn host(event: &HostEvent, names: &Members) -> Words {
             Warning,
             format!("received an unknown command: {line}"),
         ),
-        HostEvent::Exchange(exchange) => (
-            "exchange",
-            Info,
-            format!("{} complete cycles", exchange.complete_cycles),
-        ),
         HostEvent::Stopped(_) => ("stopped", Info, "ended as requested".to_owned()),
     }
 }
