@@ -1,11 +1,14 @@
-//! What the tests of several crates share: skipped tests, random numbers and random programs.
+//! What the tests of several crates share: the press cell, skipped tests, random numbers and random programs.
 
+mod cells;
 pub mod random;
 
 use std::fmt::Display;
 use std::fs::OpenOptions;
 use std::io::{self, Write as _};
 use std::thread;
+
+pub use cells::{cluster, line, press_cell};
 
 /// Where [`skip`] writes a line for each test, for whoever counts them.
 pub const LIST: &str = "UNDERSTUDY_SKIPPED";
