@@ -10,6 +10,7 @@ use understudy_cluster::{Cluster, Loaded, Overrides, TemplateFile};
 use understudy_interchange::parse_program;
 use understudy_journal::{Members, RunDirectory, RunDirectoryError, named_file};
 use understudy_ladder::Program;
+use understudy_parity::ParityController;
 use understudy_scenarios::{Scenario, read as read_scenario};
 use understudy_text::spelling::nearest;
 use understudy_text::{Report, decode};
@@ -244,4 +245,23 @@ pub(crate) fn write_new(folder: &Path, files: &[NewFile]) -> Result<Vec<PathBuf>
 pub(crate) fn unwritable(path: &Path, error: &io::Error) -> Answer {
     let message = format!("{} cannot be written: {error}", path.display());
     Answer::failed(Status::Failed, "U0602", message)
+}
+
+/// The generated controller of a cluster whose programs are all Boolean, for a command that works on circuits.
+///
+/// # Errors
+/// The answer of the command, where a program has numbers.
+pub(crate) fn parity_of<'a>(
+    cluster: &'a Cluster,
+    command: &str,
+) -> Result<&'a ParityController, Answer> {
+    cluster.parity().ok_or_else(|| {
+        let mut controllers = cluster.controllers().iter();
+        let typed = controllers.find(|controller| controller.circuit().is_none());
+        let message = format!(
+            "`{command}` works on Boolean programs, and the program of `{}` has numbers",
+            typed.map_or("the cluster", |typed| &typed.name)
+        );
+        Answer::failed(Status::BadInput, "U0438", message)
+    })
 }

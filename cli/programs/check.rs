@@ -156,14 +156,16 @@ impl Found<'_> {
         let period = cluster.agreement().schedule.period();
         let mut seen = Vec::new();
         for controller in cluster.controllers() {
-            let of_it =
-                |report: &&mut Report| Path::new(&report.name).ends_with(&controller.ladder);
+            let of_it = |report: &&mut Report| Path::new(&report.name).ends_with(&controller.file);
             let Some(report) = reports.iter_mut().find(of_it) else {
                 continue;
             };
             let known = seen.contains(&report.name) || has_errors(&report.diagnostics);
             seen.push(report.name.clone());
-            if !known && looking.at_rungs(&controller.program, period, &mut report.diagnostics) {
+            if !known
+                && let Some(ladder) = controller.ladder()
+                && looking.at_rungs(ladder, period, &mut report.diagnostics)
+            {
                 self.cut_short.push(report.name.clone());
             }
         }

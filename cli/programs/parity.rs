@@ -43,7 +43,7 @@ enum Form {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let (cluster, reports) = files::cluster(&arguments.cluster, Overrides::default())?;
-    let (text, result) = made(&cluster, arguments.form);
+    let (text, result) = made(&cluster, arguments.form)?;
     let output = arguments.output.as_deref();
     let answer = files::deliver(output, &text, result)?;
     let answer = match output {
@@ -54,8 +54,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
 }
 
 /// Text and JSON of the controller.
-fn made(cluster: &Cluster, form: Form) -> (String, Value) {
-    let parity = cluster.parity();
+fn made(cluster: &Cluster, form: Form) -> Result<(String, Value), Answer> {
+    let parity = files::parity_of(cluster, "parity")?;
     let circuit = parity.circuit();
     let text = match form {
         Form::Ladder => print(&from_circuit(circuit)),
@@ -69,9 +69,9 @@ fn made(cluster: &Cluster, form: Form) -> (String, Value) {
             } else {
                 equations.to_text(Style::Symbols)
             };
-            return (text, value);
+            return Ok((text, value));
         }
     };
     let result = json!({ "text": text });
-    (text, result)
+    Ok((text, result))
 }

@@ -12,6 +12,7 @@ use serde_json::json;
 use understudy_cluster::{Cluster, Overrides};
 use understudy_ladder::Program;
 use understudy_logic::Circuit;
+use understudy_parity::ParityController;
 use understudy_text::duration::parse_positive;
 use understudy_text::{Report, has_errors};
 use understudy_verification::program::{Bounds, Remarks, Subject};
@@ -274,31 +275,36 @@ fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Result<Answer, Ans
         return Err(Answer::failed(Status::BadInput, "U0437", message));
     }
     let (cluster, reports) = files::cluster(&arguments.file, Overrides::default())?;
+    let understudy = files::parity_of(&cluster, "verify")?;
     let go_on = |work| patience.goes_on(work);
     let bounds = bounds(arguments, &go_on);
     let mut programs = Vec::new();
     for controller in cluster.controllers() {
-        patience.turn_to(format!("`{}`", controller.program.name));
+        patience.turn_to(format!("`{}`", controller.name));
+        let Some(ladder) = controller.ladder() else {
+            continue;
+        };
         let period = cluster.agreement().schedule.period();
-        let subject = Subject::new(&controller.program, period).map_err(not_lowered)?;
+        let subject = Subject::new(ladder, period).map_err(not_lowered)?;
         let remarks = subject
-            .remarks(&controller.program, period, bounds)
+            .remarks(ladder, period, bounds)
             .map_err(not_lowered)?;
         programs.push(ProgramAnswer::of(&subject, bounds, &remarks));
     }
-    Ok(answer::of_programs(programs, Some(parity(&cluster)), None)
-        .with_used(reports)
-        .and_next(&[&"simulate", &arguments.file]))
+    Ok(
+        answer::of_programs(programs, Some(parity(&cluster, understudy)), None)
+            .with_used(reports)
+            .and_next(&[&"simulate", &arguments.file]),
+    )
 }
 
 /// Result of the proof of the understudy.
-fn parity(cluster: &Cluster) -> Result<String, String> {
-    let members: Vec<Circuit> = cluster
-        .controllers()
-        .iter()
-        .map(|controller| controller.circuit.clone())
+fn parity(cluster: &Cluster, understudy: &ParityController) -> Result<String, String> {
+    let controllers = cluster.controllers().iter();
+    let members: Vec<Circuit> = controllers
+        .filter_map(|controller| controller.circuit().cloned())
         .collect();
-    match prove_parity(&members, cluster.parity().circuit()) {
+    match prove_parity(&members, understudy.circuit()) {
         Ok(proof) => Ok(format!(
             "the understudy equals the sum of its members: {} registers and {} outputs compared",
             proof.registers, proof.outputs

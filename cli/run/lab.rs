@@ -218,7 +218,7 @@ fn first_reconstructed(cluster: &Cluster, summary: &Summary) -> Option<(String, 
     let controllers = cluster.controllers();
     summary.steps.iter().find_map(|step| {
         let controller = controllers.iter().find(|it| it.name == step.name)?;
-        let output = controller.circuit.outputs().first()?;
+        let output = controller.interface.outputs.iter().next()?;
         let output = format!("{}.{}", controller.name, output.name);
         (step.action == "crash").then(|| (output, (step.measured + 1).to_string()))
     })

@@ -1,4 +1,4 @@
-//! What a station reports, for the journal.
+//! Events of a station, for the journal.
 
 use std::time::Duration;
 
@@ -9,99 +9,100 @@ use understudy_wire::{
     ConfigurationHash, Image, Lineage, Member, Moment, ProgramId, ProgramSet, StationId, Word,
 };
 
-/// One thing that happened to a station.
+/// Event of a station.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "kebab-case")]
 pub enum Event {
-    /// It took its turn.
+    /// It published its turn.
     Published {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
-        /// Its outputs.
+        /// Its parity words.
         words: SmallVec<[Word; 2]>,
     },
-    /// The state of a program as it holds it. Said now and then, so that whoever begins to look at a cluster that runs can follow
+    /// The state of a program that it holds. Reported periodically, so that a viewer of a running cluster can follow
     /// its programs from there.
     Holds {
-        /// After the sample of this cycle.
+        /// Cycle of the newest sample in the state.
         moment: Moment,
-        /// Whose state.
+        /// Program of the state.
         program: ProgramId,
-        /// Where it stands.
+        /// Lineage of the state.
         lineage: Lineage,
         /// x(t+1).
         state: Image,
     },
-    /// It starts the cycles from now on.
+    /// It starts the cycles from now on: it is the cycle master.
     BecameCycleMaster {
-        /// From this cycle.
+        /// First cycle that it starts.
         moment: Moment,
     },
-    /// Another station was silent for too long: θ = 1, and its slot is closed.
+    /// Another station was not received for `flag_after` cycles: θ = 1, and its slot is closed.
     Flagged {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
-        /// Who was silent.
+        /// Flagged station.
         station: StationId,
     },
-    /// A flagged station speaks again.
+    /// A flagged station was received again: θ = 0.
     Cleared {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
-        /// Who speaks.
+        /// Station that was received.
         station: StationId,
     },
     /// It listens, and asks for the states that it lacks.
     Joins {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
         /// The programs whose states it lacks.
         wants: ProgramSet,
     },
     /// It has the state of a program: from another station, or by replaying from the initial state.
     Adopted {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
-        /// Whose state.
+        /// Program of the state.
         program: ProgramId,
-        /// Where it stands now.
+        /// Lineage of the state.
         lineage: Lineage,
-        /// Who gave it; nobody where it was replayed from the initial state.
+        /// Station that transferred it; `None` where it was replayed from the initial state.
         from: Option<StationId>,
     },
-    /// A copy proved itself in shadow: from now on it takes part in the turns.
+    /// A replica has ended its shadow mode: from now on the station publishes its outputs.
     Synchronised {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
-        /// Whose state.
+        /// Program of the state.
         program: ProgramId,
     },
-    /// Equal lineages and unequal digests: a value fault here or there.
+    /// Equal lineages and unequal digests: a value fault in one of two stations.
     DigestDiffers {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
-        /// Whose state.
+        /// Program of the state.
         program: ProgramId,
         /// The station with the other digest.
         station: StationId,
     },
-    /// The program's remote I/O has found this station's state of it faulty: it says nothing of it until the operator releases it.
+    /// The remote I/O has found this station's state of the program faulty: the station publishes none of its outputs
+    /// until the operator releases it.
     Excluded {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
-        /// Whose state.
+        /// Program of the state.
         program: ProgramId,
     },
-    /// The operator has released it: it begins again, without that state.
+    /// The operator has released it: it starts again, without that state.
     Readmitted {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
-        /// Whose state.
+        /// Program of the state.
         program: ProgramId,
     },
     /// A member of this cluster runs another configuration; its frames are dropped.
     Refused {
-        /// Who.
+        /// Member whose frames are dropped.
         member: Member,
         /// Its configuration.
         theirs: ConfigurationHash,
@@ -110,9 +111,9 @@ pub enum Event {
     },
     /// The host woke this station too late to keep its times.
     Stalled {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
-        /// Behind the time that it had asked for.
+        /// Delay behind the time that it had asked for.
         late: Duration,
     },
 }

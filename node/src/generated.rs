@@ -6,10 +6,10 @@
 //! y(N+1)(t) = h(N+1)(x(N+1)(t), u(N+1)(t))                   (8)
 //! ```
 //!
-//! Samples arrive, are replayed and become void program by program, and a state is transferred program by program. So the
-//! replicas hold x(N+1) from cycle to cycle, and the generated circuit is evaluated on it in each turn.
+//! Samples arrive, are replayed and become void program by program, and a state is transferred program by program. So
+//! the replicas hold x(N+1) from cycle to cycle, and the generated circuit is evaluated on it in each turn.
 
-use understudy_logic::{Scan, Scratch};
+use understudy_executable::{Executable, Scratch};
 use understudy_wire::Image;
 
 use crate::replica::Step;
@@ -18,7 +18,7 @@ use crate::replica::Step;
 ///
 /// `None` where they are not the steps of all programs of `generated`.
 pub(crate) fn outputs<'a>(
-    generated: &Scan,
+    generated: &Executable,
     scratch: &mut Scratch,
     steps: impl Iterator<Item = &'a Step>,
 ) -> Option<Image> {
@@ -27,7 +27,7 @@ pub(crate) fn outputs<'a>(
         state.append(&step.state);
         inputs.append(&step.inputs);
     }
-    if state.width != generated.register_count() || inputs.width != generated.input_count() {
+    if state.width != generated.state_count() || inputs.width != generated.input_count() {
         return None;
     }
     let mut outputs = Image::zero(generated.output_count());

@@ -1,6 +1,7 @@
 //! A station: the cycle, the token, and repair, as a pure state machine.
 //!
-//! [`Station`] is a controller or an understudy: they differ in which programs they run, and in the words that they say.
+//! [`Station`] is a controller or an understudy: they differ in the programs that they run and in the words that they
+//! publish.
 
 mod event;
 mod generated;

@@ -1,14 +1,14 @@
-//! A copy of one program's state, advanced with the very samples that its remote I/O sends (invariant *Same inputs*).
+//! A replica of one program's state, advanced with the samples that its remote I/O sends (invariant *Same inputs*).
 //!
-//! A copy knows where it stands by its lineage alone. Each sample carries the lineages of the last few cycles, so a copy finds
-//! itself in that history and replays what it missed. One that does not find itself there goes back to a state that it had a
-//! few steps ago, starts from the initial state where the history does, or is [`Standing::Lost`] until somebody
-//! gives it a state. It never steps on a guess.
+//! A lineage identifies the state of a replica. Each sample carries the lineages of the last few cycles, so a replica
+//! finds its own in that history and replays the samples that it missed. A replica that is not in the history goes back
+//! to a state that it had a few steps ago, or starts from the initial state where the history does; otherwise it is
+//! [`Standing::Lost`] until another station transfers a state. It never steps on a guess.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use understudy_logic::Scratch;
+use understudy_executable::Scratch;
 use understudy_wire::{
     Body, Digest, Frame, Holding, Image, Lineage, Moment, ProgramId, Recalled, Sample, StationId,
     Transfer,
@@ -16,34 +16,45 @@ use understudy_wire::{
 
 use crate::settings::Program;
 
-/// How much a copy may be trusted to speak.
+/// Whether the outputs of a replica may be published.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Standing {
-    /// There is no copy, or none that the program's remote I/O knows.
+    /// There is no state, or none of the remote I/O's history.
     Lost,
-    /// Adopted from another station; takes no part in the turns for so many more cycles synchronised.
+    /// Adopted from another station, in shadow mode: cycles that it must still be current before its outputs are
+    /// published.
     Shadow(u32),
-    /// Replayed from the initial state, or proved in shadow.
+    /// Synchronised: replayed from the initial state, or after its shadow mode.
     Proven,
-    /// Its remote I/O has found it faulty: it waits for the operator.
+    /// Found faulty by the remote I/O: it waits for the operator.
     Excluded,
 }
 
-/// A station's copy of one program.
+/// A station's replica of one program.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) struct Replica {
     id: ProgramId,
     standing: Standing,
-    copy: Option<Copied>,
+    held: Option<Held>,
     /// States before the last steps, oldest first; at most as many as a sample's history.
     past: VecDeque<State>,
     /// The last step: a state that was transferred has no outputs until it is stepped.
     step: Step,
-    /// The last sample that could not be followed, for replaying it onto a state that is given later.
+    /// The last sample that could not be followed, to be replayed onto a state that is transferred later.
     unfollowed: Option<Arc<Frame>>,
-    /// What the newest sample said, and its cycle; of no cycle where another station told it.
-    recalled: Option<(Option<Moment>, Recalled)>,
+    remembered: Remembered,
     history: usize,
+}
+
+/// The newest sample of the program that this station remembers, for a remote I/O that has lost its memory.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+enum Remembered {
+    /// None.
+    Nothing,
+    /// None of its own; what another station remembers.
+    Relayed(Recalled),
+    /// The sample that this station received in that cycle.
+    Received(Moment, Recalled),
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -69,21 +80,21 @@ pub(crate) struct Step {
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-struct Copied {
+struct Held {
     born: Moment,
     state: State,
 }
 
-/// What a sample did to a copy.
+/// Effect of a sample on a replica.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Followed {
     /// It is current.
     Synchronised,
-    /// It is current, and stands where it does because the history starts from the initial state.
+    /// It is current, because the history starts from the initial state.
     FromGenesis(Lineage),
-    /// It does not find itself in the history.
+    /// Its state is not in the history.
     Lost,
-    /// The history does not lead where its remote I/O says that it does: it has been changed, and says nothing.
+    /// The history does not lead to the lineage in the sample: the sample was changed on its way, and counts as lost.
     Changed,
 }
 
@@ -92,16 +103,16 @@ impl Replica {
         Self {
             id,
             standing: Standing::Lost,
-            copy: None,
+            held: None,
             past: VecDeque::with_capacity(history),
             step: Step {
-                state: Image::zero(program.scan.register_count()),
-                inputs: Image::zero(program.scan.input_count()),
-                outputs: Image::zero(program.scan.output_count()),
+                state: Image::zero(program.executable.state_count()),
+                inputs: Image::zero(program.executable.input_count()),
+                outputs: Image::zero(program.executable.output_count()),
                 after: None,
             },
             unfollowed: None,
-            recalled: None,
+            remembered: Remembered::Nothing,
             history,
         }
     }
@@ -116,15 +127,15 @@ impl Replica {
 
     /// Whether it was stepped with the sample of `moment`, and so knows y(i) of that cycle.
     pub(crate) fn is_current(&self, moment: Moment) -> bool {
-        let knows = |copy: &Copied| {
-            copy.state.stepped == moment && self.step.after == Some(copy.state.lineage)
+        let knows = |held: &Held| {
+            held.state.stepped == moment && self.step.after == Some(held.state.lineage)
         };
         !matches!(self.standing, Standing::Lost | Standing::Excluded)
-            && self.copy.as_ref().is_some_and(knows)
+            && self.held.as_ref().is_some_and(knows)
     }
 
-    /// Whether it may speak of `moment`.
-    pub(crate) fn may_speak(&self, moment: Moment) -> bool {
+    /// Whether its outputs of `moment` may be published.
+    pub(crate) fn may_publish(&self, moment: Moment) -> bool {
         self.standing == Standing::Proven && self.is_current(moment)
     }
 
@@ -138,37 +149,37 @@ impl Replica {
         &self.step
     }
 
-    /// Where it stands, and in which state.
+    /// Its state with its lineage.
     pub(crate) fn state(&self) -> Option<(Lineage, &Image)> {
-        let state = &self.copy.as_ref()?.state;
+        let state = &self.held.as_ref()?.state;
         Some((state.lineage, &state.bits))
     }
 
     pub(crate) fn lineage(&self) -> Option<Lineage> {
-        self.copy.as_ref().map(|copy| copy.state.lineage)
+        self.held.as_ref().map(|held| held.state.lineage)
     }
 
-    /// What it says of itself; a lost copy too, for it may be the newest that lives.
+    /// The state that it reports to hold; also that of a lost replica, which may be the newest available one.
     pub(crate) fn holding(&self) -> Option<Holding> {
-        self.copy.as_ref().map(|copy| Holding {
+        self.held.as_ref().map(|held| Holding {
             program: self.id,
-            born: copy.born,
-            lineage: copy.state.lineage,
-            stepped: copy.state.stepped,
-            digest: copy.state.digest,
+            born: held.born,
+            lineage: held.state.lineage,
+            stepped: held.state.stepped,
+            digest: held.state.digest,
         })
     }
 
-    /// Keeps what the sample of `moment` says, whether it can be followed or not.
-    pub(crate) fn hear(&mut self, program: &Program, moment: Moment, sample: &Sample) {
+    /// Remembers the sample of `moment`, whether it can be followed or not.
+    pub(crate) fn remember(&mut self, program: &Program, moment: Moment, sample: &Sample) {
         let Some(inputs) = sample.history.last() else {
             return;
         };
-        if inputs.width() == program.scan.input_count() {
+        if inputs.width() == program.executable.input_count() {
             // Outputs of the first sample may have been proved in this station's earlier life.
-            let witnessed = match &self.recalled {
-                Some((Some(heard), known)) => known.witnessed || *heard < moment,
-                _ => false,
+            let witnessed = match &self.remembered {
+                Remembered::Received(received, known) => known.witnessed || *received < moment,
+                Remembered::Nothing | Remembered::Relayed(_) => false,
             };
             let recalled = Recalled {
                 program: self.id,
@@ -178,49 +189,54 @@ impl Replica {
                 accounted_for: sample.gone,
                 inputs: inputs.clone(),
             };
-            self.recalled = Some((Some(moment), recalled));
+            self.remembered = Remembered::Received(moment, recalled);
         }
     }
 
-    /// A station claims at `now` to hold the state of the cycle `stepped`. One that is no newer than the newest sample received here,
-    /// `silent_after` cycles after it, means that the remote I/O is silent there too; if that station received samples itself, as it
-    /// recalls, no newer output came of its state.
-    pub(crate) fn hear_claim(
+    /// A station reports at `now` to hold the state of the cycle `stepped`. If that is no newer than the newest sample
+    /// received here, `silent_after` cycles after it, the remote I/O is not received there either; if that station
+    /// received samples itself, as it recalls, no newer output was computed from its state.
+    pub(crate) fn receive_holding(
         &mut self,
         station: StationId,
         stepped: Moment,
         theirs: Option<&Recalled>,
         (now, silent_after): (Moment, u32),
     ) {
-        let Some((Some(heard), recalled)) = &mut self.recalled else {
+        let Remembered::Received(received, recalled) = &mut self.remembered else {
             return;
         };
         let theirs = theirs.filter(|theirs| theirs.witnessed);
-        if stepped > *heard {
+        if stepped > *received {
             recalled.accounted_for.remove(station);
         } else if let Some(theirs) = theirs
-            && now >= heard.plus(u64::from(silent_after))
+            && now >= received.plus(u64::from(silent_after))
         {
             recalled.accounted_for.insert(station);
             recalled.applied = recalled.applied.max(theirs.applied);
         }
     }
 
-    /// Takes what another station has heard, where this one has heard nothing.
-    pub(crate) fn is_told(&mut self, program: &Program, recalled: &Recalled) {
-        if self.recalled.is_none() && recalled.inputs.width() == program.scan.input_count() {
+    /// Takes what another station remembers, where this one has received no sample.
+    pub(crate) fn take_recalled(&mut self, program: &Program, recalled: &Recalled) {
+        if self.remembered == Remembered::Nothing
+            && recalled.inputs.width() == program.executable.input_count()
+        {
             let recalled = Recalled {
                 witnessed: false,
                 ..recalled.clone()
             };
-            self.recalled = Some((None, recalled));
+            self.remembered = Remembered::Relayed(recalled);
         }
     }
 
-    /// What the newest sample said, where none was heard in the cycle `moment`.
+    /// What it remembers of the newest sample, where none was received in the cycle `moment`.
     pub(crate) fn recalled(&self, moment: Moment) -> Option<&Recalled> {
-        let (heard, recalled) = self.recalled.as_ref()?;
-        (*heard != Some(moment)).then_some(recalled)
+        match &self.remembered {
+            Remembered::Nothing => None,
+            Remembered::Relayed(recalled) => Some(recalled),
+            Remembered::Received(received, recalled) => (*received != moment).then_some(recalled),
+        }
     }
 
     /// Follows the sample of `moment`, a frame whose body is `sample`.
@@ -236,7 +252,7 @@ impl Replica {
         };
         let moment = frame.header.moment;
         if sample.history.len() > self.history
-            || sample.history[0].width() != program.scan.input_count()
+            || sample.history[0].width() != program.executable.input_count()
         {
             return Followed::Lost;
         }
@@ -251,9 +267,9 @@ impl Replica {
             return Followed::Changed;
         }
         if self
-            .copy
+            .held
             .as_ref()
-            .is_some_and(|copy| copy.state.lineage == sample.before)
+            .is_some_and(|held| held.state.lineage == sample.before)
         {
             self.step(program, scratch, newest, moment);
             return self.synchronised(shadow_cycles);
@@ -268,9 +284,12 @@ impl Replica {
         }
         let genesis = Lineage::genesis(program.hash, sample.born);
         if let Some(place) = lineages.iter().position(|&lineage| lineage == genesis) {
-            let initial = Image::from_words(program.scan.register_count(), program.scan.initial());
+            let initial = Image::from_words(
+                program.executable.state_count(),
+                program.executable.initial(),
+            );
             self.past.clear();
-            self.copy = Some(Copied {
+            self.held = Some(Held {
                 born: sample.born,
                 state: State {
                     bits: initial.expect("a circuit packs its initial state"),
@@ -289,7 +308,7 @@ impl Replica {
         Followed::Lost
     }
 
-    /// Takes a state from another station if it leads to the last sample heard. True if it was taken.
+    /// Adopts a state from another station if it leads to the last sample received. True if it was adopted.
     pub(crate) fn adopt(
         &mut self,
         program: &Program,
@@ -299,7 +318,7 @@ impl Replica {
     ) -> bool {
         if self.standing != Standing::Lost
             || transfer.hash != program.hash
-            || transfer.state.width() != program.scan.register_count()
+            || transfer.state.width() != program.executable.state_count()
         {
             return false;
         }
@@ -318,12 +337,12 @@ impl Replica {
                 }
                 place
             }
-            // No sample was heard: its remote I/O is down, and the state is kept for when it comes back.
-            _ if self.copy.is_none() => None,
+            // No sample was received: the remote I/O is down, and the state is kept until it comes back.
+            _ if self.held.is_none() => None,
             _ => return false,
         };
         self.past.clear();
-        self.copy = Some(Copied {
+        self.held = Some(Held {
             born: transfer.born,
             state: State {
                 bits: transfer.state.clone(),
@@ -341,28 +360,31 @@ impl Replica {
         true
     }
 
-    /// The state itself, for one who lacks it and can prove outputs with it from then on; none from a copy that is lost.
+    /// The state, for a station that lacks it and can prove outputs with it from then on; `None` unless it is
+    /// synchronised.
     pub(crate) fn transfer(&mut self, program: &Program, to: StationId) -> Option<Transfer> {
-        let copy = self
-            .copy
+        let held = self
+            .held
             .as_ref()
             .filter(|_| self.standing == Standing::Proven)?;
-        if let Some((_, recalled)) = &mut self.recalled {
+        if let Remembered::Relayed(recalled) | Remembered::Received(_, recalled) =
+            &mut self.remembered
+        {
             recalled.accounted_for.remove(to);
         }
         Some(Transfer {
             to,
             program: self.id,
             hash: program.hash,
-            born: copy.born,
-            lineage: copy.state.lineage,
-            stepped: copy.state.stepped,
-            digest: copy.state.digest,
-            state: copy.state.bits.clone(),
+            born: held.born,
+            lineage: held.state.lineage,
+            stepped: held.state.stepped,
+            digest: held.state.digest,
+            state: held.state.bits.clone(),
         })
     }
 
-    /// Ends the cycle `moment`. True where the copy has just proved itself.
+    /// Ends the cycle `moment`. True where the shadow mode has just ended.
     pub(crate) fn close_cycle(&mut self, moment: Moment) -> bool {
         match self.standing {
             Standing::Shadow(left) if self.is_current(moment) => {
@@ -376,34 +398,35 @@ impl Replica {
         }
     }
 
-    /// A value fault: one bit of the state is another from now on.
+    /// Flips one bit of the state: a value fault.
     pub(crate) fn flip_state(&mut self, bit: usize) {
-        if let Some(copy) = &mut self.copy
-            && let Some(bit) = bit.checked_rem(copy.state.bits.width())
+        if let Some(held) = &mut self.held
+            && let Some(bit) = bit.checked_rem(held.state.bits.width())
         {
-            let value = copy.state.bits.get(bit);
-            copy.state.bits.set(bit, !value);
+            let value = held.state.bits.get(bit);
+            held.state.bits.set(bit, !value);
         }
     }
 
-    /// Throws the copy away: it computes otherwise than its twin.
+    /// Discards the state, which differs from that of another station.
     pub(crate) fn discard(&mut self) {
-        self.copy = None;
+        self.held = None;
         self.past.clear();
         self.standing = Standing::Lost;
         self.unfollowed = None;
     }
 
-    /// Its remote I/O excludes it, or does so no more: then it begins again without a state. True where that is news.
+    /// Applies the remote I/O's exclusion of this station, or its end: it then starts again without a state. True where
+    /// it changed.
     pub(crate) fn set_excluded(&mut self, excluded: bool) -> bool {
-        let news = excluded != (self.standing == Standing::Excluded);
-        if news {
+        let changed = excluded != (self.standing == Standing::Excluded);
+        if changed {
             self.discard();
             if excluded {
                 self.standing = Standing::Excluded;
             }
         }
-        news
+        changed
     }
 
     fn synchronised(&mut self, shadow_cycles: u32) -> Followed {
@@ -414,11 +437,12 @@ impl Replica {
         Followed::Synchronised
     }
 
-    /// The place in the history at which this copy stands now, or stood a few steps ago; it stands there afterwards.
+    /// The place of the state in the history, or of the newest earlier state that is in it, to which the replica then
+    /// goes back.
     fn find(&mut self, lineages: &[Lineage]) -> Option<usize> {
-        let copy = self.copy.as_mut()?;
+        let held = self.held.as_mut()?;
         let place_of = |lineage| lineages.iter().rposition(|&known| known == lineage);
-        if let Some(place) = place_of(copy.state.lineage) {
+        if let Some(place) = place_of(held.state.lineage) {
             return Some(place);
         }
         let (back, place) = self
@@ -428,12 +452,12 @@ impl Replica {
             .rev()
             .find_map(|(back, state)| place_of(state.lineage).map(|place| (back, place)))?;
         self.past.truncate(back + 1);
-        copy.state = self.past.pop_back()?;
+        held.state = self.past.pop_back()?;
         Some(place)
     }
 
-    /// Steps through the history from `place` on. A place past its end means that the copy has this sample already: voided
-    /// samples may come again as they were.
+    /// Steps through the history from `place` on. A place past its end means that the replica has this sample already:
+    /// void samples may be sent again unchanged.
     fn replay(
         &mut self,
         program: &Program,
@@ -445,34 +469,34 @@ impl Replica {
         for inputs in &sample.history[place.min(sample.history.len())..] {
             self.step(program, scratch, inputs, moment);
         }
-        if let Some(copy) = &mut self.copy {
-            copy.state.stepped = moment;
+        if let Some(held) = &mut self.held {
+            held.state.stepped = moment;
         }
     }
 
     fn step(&mut self, program: &Program, scratch: &mut Scratch, inputs: &Image, moment: Moment) {
-        let Some(copy) = self.copy.as_mut() else {
+        let Some(held) = self.held.as_mut() else {
             return;
         };
         let mut before = if self.past.len() < self.history {
-            copy.state.clone()
+            held.state.clone()
         } else {
-            self.past.pop_front().unwrap_or_else(|| copy.state.clone())
+            self.past.pop_front().unwrap_or_else(|| held.state.clone())
         };
-        before.clone_from(&copy.state);
+        before.clone_from(&held.state);
         self.past.push_back(before);
-        copy.state.digest = Digest::of(&copy.state.bits);
-        self.step.state.clone_from(&copy.state.bits);
+        held.state.digest = Digest::of(&held.state.bits);
+        self.step.state.clone_from(&held.state.bits);
         self.step.inputs.clone_from(inputs);
-        program.scan.step(
+        program.executable.step(
             scratch,
-            copy.state.bits.words_mut(),
+            held.state.bits.words_mut(),
             inputs.words(),
             self.step.outputs.words_mut(),
         );
-        copy.state.lineage = copy.state.lineage.after(inputs);
-        copy.state.stepped = moment;
-        self.step.after = Some(copy.state.lineage);
+        held.state.lineage = held.state.lineage.after(inputs);
+        held.state.stepped = moment;
+        self.step.after = Some(held.state.lineage);
     }
 }
 

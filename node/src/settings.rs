@@ -1,33 +1,34 @@
-//! What a station is told when it starts.
+//! Configuration of a station.
 
 use std::sync::Arc;
 
 use understudy_cycle::Agreement;
-use understudy_logic::Scan;
+use understudy_executable::Executable;
 use understudy_wire::{Epoch, ProgramHash, ProgramId, StationId};
 
-/// One of the cluster's programs, compiled.
+/// Compiled program of the cluster.
 #[derive(Debug, Clone)]
 pub struct Program {
-    /// Of its circuit.
+    /// Hash of its canonical text.
     pub hash: ProgramHash,
-    /// Its f and h.
-    pub scan: Scan,
+    /// Its f and h, (1) and (2).
+    pub executable: Executable,
 }
 
-/// A station's own settings.
+/// Configuration of one station.
 #[derive(Debug, Clone)]
 pub struct Settings {
     /// Its rank.
     pub station: StationId,
-    /// What all agreed on.
+    /// Configuration shared by all members.
     pub agreement: Arc<Agreement>,
     /// All programs of the cluster, in order; a controller runs its own, an understudy all of them.
     pub programs: Arc<[Program]>,
     /// The generated parity controller, which an understudy evaluates in [`understudy_cycle::Mode::Paper`]. It publishes no parity
     /// word in that mode where this is absent.
-    pub generated: Option<Arc<Scan>>,
-    /// The epoch that it starts when nobody is there: later than any that the cluster has had (the wall clock at start serves).
+    pub generated: Option<Arc<Executable>>,
+    /// Epoch that it founds when it receives no other member: later than any earlier one of the cluster, such as the
+    /// wall clock at its start.
     pub epoch: Epoch,
 }
 

@@ -1,19 +1,21 @@
 //! The station: a controller or an understudy in the cycle.
 //!
 //! ```text
-//!            any frame of a later cycle, or its own turn to pace
+//!            any frame of a later cycle, or this station starts it
 //!        ┌───────────────────────────────────────────────────────┐
 //!        ▼                                                       │
-//!   samples come: copies follow ──► its turn: words ──► rest: asks for what it lacks, gives what others lack
+//!   samples: replicas follow ──► its turn: words ──► rest: asks for the states that it lacks, transfers those that others lack
 //! ```
 //!
-//! It speaks when it knows its outputs and its predecessor has published or its own slot starts, whichever is first; at the last
-//! call it speaks whatever it knows; and only with copies that are proven (invariant *Synchronised or silent*). It decides nothing
-//! for others: what is applied is decided by each remote I/O for itself (*No election*).
+//! It publishes when it knows its outputs and its predecessor has published or its own slot starts, whichever is first;
+//! at the last call it publishes the outputs that it knows; and only those of synchronised replicas (invariant
+//! *Synchronised or silent*). Each remote I/O decides by itself which outputs it applies (*No election*).
 
-mod pacing;
+mod cycle_master;
 mod relay;
 mod repair;
+#[cfg(test)]
+mod tests;
 mod turn;
 
 use std::hash::{Hash, Hasher};
@@ -21,7 +23,7 @@ use std::sync::Arc;
 
 use smallvec::SmallVec;
 use understudy_cycle::{Arrival, Input, Machine, Output, Participant};
-use understudy_logic::Scratch;
+use understudy_executable::Scratch;
 use understudy_wire::{
     Body, ConfigurationHash, Digest, Frame, Holding, Image, Lineage, Member, Moment, ProgramId,
     ProgramSet, Recalled, Sample, StationId, StationSet, Time,
@@ -40,31 +42,61 @@ pub struct Station {
     scratch: Scratch,
     cycle: CycleNotes,
     started: Time,
-    /// Whether this station starts the cycles.
-    is_cycle_master: bool,
+    role: Role,
     wanted: ProgramSet,
-    /// Stations that asked to join in the last cycle; they pace only when nobody who speaks does.
+    /// Stations that asked to join in the last cycle; they start cycles only when no publishing station does.
     joining: StationSet,
-    /// Whose states differed in the last cycle.
+    /// Programs and stations whose states differed in the last cycle.
     differed: SmallVec<[(ProgramId, StationId); 1]>,
-    /// Programs whose samples any other station lacked in the last cycle.
+    /// Programs whose samples another station lacked in the last cycle.
     lacked: ProgramSet,
-    /// Those of them whose samples this station had.
+    /// Programs of `lacked` whose samples this station had.
     awaited: ProgramSet,
+}
+
+/// Who starts the cycles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Role {
+    /// Not known yet: the station has just started and is in no cycle.
+    Listening,
+    /// Another station.
+    Following,
+    /// This station, until it receives the Sync of another one.
+    CycleMaster,
+}
+
+/// The token of the current cycle.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+enum Token {
+    /// This station has not published in this cycle.
+    #[default]
+    Awaited,
+    /// This station has published its turn.
+    Passed,
+}
+
+/// The rest of the current cycle, in which stations ask for states.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+enum Rest {
+    /// It has not begun.
+    #[default]
+    Ahead,
+    /// It has begun: this station has asked for the states that it lacks.
+    Begun,
 }
 
 /// What a station remembers of the current cycle only.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 struct CycleNotes {
-    published: bool,
-    asked: bool,
-    /// The turns of controllers that said their outputs.
-    said: SmallVec<[Said; 2]>,
-    /// Whose states differ from equal ones of this station.
+    token: Token,
+    rest: Rest,
+    /// Outputs that controllers published of their own programs.
+    controller_turns: SmallVec<[ControllerTurn; 2]>,
+    /// Programs and stations whose digests differ from those of this station at equal lineages.
     differs: SmallVec<[(ProgramId, StationId); 1]>,
-    /// Programs that a station of lower rank can give the state of.
+    /// Programs whose state a station of lower rank can transfer.
     others_have: ProgramSet,
-    /// Who asked to join.
+    /// Stations that asked to join.
     joiners: StationSet,
     /// The samples of this cycle, from their remote I/Os or relayed.
     samples: SmallVec<[Arc<Frame>; 2]>,
@@ -76,9 +108,9 @@ struct CycleNotes {
     relayed: ProgramSet,
 }
 
-/// What a controller has said of its own program.
+/// Outputs that a controller published of its own program, with the state that they are computed from.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-struct Said {
+struct ControllerTurn {
     program: ProgramId,
     lineage: Lineage,
     digest: Digest,
@@ -99,7 +131,7 @@ impl Station {
             scratch: Scratch::default(),
             cycle: CycleNotes::default(),
             started: now,
-            is_cycle_master: false,
+            role: Role::Listening,
             wanted: ProgramSet::EMPTY,
             joining: StationSet::EMPTY,
             differed: SmallVec::new(),
@@ -111,7 +143,7 @@ impl Station {
         station
     }
 
-    /// Flips one bit of x(i), counted round its width, as a fault of the memory does. Nothing where it holds no x(i).
+    /// Flips one bit of x(i), modulo its width, as a memory fault does; no effect without x(i).
     pub fn flip_state(&mut self, program: ProgramId, bit: usize) {
         if let Some(replica) = self.replicas.iter_mut().find(|it| it.id() == program) {
             replica.flip_state(bit);
@@ -123,7 +155,7 @@ impl Station {
         self.settings.agreement.configuration
     }
 
-    /// The state of a program that it holds, with its lineage; it may be behind the newest sample.
+    /// State of a program that it holds, with its lineage; it may be older than the newest sample.
     pub fn state_of(&self, program: ProgramId) -> Option<(Lineage, &Image)> {
         self.replicas
             .iter()
@@ -139,7 +171,7 @@ impl Station {
         self.settings.agreement.schedule.is_understudy(self.own())
     }
 
-    fn speaks(&self) -> bool {
+    fn publishes(&self) -> bool {
         self.replicas
             .iter()
             .any(|replica| replica.standing() == Standing::Proven)
@@ -159,8 +191,9 @@ impl Station {
             Arrival::Begins(anchor) => {
                 self.close_cycle();
                 self.member.clock.begin(now, frame.header.moment, anchor);
-                let pacer = matches!(frame.body, Body::Sync);
-                self.is_cycle_master &= !pacer;
+                if self.role == Role::Listening || frame.body == Body::Sync {
+                    self.role = Role::Following;
+                }
             }
         }
         match (&frame.body, frame.header.sender) {
@@ -169,14 +202,14 @@ impl Station {
                 self.follow(program, frame, sample);
             }
             (Body::Turn(turn), Member::Station(station)) => {
-                self.hear_turn(station, turn);
-                self.hear_relayed(&frame.header, turn);
+                self.receive_turn(station, turn);
+                self.receive_relayed(&frame.header, turn);
             }
-            (Body::Join(join), Member::Station(station)) => self.hear_join(station, join),
+            (Body::Join(join), Member::Station(station)) => self.receive_join(station, join),
             (Body::Transfer(transfer), Member::Station(station)) => self.adopt(station, transfer),
             _ => {}
         }
-        self.speak_if_it_is_time(now);
+        self.publish_if_due(now);
     }
 
     fn follow(&mut self, program: ProgramId, frame: &Arc<Frame>, sample: &Sample) {
@@ -190,7 +223,7 @@ impl Station {
         else {
             return;
         };
-        replica.hear(&self.settings.programs[program.index()], moment, sample);
+        replica.remember(&self.settings.programs[program.index()], moment, sample);
         if replica.set_excluded(excluded) {
             self.member.report(if excluded {
                 Event::Excluded { moment, program }
@@ -218,45 +251,45 @@ impl Station {
         self.replicas.iter().filter_map(Replica::holding).collect()
     }
 
-    /// For remote I/Os that say nothing in this cycle.
+    /// What it recalls of the programs whose samples it has not received in this cycle.
     fn recalled(&self, moment: Moment) -> Vec<Recalled> {
         let recalled = self.replicas.iter().filter_map(|it| it.recalled(moment));
         recalled.cloned().collect()
     }
 
-    fn is_told(&mut self, recalled: &[Recalled]) {
+    fn take_recalled(&mut self, recalled: &[Recalled]) {
         for one in recalled {
             if let Some(replica) = self.replicas.iter_mut().find(|it| it.id() == one.program) {
-                replica.is_told(&self.settings.programs[one.program.index()], one);
+                replica.take_recalled(&self.settings.programs[one.program.index()], one);
             }
         }
     }
 
     fn next_wakeup(&self) -> Time {
-        let others = [self.member.copies_at(), self.speaks_at(), self.asks_at()];
+        let others = [self.member.copies_at(), self.publishes_at(), self.asks_at()];
         let first = others.into_iter().flatten().fold(Time(u64::MAX), Time::min);
-        // Nobody paces before the cycle is over.
+        // No station starts the next cycle before the current one is over.
         let end = self.member.clock.anchor() + self.settings.agreement.schedule.period();
-        if self.member.clock.moment().is_some() && first <= end {
+        if self.role != Role::Listening && first <= end {
             return first;
         }
-        first.min(self.paces_at())
+        first.min(self.starts_cycle_at())
     }
 
     fn wake(&mut self, now: Time) {
         self.member.send_copies(now);
-        self.speak_if_it_is_time(now);
+        self.publish_if_due(now);
         if self.asks_at().is_some_and(|due| due <= now) {
             self.ask();
         }
-        let planned = self.paces_at();
+        let planned = self.starts_cycle_at();
         if planned <= now {
-            self.pace(now, planned);
+            self.start_cycle(now, planned);
         }
     }
 }
 
-/// Two stations of equal settings that are drained and hash alike go on alike.
+/// Two stations of equal settings that are drained and hash alike behave alike.
 impl Hash for Station {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
         let Self {
@@ -266,7 +299,7 @@ impl Hash for Station {
             scratch: _,
             cycle,
             started,
-            is_cycle_master,
+            role,
             wanted,
             joining,
             differed,
@@ -274,7 +307,7 @@ impl Hash for Station {
             awaited,
         } = self;
         (member, replicas).hash(hasher);
-        (cycle, started, is_cycle_master, wanted).hash(hasher);
+        (cycle, started, role, wanted).hash(hasher);
         (joining, differed, lacked, awaited).hash(hasher);
     }
 }

@@ -1,14 +1,15 @@
-//! What a station says of a cycle: its parity words, each with a mask.
+//! The parity words of a station in one cycle, each with a mask.
 //!
-//! A controller has one word, y(i) over its own program. An understudy, which speaks last and so knows who was silent, says
+//! A controller has one word, y(i) over its own program. An understudy publishes last, so it knows which controllers it
+//! has not received. It publishes
 //!
 //! ```text
-//! one word over all programs that published for themselves        Σ h(j)(x(j), u(j)), (9) when nobody was silent
-//! one word for each program whose controller was silent       h(j)(x(j), u(j))
+//! one word over all programs whose controllers were received      Σ h(j)(x(j), u(j)), (9) when all were received
+//! one word for each program whose controller was not received     h(j)(x(j), u(j))
 //! ```
 //!
-//! A controller that said something else than the understudy would counts as silent here: its program gets a word of its own, so
-//! that its remote I/O can tell the two apart, and no other program is touched by a value fault.
+//! A controller whose outputs differ from those of the understudy counts as not received: its program gets a word of
+//! its own, so that its remote I/O can compare both, and a value fault affects no other program.
 //! A program of which it does not know this cycle's output is in no word, instead of spoiling one.
 
 use smallvec::SmallVec;
@@ -23,10 +24,25 @@ pub fn of_controller(program: ProgramId, outputs: &Image) -> SmallVec<[Word; 2]>
     }]
 }
 
-/// The parity words of an understudy that knows the outputs of `known` (those that `outputs_of` answers for), in a cluster of
-/// the programs `all`, where the controllers of `published` have published the same outputs in this cycle.
-///
-/// In the paper's mode an understudy publishes this sum as the output of the generated parity controller.
+/// The masks of the parity words of an understudy that knows the outputs of `known`, in a cluster of the programs `all`,
+/// where the controllers of `published` have published the same outputs in this cycle.
+pub(crate) fn masks_of_understudy(
+    mode: Mode,
+    all: ProgramSet,
+    known: ProgramSet,
+    published: ProgramSet,
+) -> SmallVec<[ProgramSet; 2]> {
+    let (together, others) = match mode {
+        Mode::Full => (known.and(published), known.without(published)),
+        Mode::Paper if known == all => (all, ProgramSet::EMPTY),
+        Mode::Paper => (ProgramSet::EMPTY, ProgramSet::EMPTY),
+    };
+    let first = (!together.is_empty()).then_some(together);
+    let others = others.iter().map(ProgramSet::only);
+    first.into_iter().chain(others).collect()
+}
+
+/// The parity words of an understudy, as sums of the outputs that `outputs_of` returns for the programs of `known`.
 pub fn of_understudy<'a>(
     mode: Mode,
     all: ProgramSet,
@@ -34,30 +50,20 @@ pub fn of_understudy<'a>(
     published: ProgramSet,
     outputs_of: impl Fn(ProgramId) -> Option<&'a Image>,
 ) -> SmallVec<[Word; 2]> {
-    let sum = |mask: ProgramSet| understudy_parity::sum(mask, &outputs_of);
-    match mode {
-        Mode::Paper if known == all => sum(all).into_iter().collect(),
-        Mode::Paper => SmallVec::new(),
-        Mode::Full => {
-            let together = known.and(published);
-            let silent = known.without(published);
-            let first = (!together.is_empty()).then_some(together);
-            first
-                .into_iter()
-                .chain(silent.iter().map(ProgramSet::only))
-                .filter_map(sum)
-                .collect()
-        }
-    }
+    let masks = masks_of_understudy(mode, all, known, published).into_iter();
+    masks
+        .filter_map(|mask| understudy_parity::sum(mask, &outputs_of))
+        .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Every cluster of three programs: whoever was silent, every known output can be had from the words and the turns.
+    /// Every cluster of three programs: whichever controllers are not received, the words and the turns give every
+    /// known output.
     #[test]
-    fn no_silence_spoils_a_word() {
+    fn no_erasure_spoils_a_word() {
         let outputs: Vec<Image> = [0b101_u64, 0b11, 0b1]
             .iter()
             .zip([3, 2, 1])

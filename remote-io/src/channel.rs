@@ -1,8 +1,8 @@
-//! Input channels that say of themselves when they are failed.
+//! Input channels that report their own failure.
 //!
-//! An input module knows of each wire whether it is broken, short or out of its range. A program that has an input `NAME` and
-//! an input `NAME.failed` is told so, and sees NAME's last good value as long as its channel is failed: a broken wire is no
-//! event. Such programs are what `understudy reconfigure` makes.
+//! An input module knows of each wire whether it is broken, short or out of its range. A program that has an input
+//! `NAME` and an input `NAME.failed` receives this status, and NAME keeps its last good value as long as its channel is
+//! failed: a broken wire is no event. Such programs are what `understudy reconfigure` makes.
 
 use understudy_wire::Image;
 

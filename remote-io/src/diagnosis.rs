@@ -1,17 +1,16 @@
-//! Channels that say nothing of themselves, and whose failure a ladder finds by what the plant can do.
+//! Channels that do not report their failure: a ladder finds it from what the plant can do.
 //!
-//! The ladder is scanned before each sample. It sees what the sensors show and what has been driven; what it finds becomes part
-//! of u(i), and so of the history: a copy of the program is told nothing that its remote I/O was not told, whoever has
-//! restarted since.
+//! The ladder is scanned before each sample. It reads the sensors and the driven outputs; its findings become part
+//! of u(i), and so of the history: all replicas of the program receive what the remote I/O found, also after restarts.
 //!
 //! ```text
-//!   sees  every input of the program by its name   what the device shows, not what the program sees
-//!         every output of the program by its name  what was driven since the last sample
-//!         NAME.recalled                            NAME.failed of the last sample, in the first scan after a restart
-//!         diagnosis.driven                         what was driven was true, neither held nor fail-safe
-//!         diagnosis.release                        the operator has released since the last scan
-//!   says  NAME.diagnosed                           NAME.failed is 1, and NAME keeps its last good value
-//!         NAME.unsteady                            NAME keeps its last value, and is not called failed
+//!   reads   every input of the program by its name   the value of the device, not the value that the program reads
+//!           every output of the program by its name  the output driven since the last sample
+//!           NAME.recalled                            NAME.failed of the last sample, in the first scan after a restart
+//!           diagnosis.driven                         the driven output was proven, neither held nor fail-safe
+//!           diagnosis.release                        the operator has released since the last scan
+//!   writes  NAME.diagnosed                           NAME.failed is 1, and NAME keeps its last good value
+//!           NAME.unsteady                            NAME keeps its last value, and is not reported as failed
 //! ```
 
 use understudy_logic::{Circuit, Scan, Scratch};
@@ -21,13 +20,13 @@ use understudy_wire::Image;
 #[derive(Debug, Clone)]
 pub struct Diagnosis {
     scan: Scan,
-    sees: Vec<Sees>,
+    inputs: Vec<InputSource>,
     /// For each output.
-    says: Vec<Says>,
+    outputs: Vec<OutputMeaning>,
 }
 
 #[derive(Debug, Clone, Copy)]
-enum Sees {
+enum InputSource {
     Input(usize),
     Output(usize),
     /// By the place of the status in u(i).
@@ -37,7 +36,7 @@ enum Sees {
 }
 
 #[derive(Debug, Clone, Copy)]
-enum Says {
+enum OutputMeaning {
     /// By the place of the status in u(i).
     Diagnosed(usize),
     Unsteady(usize),
@@ -45,9 +44,9 @@ enum Says {
     Nothing,
 }
 
-/// What it sees in one scan.
+/// Inputs of one scan.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Sight<'a> {
+pub(crate) struct Observation<'a> {
     pub(crate) sensors: &'a Image,
     pub(crate) driven: &'a Image,
     pub(crate) is_true: bool,
@@ -75,7 +74,7 @@ impl Diagnosis {
     /// `circuit` for a program with these inputs and outputs.
     ///
     /// # Errors
-    /// Each of its inputs that nothing can tell it, and each output that claims to speak of a channel that is none.
+    /// Each input of the circuit without a source, and each output that names a channel that does not exist.
     pub fn new(
         circuit: &Circuit,
         inputs: &[String],
@@ -85,36 +84,36 @@ impl Diagnosis {
         let input = |name: &str| inputs.iter().position(|known| known == name);
         let status =
             |name: &str| input(&format!("{name}.failed")).filter(|_| input(name).is_some());
-        let mut sees = Vec::new();
+        let mut sources = Vec::new();
         for name in circuit.inputs() {
             let output = || outputs.iter().position(|known| known == name);
             let recalled = || name.strip_suffix(".recalled").and_then(status);
             let found = match name.as_str() {
-                "diagnosis.driven" => Some(Sees::Driven),
-                "diagnosis.release" => Some(Sees::Release),
+                "diagnosis.driven" => Some(InputSource::Driven),
+                "diagnosis.release" => Some(InputSource::Release),
                 _ => input(name)
-                    .map(Sees::Input)
-                    .or_else(|| output().map(Sees::Output))
-                    .or_else(|| recalled().map(Sees::Recalled)),
+                    .map(InputSource::Input)
+                    .or_else(|| output().map(InputSource::Output))
+                    .or_else(|| recalled().map(InputSource::Recalled)),
             };
             match found {
-                Some(found) => sees.push(found),
+                Some(found) => sources.push(found),
                 None => unknown.push(format!("the program has no signal `{name}`")),
             }
         }
-        let mut says = Vec::new();
+        let mut meanings = Vec::new();
         for output in circuit.outputs() {
             let (found, channel) = if let Some(channel) = output.name.strip_suffix(".diagnosed") {
-                (status(channel).map(Says::Diagnosed), channel)
+                (status(channel).map(OutputMeaning::Diagnosed), channel)
             } else if let Some(channel) = output.name.strip_suffix(".unsteady") {
-                (input(channel).map(Says::Unsteady), channel)
+                (input(channel).map(OutputMeaning::Unsteady), channel)
             } else {
-                (Some(Says::Nothing), "")
+                (Some(OutputMeaning::Nothing), "")
             };
             match found {
-                Some(found) => says.push(found),
+                Some(found) => meanings.push(found),
                 None => unknown.push(format!(
-                    "`{}` speaks of a channel that is none: the program needs the inputs `{channel}` and `{channel}.failed`",
+                    "`{}` names an unknown channel: the program needs the inputs `{channel}` and `{channel}.failed`",
                     output.name
                 )),
             }
@@ -124,8 +123,8 @@ impl Diagnosis {
         }
         Ok(Self {
             scan: Scan::new(circuit),
-            sees,
-            says,
+            inputs: sources,
+            outputs: meanings,
         })
     }
 }
@@ -155,33 +154,35 @@ impl Diagnosing {
     }
 
     /// One scan.
-    pub(crate) fn scan(&mut self, diagnosis: &Diagnosis, sight: Sight<'_>) -> Found {
+    pub(crate) fn scan(&mut self, diagnosis: &Diagnosis, observation: Observation<'_>) -> Found {
         let recalled = self.recalled.take();
-        let bit = |sees: &Sees| match *sees {
-            Sees::Input(place) => sight.sensors.get(place),
-            Sees::Output(place) => sight.driven.get(place),
-            Sees::Recalled(place) => recalled.as_ref().is_some_and(|inputs| inputs.get(place)),
-            Sees::Driven => sight.is_true,
-            Sees::Release => self.released,
+        let bit = |source: &InputSource| match *source {
+            InputSource::Input(place) => observation.sensors.get(place),
+            InputSource::Output(place) => observation.driven.get(place),
+            InputSource::Recalled(place) => {
+                recalled.as_ref().is_some_and(|inputs| inputs.get(place))
+            }
+            InputSource::Driven => observation.is_true,
+            InputSource::Release => self.released,
         };
-        let inputs = Image::from_bits(diagnosis.sees.iter().map(bit));
+        let inputs = Image::from_bits(diagnosis.inputs.iter().map(bit));
         self.released = false;
-        let mut said = Image::zero(diagnosis.says.len());
+        let mut outputs = Image::zero(diagnosis.outputs.len());
         diagnosis.scan.step(
             &mut Scratch::default(),
             self.registers.words_mut(),
             inputs.words(),
-            said.words_mut(),
+            outputs.words_mut(),
         );
         let mut found = Found {
-            failed: Image::zero(sight.sensors.width()),
-            unsteady: Image::zero(sight.sensors.width()),
+            failed: Image::zero(observation.sensors.width()),
+            unsteady: Image::zero(observation.sensors.width()),
         };
-        for (place, says) in diagnosis.says.iter().enumerate() {
-            match *says {
-                Says::Diagnosed(status) => found.failed.set(status, said.get(place)),
-                Says::Unsteady(input) => found.unsteady.set(input, said.get(place)),
-                Says::Nothing => {}
+        for (place, meaning) in diagnosis.outputs.iter().enumerate() {
+            match *meaning {
+                OutputMeaning::Diagnosed(status) => found.failed.set(status, outputs.get(place)),
+                OutputMeaning::Unsteady(input) => found.unsteady.set(input, outputs.get(place)),
+                OutputMeaning::Nothing => {}
             }
         }
         found
@@ -198,7 +199,8 @@ mod tests {
         text.split(' ').map(str::to_owned).collect()
     }
 
-    /// `a.diagnosed` is set while `a` shows 1 without `motor`, and kept until the operator releases; `a.unsteady` is motor.
+    /// `a.diagnosed` is set while `a` shows 1 without `motor`, and kept until the operator releases; `a.unsteady` is
+    /// motor.
     fn circuit() -> Circuit {
         let mut builder = CircuitBuilder::new("diagnosis");
         let [a, motor, recalled, release] =
@@ -217,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ladder_may_speak_of_the_signals_of_its_program_only() {
+    fn a_ladder_may_name_the_signals_of_its_program_only() {
         let of = |inputs: &str, outputs: &str| {
             Diagnosis::new(&circuit(), &names(inputs), &names(outputs)).map(|_| ())
         };
@@ -234,7 +236,7 @@ mod tests {
         let scan = |diagnosing: &mut Diagnosing, a: bool, motor: bool| {
             let found = diagnosing.scan(
                 &diagnosis,
-                Sight {
+                Observation {
                     sensors: &Image::from_bits([a, false]),
                     driven: &Image::from_bits([motor]),
                     is_true: true,

@@ -1,4 +1,4 @@
-//! What a remote I/O reports, for the journal.
+//! Events of a remote I/O, for the journal.
 
 use std::time::Duration;
 
@@ -12,13 +12,14 @@ use understudy_wire::{
 
 use crate::settings::ValueFault;
 
-/// One thing that happened to a remote I/O.
+/// Event of a remote I/O.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "kebab-case")]
 pub enum Event {
-    /// u(i) of a cycle. Reported before the sample leaves, so that there is a record of it even of one who dies before the deadline.
+    /// u(i) of a cycle. Reported before the sample is sent, so that it is recorded even if the remote I/O fails before
+    /// the deadline.
     Sampled {
-        /// This cycle.
+        /// Cycle of the sample.
         moment: Moment,
         /// u(i).
         inputs: Image,
@@ -27,54 +28,56 @@ pub enum Event {
         /// The lineage that this sample extends, L(i)(t).
         before: Lineage,
     },
-    /// A deadline: what was sampled in this cycle, and what is driven from now on.
+    /// A deadline: the sample of this cycle, and the outputs that are driven from now on.
     Applied {
-        /// This cycle.
+        /// Cycle of the deadline.
         moment: Moment,
-        /// u(i); nothing where no cycle was started or the history is not known yet.
+        /// u(i); `None` where no cycle was started or the history is not known yet.
         sampled: Option<Image>,
         /// y(i).
         outputs: Image,
-        /// Where it came from.
+        /// Source of the outputs.
         source: Source,
-        /// Whose word restored it.
+        /// Understudy whose word the output was reconstructed from.
         word_of: Option<StationId>,
-        /// Why nothing true was left, where the outputs are held or fail-safe.
+        /// Reason why no output was provable, where the outputs are held or fail-safe.
         missing: Option<Missing>,
-        /// Stations that published in this cycle, as heard here.
+        /// Stations whose turns of this cycle were received here.
         heard: StationSet,
     },
     /// The program starts from its initial state.
     StartedCold {
-        /// Its genesis.
+        /// Genesis lineage.
         born: Moment,
         /// Whether the operator has to release the outputs.
         awaits_release: bool,
     },
-    /// After a restart, or when no living station is on this remote I/O's history: it goes on from a lineage that one still has.
+    /// After a restart, or when no living station is on this remote I/O's history: it continues from a lineage that a
+    /// station holds.
     AdoptedLineage {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
         /// The lineage.
         lineage: Lineage,
-        /// Who has it.
+        /// Station that holds it.
         from: StationId,
     },
-    /// After a restart: living stations hold different states of one cycle. The operator decides, by releasing the outputs, for
-    /// the first of them.
+    /// After a restart: living stations hold different states of one cycle. The operator chooses; a release of the
+    /// outputs chooses the first of them.
     Disputed {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
-        /// Who holds them.
+        /// Stations that hold them.
         stations: StationSet,
     },
-    /// No living station can prove the state that the newest applied output came from: the outputs are held, then fail-safe.
+    /// No living station can prove the state that the newest applied output came from: the outputs are held, then
+    /// fail-safe.
     StateLost {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
         /// The cycle of the newest sample whose outputs were applied; not known after a restart.
         applied: Option<Moment>,
-        /// The cycle of the newest state that a living station holds.
+        /// Cycle of the newest state that a living station holds.
         newest: Moment,
         /// The station that holds it.
         holder: StationId,
@@ -83,122 +86,124 @@ pub enum Event {
     },
     /// A station has returned that can prove the state: the program continues.
     StateRecovered {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
-        /// The station.
+        /// The station that returned.
         from: StationId,
     },
     /// The operator chose a state that is not the newest available one, or where no choice was asked for.
     ChoiceRefused {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
-        /// The cycle of the newest available state, where a choice is asked for.
+        /// Cycle of the newest available state, where a choice is asked for.
         newest: Option<Moment>,
     },
     /// The failure of one station would be masked from now on.
     Protected {
-        /// From this cycle.
+        /// First cycle with it.
         moment: Moment,
     },
     /// The failure of one station would not be masked any more.
     Unprotected {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
         /// The first cycle of those in a row in which it would not have been masked.
         since: Moment,
         /// The stations that could not prove the program's output, and why.
         lacking: SmallVec<[Lacking; 2]>,
     },
-    /// Samples that nobody heard are void: the program goes on from an older state that a station still has.
+    /// Samples that no station received are void: the program continues from an older state that a station still has.
     Voided {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
-        /// How many.
+        /// Number of void samples.
         samples: usize,
-        /// Where it goes on from.
+        /// Lineage from which it continues.
         lineage: Lineage,
     },
     /// The operator has released the outputs, and the stations that were excluded or accused.
     Released {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
     },
-    /// The operator has put a value in the place of a signal. An input is sampled so; an output is driven so, whatever is applied.
+    /// The operator has forced a signal: an input is sampled with the value, an output is driven with it, whatever is
+    /// applied.
     Forced {
-        /// From this cycle.
+        /// First cycle with it.
         moment: Moment,
-        /// Which signal, what, for how long, who and why.
+        /// Signal, value, duration, operator and reason.
         force: Force,
     },
-    /// The signal is its own again.
+    /// A force has ended.
     Unforced {
-        /// From this cycle.
+        /// First cycle with it.
         moment: Moment,
-        /// Which signal.
+        /// Signal that was forced.
         signal: SignalPlace,
-        /// Whether its time was over; the operator has taken it back otherwise.
+        /// Whether its time was over; otherwise the operator has removed it.
         expired: bool,
     },
-    /// After a restart: stations recall whom this remote I/O had excluded.
+    /// After a restart: stations recall the ones that this remote I/O had excluded.
     RecalledExclusion {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
-        /// They stay excluded until the operator releases them.
+        /// Stations that stay excluded until the operator releases them.
         stations: StationSet,
     },
-    /// The diagnosis finds other channels failed than before.
+    /// The diagnosis finds other failed channels than before.
     Diagnosed {
-        /// From this cycle.
+        /// First cycle with it.
         moment: Moment,
-        /// Their statuses, as bits of u(i).
+        /// Statuses of the channels, as bits of u(i).
         failed: Image,
     },
-    /// A station was silent for too long: θ = 1.
+    /// A station was not received for `flag_after` cycles: θ = 1.
     Flagged {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
-        /// Who was silent.
+        /// Flagged station.
         station: StationId,
     },
-    /// A flagged station speaks again.
+    /// A flagged station was received again: θ = 0.
     Cleared {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
-        /// Who speaks.
+        /// Station that was received.
         station: StationId,
     },
-    /// All outputs of the word are there and their sum is not 0: a value fault, (10) does not hold.
+    /// All outputs of a word were received and their sum is not 0: a value fault, (10) does not hold.
     Syndrome {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
-        /// The sum.
+        /// Syndrome.
         syndrome: Image,
-        /// One of these is wrong.
+        /// Stations of which one is wrong.
         accused: StationSet,
     },
-    /// Stations say different outputs, or have different states, of one history of this program. Reported when it begins.
+    /// Stations publish different outputs, or have different states, of one history of this program. Reported when it
+    /// begins.
     ValueFault {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
-        /// Those of them that can be wrong: by majority where it is located.
+        /// Stations that may be wrong: the minority where the fault is located.
         accused: StationSet,
-        /// Whether it is known who is wrong; then the outputs of the others are driven, and the accused excluded.
+        /// Whether a majority locates the fault; then its outputs are applied, and the others are excluded.
         located: bool,
-        /// What is driven otherwise.
+        /// Reaction where it is not located.
         answer: ValueFault,
     },
     /// Equal lineages and unequal digests of a program's state: a value fault in one of two stations.
     DigestDiffers {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
-        /// Whose state.
+        /// Program of the state.
         program: ProgramId,
-        /// One of these is wrong.
+        /// Stations of which one is wrong.
         accused: StationSet,
     },
     /// A member of this cluster runs another configuration; its frames are dropped.
     Refused {
-        /// Who.
+        /// Member whose frames are dropped.
         member: Member,
         /// Its configuration.
         theirs: ConfigurationHash,
@@ -207,24 +212,24 @@ pub enum Event {
     },
     /// The host woke this remote I/O too late to keep its times.
     Stalled {
-        /// In this cycle.
+        /// Current cycle.
         moment: Moment,
-        /// Behind the time that it had asked for.
+        /// Delay behind the time that it had asked for.
         late: Duration,
     },
 }
 
-/// A station that cannot stand in for a program, as its remote I/O sees it.
+/// A station that cannot prove the output of a program, from the view of its remote I/O.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Lacking {
     /// The station.
     pub station: StationId,
-    /// Why.
+    /// Reason.
     #[serde(flatten)]
     pub reason: LackingReason,
 }
 
-/// Why a station cannot stand in for a program.
+/// Reason why a station cannot prove the output of a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(tag = "reason", rename_all = "kebab-case")]
 pub enum LackingReason {
@@ -234,7 +239,7 @@ pub enum LackingReason {
     Joining,
     /// Its state is behind: it has not received the newest samples.
     Behind {
-        /// The cycle of its newest sample.
+        /// Cycle of its newest sample.
         stepped: Moment,
     },
     /// It was found faulty, and waits for the operator.
@@ -243,7 +248,7 @@ pub enum LackingReason {
     Failed,
 }
 
-/// Why there was nothing true to apply.
+/// Reason why no output was provable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Missing {
@@ -251,7 +256,7 @@ pub enum Missing {
     NoCycle,
     /// The host woke this remote I/O more than a period after the deadline.
     TooLate,
-    /// The sensors cannot be seen: their device is lost, or refuses.
+    /// The sensors are not known: their device is lost, or refuses.
     BadQuality,
     /// This remote I/O does not know its program's history yet.
     NoHistory,
@@ -259,11 +264,11 @@ pub enum Missing {
     StateLost,
     /// The operator has not released the outputs after a cold start, or after a value fault.
     NotReleased,
-    /// Stations disagree, and nobody says who is right.
+    /// Stations disagree, and no majority exists.
     ValueFault,
-    /// Neither the controller nor any word of an understudy was there with the true lineage.
+    /// Neither the controller nor a word of an understudy was received with the true lineage.
     NotSynchronised,
-    /// A word was there, and another member of it was not.
+    /// A word was received, and another member of it was not.
     TwoErasures,
     /// The paper's S2: two stations have failed.
     SecondFailure,

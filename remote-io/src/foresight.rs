@@ -1,4 +1,4 @@
-//! What a remote I/O would drive if these turns were all that it heard: its own rule, asked before it has to answer.
+//! The output that a remote I/O would apply if it received given turns: its own rule, evaluated for a viewer.
 
 use std::sync::Arc;
 
@@ -6,27 +6,27 @@ use understudy_cycle::Mode;
 use understudy_wire::{Frame, Image, Lineage, ProgramId, Source, StationSet};
 
 use crate::event::Missing;
-use crate::selection::{Heard, Selection};
+use crate::selection::{Received, Selection};
 use crate::settings::ValueFault;
 use crate::trust::Trust;
 
-/// One cycle as it could be heard.
+/// Turns of one cycle.
 #[derive(Debug, Clone, Copy)]
 pub struct Foreseen<'a> {
-    /// The frame of each station's turn, by rank; nothing where it is silent.
+    /// Frame of each station's turn, by rank; `None` where it was not received.
     pub turns: &'a [Option<Arc<Frame>>],
-    /// N.
+    /// Number of controllers, N.
     pub controllers: usize,
-    /// How many failures are masked.
+    /// Number of failures that are masked.
     pub mode: Mode,
 }
 
 impl Foreseen<'_> {
-    /// Where the `width` outputs of `program` would come from, and what they would be, if its true lineage after this cycle's
-    /// sample is `truth` and it has found the states of `excluded` faulty.
+    /// Source of the `width` outputs of `program`, and their values, where its true lineage after the sample of this
+    /// cycle is `truth` and the states of `excluded` were found faulty.
     ///
     /// # Errors
-    /// Why nothing true would be there; then the outputs are held, and fall safe.
+    /// Reason why no output is provable; the remote I/O then holds the outputs and later applies the fail-safe ones.
     pub fn source(
         &self,
         program: ProgramId,
@@ -34,13 +34,13 @@ impl Foreseen<'_> {
         width: usize,
         excluded: StationSet,
     ) -> Result<(Source, Image), Missing> {
-        let heard = Heard {
+        let received = Received {
             turns: self.turns,
             controllers: self.controllers,
             mode: self.mode,
         };
         let mut trust = Trust::excluding(excluded);
-        let (selection, _) = heard.select(program, truth, width, &mut trust, ValueFault::Hold);
+        let (selection, _) = received.select(program, truth, width, &mut trust, ValueFault::Hold);
         match selection {
             Selection::Direct(outputs) => Ok((Source::Direct, outputs)),
             Selection::Reconstructed(outputs, _) => Ok((Source::Reconstructed, outputs)),

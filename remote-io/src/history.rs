@@ -1,15 +1,17 @@
 //! The history of one program as its remote I/O has made it: the truth about u(i), and so about x(i).
 //!
-//! Invariant *The plant decides history*: only this remote I/O samples u(i), so only it can extend the chain of lineages
+//! Invariant *The plant decides history*: only this remote I/O samples u(i), so only it can extend the chain of
+//! lineages
 //!
 //! ```text
 //!   base ──u──► L ──u──► L ──u──► head          at most `capacity` samples, all of them in every Sample frame
 //!            ▲
-//!            └ the newest that a living station has said to hold
+//!            └ the newest that a living station has reported to hold
 //! ```
 //!
-//! When the window is full, samples that no station has followed and of which no output was applied become void, and the
-//! program continues from the newest state that is left. Invariant *Never back*: samples up to the newest applied one (the
+//! When the window is full, samples that no station has followed and of which no output was applied become void, and
+//! the program continues from the newest state that is left. Invariant *Never back*: samples up to the newest applied
+//! one (the
 //! *floor*) never become void.
 
 use std::collections::VecDeque;
@@ -23,7 +25,7 @@ pub(crate) struct History {
     born: Moment,
     base: Lineage,
     samples: VecDeque<(Image, Lineage)>,
-    /// Samples from the base up to the newest lineage that any station ever said to hold.
+    /// Samples from the base up to the newest lineage that any station has reported to hold.
     confirmed: usize,
     capacity: usize,
 }
@@ -90,8 +92,8 @@ impl History {
 
     /// Appends this cycle's sample; answers with how many older ones became void by it.
     ///
-    /// `living` are the oldest and the newest place that living stations hold, where one does; `floor` is the lineage after the
-    /// newest applied sample.
+    /// `living` are the oldest and the newest place that living stations hold, where one does; `floor` is the lineage
+    /// after the newest applied sample.
     pub(crate) fn push(
         &mut self,
         inputs: &Image,
@@ -155,9 +157,9 @@ mod tests {
         }
     }
 
-    /// Whichever sample was the last that anybody followed, an isolated history comes back to it and never loses it.
+    /// Whichever sample was the last that a station followed, an isolated history comes back to it and never loses it.
     #[test]
-    fn what_nobody_heard_is_void() {
+    fn samples_that_no_station_received_are_void() {
         for followed in 0..6 {
             let mut history = history(3);
             let mut last = history.head();
@@ -177,8 +179,8 @@ mod tests {
         }
     }
 
-    /// Every floor, and every place of a living station from there on or behind: the history never loses the state at the floor,
-    /// or a newer one that it continues from, and a living station at its oldest state stays in it.
+    /// Every floor, and every place of a living station from there on or behind: the history never loses the state at
+    /// the floor, or a newer one that it continues from, and a living station at its oldest state stays in it.
     #[test]
     fn an_applied_sample_never_becomes_void() {
         let check = |floor: usize, held: Option<usize>| {

@@ -1,19 +1,19 @@
 //! The plant's side: samples, selects or reconstructs, holds, and falls safe.
 //!
-//! [`RemoteIo`] is the only source of u(i) and the only place where y(i) is applied, and so the arbiter of program i: no
-//! agreement among the others is needed to mask a failure, and no two masters can drive one actuator.
+//! [`RemoteIo`] is the only source of u(i) and the only place where y(i) is applied, and so the arbiter of program i:
+//! no agreement among the others is needed to mask a failure, and no two masters can drive one actuator.
 
 mod channel;
 mod diagnosis;
 mod event;
 mod foresight;
 mod history;
+mod holders;
 mod remote_io;
 mod selection;
 mod settings;
 mod trust;
 mod votes;
-mod witnesses;
 
 pub use channel::Channel;
 pub use diagnosis::Diagnosis;

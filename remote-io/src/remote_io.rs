@@ -1,13 +1,13 @@
 //! The remote I/O of one program, the arbiter of its history.
 //!
 //! ```text
-//!   cycle starts ──► samples u(i), says it ──► hears turns ──► deadline: selects, drives y(i) ──► rest
-//!                                                              (or holds, then falls safe)
+//!   cycle starts ──► samples u(i), sends it ──► receives turns ──► deadline: selects, drives y(i) ──► rest
+//!                                                                  (or holds, then falls safe)
 //! ```
 //!
-//! It drives at every deadline, also when no cycle was started: then it holds, and falls safe after `hold_cycles`. What it knows of
-//! the history is one of three states ([`Knowledge`]), and proven outputs are applied on the proof alone or on the operator's
-//! release ([`Authority`]):
+//! It drives at every deadline, also when no cycle was started: then it holds, and falls safe after `hold_cycles`. What
+//! it knows of the history is one of three states ([`Knowledge`]), and proven outputs are applied on the proof alone or
+//! on the operator's release ([`Authority`]):
 //!
 //! ```text
 //!   Listening ── a living station holds a state ──────────────► Running from its lineage
@@ -18,7 +18,7 @@
 //!                a station returns with it, or the operator decides
 //! ```
 //!
-//! Invariant *Never back*: the history continues from a state before the floor only if the operator says so.
+//! Invariant *Never back*: the history continues from a state before the floor only if the operator chooses it.
 
 mod deadline;
 mod forcing;
@@ -40,10 +40,10 @@ use understudy_wire::{
 
 use crate::diagnosis::Diagnosing;
 use crate::event::{Event, Missing};
+use crate::holders::Holders;
 use crate::selection::Selection;
 use crate::settings::Settings;
 use crate::trust::Trust;
-use crate::witnesses::Witnesses;
 
 use forcing::Forcing;
 use knowledge::Knowledge;
@@ -54,7 +54,7 @@ use protection::Protection;
 pub struct RemoteIo {
     settings: Settings,
     member: Participant<Event>,
-    witnesses: Witnesses,
+    holders: Holders,
     knowledge: Knowledge,
     /// What the operator is asked.
     question: Option<Question>,
@@ -128,7 +128,7 @@ impl RemoteIo {
         member.clock.start(now);
         let mut remote_io = Self {
             member,
-            witnesses: Witnesses::new(settings.program, agreement),
+            holders: Holders::new(settings.program, agreement),
             knowledge: Knowledge::default(),
             question: None,
             authority: Authority::Proof,
@@ -180,7 +180,7 @@ impl RemoteIo {
             Arrival::Begins(anchor) => self.begin_cycle(now, frame.header.moment, anchor),
         }
         match &frame.body {
-            Body::Turn(turn) if self.member.attendance.heard(station) => {
+            Body::Turn(turn) if self.member.attendance.receive_turn(station) => {
                 self.note(station, &turn.holdings, &turn.recalled);
                 self.turns[station.index()] = Some(Arc::clone(frame));
             }
@@ -226,7 +226,7 @@ impl RemoteIo {
         let recalled = recalled.iter().find(|recalled| {
             recalled.program == program && recalled.inputs.width() == self.settings.inputs
         });
-        self.witnesses.note(station, own, recalled);
+        self.holders.note(station, own, recalled);
         if let (Some(run), Some(holding)) = (self.knowledge.run_mut(), own)
             && let Some(place) = run.history.place(holding.lineage)
         {
@@ -250,7 +250,7 @@ impl RemoteIo {
 
     fn close_cycle(&mut self) {
         self.member.close_cycle();
-        self.witnesses.close_cycle();
+        self.holders.close_cycle();
         if let Some(run) = self.knowledge.run_mut() {
             run.sampled = false;
         }
@@ -288,7 +288,7 @@ impl Hash for RemoteIo {
         let Self {
             settings: _,
             member,
-            witnesses,
+            holders,
             knowledge,
             question,
             authority,
@@ -307,7 +307,7 @@ impl Hash for RemoteIo {
             trust,
             differed,
         } = self;
-        (member, witnesses, knowledge, question, authority).hash(hasher);
+        (member, holders, knowledge, question, authority).hash(hasher);
         (sensors, field, diagnosing, diagnosed, forcing).hash(hasher);
         (looked, protection, turns, deadline, missed, applied).hash(hasher);
         (last_true, trust, differed).hash(hasher);

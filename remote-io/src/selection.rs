@@ -1,14 +1,14 @@
 //! Which output a remote I/O may apply in one cycle.
 //!
-//! Invariant *No guess*: a value is applied only if it is provably h(x(t), u(t)) of the one true history of this program,
-//! the history that this remote I/O itself has sampled. Proof is by lineage: a lineage names the initial state and every input
-//! since, so equal lineages mean equal states. (Fujimoto and Sekiguchi, Theorem 2; they assume a perfect failure flag,
-//! which lineage replaces.)
+//! Invariant *No guess*: a value is applied only if it is provably h(x(t), u(t)) of the one true history of this
+//! program, the history that this remote I/O itself has sampled. Proof is by lineage: a lineage identifies the initial
+//! state and every input since, so equal lineages mean equal states. (Fujimoto and Sekiguchi, Theorem 2; they assume a
+//! perfect failure flag, which lineage replaces.)
 //!
 //! ```text
 //!   own frame, own lineage ──────────────────────────► a vote ─┐
-//!   word over a mask with me, my lineage,                      ├─► they agree: Direct, or Reconstructed where it is silent
-//!   and every other member's frame agrees with it ───► a vote ─┘   they do not: see `trust`
+//!   word over a mask with me, my lineage,                      ├─► they agree: Direct, or Reconstructed if it is missing
+//!   and every other member's frame agrees with it ───► a vote ─┘   they differ: see `trust`
 //!   neither ─────────────────────────────────────────► Missing (the caller holds, then falls safe)
 //! ```
 
@@ -24,7 +24,7 @@ use crate::settings::ValueFault;
 use crate::trust::{Accusation, Judgement, Trust};
 use crate::votes::{Vote, Votes};
 
-/// Where an applied output comes from.
+/// Source of an applied output.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Selection {
     Direct(Image),
@@ -32,22 +32,22 @@ pub(crate) enum Selection {
     Missing(Missing),
 }
 
-/// What was heard in this cycle.
+/// Turns that were received in this cycle.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Heard<'a> {
-    /// The frame of each station's turn, by rank.
+pub(crate) struct Received<'a> {
+    /// Frame of each station's turn, by rank.
     pub(crate) turns: &'a [Option<Arc<Frame>>],
-    /// N.
+    /// Number of controllers, N.
     pub(crate) controllers: usize,
-    /// How many failures are masked.
+    /// Number of failures that are masked.
     pub(crate) mode: Mode,
 }
 
-impl<'a> Heard<'a> {
-    /// Selects the `width` outputs of program `me`, whose true lineage after this cycle's sample is `truth`; says who is wrong
-    /// where that is news. The paper's mode compares nothing: its theorems are about erasures.
+impl<'a> Received<'a> {
+    /// Selects the `width` outputs of program `me`, whose true lineage after the sample of this cycle is `truth`; also
+    /// returns the stations of a new value fault. The paper's mode compares no votes: its theorems are about erasures.
     ///
-    /// At most (words heard) × N steps, each over the holdings of one turn.
+    /// At most (received words) × N steps, each over the holdings of one turn.
     pub(crate) fn select(
         &self,
         me: ProgramId,
@@ -82,7 +82,7 @@ impl<'a> Heard<'a> {
         (selection, accusation)
     }
 
-    /// What each station that is not `excluded` says of the outputs of `me`, and why nobody does where nobody does.
+    /// Votes of the stations that are not `excluded` for the outputs of `me`, and the reason where there is none.
     fn votes(
         &self,
         me: ProgramId,
@@ -133,8 +133,8 @@ impl<'a> Heard<'a> {
         (votes, missing)
     }
 
-    /// Output of a program that may be added to a word of `turn`: its controller published it in this cycle, with the lineage
-    /// and the state digest that the understudy has for it.
+    /// Output of a program that may be added to a word of `turn`: its controller published it in this cycle, with the
+    /// lineage and the state digest that the understudy has for it.
     fn addend(&self, program: ProgramId, turn: &Turn) -> Option<&'a Image> {
         let (outputs, theirs) = self.own_word(program)?;
         let ours = holding_of(turn, program)?;
@@ -142,7 +142,8 @@ impl<'a> Heard<'a> {
         equal.then_some(&outputs.sum)
     }
 
-    /// Syndromes (10) that are not 0, of every word of which all outputs are received, with the stations that can be wrong.
+    /// Syndromes (10) that are not 0, of every word of which all outputs are received, with the stations that can be
+    /// wrong.
     pub(crate) fn syndromes(self) -> impl Iterator<Item = (Image, StationSet)> {
         let words = self.understudies().filter_map(move |understudy| {
             let turn = self.turn_of(understudy)?;
@@ -157,7 +158,7 @@ impl<'a> Heard<'a> {
         })
     }
 
-    /// Equal lineages and unequal digests: a state was corrupted, here or there.
+    /// Equal lineages and unequal digests: a state was corrupted in one of the stations.
     pub(crate) fn digest_differences(&self) -> Vec<(ProgramId, StationSet)> {
         let mut differences = Vec::new();
         for program in (0..self.controllers as u8).map(ProgramId) {
@@ -183,7 +184,7 @@ impl<'a> Heard<'a> {
         }
     }
 
-    /// Stations that said no output in this cycle.
+    /// Stations that published no output in this cycle.
     fn silent(&self) -> StationSet {
         let all = (0..self.turns.len() as u8).map(StationId);
         all.filter(|&station| {
@@ -197,7 +198,7 @@ impl<'a> Heard<'a> {
         (self.controllers as u8..self.turns.len() as u8).map(StationId)
     }
 
-    /// The output that a controller says of its own program, with the state that it rests on.
+    /// The output that a controller publishes of its own program, with the state that it is computed from.
     fn own_word(&self, program: ProgramId) -> Option<(&'a Word, &'a Holding)> {
         let turn = self.turn_of(StationId(program.0))?;
         let own = ProgramSet::only(program);
@@ -221,12 +222,12 @@ mod tests {
     const OUTPUTS: [u64; 3] = [0b101, 0b11, 0b110];
     const TRUE: Lineage = Lineage(7);
 
-    /// What one controller does in the cycle.
+    /// Behaviour of one controller in the cycle.
     #[derive(Debug, Clone, Copy, PartialEq)]
     enum Controller {
         Silent,
         True,
-        /// It speaks from another history, and so says something else.
+        /// It publishes from another history, and so another output.
         Stale,
         /// Its lineage is the true one, and its state was corrupted.
         Corrupted,
@@ -292,7 +293,7 @@ mod tests {
         ))
     }
 
-    /// An understudy that is right, with one word over `mask` and one for each other program of `alone`.
+    /// An understudy without a fault, with one word over `mask` and one for each other program of `alone`.
     fn understudy(mask: u64, alone: u64) -> Arc<Frame> {
         let holdings: Vec<Holding> = (0..3).map(|program| holding(program, TRUE, 1)).collect();
         let word = |mask: ProgramSet| {
@@ -317,8 +318,8 @@ mod tests {
         frame(3, &holdings, &words)
     }
 
-    /// Every controller in every case, with every word of one understudy, and without it: a true output is found where one can
-    /// be proved, and nothing else is ever applied but what the controller itself says of the true history.
+    /// Every controller in every case, with every word of one understudy, and without it: a true output is found where
+    /// one can be proved, and nothing else is applied but what the controller itself publishes of the true history.
     #[test]
     fn what_is_applied_is_proved() {
         for cases in (0..64).map(|case| [case % 4, case / 4 % 4, case / 16]) {
@@ -336,13 +337,13 @@ mod tests {
             .map(|program| controller(program, cases[program]))
             .collect();
         turns.push(with_understudy.then(|| understudy(mask, alone)));
-        let heard = Heard {
+        let received = Received {
             turns: &turns,
             controllers: 3,
             mode: Mode::Full,
         };
         for me in 0..3 {
-            let (selection, accusation) = select(heard, me, ValueFault::Alarm);
+            let (selection, accusation) = select(received, me, ValueFault::Alarm);
             let others = (0..3).filter(|&other| other != me && mask >> other & 1 == 1);
             let provable = with_understudy
                 && if mask >> me & 1 == 1 {
@@ -351,10 +352,10 @@ mod tests {
                     alone >> me & 1 == 1
                 };
             match cases[me] {
-                // A value fault of a controller that is alone cannot be seen in its own frame.
+                // A value fault of a controller cannot be detected from its own frame alone.
                 Controller::Corrupted => {
                     assert_eq!(selection, Selection::Direct(image(me, true)));
-                    let (held, _) = select(heard, me, ValueFault::Hold);
+                    let (held, _) = select(received, me, ValueFault::Hold);
                     let accused = [StationId(me as u8), StationId(3)].into_iter().collect();
                     let located = false;
                     if provable {
@@ -376,18 +377,23 @@ mod tests {
             .iter()
             .filter(|&&case| case == Controller::Corrupted)
             .count();
-        let differences = heard.digest_differences().len();
+        let differences = received.digest_differences().len();
         assert_eq!(differences, if with_understudy { corrupted } else { 0 });
-        assert_eq!(heard.syndromes().count(), 0);
+        assert_eq!(received.syndromes().count(), 0);
     }
 
-    /// Of a remote I/O that trusts everybody.
-    fn select(heard: Heard<'_>, me: usize, answer: ValueFault) -> (Selection, Option<Accusation>) {
+    /// Selection of a remote I/O that suspects no station.
+    fn select(
+        received: Received<'_>,
+        me: usize,
+        answer: ValueFault,
+    ) -> (Selection, Option<Accusation>) {
         let program = ProgramId(me as u8);
-        heard.select(program, TRUE, WIDTHS[me], &mut Trust::default(), answer)
+        received.select(program, TRUE, WIDTHS[me], &mut Trust::default(), answer)
     }
 
-    /// An output that is corrupted on its way out of a sound state leaves a syndrome, (10), and accuses all who can be wrong.
+    /// An output that is corrupted after it was computed leaves a syndrome, (10), and all stations that can be wrong
+    /// are reported.
     #[test]
     fn a_corrupted_output_leaves_a_syndrome() {
         for program in 0..3 {
@@ -400,19 +406,19 @@ mod tests {
             };
             turns[program] = Some(frame(program, &[holding(program, TRUE, 1)], &[word]));
             turns.push(Some(understudy(0b111, 0)));
-            let heard = Heard {
+            let received = Received {
                 turns: &turns,
                 controllers: 3,
                 mode: Mode::Full,
             };
-            let syndromes: Vec<_> = heard.syndromes().collect();
+            let syndromes: Vec<_> = received.syndromes().collect();
             assert_eq!(syndromes.len(), 1);
             assert_eq!(syndromes[0].0.words(), [1]);
             assert_eq!(syndromes[0].1, StationSet::first(4));
         }
     }
 
-    /// The paper's S2: with two stations silent nothing is applied, not even what is there.
+    /// The paper's S2: with two stations not received no output is applied, not even a received one.
     #[test]
     fn the_paper_fails_with_the_second_station() {
         for silent in (0..16_u64).map(StationSet::from_bits) {
@@ -423,13 +429,13 @@ mod tests {
                     _ => controller(rank, Controller::True),
                 })
                 .collect();
-            let heard = Heard {
+            let received = Received {
                 turns: &turns,
                 controllers: 3,
                 mode: Mode::Paper,
             };
             for (me, width) in (0..).zip(WIDTHS) {
-                let (selection, _) = heard.select(
+                let (selection, _) = received.select(
                     ProgramId(me),
                     TRUE,
                     width,

@@ -1,4 +1,4 @@
-//! What a remote I/O is told when it starts.
+//! Configuration of a remote I/O.
 
 use std::sync::Arc;
 
@@ -9,34 +9,34 @@ use understudy_wire::{Image, ProgramHash, ProgramId};
 use crate::channel::Channel;
 use crate::diagnosis::Diagnosis;
 
-/// A remote I/O's own settings.
+/// Configuration of one remote I/O.
 #[derive(Debug, Clone)]
 pub struct Settings {
     /// The program whose plant it serves.
     pub program: ProgramId,
-    /// What all agreed on.
+    /// Configuration shared by all members.
     pub agreement: Arc<Agreement>,
-    /// Of the program's circuit.
+    /// Hash of the program's circuit.
     pub hash: ProgramHash,
     /// Width of u(i) in bits.
     pub inputs: usize,
-    /// Inputs whose channels say when they are failed.
+    /// Inputs whose channels report their own failure.
     pub channels: Vec<Channel>,
-    /// What finds failed channels that do not say so.
+    /// Ladder that finds failed channels that do not report it.
     pub diagnosis: Option<Arc<Diagnosis>>,
-    /// Cycles for which the last true outputs are kept when nothing true is there.
+    /// Cycles for which the last proven outputs are held.
     pub hold_cycles: u32,
-    /// y(i) after that; its width is that of the outputs.
+    /// Fail-safe y(i), applied after that; its width is that of the outputs.
     pub fail_safe: Image,
     /// Who releases the outputs after a cold start.
     pub release: Release,
-    /// What is driven while nobody can say which of two stations is right.
+    /// Reaction to a value fault that no majority locates.
     pub value_fault: ValueFault,
-    /// What follows where the state of the program is lost.
+    /// Reaction to a lost state.
     pub stale_state: StaleState,
 }
 
-/// What follows where no living station can prove the state that the newest applied output came from, and one holds an older state.
+/// Reaction where no living station can prove the state of the newest applied output, and one holds an older state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StaleState {
@@ -47,15 +47,15 @@ pub enum StaleState {
     Cold,
 }
 
-/// What is driven while two stations say different outputs from one history, and no third one says which is right.
+/// Reaction where two stations publish different outputs of one history, and no third one makes a majority.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ValueFault {
-    /// The last true outputs for the configured cycles, then the fail-safe ones, until they agree again, a third one
-    /// says who is right, or the operator releases them.
+    /// The last proven outputs for the configured cycles, then the fail-safe ones, until the stations agree again, a
+    /// third one makes a majority, or the operator releases them.
     #[default]
     Hold,
-    /// The outputs of the controller itself, which may be wrong.
+    /// The outputs of the controller, which may be wrong.
     Alarm,
     /// The fail-safe outputs, at once, until the operator releases them.
     FailSafe,
@@ -65,7 +65,7 @@ pub enum ValueFault {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Release {
-    /// Nobody has to: they are driven as soon as they are true.
+    /// No release is needed: outputs are applied as soon as they are proven.
     #[default]
     Automatic,
     /// The operator, by a command; fail-safe until then.

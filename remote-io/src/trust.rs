@@ -1,39 +1,41 @@
-//! Whom a remote I/O believes: who was found faulty, and who is accused.
+//! Stations that a remote I/O has found faulty, and stations that it suspects.
 //!
 //! ```text
-//!   votes agree ─────────────── driven; those who are accused of an output only are cleared
-//!   a majority ──────────────── driven; the minority is excluded until the operator releases it
-//!   a tie ───────────────────── all who vote are accused; the configured answer, until a third station
-//!                               says who is right, or the operator releases them
+//!   votes agree ─────────────── applied; stations suspected for an output only are cleared
+//!   a majority ──────────────── applied; the minority is excluded until the operator releases it
+//!   a tie ───────────────────── all voters are suspected; the configured reaction, until a third station
+//!                               makes a majority, or the operator releases them
 //! ```
 //!
-//! Two that are accused of different states and agree later prove nothing: one may have taken the state of the other.
+//! Two stations that differed in their states and agree later prove nothing: one may have adopted the state of the
+//! other.
 
 use understudy_wire::StationSet;
 
 use crate::votes::{Finding, Vote, find};
 
-/// Kept from cycle to cycle. Stations recall the excluded for a remote I/O that restarts; whom it has only accused, it accuses again.
+/// Kept from cycle to cycle. Stations recall the excluded ones for a remote I/O that restarts; the suspected ones are
+/// found again.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub(crate) struct Trust {
     excluded: StationSet,
     accused: StationSet,
-    /// Whether the accused differed in what they said only.
+    /// Whether the suspected stations differed in their outputs only.
     in_outputs_only: bool,
 }
 
-/// What may be driven.
+/// The vote that may be applied.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Judgement {
-    /// Nobody votes.
+    /// No station votes.
     Silence,
     /// The vote at this place.
     Believed(usize),
-    /// None of them can be believed.
+    /// None: the votes differ and no majority exists.
     Doubted,
 }
 
-/// Who is wrong, where that is news.
+/// A value fault that was not known before: the stations that may be wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Accusation {
     pub(crate) accused: StationSet,
@@ -41,7 +43,7 @@ pub(crate) struct Accusation {
 }
 
 impl Trust {
-    /// Of one that has found these stations faulty.
+    /// For a remote I/O that has found these stations faulty.
     pub(crate) fn excluding(excluded: StationSet) -> Self {
         Self {
             excluded,
@@ -54,17 +56,17 @@ impl Trust {
         self.excluded
     }
 
-    /// Whether no station is excluded or accused, so that an operator has nothing to release.
+    /// Whether no station is excluded or suspected, so that an operator has nothing to release.
     pub(crate) fn is_complete(&self) -> bool {
         *self == Self::default()
     }
 
-    /// The operator releases everybody.
+    /// The operator releases all stations.
     pub(crate) fn release(&mut self) {
         *self = Self::default();
     }
 
-    /// Judges the votes of one cycle, none of them of an excluded station.
+    /// Judges the votes of one cycle; no excluded station votes.
     pub(crate) fn judge(&mut self, votes: &[Vote]) -> (Judgement, Option<Accusation>) {
         match find(votes) {
             Finding::Silence => (Judgement::Silence, None),

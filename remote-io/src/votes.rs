@@ -1,11 +1,11 @@
-//! What the stations say of one program's outputs in one cycle, and whether they agree.
+//! The outputs of one program that stations publish in one cycle, and whether they agree.
 //!
-//! A station votes where it speaks from the true lineage; its vote is the digest of its state and the outputs. Invariant *No
-//! guess* rests on equal lineages meaning equal states, which only a value fault can break; so votes that differ prove a value
-//! fault, and a majority of them locates it, as long as there is no second one.
+//! A station votes where it publishes from the true lineage; its vote is the digest of its state and the outputs.
+//! Invariant *No guess* rests on equal lineages meaning equal states, which only a value fault can break; so votes that
+//! differ prove a value fault, and a majority of them locates it, as long as there is no second one.
 //!
-//! A word over several programs is no witness against a controller: it differs as well where another member was changed on
-//! its way. An understudy that itself heard another output than its own gives that program a word of its own.
+//! A word over several programs is no evidence against a controller: it differs as well where another member was
+//! changed on its way. An understudy that received another output than its own gives that program a word of its own.
 
 use smallvec::SmallVec;
 use understudy_wire::{Digest, Image, StationId, StationSet};
@@ -16,29 +16,29 @@ pub(crate) struct Vote {
     pub(crate) station: StationId,
     pub(crate) digest: Digest,
     pub(crate) outputs: Image,
-    /// Whether it rests on no other station's words.
+    /// Whether it depends on no other station's words.
     pub(crate) independent: bool,
 }
 
 /// The votes of one cycle: the controller's first, then those of understudies by rank.
 pub(crate) type Votes = SmallVec<[Vote; 3]>;
 
-/// What they come to.
+/// Result of the comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Finding {
-    /// Nobody votes.
+    /// No station votes.
     Silence,
-    /// All of them say the same.
+    /// All votes are equal.
     Agreement,
-    /// More than one, and more than say anything else, say the same; the others are wrong.
+    /// More than one vote, and more than any other, are equal; the other stations are wrong.
     Majority {
         /// The place of the first vote of the majority.
         place: usize,
         wrong: StationSet,
     },
-    /// Nobody can say who is wrong.
+    /// No majority exists.
     Tie {
-        /// Whether all of them have the same state, so that only what they said of it differs.
+        /// Whether all have the same state and only their outputs differ.
         in_outputs_only: bool,
     },
 }
@@ -53,7 +53,7 @@ pub(crate) fn find(votes: &[Vote]) -> Finding {
     if votes.iter().all(|vote| same(vote, first)) {
         return Finding::Agreement;
     }
-    // Whoever says the same as the first that speaks for itself, the controller where it does, stands by it.
+    // A vote equal to the first independent one, which is that of the controller where it votes, supports it.
     let direct = votes.iter().find(|vote| vote.independent);
     let counts = |vote: &&Vote| vote.independent || direct.is_some_and(|direct| same(vote, direct));
     let support = |one: &Vote| {
@@ -97,12 +97,12 @@ mod tests {
     #[test]
     fn the_most_say_who_is_wrong() {
         for count in 0..=5_u32 {
-            for says in 0..4_u64.pow(count) {
-                let said = |rank: u32| says / 4_u64.pow(rank) % 4;
+            for votes in 0..4_u64.pow(count) {
+                let vote_of = |rank: u32| votes / 4_u64.pow(rank) % 4;
                 let votes: Vec<Vote> = (0..count)
-                    .map(|rank| vote(rank as u8, said(rank) / 2, said(rank) % 2, true))
+                    .map(|rank| vote(rank as u8, vote_of(rank) / 2, vote_of(rank) % 2, true))
                     .collect();
-                let tally = |what: u64| (0..count).filter(|&rank| said(rank) == what).count();
+                let tally = |what: u64| (0..count).filter(|&rank| vote_of(rank) == what).count();
                 let mut counts = [0, 1, 2, 3].map(tally);
                 counts.sort_unstable();
                 match find(&votes) {
@@ -110,16 +110,16 @@ mod tests {
                     Finding::Agreement => assert_eq!(counts[2], 0),
                     Finding::Majority { place, wrong } => {
                         assert!(counts[3] > 1 && counts[3] > counts[2] && counts[2] > 0);
-                        let right = said(place as u32);
+                        let right = vote_of(place as u32);
                         assert_eq!(tally(right), counts[3]);
                         for rank in 0..count {
                             let accused = wrong.contains(StationId(rank as u8));
-                            assert_eq!(accused, said(rank) != right);
+                            assert_eq!(accused, vote_of(rank) != right);
                         }
                     }
                     Finding::Tie { in_outputs_only } => {
                         assert!(counts[2] > 0 && (counts[3] == 1 || counts[3] == counts[2]));
-                        let states = (0..count).map(|rank| said(rank) / 2);
+                        let states = (0..count).map(|rank| vote_of(rank) / 2);
                         let low = states.clone().filter(|&state| state == 0).count();
                         assert_eq!(in_outputs_only, low == 0 || low == count as usize);
                     }
@@ -128,9 +128,10 @@ mod tests {
         }
     }
 
-    /// Two words over several programs agree with each other and not with the controller: another member may be the cause.
+    /// Two words over several programs agree with each other and not with the controller: another member may be the
+    /// cause.
     #[test]
-    fn a_shared_word_is_no_witness_against_a_controller() {
+    fn a_shared_word_is_no_evidence_against_a_controller() {
         let direct = vote(0, 7, 1, true);
         let shared = [vote(2, 7, 0, false), vote(3, 7, 0, false)];
         let [second, third] = shared;

@@ -15,7 +15,7 @@ impl Terms {
         let programs = (0..cluster.controllers().len()).map(|index| ProgramId(index as u8));
         let referees = programs.filter_map(|program| {
             let settings = cluster.remote_io_settings(program)?;
-            let scan = cluster.programs()[program.index()].scan.clone();
+            let scan = cluster.programs()[program.index()].executable.clone();
             Some(Referee::new(&settings, scan))
         });
         let signals = cluster.controllers().iter().enumerate();
@@ -24,13 +24,8 @@ impl Terms {
                 .plant_settings(ProgramId(index as u8))
                 .map(|settings| settings.plant.position_names().to_vec())
                 .unwrap_or_default(),
-            inputs: controller.circuit.inputs().to_vec(),
-            outputs: controller
-                .circuit
-                .outputs()
-                .iter()
-                .map(|output| output.name.clone())
-                .collect(),
+            inputs: controller.interface.inputs.bit_names(),
+            outputs: controller.interface.outputs.bit_names(),
         });
         let mut plants = ProgramSet::default();
         for (program, plant) in cluster.plants().iter().enumerate() {

@@ -6,8 +6,8 @@ use std::collections::HashMap;
 
 use understudy_cluster::Cluster;
 use understudy_cycle::Mode;
+use understudy_executable::Scratch;
 use understudy_journal::{Happening, Members};
-use understudy_logic::Scratch;
 use understudy_node::Event as StationEvent;
 use understudy_parity::sum;
 use understudy_remote_io::Event as RemoteIoEvent;
@@ -39,13 +39,13 @@ impl Reference {
         let initial = || {
             let genesis = Lineage::genesis(found.hash, *born);
             assert_eq!(*before, genesis, "the history is known from its start");
-            Image::from_words(found.scan.register_count(), found.scan.initial())
+            Image::from_words(found.executable.state_count(), found.executable.initial())
                 .expect("an initial state")
         };
         let known = self.states.get(&(program, *before)).cloned();
         let mut state = known.unwrap_or_else(initial);
-        let mut outputs = Image::zero(found.scan.output_count());
-        found.scan.step(
+        let mut outputs = Image::zero(found.executable.output_count());
+        found.executable.step(
             &mut self.scratch,
             state.words_mut(),
             inputs.words(),

@@ -92,6 +92,7 @@ impl Programs {
         }
         for cluster in clusters {
             let prefix = prefix(cluster.name());
+            files::parity_of(&cluster, "allocate")?;
             groups.push(of_cluster(cluster, prefix));
         }
         Ok(Self { groups, reports })
@@ -148,14 +149,16 @@ fn of_ladders(members: Vec<Member>, period: Duration, prefix: String) -> Result<
 }
 
 fn of_cluster(cluster: Cluster, prefix: String) -> Group {
-    let members = cluster.controllers().iter().map(|controller| Member {
-        name: controller.name.clone(),
-        ladder: controller.program.clone(),
-        circuit: controller.circuit.clone(),
+    let members = cluster.controllers().iter().filter_map(|controller| {
+        Some(Member {
+            name: controller.name.clone(),
+            ladder: controller.ladder()?.clone(),
+            circuit: controller.circuit()?.clone(),
+        })
     });
     Group {
         members: members.collect(),
-        parity: Some(cluster.parity().clone()),
+        parity: cluster.parity().cloned(),
         period: cluster.agreement().schedule.period(),
         cluster: Some(Box::new(cluster)),
         prefix,

@@ -55,12 +55,15 @@ impl Looking {
 
     /// Reports an understudy that is not the sum of its members; true if undecided.
     pub(super) fn at_understudy(&self, cluster: &Cluster, report: &mut Report) -> bool {
+        let Some(parity) = cluster.parity() else {
+            return false;
+        };
         let controllers = cluster.controllers().iter();
         let members: Vec<Circuit> = controllers
-            .map(|controller| controller.circuit.clone())
+            .filter_map(|controller| controller.circuit().cloned())
             .collect();
         let go_on = |_: Work| Instant::now() < self.end;
-        match prove_parity_while(&members, cluster.parity().circuit(), NODES, &go_on) {
+        match prove_parity_while(&members, parity.circuit(), NODES, &go_on) {
             Ok(_) => false,
             Err(Refutation::Undecided { .. }) => true,
             Err(wrong) => {

@@ -8,7 +8,7 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use understudy_cluster::Cluster;
 use understudy_cycle::{Agreement, Input, Machine, Output, RemoteIoInput};
-use understudy_logic::Scan;
+use understudy_executable::Executable;
 use understudy_plant::Plant;
 use understudy_simulator::Network;
 use understudy_wire::{Body, Field, Frame, Image, Member, ProgramId, Time, encode};
@@ -54,7 +54,7 @@ struct Cell {
 pub(crate) struct Pairs {
     redundancy: Redundancy,
     agreement: Arc<Agreement>,
-    scans: Vec<Arc<Scan>>,
+    scans: Vec<Arc<Executable>>,
     cells: Vec<Cell>,
     network: Network,
     random: Pcg64Mcg,
@@ -84,10 +84,10 @@ impl Pairs {
         seed: u64,
     ) -> Self {
         let now = Time::default();
-        let scans: Vec<Arc<Scan>> = cluster
+        let scans: Vec<Arc<Executable>> = cluster
             .programs()
             .iter()
-            .map(|program| Arc::new(program.scan.clone()))
+            .map(|program| Arc::new(program.executable.clone()))
             .collect();
         let mut pairs = Self {
             redundancy,

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use smallvec::smallvec;
 use understudy_cycle::{Agreement, Copies, Input, Machine, Output};
-use understudy_logic::{Scan, Scratch};
+use understudy_executable::{Executable, Scratch};
 use understudy_wire::{
     Body, Cycle, Digest, Epoch, Frame, Header, Holding, Image, Lineage, Member, Moment,
     ProgramHash, ProgramId, ProgramSet, StationId, StationSet, Time, Transfer, Turn, Word,
@@ -43,7 +43,7 @@ pub(crate) struct Settings {
     pub(crate) redundancy: Redundancy,
     pub(crate) agreement: Arc<Agreement>,
     pub(crate) program: ProgramId,
-    pub(crate) scan: Arc<Scan>,
+    pub(crate) scan: Arc<Executable>,
 }
 
 /// What a box reports.
@@ -108,11 +108,11 @@ impl Partner {
 
     fn new(now: Time, settings: Settings, standing: Standing) -> Self {
         let scan = &settings.scan;
-        let state = Image::from_words(scan.register_count(), scan.initial());
+        let state = Image::from_words(scan.state_count(), scan.initial());
         Self {
             standing,
             term: 0,
-            state: state.unwrap_or_else(|_| Image::zero(scan.register_count())),
+            state: state.unwrap_or_else(|_| Image::zero(scan.state_count())),
             stepped: 0,
             cycle: 0,
             began: now,

@@ -1,26 +1,28 @@
-//! Which terminal of a model is which signal of its controller.
+//! Binding of a model's terminals to the signals of its controller.
 //!
-//! A terminal without an entry in [`Signals`] is bound to the signal of its own name. Every sensor has to be an input of the
-//! controller and every actuator an output, but for those that follow another plant; an input that no sensor drives stays 0.
+//! A terminal without an entry in [`Signals`] is bound to the signal of its own name. Every sensor must be an input of
+//! the controller and every actuator an output, except those that follow another plant; an input that no sensor drives
+//! stays 0.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
-use understudy_logic::Circuit;
+use understudy_executable::Interface;
+use understudy_typed::{Elementary, Point, Points};
 
-use crate::model::{Direction, Terminals};
+use crate::model::{Direction, Terminal, Terminals};
 
-/// From the name of a model's terminal to the name of the controller's signal, where the two differ.
+/// Names of the controller's signals by the name of the model's terminal, where the two differ.
 pub type Signals = BTreeMap<String, String>;
 
-/// Why a model and its controller do not fit; the last two are no obstacle.
+/// Reason why a model and its controller do not fit; the last two are warnings.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum BindingProblem {
     /// The model has no such terminal.
     UnknownTerminal {
-        /// As in [`Signals`].
+        /// Name in [`Signals`].
         terminal: String,
-        /// All that there are.
+        /// All terminals of the model.
         known: Arc<[String]>,
     },
     /// The controller has no input or no output of this name.
@@ -29,16 +31,25 @@ pub enum BindingProblem {
         terminal: String,
         /// Whether the model drives it or is driven by it.
         direction: Direction,
+        /// Signal that it is bound to.
+        signal: String,
+        /// The inputs, or the outputs, of the controller.
+        known: Arc<[String]>,
+    },
+    /// A terminal and the signal that it is bound to are of different types.
+    OtherType {
+        /// The terminal and its type.
+        terminal: Terminal,
         /// What it is bound to.
         signal: String,
-        /// The inputs, or the outputs, that the controller has.
-        known: Arc<[String]>,
+        /// The signal's type.
+        of: Elementary,
     },
     /// Two sensors are bound to one input of the controller.
     DrivenTwice {
         /// The second of the two.
         terminal: String,
-        /// What both are bound to.
+        /// Input that both are bound to.
         signal: String,
     },
     /// A terminal that follows another plant is bound to a signal of the controller too.
@@ -58,29 +69,29 @@ pub enum BindingProblem {
     },
 }
 
-/// What moves an actuator.
+/// Source of an actuator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Driver {
-    /// A bit of y(i).
+    /// Bits of y(i), from this one on.
     Output(usize),
-    /// What another plant shows, by its number in `follows`.
+    /// A sensor of another plant, by its number in `follows`.
     Neighbour(usize),
 }
 
-/// Of each sensor, its place in u(i); of each actuator, what moves it.
+/// Of each sensor, its first bit in u(i); of each actuator, what moves it; of both, how many bits.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Binding {
-    pub(crate) sensors: Vec<usize>,
-    pub(crate) actuators: Vec<Driver>,
+    pub(crate) sensors: Vec<(usize, usize)>,
+    pub(crate) actuators: Vec<(Driver, usize)>,
     /// Bits of u(i).
     pub(crate) inputs: usize,
 }
 
 impl Binding {
-    /// Finds every problem; the binding is there when none of them is an obstacle.
+    /// Finds every problem; returns the binding unless one of them is an error.
     pub(crate) fn new(
         terminals: &Terminals,
-        controller: &Circuit,
+        controller: &Interface,
         signals: &Signals,
         follows: &[String],
     ) -> (Option<Self>, Vec<BindingProblem>) {
@@ -94,7 +105,7 @@ impl Binding {
                 });
             }
         }
-        let actuators: Arc<[String]> = terminals.actuators.as_slice().into();
+        let actuators = names(&terminals.actuators);
         for terminal in follows {
             if !actuators.contains(terminal) {
                 problems.push(BindingProblem::UnknownTerminal {
@@ -106,31 +117,36 @@ impl Binding {
                 problems.push(BindingProblem::FollowsTwo { terminal });
             }
         }
-        let inputs: Arc<[String]> = controller.inputs().into();
-        let outputs = controller.outputs().iter();
-        let outputs: Arc<[String]> = outputs.map(|output| output.name.clone()).collect();
-        let mut places = |direction: Direction, terminals: &[&String], known: &Arc<[String]>| {
+        let (inputs, outputs) = (&controller.inputs, &controller.outputs);
+        let mut places = |direction: Direction, terminals: &[&Terminal], points: &Points| {
             let mut places = Vec::with_capacity(terminals.len());
             let mut taken = HashSet::new();
-            let place_of: HashMap<&String, usize> = known
+            let point_of: HashMap<&str, &Point> = points
                 .iter()
-                .enumerate()
-                .map(|(place, name)| (name, place))
+                .map(|point| (point.name.as_str(), point))
                 .collect();
             for &terminal in terminals {
-                let signal = signals.get(terminal).unwrap_or(terminal);
-                let Some(&place) = place_of.get(signal) else {
+                let signal = signals.get(&terminal.name).unwrap_or(&terminal.name);
+                let Some(&point) = point_of.get(signal.as_str()) else {
                     problems.push(BindingProblem::UnknownSignal {
-                        terminal: terminal.clone(),
+                        terminal: terminal.name.clone(),
                         direction,
                         signal: signal.clone(),
-                        known: Arc::clone(known),
+                        known: points.names().map(str::to_owned).collect(),
                     });
                     continue;
                 };
+                if point.of != terminal.of {
+                    problems.push(BindingProblem::OtherType {
+                        terminal: terminal.clone(),
+                        signal: signal.clone(),
+                        of: point.of,
+                    });
+                }
+                let place = point.bit as usize;
                 if !taken.insert(place) && direction == Direction::Sensor {
                     problems.push(BindingProblem::DrivenTwice {
-                        terminal: terminal.clone(),
+                        terminal: terminal.name.clone(),
                         signal: signal.clone(),
                     });
                 }
@@ -138,41 +154,49 @@ impl Binding {
             }
             places
         };
-        let sensors: Vec<&String> = terminals.sensors.iter().collect();
-        let sensors = places(Direction::Sensor, &sensors, &inputs);
-        let followed = |terminal: &String| follows.iter().position(|name| name == terminal);
+        let sensors: Vec<&Terminal> = terminals.sensors.iter().collect();
+        let sensors = places(Direction::Sensor, &sensors, inputs);
+        let followed = |terminal: &Terminal| follows.iter().position(|name| *name == terminal.name);
         let driven = terminals.actuators.iter();
-        let driven: Vec<&String> = driven.filter(|name| followed(name).is_none()).collect();
-        let driven = places(Direction::Actuator, &driven, &outputs);
+        let driven: Vec<&Terminal> = driven.filter(|it| followed(it).is_none()).collect();
+        let driven = places(Direction::Actuator, &driven, outputs);
         let fits = problems.is_empty();
-        let unbound = |names: &[String], places: &[usize]| {
+        let unbound = |points: &Points, places: &[usize]| {
             let places: HashSet<usize> = places.iter().copied().collect();
-            let unbound = names.iter().enumerate();
-            let unbound = unbound.filter(|(place, _)| !places.contains(place));
-            unbound.map(|(_, name)| name.clone()).collect::<Vec<_>>()
+            let unbound = points.iter();
+            let unbound = unbound.filter(|point| !places.contains(&(point.bit as usize)));
+            unbound.map(|point| point.name.clone()).collect::<Vec<_>>()
         };
-        // Where something does not fit, what is left over is only its other side.
+        // Where a name does not fit, the unbound signal is only the other side of the same problem.
         if fits {
-            for input in unbound(&inputs, &sensors) {
+            for input in unbound(inputs, &sensors) {
                 if !terminals.always_zero.contains(&input) {
                     problems.push(BindingProblem::InputStaysZero { input });
                 }
             }
-            for output in unbound(&outputs, &driven) {
+            for output in unbound(outputs, &driven) {
                 problems.push(BindingProblem::OutputHasNoEffect { output });
             }
         }
         let mut driven = driven.into_iter();
         let actuators = terminals.actuators.iter().filter_map(|terminal| {
             let neighbour = followed(terminal).map(Driver::Neighbour);
-            neighbour.or_else(|| driven.next().map(Driver::Output))
+            let driver = neighbour.or_else(|| driven.next().map(Driver::Output))?;
+            Some((driver, terminal.bits()))
         });
-        let actuators = actuators.collect();
         let binding = Self {
-            sensors,
-            actuators,
-            inputs: inputs.len(),
+            actuators: actuators.collect(),
+            sensors: sensors
+                .into_iter()
+                .zip(terminals.sensors.iter().map(Terminal::bits))
+                .collect(),
+            inputs: inputs.width(),
         };
         (fits.then_some(binding), problems)
     }
+}
+
+fn names(terminals: &[Terminal]) -> Arc<[String]> {
+    let names = terminals.iter().map(|terminal| terminal.name.clone());
+    names.collect()
 }

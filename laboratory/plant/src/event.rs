@@ -1,27 +1,27 @@
-//! What a plant reports, for the journal.
+//! Events of a plant, for the journal.
 
 use serde::{Deserialize, Serialize};
 use understudy_cycle::Refusal;
 use understudy_wire::{ConfigurationHash, Field, Image, Member, Moment};
 
-/// One thing that happened to a plant.
+/// Event of a plant.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "kebab-case")]
 pub enum Event {
-    /// It moved on by one cycle.
+    /// It stepped by one cycle.
     Stepped {
         /// The cycle of the actuation that drives it.
         moment: Moment,
-        /// What made it step.
+        /// Cause of the step.
         pace: Pace,
-        /// y(i), as it took effect.
+        /// y(i) that took effect.
         outputs: Image,
-        /// What its sensors see afterwards, and what it has counted since its start.
+        /// Its sensors after the step, and its counts since its start.
         field: Field,
     },
     /// A member of this cluster runs another configuration; its frames are dropped.
     Refused {
-        /// Who.
+        /// Member whose frames are dropped.
         member: Member,
         /// Its configuration.
         theirs: ConfigurationHash,
@@ -30,15 +30,15 @@ pub enum Event {
     },
 }
 
-/// What made a plant step.
+/// Cause of a step of a plant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Pace {
-    /// An actuation of a cycle that it had not seen yet.
+    /// An actuation of a new cycle.
     Driven,
-    /// Time: no actuation came, and the last outputs stay in force.
+    /// Time: no actuation arrived, and the last outputs stay in effect.
     Alone,
-    /// Time: no actuation has come for so long that the watchdog has put the fail-safe outputs in force.
+    /// Time: no actuation arrived for so long that the watchdog has applied the fail-safe outputs.
     Watchdog,
 }
 

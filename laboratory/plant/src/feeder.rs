@@ -1,9 +1,9 @@
-//! Where parts come from: the plant's own feeder, or the plant that feeds it.
+//! Source of parts: the plant's own feeder, or the plant that feeds it.
 
 /// Puts a part at a place, one at a time.
 ///
-/// Its own supply is endless and puts the next part when the place has been free for `pause_cycles`; parts from another plant
-/// are placed at once, and those that come while the place is taken are the model's concern.
+/// Its own supply is endless and puts the next part when the place has been free for `pause_cycles`; parts from another
+/// plant are placed at once, and those that come while the place is taken are the model's concern.
 #[derive(Debug, Clone, Hash)]
 pub(crate) struct Feeder {
     supply: Supply,

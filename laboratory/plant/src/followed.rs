@@ -1,38 +1,49 @@
-//! What a terminal of a plant follows: a sensor of its neighbour.
+//! A terminal that follows a sensor of another plant.
 
+use smallvec::SmallVec;
 use understudy_wire::{Field, Moment, ProgramId};
 
-/// Where a terminal of a plant follows another plant, in the order of the names given to [`crate::Plant::following`].
+/// Source of a following terminal, in the order of the names given to [`crate::Plant::following`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Followed {
-    /// The plant that is followed, by its program.
+    /// Program of the plant that is followed.
     pub from: ProgramId,
-    /// The bit of u(from) that its sensor drives.
+    /// The first bit of u(from) that its sensor drives.
     pub sensor: usize,
+    /// How many bits its sensor drives.
+    pub bits: usize,
 }
 
-/// What was heard of a followed plant. Lost frames cost nothing but time: each one says the whole truth.
+impl Followed {
+    /// What the sensor shows, bit by bit.
+    pub fn shown(self, field: &Field) -> SmallVec<[bool; 1]> {
+        let bits = self.sensor..self.sensor + self.bits;
+        bits.map(|bit| field.sensors.get(bit)).collect()
+    }
+}
+
+/// Last received state of a followed plant. Lost frames cost time only: each frame carries the whole state.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Hearing {
     heard: Moment,
 }
 
 impl Hearing {
-    /// What the sensor shows, where this frame is no older than the last one.
+    /// Value of the sensor, where this frame is not older than the last one.
     ///
-    /// Cycles order frames within an epoch only. A frame of another epoch counts as new, also of an older one, because epochs
-    /// are given up; and one without a moment is of a plant that has just started.
+    /// Cycles order frames within an epoch only. A frame of another epoch counts as new, also of an older one, because
+    /// epochs are given up; and one without a moment is of a plant that has just started.
     pub(crate) fn hear(
         &mut self,
         followed: Followed,
         moment: Moment,
         field: &Field,
-    ) -> Option<bool> {
+    ) -> Option<SmallVec<[bool; 1]>> {
         let old = moment.epoch == self.heard.epoch && moment.cycle < self.heard.cycle;
         if old && moment != Moment::default() {
             return None;
         }
         self.heard = moment;
-        Some(field.sensors.get(followed.sensor))
+        Some(followed.shown(field))
     }
 }

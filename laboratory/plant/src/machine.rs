@@ -1,7 +1,7 @@
-//! A plant as a member of its own.
+//! A plant as a member.
 //!
 //! ```text
-//!            ┌── each period: say the field ──┐
+//!            ┌── each period: send the field ─┐
 //!   start ──►│ not driven yet                 │
 //!            └──────────┬─────────────────────┘
 //!             actuation │ step
@@ -15,8 +15,9 @@
 //!            └ watchdog: a step each period, fail-safe ──────┘
 //! ```
 //!
-//! Invariant: an actuation steps the plant once, however often its frame arrives, and an older one never does, except where the
-//! watchdog has run out or the epoch of the last one bound nobody. At most one step a wake-up: time that its host lost is lost.
+//! Invariant: an actuation steps the plant once, however often its frame arrives, and an older one never does, except
+//! where the watchdog has run out or the epoch of the last one bound no member. At most one step for each wake-up: time
+//! of a host stall is lost.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -31,22 +32,22 @@ use crate::model::Plant;
 /// Periods without an actuation after which the fail-safe outputs are in force, unless configured otherwise.
 pub const WATCHDOG_CYCLES: u32 = 3;
 
-/// A plant's own settings.
+/// Configuration of a plant.
 #[derive(Debug, Clone)]
 pub struct Settings {
-    /// The program that it is the plant of.
+    /// Program whose plant it is.
     pub program: ProgramId,
-    /// What all agreed on.
+    /// Configuration shared by all members.
     pub agreement: Arc<Agreement>,
-    /// In its initial state.
+    /// Plant in its initial state.
     pub plant: Plant,
-    /// The program of the plant whose parts it takes.
+    /// Program of the plant whose parts it receives.
     pub fed_by: Option<ProgramId>,
-    /// What the plant follows, by number.
+    /// Followed terminals, by number.
     pub follows: Vec<Followed>,
-    /// y(i) where the watchdog has run out; its width is that of the outputs.
+    /// y(i) after the watchdog has run out; its width is that of the outputs.
     pub fail_safe: Image,
-    /// Periods without an actuation after which that is so: at least 2.
+    /// Periods without an actuation until the watchdog runs out: at least 2.
     pub watchdog_cycles: u32,
 }
 
@@ -54,11 +55,11 @@ pub struct Settings {
 #[derive(Debug, Clone)]
 pub struct PlantMachine {
     settings: Settings,
-    /// The last actuation: when it came, of which moment, and what it drives.
+    /// The last actuation: time of arrival, moment and outputs.
     driven: Option<Driven>,
     wakeup: Time,
     feed: Feed,
-    /// By number of what it follows.
+    /// State of each followed terminal, by number.
     hearings: Vec<Hearing>,
     endpoint: Endpoint<Event>,
 }
@@ -72,7 +73,7 @@ struct Driven {
     outputs: Image,
 }
 
-/// Parts on their way from the feeding plant. Its counter never falls but at its restart, so that lost frames heal.
+/// Parts on their way from the feeding plant. The counter falls only at a restart, so that lost frames are made up for.
 #[derive(Debug, Clone, Default)]
 struct Feed {
     moment: Moment,
@@ -82,7 +83,7 @@ struct Feed {
 
 impl Feed {
     fn hear(&mut self, moment: Moment, handed_over: u64) {
-        // The counter itself tells old frames from new ones; moments do not, where an epoch was given up for an older one.
+        // The counter itself orders frames; moments do not, where an epoch was given up for an older one.
         if handed_over < self.handed_over {
             // A plant that was not driven yet has no moment: it has just started, and counts from 0.
             let restarted = moment == Moment::default() || moment > self.moment;
@@ -98,7 +99,7 @@ impl Feed {
 }
 
 impl PlantMachine {
-    /// A plant that starts at `now` and says at once what it shows.
+    /// A plant that starts at `now` and sends its field at once.
     pub fn new(settings: Settings, now: Time) -> Self {
         Self {
             driven: None,
@@ -110,7 +111,7 @@ impl PlantMachine {
         }
     }
 
-    /// What it shows now.
+    /// Its current sensors and counts.
     pub fn field(&self) -> Field {
         self.settings.plant.field()
     }
@@ -150,9 +151,9 @@ impl PlantMachine {
         let follows = self.settings.follows.iter().zip(&mut self.hearings);
         for (number, (followed, hearing)) in follows.enumerate() {
             if followed.from == program
-                && let Some(on) = hearing.hear(*followed, moment, field)
+                && let Some(shown) = hearing.hear(*followed, moment, field)
             {
-                self.settings.plant.see(number, on);
+                self.settings.plant.see(number, &shown);
             }
         }
     }

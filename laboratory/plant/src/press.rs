@@ -1,7 +1,8 @@
-//! The press of section V: a ram that presses the part that lies under it.
+//! The press of section V: a ram that presses the part below it.
 //!
-//! A part is finished, counted and taken away when the ram has gone down on it and has come back up. Plant fault: a part that
-//! arrives while another lies there, or while the ram is more than a step from up; such a part is lost.
+//! A part is finished, counted and taken away when the ram has gone down on it and has come back up. Plant fault: a
+//! part that arrives while another one is in the press, or while the ram is more than a step from up; such a part is
+//! lost.
 
 use serde::{Deserialize, Serialize};
 use smallvec::{SmallVec, smallvec};
@@ -10,7 +11,7 @@ use crate::feeder::Feeder;
 use crate::model::{Counts, Model};
 use crate::robot::{moved, shown, tolerance};
 
-/// How far and how fast.
+/// Travel times of the press.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, Hash)]
 pub struct PressParameters {
     /// Cycles from up to down; at least 1.
@@ -28,9 +29,9 @@ impl Default for PressParameters {
     }
 }
 
-/// In the order of u20 to u22.
+/// Sensors in the order of u20 to u22.
 pub(crate) const SENSORS: [&str; 3] = ["part_present", "ram_up", "ram_down"];
-/// In the order of y21 and y22.
+/// Actuators in the order of y21 and y22.
 pub(crate) const ACTUATORS: [&str; 2] = ["move_down", "move_up"];
 pub(crate) const POSITIONS: [&str; 1] = ["ram"];
 
@@ -38,7 +39,7 @@ pub(crate) const POSITIONS: [&str; 1] = ["ram"];
 pub(crate) struct Press {
     parameters: PressParameters,
     feeder: Feeder,
-    /// 0 is up.
+    /// Position of the ram; 0 is up.
     ram: u32,
     part: Option<Part>,
     counts: Counts,

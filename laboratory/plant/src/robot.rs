@@ -6,9 +6,10 @@
 //!   pick place                          where it hands over
 //! ```
 //!
-//! Driving an axis against its end stop is harmless, as is driving it both ways at once. Plant faults: moving sideways while not up, and
-//! opening the gripper with a part anywhere but at the two places below. A step short of an end is near enough for both: an output
-//! that is held for a cycle moves an axis a little further, and breaks nothing.
+//! Driving an axis against its end stop is harmless, as is driving it in both directions at once. Plant faults: moving
+//! sideways while not up, and opening the gripper with a part elsewhere than at the two places below. An end may be
+//! missed by one step for both: an output that is held for a cycle moves an axis a little further, which is no plant
+//! fault.
 
 use serde::{Deserialize, Serialize};
 use smallvec::{SmallVec, smallvec};
@@ -16,7 +17,7 @@ use smallvec::{SmallVec, smallvec};
 use crate::feeder::Feeder;
 use crate::model::{Counts, Model, SHOWN};
 
-/// How far and how fast.
+/// Travel times of the arm.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, Hash)]
 pub struct RobotParameters {
     /// Cycles from left to right; at least 1.
@@ -27,7 +28,7 @@ pub struct RobotParameters {
     pub feed_cycles: u32,
 }
 
-/// About 48 cycles a part: six in 300.
+/// About 48 cycles for each part: six parts in 300 cycles.
 impl Default for RobotParameters {
     fn default() -> Self {
         Self {
@@ -38,7 +39,7 @@ impl Default for RobotParameters {
     }
 }
 
-/// In the order of u10 to u14.
+/// Sensors in the order of u10 to u14.
 pub(crate) const SENSORS: [&str; 5] = [
     "part_present",
     "arm_left",
@@ -46,7 +47,7 @@ pub(crate) const SENSORS: [&str; 5] = [
     "arm_up",
     "arm_down",
 ];
-/// In the order of y11 to y15.
+/// Actuators in the order of y11 to y15.
 pub(crate) const ACTUATORS: [&str; 5] = ["move_right", "move_left", "move_down", "move_up", "grip"];
 pub(crate) const POSITIONS: [&str; 3] = ["horizontal", "vertical", "gripper"];
 
@@ -54,9 +55,9 @@ pub(crate) const POSITIONS: [&str; 3] = ["horizontal", "vertical", "gripper"];
 pub(crate) struct Robot {
     parameters: RobotParameters,
     feeder: Feeder,
-    /// 0 is left.
+    /// Position of the horizontal axis; 0 is left.
     horizontal: u32,
-    /// 0 is up.
+    /// Position of the vertical axis; 0 is up.
     vertical: u32,
     closed: bool,
     holds_part: bool,
@@ -90,7 +91,7 @@ impl Robot {
         self.vertical == self.parameters.vertical_cycles
     }
 
-    /// Low enough to open the gripper.
+    /// Whether the arm is low enough to open the gripper.
     fn is_low(&self) -> bool {
         let end = self.parameters.vertical_cycles;
         self.vertical + tolerance(end) >= end
@@ -183,12 +184,12 @@ pub(crate) fn moved(position: u32, further: bool, back: bool, end: u32) -> u32 {
     }
 }
 
-/// By how many steps of an axis its end may be missed; a short one is exact.
+/// Number of steps by which the end of an axis may be missed; a short axis is exact.
 pub(crate) fn tolerance(end: u32) -> u32 {
     u32::from(end > 2)
 }
 
-/// 0 to 1000 of the way to `end`.
+/// Position in 0 to 1000 of the way to `end`.
 pub(crate) fn shown(position: u32, end: u32) -> u16 {
     (u64::from(position) * u64::from(SHOWN) / u64::from(end.max(1))) as u16
 }

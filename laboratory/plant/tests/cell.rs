@@ -110,7 +110,7 @@ struct Loop {
 
 impl Loop {
     fn new(circuit: &Circuit, kind: &ModelKind, fed: bool) -> Self {
-        let (plant, problems) = Plant::new(kind, circuit, &Signals::new(), fed);
+        let (plant, problems) = Plant::new(kind, &circuit.into(), &Signals::new(), fed);
         assert_eq!(problems, []);
         let plant = plant.expect("it fits");
         let scan = Scan::new(circuit);
@@ -223,7 +223,12 @@ fn outputs(names: &[&str]) -> Image {
 /// Drives the arm by hand: each entry is what is on, and for how many cycles.
 fn check_arm(script: &[(&[&str], usize)], handed_over: u64, plant_faults: u64) {
     let kind = ModelKind::Robot(RobotParameters::default());
-    let (plant, _) = Plant::new(&kind, &robot(Reading::Working), &Signals::new(), false);
+    let (plant, _) = Plant::new(
+        &kind,
+        &(&robot(Reading::Working)).into(),
+        &Signals::new(),
+        false,
+    );
     let mut plant = plant.expect("it fits");
     for (names, cycles) in script {
         for _ in 0..*cycles {
@@ -274,7 +279,7 @@ fn the_arm_knows_what_must_not_happen() {
 #[test]
 fn a_part_on_an_occupied_press_or_under_its_ram_is_a_plant_fault() {
     let kind = ModelKind::Press(PressParameters::default());
-    let (plant, _) = Plant::new(&kind, &press(), &Signals::new(), true);
+    let (plant, _) = Plant::new(&kind, &(&press()).into(), &Signals::new(), true);
     let mut plant = plant.expect("it fits");
     let still = Image::zero(2);
     let down = Image::from_bits([true, false]);
@@ -292,8 +297,8 @@ proptest! {
     fn no_output_brings_a_plant_out_of_its_bounds(script in prop::collection::vec(any::<u8>(), 1..400)) {
         let arm = ModelKind::Robot(RobotParameters::default());
         let ram = ModelKind::Press(PressParameters::default());
-        let (arm, _) = Plant::new(&arm, &robot(Reading::Working), &Signals::new(), false);
-        let (ram, _) = Plant::new(&ram, &press(), &Signals::new(), true);
+        let (arm, _) = Plant::new(&arm, &(&robot(Reading::Working)).into(), &Signals::new(), false);
+        let (ram, _) = Plant::new(&ram, &(&press()).into(), &Signals::new(), true);
         let (mut arm, mut ram) = (arm.expect("it fits"), ram.expect("it fits"));
         let (mut handed_over, mut finished) = (0, 0);
         for byte in script {

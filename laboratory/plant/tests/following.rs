@@ -37,12 +37,12 @@ fn controller() -> Circuit {
 /// Gas burns over the pilot flame.
 fn burner() -> ModelKind {
     let burner = circuit("burner", &["gas", "pilot_flame"], "main_flame");
-    ModelKind::Ladder(Box::new(burner))
+    ModelKind::Program(Box::new((&burner).into()))
 }
 
 fn following(signals: &Signals, follows: &[&str]) -> (Option<Plant>, Vec<BindingProblem>) {
     let follows: Vec<String> = follows.iter().map(|&name| name.into()).collect();
-    Plant::following(&burner(), &controller(), signals, &follows, false)
+    Plant::following(&burner(), &(&controller()).into(), signals, &follows, false)
 }
 
 fn plant() -> Plant {
@@ -56,12 +56,12 @@ fn a_terminal_that_follows_is_not_the_controllers() {
     let mut plant = plant();
     let on = Image::from_bits([true]);
     assert!(!plant.step(&on, 0).sensors.get(0), "not seen yet");
-    plant.see(0, true);
+    plant.see(0, &[true]);
     assert!(plant.step(&on, 0).sensors.get(0));
     assert!(plant.step(&on, 0).sensors.get(0), "it stays");
-    plant.see(0, false);
+    plant.see(0, &[false]);
     assert!(!plant.step(&on, 0).sensors.get(0));
-    plant.see(1, true);
+    plant.see(1, &[true]);
     assert!(!plant.step(&on, 0).sensors.get(0), "nothing has number 1");
 }
 
@@ -106,6 +106,7 @@ fn machine() -> PlantMachine {
             follows: vec![Followed {
                 from: PILOT,
                 sensor: 2,
+                bits: 1,
             }],
             fail_safe: Image::zero(1),
             watchdog_cycles: WATCHDOG_CYCLES,

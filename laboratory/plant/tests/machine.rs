@@ -41,7 +41,7 @@ fn machine() -> PlantMachine {
         listen_cycles: 4,
     };
     let kind = ModelKind::Press(PressParameters::default());
-    let (plant, problems) = Plant::new(&kind, &controller(), &Signals::new(), true);
+    let (plant, problems) = Plant::new(&kind, &(&controller()).into(), &Signals::new(), true);
     assert_eq!(problems, []);
     PlantMachine::new(
         Settings {
@@ -268,7 +268,7 @@ fn every_misfit_between_a_model_and_its_controller_is_named_in_one_run() {
     ]
     .map(|(terminal, signal)| (terminal.to_owned(), signal.to_owned()))
     .into();
-    let (plant, problems) = Plant::new(&kind, &controller(), &signals, true);
+    let (plant, problems) = Plant::new(&kind, &(&controller()).into(), &signals, true);
     assert!(plant.is_none());
     let found: Vec<_> = problems
         .iter()
@@ -312,9 +312,9 @@ fn a_program_can_be_a_plant() {
     tank.output("plant_fault", arrives);
     let tank = tank.finish().expect("a circuit");
 
-    let kind = ModelKind::Ladder(Box::new(tank));
+    let kind = ModelKind::Program(Box::new((&tank).into()));
     assert!(kind.takes_parts() && kind.hands_over());
-    let (plant, problems) = Plant::new(&kind, &controller, &Signals::new(), true);
+    let (plant, problems) = Plant::new(&kind, &(&controller).into(), &Signals::new(), true);
     let expected = [
         BindingProblem::InputStaysZero {
             input: "lid_closed".into(),

@@ -59,7 +59,7 @@ impl Plants {
         self.taken[index] = handed_over;
         for (number, followed) in self.follows[index].iter().enumerate() {
             if let Some(field) = &self.shown[followed.from.index()] {
-                plant.see(number, field.sensors.get(followed.sensor));
+                plant.see(number, &followed.shown(field));
             }
         }
         self.shown[index] = Some(plant.step(outputs, arrived));

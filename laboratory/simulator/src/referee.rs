@@ -24,7 +24,7 @@ use std::collections::VecDeque;
 use std::hash::{Hash, Hasher};
 
 use serde::{Deserialize, Serialize};
-use understudy_logic::{Scan, Scratch};
+use understudy_executable::{Executable, Scratch};
 use understudy_remote_io::{Event, Settings};
 use understudy_wire::{Image, Lineage, Moment, ProgramHash, Source, StationId};
 
@@ -46,7 +46,7 @@ const CHOICE_SAMPLES: u32 = 256;
 /// Checks one remote I/O.
 #[derive(Debug, Clone)]
 pub struct Referee {
-    scan: Scan,
+    executable: Executable,
     hash: ProgramHash,
     fail_safe: Image,
     hold_cycles: u32,
@@ -171,10 +171,10 @@ fn text(image: &Option<Image>) -> String {
 }
 
 impl Referee {
-    /// For the remote I/O of these settings, whose program is `scan`.
-    pub fn new(settings: &Settings, scan: Scan) -> Self {
+    /// For the remote I/O of these settings, whose program is `executable`.
+    pub fn new(settings: &Settings, executable: Executable) -> Self {
         Self {
-            scan,
+            executable,
             hash: settings.hash,
             fail_safe: settings.fail_safe.clone(),
             hold_cycles: settings.hold_cycles,
@@ -350,7 +350,8 @@ impl Referee {
             self.cold_starts += 1;
             self.applied = false;
             self.last_true = None;
-            let initial = Image::from_words(self.scan.register_count(), self.scan.initial());
+            let initial =
+                Image::from_words(self.executable.state_count(), self.executable.initial());
             let initial = initial.expect("a circuit packs its initial state");
             // The floor stays until an output is applied: a cold start of which nothing came may be undone.
             self.remember(born, before, initial);
@@ -407,8 +408,8 @@ impl Referee {
         let State {
             lineage, mut bits, ..
         } = self.states[place].clone();
-        let mut outputs = Image::zero(self.scan.output_count());
-        self.scan.step(
+        let mut outputs = Image::zero(self.executable.output_count());
+        self.executable.step(
             &mut self.scratch,
             bits.words_mut(),
             inputs.words(),

@@ -96,7 +96,12 @@ impl Simulation {
         let referees = parts
             .remote_ios
             .iter()
-            .map(|settings| Referee::new(settings, programs[settings.program.index()].scan.clone()))
+            .map(|settings| {
+                Referee::new(
+                    settings,
+                    programs[settings.program.index()].executable.clone(),
+                )
+            })
             .collect();
         let stations = parts.stations.iter().enumerate().map(|(rank, settings)| {
             let mut settings = settings.clone();

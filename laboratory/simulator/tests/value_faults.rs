@@ -78,7 +78,7 @@ fn state_flips(understudies: usize) -> impl Iterator<Item = (usize, usize, Actio
     let widths = parts.stations[0]
         .programs
         .iter()
-        .map(|it| it.scan.register_count());
+        .map(|it| it.executable.state_count());
     let widths: Vec<usize> = widths.collect();
     (0..2).flat_map(move |program| {
         let holders = [program].into_iter().chain(2..2 + understudies);

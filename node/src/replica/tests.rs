@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use proptest::prelude::*;
-use understudy_logic::{Circuit, CircuitBuilder, Scan};
+use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_wire::{
     ClusterHash, ConfigurationHash, Cycle, Epoch, Header, Member, ProgramHash, StationId,
     StationSet,
@@ -15,7 +15,7 @@ const HISTORY: usize = 4;
 const SHADOW_CYCLES: u32 = 2;
 const HASH: ProgramHash = ProgramHash(11);
 
-/// A three-bit register that shifts its input in, and says the sum of its bits.
+/// A three-bit register that shifts its input in, and outputs the sum of its bits.
 fn shift_register() -> Circuit {
     let mut builder = CircuitBuilder::new("shift");
     let input = builder.input("u");
@@ -33,7 +33,7 @@ fn shift_register() -> Circuit {
 fn program() -> Program {
     Program {
         hash: HASH,
-        scan: Scan::new(&shift_register()),
+        executable: (&shift_register()).into(),
     }
 }
 
@@ -139,8 +139,8 @@ impl Truth {
 
 #[derive(Debug, Clone)]
 enum Step {
-    /// A sample, and whether it is heard.
-    Sample { bit: bool, heard: bool },
+    /// A sample, and whether it is received.
+    Sample { bit: bool, received: bool },
     /// Another station gives a state of so many cycles ago.
     Transfer { age: usize },
     /// It is gone and starts again.
@@ -151,7 +151,7 @@ enum Step {
 
 fn step() -> impl Strategy<Value = Step> {
     prop_oneof![
-        12 => (any::<bool>(), prop::bool::weighted(0.7)).prop_map(|(bit, heard)| Step::Sample { bit, heard }),
+        12 => (any::<bool>(), prop::bool::weighted(0.7)).prop_map(|(bit, received)| Step::Sample { bit, received }),
         2 => (0..8_usize).prop_map(|age| Step::Transfer { age }),
         1 => Just(Step::Restart),
         1 => (0..HISTORY).prop_map(|samples| Step::Void { samples }),
@@ -161,10 +161,10 @@ fn step() -> impl Strategy<Value = Step> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(500) })]
 
-    /// Whatever is lost, given, voided or restarted: a copy that says it is current says the true lineage and the true output, and
-    /// one that has missed no more than the history is current.
+    /// Whatever is lost, transferred, voided or restarted: a replica that is current has the true lineage and the true
+    /// output, and a replica that has missed no more than the history is current.
     #[test]
-    fn a_current_copy_is_true(steps in prop::collection::vec(step(), 1..60)) {
+    fn a_current_replica_is_true(steps in prop::collection::vec(step(), 1..60)) {
         let program = program();
         let mut scratch = Scratch::default();
         let mut truth = Truth::new();
@@ -172,9 +172,9 @@ proptest! {
         let mut missed = 0;
         for step in steps {
             match step {
-                Step::Sample { bit, heard } => {
+                Step::Sample { bit, received } => {
                     let frame = truth.sample(bit);
-                    if !heard {
+                    if !received {
                         missed += 1;
                         continue;
                     }
@@ -215,7 +215,7 @@ proptest! {
 }
 
 #[test]
-fn a_given_state_speaks_only_after_its_shadow() {
+fn a_transferred_state_is_published_only_after_its_shadow_mode() {
     let program = program();
     let mut scratch = Scratch::default();
     let mut truth = Truth::new();
@@ -245,7 +245,7 @@ fn a_given_state_speaks_only_after_its_shadow() {
             Followed::Synchronised
         );
         assert_eq!(
-            replica.may_speak(frame.header.moment),
+            replica.may_publish(frame.header.moment),
             proved.contains(&true)
         );
         proved.push(replica.close_cycle(frame.header.moment));
@@ -253,24 +253,24 @@ fn a_given_state_speaks_only_after_its_shadow() {
     assert_eq!(proved, [false, true, false]);
 }
 
-/// The same sample again, as a copy, is no second one: its outputs may have been proved before a restart.
+/// A copy of a sample is not a second sample: its outputs may have been proved before a restart.
 #[test]
 fn a_station_is_a_witness_from_its_second_sample_on() {
     let program = program();
     let mut truth = Truth::new();
     let mut replica = Replica::new(ProgramId(0), &program, HISTORY);
-    let mut hear = |frame: &Frame| {
+    let mut remember = |frame: &Frame| {
         let Body::Sample(sample) = &frame.body else {
             panic!("a sample");
         };
-        replica.hear(&program, frame.header.moment, sample);
-        let recalled = replica.recalled(moment(0)).expect("it was heard");
+        replica.remember(&program, frame.header.moment, sample);
+        let recalled = replica.recalled(moment(0)).expect("it was received");
         recalled.witnessed
     };
     let first = truth.sample(true);
-    assert!(!hear(&first));
-    assert!(!hear(&first));
+    assert!(!remember(&first));
+    assert!(!remember(&first));
     let second = truth.sample(true);
-    assert!(hear(&second));
-    assert!(hear(&second));
+    assert!(remember(&second));
+    assert!(remember(&second));
 }

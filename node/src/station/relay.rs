@@ -5,9 +5,10 @@
 //!   cycle t + 1  a station that has the sample of i relays it ──► the understudy, which sends last, is synchronised in t + 1
 //! ```
 //!
-//! A relayed sample is the sample itself, with its history: one that lacked several cycles replays them. Invariant: one broken link
-//! of a remote I/O costs no replica its history, as long as any station receives the samples. A sample that was changed on its way
-//! does not lead to its own lineage and is not relayed; a replica that followed a forged one could not prove itself to the remote I/O.
+//! A relayed sample is the sample itself, with its history: a station that lacked several cycles replays them.
+//! Invariant: one broken link of a remote I/O costs no replica its history, as long as any station receives the
+//! samples. A sample that was changed on its way does not lead to its own lineage and is not relayed; a replica that
+//! followed a forged one could not prove itself to the remote I/O.
 
 use std::sync::Arc;
 
@@ -20,19 +21,19 @@ use super::Station;
 use crate::replica::Replica;
 
 impl Station {
-    /// Keeps a sample of this cycle for those that lack it.
+    /// Keeps a sample of this cycle for stations that lack it.
     pub(super) fn keep_sample(&mut self, frame: &Arc<Frame>) {
         let is_new = !self.has_sample(frame.header.sender);
         if let Body::Sample(sample) = &frame.body
             && is_new
-            && leads_where_it_says(sample)
+            && leads_to_its_lineage(sample)
         {
             self.cycle.samples.push(Arc::clone(frame));
         }
     }
 
     /// Follows the samples that another station relays, where it lacks them.
-    pub(super) fn hear_relayed(&mut self, header: &Header, turn: &Turn) {
+    pub(super) fn receive_relayed(&mut self, header: &Header, turn: &Turn) {
         self.cycle.lacked = self.cycle.lacked.or(turn.lacks);
         for Relayed { program, sample } in &turn.relayed {
             self.cycle.relayed.insert(*program);
@@ -50,8 +51,8 @@ impl Station {
         }
     }
 
-    /// What other stations claim to hold.
-    pub(super) fn hear_claims(
+    /// Compares the states that another station reports to hold.
+    pub(super) fn receive_holdings(
         &mut self,
         station: StationId,
         holdings: &[Holding],
@@ -63,7 +64,7 @@ impl Station {
             let mut replicas = self.replicas.iter_mut();
             if let Some(replica) = replicas.find(|replica| replica.id() == holding.program) {
                 let theirs = recalled.iter().find(|it| it.program == holding.program);
-                replica.hear_claim(station, holding.stepped, theirs, (now, silent_after));
+                replica.receive_holding(station, holding.stepped, theirs, (now, silent_after));
             }
         }
     }
@@ -81,7 +82,7 @@ impl Station {
         awaited.all(|program| self.has_sample(Member::RemoteIo(program)))
     }
 
-    /// Ends a cycle: what others lacked in it they will lack in the next one.
+    /// Ends a cycle: stations that lacked a sample in it are expected to lack it in the next one.
     pub(super) fn close_relay(&mut self) {
         self.lacked = self.cycle.lacked;
         let had = self
@@ -95,7 +96,8 @@ impl Station {
         self.awaited = self.lacked.and(had.collect());
     }
 
-    /// The turn with the samples that others lack and that no station has relayed in this cycle, as many as a frame takes.
+    /// The turn with the samples that others lack and that no station has relayed in this cycle, as many as a frame
+    /// takes.
     pub(super) fn with_relayed(&self, mut turn: Turn) -> Body {
         let lacked = self
             .lacked
@@ -113,7 +115,8 @@ impl Station {
                 _ => None,
             })
             .collect();
-        // Which of them have to wait changes from cycle to cycle: a history bridges the cycles between.
+        // The order rotates from cycle to cycle, so that samples that do not fit are sent later: a history bridges the
+        // cycles between.
         if let Some(first) = turn.relayed.len().checked_sub(1) {
             let moment = self.member.moment();
             let by = moment.cycle.0 as usize % (first + 1);
@@ -135,8 +138,8 @@ impl Station {
     }
 }
 
-/// Whether it was not changed since it was sampled.
-fn leads_where_it_says(sample: &Sample) -> bool {
+/// Whether the sample is unchanged since it was sampled.
+fn leads_to_its_lineage(sample: &Sample) -> bool {
     let newest = sample.history.last();
     newest.is_some_and(|newest| sample.before.after(newest) == sample.after)
 }

@@ -1,22 +1,22 @@
-//! Repair: a station asks for the states that it lacks, and gives those that others lack.
+//! Repair: a station asks for the states that it lacks, and transfers those that others lack.
 //!
-//! The first who holds a state answers: its controller, then the understudies by rank. What is given is checked by
-//! [`crate::replica::Replica::adopt`]: it has to lead to the last sample heard.
+//! The first station that holds a state answers: its controller, then the understudies by rank. A transferred state is
+//! checked by [`crate::replica::Replica::adopt`]: it must lead to the last sample that was received.
 
 use understudy_wire::{Body, Join, ProgramSet, StationId, Time, Transfer};
 
-use super::Station;
+use super::{Rest, Role, Station};
 use crate::event::Event;
 use crate::replica::{Replica, Standing};
 
 impl Station {
-    pub(super) fn hear_join(&mut self, station: StationId, join: &Join) {
+    pub(super) fn receive_join(&mut self, station: StationId, join: &Join) {
         if self.cycle.joiners.contains(station) {
             return;
         }
         self.cycle.joiners.insert(station);
-        self.is_told(&join.recalled);
-        self.hear_claims(station, &join.holdings, &join.recalled);
+        self.take_recalled(&join.recalled);
+        self.receive_holdings(station, &join.holdings, &join.recalled);
         self.cycle.lacked = self.cycle.lacked.or(join.lacks);
         for program in join.wants.iter() {
             if self.cycle.others_have.contains(program) && self.own().0 != program.0 {
@@ -60,7 +60,7 @@ impl Station {
     }
 
     pub(super) fn ask(&mut self) {
-        self.cycle.asked = true;
+        self.cycle.rest = Rest::Begun;
         let Some(moment) = self.member.clock.moment() else {
             return;
         };
@@ -72,7 +72,7 @@ impl Station {
                 self.report(Event::Joins { moment, wants });
             }
         }
-        if !wants.is_empty() || !self.speaks() {
+        if !wants.is_empty() || !self.publishes() {
             let holdings = self.holdings();
             let recalled = self.recalled(moment);
             self.member.send(Body::Join(Join {
@@ -86,6 +86,6 @@ impl Station {
 
     pub(super) fn asks_at(&self) -> Option<Time> {
         let due = self.member.clock.anchor() + self.settings.agreement.schedule.rest();
-        (self.member.clock.moment().is_some() && !self.cycle.asked).then_some(due)
+        (self.role != Role::Listening && self.cycle.rest == Rest::Ahead).then_some(due)
     }
 }

@@ -1,4 +1,4 @@
-//! The token: whose turns were heard, and when this station takes its own.
+//! The token: turns that were received, and the time at which this station publishes its own.
 
 use std::time::Duration;
 
@@ -8,17 +8,17 @@ use understudy_wire::{
     Holding, Moment, ProgramId, ProgramSet, StationId, StationSet, Time, Turn, Word,
 };
 
-use super::{Said, Station};
+use super::{ControllerTurn, Station, Token};
 use crate::event::Event;
 use crate::replica::{Replica, Standing};
 use crate::{generated, words};
 
-/// How often a station says which states it holds.
+/// Time between two reports of the states that a station holds.
 const STATES_EVERY: Duration = Duration::from_secs(2);
 
 impl Station {
-    pub(super) fn hear_turn(&mut self, station: StationId, turn: &Turn) {
-        if !self.member.attendance.heard(station) {
+    pub(super) fn receive_turn(&mut self, station: StationId, turn: &Turn) {
+        if !self.member.attendance.receive_turn(station) {
             return;
         }
         let own_program = ProgramId(station.0);
@@ -29,7 +29,7 @@ impl Station {
                 && word.mask == ProgramSet::only(own_program)
                 && let Some(own) = holdings.find(|holding| holding.program == own_program)
             {
-                self.cycle.said.push(Said {
+                self.cycle.controller_turns.push(ControllerTurn {
                     program: own_program,
                     lineage: own.lineage,
                     digest: own.digest,
@@ -40,12 +40,12 @@ impl Station {
                 self.cycle.others_have = self.cycle.others_have.or(word.mask);
             }
         }
-        self.is_told(&turn.recalled);
-        self.hear_claims(station, &turn.holdings, &turn.recalled);
+        self.take_recalled(&turn.recalled);
+        self.receive_holdings(station, &turn.holdings, &turn.recalled);
         self.compare(station, &turn.holdings);
     }
 
-    /// Equal lineages mean equal states; where the digests differ all the same, a value has been corrupted.
+    /// Equal lineages mean equal states; digests that differ nevertheless show a value fault.
     pub(super) fn compare(&mut self, station: StationId, holdings: &[Holding]) {
         let moment = self.member.moment();
         for theirs in holdings {
@@ -76,37 +76,38 @@ impl Station {
         }
     }
 
-    /// Programs whose controllers have said in this cycle what this station would say of them.
+    /// Programs whose controllers have published the outputs that this station computes for them, in this cycle.
     fn confirmed(&self) -> ProgramSet {
-        let said = self.cycle.said.iter().filter(|said| {
-            let replica = self.replicas.iter().find(|it| it.id() == said.program);
+        let equal = self.cycle.controller_turns.iter().filter(|turn| {
+            let replica = self.replicas.iter().find(|it| it.id() == turn.program);
             replica.is_some_and(|replica| {
-                replica.outputs() == &said.outputs
+                replica.outputs() == &turn.outputs
                     && replica.holding().is_some_and(|ours| {
-                        ours.lineage == said.lineage && ours.digest == said.digest
+                        ours.lineage == turn.lineage && ours.digest == turn.digest
                     })
             })
         });
-        said.map(|said| said.program).collect()
+        equal.map(|turn| turn.program).collect()
     }
 
-    /// It speaks when it has the token and knows its outputs, and at the last call whatever it knows.
-    pub(super) fn speak_if_it_is_time(&mut self, now: Time) {
+    /// Publishes when this station has the token and knows its outputs, and at the last call the outputs that it knows.
+    pub(super) fn publish_if_due(&mut self, now: Time) {
         let Some(moment) = self.member.clock.moment() else {
             return;
         };
-        if self.cycle.published || !self.speaks() {
+        if self.cycle.token == Token::Passed || !self.publishes() {
             return;
         }
-        let due = self.speaks_by(moment);
+        let due = self.publishes_by(moment);
         let early =
             self.has_token() && self.knows_all_outputs(moment) && self.has_what_others_lack();
         if now >= due || early {
-            self.speak(now, moment);
+            self.publish(now, moment);
         }
     }
 
-    /// Whether everybody whom it has to wait for has published: its predecessor, or for an understudy all before it.
+    /// Whether all stations that it must wait for have published: its predecessor, or for an understudy all lower
+    /// ranks.
     pub(super) fn has_token(&self) -> bool {
         let before = StationSet::first(self.own().index());
         let waited_for = before.without(self.member.flagged());
@@ -126,7 +127,7 @@ impl Station {
             .all(|replica| replica.is_current(moment))
     }
 
-    /// Says what it holds, every [`STATES_EVERY`].
+    /// Reports the states that it holds, every [`STATES_EVERY`].
     fn report_states(&mut self, moment: Moment) {
         let period = self.settings.agreement.schedule.period();
         let cycles = STATES_EVERY.as_nanos() / period.as_nanos().max(1);
@@ -135,7 +136,8 @@ impl Station {
         }
         for place in 0..self.replicas.len() {
             let replica = &self.replicas[place];
-            if let Some((lineage, state)) = replica.state().filter(|_| replica.may_speak(moment)) {
+            if let Some((lineage, state)) = replica.state().filter(|_| replica.may_publish(moment))
+            {
                 let event = Event::Holds {
                     moment,
                     program: replica.id(),
@@ -147,8 +149,8 @@ impl Station {
         }
     }
 
-    pub(super) fn speak(&mut self, now: Time, moment: Moment) {
-        self.cycle.published = true;
+    pub(super) fn publish(&mut self, now: Time, moment: Moment) {
+        self.cycle.token = Token::Passed;
         let words = self.words(moment);
         self.report(Event::Published {
             moment,
@@ -168,7 +170,7 @@ impl Station {
     }
 
     fn words(&mut self, moment: Moment) -> SmallVec<[Word; 2]> {
-        let known = self.replicas.iter().filter(|it| it.may_speak(moment));
+        let known = self.replicas.iter().filter(|it| it.may_publish(moment));
         let agreement = &self.settings.agreement;
         if !self.is_understudy() {
             return known
@@ -177,29 +179,30 @@ impl Station {
         }
         let all = ProgramSet::first(agreement.schedule.controllers());
         let known = known.map(Replica::id).collect();
-        match (agreement.mode, &self.settings.generated) {
-            (Mode::Full, _) => {
-                words::of_understudy(Mode::Full, all, known, self.confirmed(), |program| {
-                    let replica = self.replicas.iter().find(|replica| replica.id() == program);
-                    replica.map(Replica::outputs)
-                })
-            }
-            (Mode::Paper, Some(scan)) if known == all => {
+        let masks = words::masks_of_understudy(agreement.mode, all, known, self.confirmed());
+        let outputs_of = |program| {
+            let replica = self.replicas.iter().find(|replica| replica.id() == program);
+            replica.map(Replica::outputs)
+        };
+        let word_of = |mask| match agreement.mode {
+            Mode::Full => understudy_parity::sum(mask, outputs_of),
+            Mode::Paper => {
+                let generated = self.settings.generated.as_ref()?;
                 let steps = self.replicas.iter().map(Replica::last_step);
-                let sum = generated::outputs(scan, &mut self.scratch, steps);
-                sum.into_iter().map(|sum| Word { mask: all, sum }).collect()
+                let sum = generated::outputs(generated, &mut self.scratch, steps)?;
+                Some(Word { mask, sum })
             }
-            (Mode::Paper, _) => SmallVec::new(),
-        }
+        };
+        masks.into_iter().filter_map(word_of).collect()
     }
 
-    pub(super) fn speaks_at(&self) -> Option<Time> {
+    pub(super) fn publishes_at(&self) -> Option<Time> {
         let moment = self.member.clock.moment()?;
-        let may = !self.cycle.published && self.speaks();
-        may.then(|| self.speaks_by(moment))
+        let may = self.cycle.token == Token::Awaited && self.publishes();
+        may.then(|| self.publishes_by(moment))
     }
 
-    fn speaks_by(&self, moment: Moment) -> Time {
+    fn publishes_by(&self, moment: Moment) -> Time {
         let schedule = &self.settings.agreement.schedule;
         self.member.clock.anchor()
             + if self.knows_all_outputs(moment) {

@@ -90,7 +90,7 @@ pub fn find(cluster: &Cluster, keys: TlsKeys, peers: Vec<Peer>) -> Result<Found,
     Ok(Found {
         line,
         signals: controllers
-            .map(|own| (own.program.inputs.len(), own.program.outputs.len()))
+            .map(|own| (own.interface.inputs.width(), own.interface.outputs.width()))
             .collect(),
         members: members
             .map(|(peer, call)| (peer, call.map_err(Vain::words)))

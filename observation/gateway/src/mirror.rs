@@ -8,6 +8,9 @@ use std::time::Duration;
 use serde_json::{Map, Value, json};
 use understudy_bus::Announcer;
 use understudy_cluster::Cluster;
+use understudy_executable::Interface;
+use understudy_typed::Points;
+use understudy_view::value_of;
 use understudy_view::{ProgramSnapshot, Snapshot};
 
 use crate::error::GatewayError;
@@ -98,21 +101,17 @@ fn documents(cluster: &Cluster, snapshot: &Snapshot) -> Vec<(String, Value)> {
         ("alarms".to_owned(), json!(snapshot.alarms)),
     ];
     for (controller, program) in cluster.controllers().iter().zip(&snapshot.programs) {
-        let outputs = controller.circuit.outputs().iter();
-        let outputs: Vec<&str> = outputs.map(|output| output.name.as_str()).collect();
-        let inputs = controller.circuit.inputs().iter().map(String::as_str);
-        let inputs: Vec<&str> = inputs.collect();
-        let document = values(program, &inputs, &outputs);
+        let document = values(program, &controller.interface);
         documents.push((format!("programs/{}", controller.name), document));
     }
     documents
 }
 
-fn values(program: &ProgramSnapshot, inputs: &[&str], outputs: &[&str]) -> Value {
+fn values(program: &ProgramSnapshot, interface: &Interface) -> Value {
     json!({
         "source": program.source,
-        "inputs": named(inputs, program.inputs.as_deref()),
-        "outputs": named(outputs, program.outputs.as_deref()),
+        "inputs": named(&interface.inputs, program.inputs.as_deref()),
+        "outputs": named(&interface.outputs, program.outputs.as_deref()),
         "word_of": program.word_of,
         "missing": program.missing,
         "awaits_release": program.awaits_release,
@@ -129,18 +128,17 @@ fn values(program: &ProgramSnapshot, inputs: &[&str], outputs: &[&str]) -> Value
 }
 
 /// Signals by name; nothing where no image is known.
-fn named(names: &[&str], bits: Option<&str>) -> Option<Map<String, Value>> {
-    let bits = bits?.bytes().map(|byte| byte == b'1');
-    let signals = names.iter().zip(bits);
-    Some(
-        signals
-            .map(|(name, bit)| ((*name).to_owned(), Value::Bool(bit)))
-            .collect(),
-    )
+fn named(points: &Points, bits: Option<&str>) -> Option<Map<String, Value>> {
+    let bits = bits?;
+    let signals = points.iter();
+    let signals = signals.filter_map(|point| Some((point.name.clone(), value_of(point, bits)?)));
+    Some(signals.collect())
 }
 
 #[cfg(test)]
 mod tests {
+    use understudy_typed::Elementary;
+
     use super::*;
 
     #[test]
@@ -154,8 +152,11 @@ mod tests {
 
     #[test]
     fn signals_stand_by_their_names() {
-        let found = named(&["a", "b"], Some("10")).map(Value::Object);
-        assert_eq!(found, Some(json!({ "a": true, "b": false })));
-        assert_eq!(named(&["a"], None), None);
+        let mut points = Points::default();
+        points.push("a", Elementary::Bool, 0);
+        points.push("b", Elementary::Sint, 0);
+        let found = named(&points, Some("1000000011111111")).map(Value::Object);
+        assert_eq!(found, Some(json!({ "a": true, "b": -1 })));
+        assert_eq!(named(&points, None), None);
     }
 }

@@ -9,7 +9,6 @@
 //! Numbers of 32 bits take two registers, the upper half first. Addresses are those on the wire, from 0.
 
 use understudy_cluster::Cluster;
-use understudy_logic::Circuit;
 use understudy_view::{RunState, Snapshot, StationState};
 
 use crate::error::GatewayError;
@@ -84,57 +83,29 @@ const SOURCES: &str = "0 not known, 1 direct, 2 reconstructed, 3 held, 4 fail-sa
 const PROTECTION: &str = "0 not known, 1 protected, 2 not protected: the failure of one station would not be masked, 3 state lost";
 
 /// Of the run, with address, width and meaning.
+#[rustfmt::skip]
 const OF_RUN: [(u16, u16, &str, &str); 8] = [
     (0, 1, "map.version", "1"),
-    (
-        1,
-        1,
-        "run.state",
-        "0 starting, 1 running, 2 finished, 3 interrupted",
-    ),
+    (1, 1, "run.state", "0 starting, 1 running, 2 finished, 3 interrupted"),
     (2, 2, "run.cycle", "the newest cycle, from the origin"),
     (4, 2, "run.period_us", "microseconds"),
-    (
-        6,
-        1,
-        "margin.survives",
-        "remaining redundancy: any further failures of stations that would be masked",
-    ),
-    (
-        7,
-        1,
-        "alarms.open",
-        "alarms that last or are not acknowledged",
-    ),
+    (6, 1, "margin.survives", "remaining redundancy: any further failures of stations that would be masked"),
+    (7, 1, "alarms.open", "alarms that last or are not acknowledged"),
     (8, 1, "cluster.programs", "number of programs"),
     (9, 1, "cluster.stations", "number of stations"),
 ];
 
 /// Of a program, with its place behind the program's first register.
+#[rustfmt::skip]
 const PROGRAM_REGISTERS: [(u16, u16, &str, &str); 10] = [
     (0, 1, "source", SOURCES),
-    (
-        1,
-        1,
-        "awaits_release",
-        "1 where the operator has to release the outputs",
-    ),
+    (1, 1, "awaits_release", "1 where the operator has to release the outputs"),
     (2, 1, "forced", "number of forced signals"),
     (3, 1, "protection", PROTECTION),
     (4, 2, "direct", "deadlines, from the origin of the run on"),
-    (
-        6,
-        2,
-        "reconstructed",
-        "deadlines, from the origin of the run on",
-    ),
+    (6, 2, "reconstructed", "deadlines, from the origin of the run on"),
     (8, 2, "held", "deadlines, from the origin of the run on"),
-    (
-        10,
-        2,
-        "fail_safe",
-        "deadlines, from the origin of the run on",
-    ),
+    (10, 2, "fail_safe", "deadlines, from the origin of the run on"),
     (12, 2, "finished", "finished parts"),
     (14, 2, "plant_faults", "plant faults"),
 ];
@@ -147,10 +118,6 @@ impl RegisterMap {
     pub fn new(cluster: &Cluster) -> Result<Self, GatewayError> {
         let programs = cluster.controllers();
         let mut places = Vec::new();
-        let outputs = |circuit: &Circuit| -> Vec<String> {
-            let outputs = circuit.outputs().iter();
-            outputs.map(|output| output.name.clone()).collect()
-        };
         for (area, meaning) in [
             (Area::DiscreteInput, "input, as last sampled"),
             (Area::Coil, "output, as driven"),
@@ -159,8 +126,8 @@ impl RegisterMap {
                 .iter()
                 .flat_map(|program| {
                     let signals = match area {
-                        Area::DiscreteInput => program.circuit.inputs().to_vec(),
-                        _ => outputs(&program.circuit),
+                        Area::DiscreteInput => program.interface.inputs.bit_names(),
+                        _ => program.interface.outputs.bit_names(),
                     };
                     let named = move |signal| format!("{}.{signal}", program.name);
                     signals.into_iter().map(named)
@@ -212,8 +179,8 @@ impl RegisterMap {
             }
         }
         let widths = programs.iter().map(|program| {
-            let circuit = &program.circuit;
-            (circuit.inputs().len(), circuit.outputs().len())
+            let interface = &program.interface;
+            (interface.inputs.width(), interface.outputs.width())
         });
         Ok(Self {
             places,

@@ -10,7 +10,7 @@ use std::io::{self, BufRead, BufReader, Write};
 use std::path::Path;
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::record::Record;
 use crate::segments::{Segments, segments_of};
@@ -150,30 +150,17 @@ pub fn records(journal: impl BufRead) -> impl Iterator<Item = Result<Record, Jou
                 Ok(line) => line,
                 Err(error) => return Some(Err(error.into())),
             };
-            let no_record = |reason| JournalError::Line {
+            if index == 0 {
+                let wrong = check_header(line.as_bytes()).err();
+                refused = matches!(wrong, Some(JournalError::Version(_)));
+                return wrong.map(Err);
+            }
+            let record = serde_json::from_str(&line);
+            Some(record.map_err(|reason| JournalError::Line {
                 line: index + 1,
                 reason,
-            };
-            if index == 0 {
-                if let Err(reason) = is_of_a_journal(&line) {
-                    return Some(Err(no_record(reason)));
-                }
-                let wrong = check_header(line.as_bytes()).err();
-                refused = wrong.is_some();
-                return wrong.map(|wrong| Err(wrong.into()));
-            }
-            Some(serde_json::from_str(&line).map_err(no_record))
+            }))
         })
-}
-
-/// Whether a line is a record of a journal of any version: each has a time.
-fn is_of_a_journal(line: &str) -> Result<(), serde_json::Error> {
-    #[derive(Deserialize)]
-    struct Timed {
-        #[serde(rename = "at_ns")]
-        _at_ns: u64,
-    }
-    serde_json::from_str::<Timed>(line).map(drop)
 }
 
 #[cfg(test)]

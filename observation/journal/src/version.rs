@@ -12,6 +12,7 @@ use std::io::{self, BufRead, BufReader, Read as _};
 use std::path::Path;
 
 use serde::Deserialize;
+use serde_json::Value;
 use understudy_bus::JOURNAL_VERSION;
 
 use crate::journal::JournalError;
@@ -32,9 +33,13 @@ pub struct WrongVersion {
     pub found: u32,
 }
 
+/// The first line: a record of any version has a time.
 #[derive(Deserialize)]
 struct First {
-    event: Header,
+    #[serde(rename = "at_ns")]
+    _at_ns: u64,
+    #[serde(default)]
+    event: Value,
 }
 
 #[derive(Deserialize)]
@@ -52,15 +57,16 @@ pub fn journal_header() -> Vec<u8> {
     line
 }
 
-/// Whether the first line of a file of a journal is that of a version that can be read.
+/// Checks the first line of a file of a journal.
 ///
 /// # Errors
-/// [`WrongVersion`].
-pub fn check_header(line: &[u8]) -> Result<(), WrongVersion> {
-    let first = serde_json::from_slice::<First>(line).ok();
-    let header = first.map(|first| first.event);
+/// [`JournalError::Line`] where it is not a record of any version, [`JournalError::Version`] where it is one of another version.
+pub fn check_header(line: &[u8]) -> Result<(), JournalError> {
+    let first: First =
+        serde_json::from_slice(line).map_err(|reason| JournalError::Line { line: 1, reason })?;
+    let header = Header::deserialize(first.event).ok();
     let header = header.filter(|header| header.event == "journal");
-    check_version(header.map_or(1, |header| header.version))
+    Ok(check_version(header.map_or(1, |header| header.version))?)
 }
 
 /// Whether records of a version can be read.
@@ -101,18 +107,22 @@ mod tests {
 
     #[test]
     fn only_this_version_is_read() {
-        let check = |line: &str, expected: Result<(), u32>| {
-            let checked = check_header(line.as_bytes()).map_err(|wrong| wrong.found);
+        let check = |line: &str, expected: Result<(), Option<u32>>| {
+            let checked = check_header(line.as_bytes()).map_err(|error| match error {
+                JournalError::Version(wrong) => Some(wrong.found),
+                _ => None,
+            });
             assert_eq!(checked, expected, "{line}");
         };
         let header = String::from_utf8(journal_header()).expect("text");
         check(&header, Ok(()));
-        check(&header.replace(":2}", ":3}"), Err(3));
+        check(&header.replace(":2}", ":3}"), Err(Some(3)));
         check(
             r#"{"at_ns":1,"name":"laboratory","party":null,"event":{"event":"started","party":{"station":0}}}"#,
-            Err(1),
+            Err(Some(1)),
         );
-        check("", Err(1));
-        check("{\"at_ns\"", Err(1));
+        check("{\"at_ns\":1}", Err(Some(1)));
+        check("", Err(None));
+        check("{\"at_ns\"", Err(None));
     }
 }

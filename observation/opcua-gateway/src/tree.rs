@@ -27,6 +27,8 @@ pub enum Kind {
     Int64,
     /// A number.
     UInt64,
+    /// A number with a fraction.
+    Double,
     /// A text.
     String,
     /// A list of texts.
@@ -40,6 +42,7 @@ impl Kind {
             Self::Boolean => "Boolean",
             Self::Int64 => "Int64",
             Self::UInt64 => "UInt64",
+            Self::Double => "Double",
             Self::String => "String",
             Self::Strings => "String[]",
         }
@@ -50,6 +53,7 @@ impl Kind {
             Self::Boolean => DataTypeId::Boolean,
             Self::Int64 => DataTypeId::Int64,
             Self::UInt64 => DataTypeId::UInt64,
+            Self::Double => DataTypeId::Double,
             Self::String | Self::Strings => DataTypeId::String,
         }
     }
@@ -175,6 +179,13 @@ pub fn variables(cluster: &Cluster) -> Vec<Variable> {
     tree.variables
 }
 
+/// Adds variables: name, kind, meaning, and the function that reads the value.
+macro_rules! rows {
+    ($tree:ident; $($name:literal $kind:ident $meaning:tt => $read:expr;)*) => {
+        $($tree.add($name, Kind::$kind, $meaning, $read);)*
+    };
+}
+
 struct Tree {
     folders: Vec<String>,
     variables: Vec<Variable>,
@@ -202,92 +213,45 @@ impl Tree {
     }
 
     fn run(&mut self) {
+        let counted = |read: fn(&Observation) -> Option<Variant>| {
+            move |seen: &Seen<'_>| seen.counted(read(seen.observation))
+        };
+        let present = |read: fn(&Observation) -> Variant| {
+            move |seen: &Seen<'_>| seen.present(Some(read(seen.observation)), StatusCode::Good)
+        };
         self.enter(&["Run"]);
-        self.add(
-            "State",
-            Kind::String,
-            "starting, running, finished or interrupted",
-            |seen| seen.counted(Some(text(seen.observation.snapshot.run.word()))),
-        );
-        self.add(
-            "Cycle",
-            Kind::Int64,
-            "newest cycle, from the origin of the run",
-            |seen| seen.counted(seen.observation.snapshot.cycle.map(Variant::from)),
-        );
-        self.add(
-            "Period",
-            Kind::UInt64,
-            "period of a cycle, in microseconds",
-            |seen| seen.counted(Some(seen.observation.snapshot.period_us.into())),
-        );
-        self.add("Mode", Kind::String, "full or paper", |seen| {
-            seen.counted(Some(text(seen.observation.snapshot.mode)))
-        });
-        self.add(
-            "Records",
-            Kind::UInt64,
-            "records of the journal that were read",
-            |seen| seen.counted(Some(seen.observation.snapshot.records.into())),
-        );
-        self.add(
-            "LeftOut",
-            Kind::UInt64,
-            "records that were gone or could not be read",
-            |seen| seen.counted(Some(seen.observation.snapshot.left_out.into())),
-        );
+        rows! { self;
+            "State" String "starting, running, finished or interrupted" => counted(|of| Some(text(of.snapshot.run.word())));
+            "Cycle" Int64 "newest cycle, from the origin of the run" => counted(|of| of.snapshot.cycle.map(Variant::from));
+            "Period" UInt64 "period of a cycle, in microseconds" => counted(|of| Some(of.snapshot.period_us.into()));
+            "Mode" String "full or paper" => counted(|of| Some(text(of.snapshot.mode)));
+            "Records" UInt64 "records of the journal that were read" => counted(|of| Some(of.snapshot.records.into()));
+            "LeftOut" UInt64 "records that were gone or could not be read" => counted(|of| Some(of.snapshot.left_out.into()));
+        }
         self.enter(&["Margin"]);
-        self.add(
-            "Survives",
-            Kind::UInt64,
-            "remaining redundancy: any further failures of stations that would be masked",
-            |seen| {
-                let survives = u64::from(seen.observation.snapshot.margin.survives);
-                seen.present(Some(survives.into()), StatusCode::Good)
-            },
-        );
-        self.add(
-            "Served",
-            Kind::Strings,
-            "programs with provable outputs",
-            |seen| {
-                let served = &seen.observation.snapshot.margin.served;
-                seen.present(Some(texts(served)), StatusCode::Good)
-            },
-        );
+        rows! { self;
+            "Survives" UInt64 "remaining redundancy: any further failures of stations that would be masked"
+                => present(|of| u64::from(of.snapshot.margin.survives).into());
+            "Served" Strings "programs with provable outputs" => present(|of| texts(&of.snapshot.margin.served));
+        }
         self.enter(&["Alarms"]);
-        self.add(
-            "Open",
-            Kind::UInt64,
-            "alarms that last or are not acknowledged",
-            |seen| {
-                let open = seen.observation.snapshot.alarms.len() as u64;
-                seen.counted(Some(open.into()))
-            },
-        );
-        self.add("Texts", Kind::Strings, "open alarms, in words", |seen| {
-            let alarms = seen.observation.snapshot.alarms.iter();
-            let alarms: Vec<String> = alarms
-                .map(|alarm| format!("cycle {}: {}: {}", alarm.cycle, alarm.name, alarm.text))
-                .collect();
-            seen.counted(Some(texts(&alarms)))
-        });
+        rows! { self;
+            "Open" UInt64 "alarms that last or are not acknowledged" => counted(|of| Some((of.snapshot.alarms.len() as u64).into()));
+            "Texts" Strings "open alarms, in words" => counted(|of| {
+                let alarms = of.snapshot.alarms.iter();
+                let alarms = alarms.map(|alarm| format!("cycle {}: {}: {}", alarm.cycle, alarm.name, alarm.text));
+                Some(texts(&alarms.collect::<Vec<_>>()))
+            });
+        }
         self.enter(&["Events"]);
-        self.add("Count", Kind::UInt64, "events so far", |seen| {
-            seen.counted(Some(seen.observation.snapshot.events.into()))
-        });
-        self.add(
-            "Recent",
-            Kind::Strings,
-            "the newest 20 events, in words, the newest last",
-            |seen| {
-                let recent = seen.observation.recent.iter();
-                let recent = recent.map(|event| {
-                    format!("cycle {}: {}: {}", event.cycle, event.name, message(event))
-                });
-                seen.counted(Some(texts(&recent.collect::<Vec<_>>())))
-            },
-        );
+        rows! { self;
+            "Count" UInt64 "events so far" => counted(|of| Some(of.snapshot.events.into()));
+            "Recent" Strings "the newest 20 events, in words, the newest last" => counted(|of| {
+                let recent = of.recent.iter();
+                let recent = recent.map(|event| format!("cycle {}: {}: {}", event.cycle, event.name, message(event)));
+                Some(texts(&recent.collect::<Vec<_>>()))
+            });
+        }
     }
 
     fn station(&mut self, rank: usize, name: &str) {
@@ -295,36 +259,13 @@ impl Tree {
         let of = move |read: fn(&StationSnapshot) -> Variant| {
             move |seen: &Seen<'_>| seen.present(seen.station(rank).map(read), StatusCode::Good)
         };
-        self.add(
-            "State",
-            Kind::String,
-            "publishing, not-received, flagged, joining, shadow-mode, refused, suspended, killed, ended or not-started",
-            of(|station| text(station.state.word())),
-        );
-        self.add(
-            "Understudy",
-            Kind::Boolean,
-            "whether it is generated from the controllers",
-            of(|station| station.understudy.into()),
-        );
-        self.add(
-            "Flagged",
-            Kind::Boolean,
-            "whether a remote I/O has closed its slot",
-            of(|station| station.flagged.into()),
-        );
-        self.add(
-            "PublishesFor",
-            Kind::Strings,
-            "programs that it publishes for",
-            of(|station| texts(&station.publishes_for)),
-        );
-        self.add(
-            "ExcludedFrom",
-            Kind::Strings,
-            "programs whose remote I/O has excluded it",
-            of(|station| texts(&station.excluded_from)),
-        );
+        rows! { self;
+            "State" String "publishing, not-received, flagged, joining, shadow-mode, refused, suspended, killed, ended or not-started" => of(|station| text(station.state.word()));
+            "Understudy" Boolean "whether it is generated from the controllers" => of(|station| station.understudy.into());
+            "Flagged" Boolean "whether a remote I/O has closed its slot" => of(|station| station.flagged.into());
+            "PublishesFor" Strings "programs that it publishes for" => of(|station| texts(&station.publishes_for));
+            "ExcludedFrom" Strings "programs whose remote I/O has excluded it" => of(|station| texts(&station.excluded_from));
+        }
     }
 
     fn program(&mut self, place: usize, controller: &Controller) {
@@ -340,119 +281,35 @@ impl Tree {
                 seen.counted(seen.program(place).and_then(read).map(Variant::from))
             }
         };
-        self.add(
-            "Source",
-            Kind::String,
-            "source of the outputs: direct, reconstructed, held or fail-safe",
-            of(|program| program.source.map(text)),
-        );
-        self.add(
-            "Since",
-            Kind::Int64,
-            "first cycle of those in a row with this source",
-            of(|program| program.since.map(Variant::from)),
-        );
-        self.add(
-            "WordOf",
-            Kind::String,
-            "station whose parity word the outputs were reconstructed from, or empty",
-            of(|program| Some(text(program.word_of.as_deref().unwrap_or_default()))),
-        );
-        self.add(
-            "Missing",
-            Kind::String,
-            "why there was no provable output in a missed cycle, or empty",
-            of(|program| Some(text(program.missing.unwrap_or_default()))),
-        );
-        self.add(
-            "AwaitsRelease",
-            Kind::Boolean,
-            "whether the operator has to release the outputs",
-            of(|program| Some(program.awaits_release.into())),
-        );
-        self.add(
-            "Forced",
-            Kind::Strings,
-            "forced signals, with owner and reason",
-            of(|program| Some(texts(&program.forced))),
-        );
-        self.add(
-            "Protected",
-            Kind::Boolean,
-            "whether the failure of one station would be masked",
-            of(|program| Some(program.protection.as_ref()?.protected.into())),
-        );
-        self.add(
-            "Protection",
-            Kind::String,
-            "protected; otherwise the first cycle without protection, and the reason",
-            of(|program| Some(text(&program.protection.as_ref()?.text()))),
-        );
-        self.add(
-            "StateLost",
-            Kind::Boolean,
-            "whether no living station can prove its state",
-            of(|program| Some(program.lost.is_some().into())),
-        );
-        self.add(
-            "LostState",
-            Kind::String,
-            "newest available state where the state is lost, or empty",
-            of(|program| {
+        rows! { self;
+            "Source" String "source of the outputs: direct, reconstructed, held or fail-safe" => of(|program| program.source.map(text));
+            "Since" Int64 "first cycle of those in a row with this source" => of(|program| program.since.map(Variant::from));
+            "WordOf" String "station whose parity word the outputs were reconstructed from, or empty" => of(|program| Some(text(program.word_of.as_deref().unwrap_or_default())));
+            "Missing" String "why there was no provable output in a missed cycle, or empty" => of(|program| Some(text(program.missing.unwrap_or_default())));
+            "AwaitsRelease" Boolean "whether the operator has to release the outputs" => of(|program| Some(program.awaits_release.into()));
+            "Forced" Strings "forced signals, with owner and reason" => of(|program| Some(texts(&program.forced)));
+            "Protected" Boolean "whether the failure of one station would be masked" => of(|program| Some(program.protection.as_ref()?.protected.into()));
+            "Protection" String "protected; otherwise the first cycle without protection, and the reason" => of(|program| Some(text(&program.protection.as_ref()?.text())));
+            "StateLost" Boolean "whether no living station can prove its state" => of(|program| Some(program.lost.is_some().into()));
+            "LostState" String "newest available state where the state is lost, or empty" => of(|program| {
                 let lost = program.lost.as_ref().map(understudy_view::LostState::text);
                 Some(text(&lost.unwrap_or_default()))
-            }),
-        );
-        self.add(
-            "LostStateCycle",
-            Kind::UInt64,
-            "the cycle of that state, as the operator's choice names it; 0 where no state is lost",
-            of(|program| Some(program.lost.as_ref().map_or(0, |lost| lost.newest).into())),
-        );
-        self.add(
-            "LostStateAge",
-            Kind::UInt64,
-            "age of that state in cycles; 0 where no state is lost",
-            of(|program| {
-                let age = program
-                    .lost
-                    .as_ref()
-                    .map_or(Some(0), |lost| lost.age_cycles);
+            });
+            "LostStateCycle" UInt64 "the cycle of that state, as the operator's choice names it; 0 where no state is lost" => of(|program| Some(program.lost.as_ref().map_or(0, |lost| lost.newest).into()));
+            "LostStateAge" UInt64 "age of that state in cycles; 0 where no state is lost" => of(|program| {
+                let age = program.lost.as_ref().map_or(Some(0), |lost| lost.age_cycles);
                 age.map(Variant::from)
-            }),
-        );
+            });
+        }
         let deadlines = "deadlines with this source, from the origin of the run on";
-        self.add(
-            "Direct",
-            Kind::UInt64,
-            deadlines,
-            count(|of| Some(of.direct)),
-        );
-        self.add(
-            "Reconstructed",
-            Kind::UInt64,
-            deadlines,
-            count(|of| Some(of.reconstructed)),
-        );
-        self.add("Held", Kind::UInt64, deadlines, count(|of| Some(of.held)));
-        self.add(
-            "FailSafe",
-            Kind::UInt64,
-            deadlines,
-            count(|of| Some(of.fail_safe)),
-        );
-        self.add(
-            "Finished",
-            Kind::UInt64,
-            "finished parts of a simulated plant",
-            count(|of| of.finished),
-        );
-        self.add(
-            "PlantFaults",
-            Kind::UInt64,
-            "plant faults of a simulated plant",
-            count(|of| of.plant_faults),
-        );
+        rows! { self;
+            "Direct" UInt64 deadlines => count(|of| Some(of.direct));
+            "Reconstructed" UInt64 deadlines => count(|of| Some(of.reconstructed));
+            "Held" UInt64 deadlines => count(|of| Some(of.held));
+            "FailSafe" UInt64 deadlines => count(|of| Some(of.fail_safe));
+            "Finished" UInt64 "finished parts of a simulated plant" => count(|of| of.finished);
+            "PlantFaults" UInt64 "plant faults of a simulated plant" => count(|of| of.plant_faults);
+        }
         self.signals(place, controller);
     }
 }

@@ -1,14 +1,36 @@
 //! Records as sentences.
 
-mod members;
-mod processes;
+use std::collections::BTreeSet;
 
-use understudy_journal::{Happening, Members, Record};
+use understudy_journal::{Happening, Members, Record, source_word};
 use understudy_remote_io::Missing;
-use understudy_wire::{Element, Member, ProgramId, ProgramSet, Set, StationId, StationSet};
+use understudy_wire::{Element, Member, ProgramId, ProgramSet, Set, Source, StationId, StationSet};
 
 use crate::event::Level;
 pub(crate) use processes::fault_text;
+
+/// A table of descriptions: each kind of event with its name, its level and its text. It makes the function that describes an event,
+/// and the list of the names.
+macro_rules! descriptions {
+    ($function:ident: $event:ident, $members:ident;
+     $($kind:ident $({ $($fields:tt)* })? $(($($values:tt)*))? => $name:literal $level:ident $text:expr;)*) => {
+        pub(super) mod $function {
+            /// Name of each kind of event.
+            pub(in crate::describe) const NAMES: &[&str] = &[$($name),*];
+        }
+
+        pub(super) fn $function(event: &$event, $members: &Members) -> Words {
+            match event {
+                $($event::$kind $({ $($fields)* })? $(($($values)*))? => {
+                    ($name, crate::event::Level::$level, String::from($text))
+                })*
+            }
+        }
+    };
+}
+
+mod members;
+mod processes;
 
 /// A record as a sentence.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -23,74 +45,19 @@ pub struct Description {
     pub is_ordinary: bool,
 }
 
-/// Every value of [`Description::event`].
-pub(crate) const EVENTS: [&str; 65] = [
-    "acknowledged",
-    "adopted",
-    "adopted-lineage",
-    "applied",
-    "attached",
-    "became-cycle-master",
-    "channel-failed",
-    "channel-opened",
-    "choice-refused",
-    "cleared",
-    "commanded",
-    "detached",
-    "diagnosed",
-    "digest-differs",
-    "disputed",
-    "duplicate-found",
-    "duplicate-gone",
-    "ended",
-    "excluded",
-    "fault",
-    "field-contested",
-    "field-lost",
-    "field-regained",
-    "field-uncontested",
-    "finished",
-    "flagged",
-    "forced",
-    "holds",
-    "interrupted",
-    "joins",
-    "journal",
-    "journal-lost",
-    "link-failed",
-    "link-reopened",
-    "new-life",
-    "no-new-life",
-    "origin",
-    "protected",
-    "published",
-    "readmitted",
-    "ready",
-    "recalled-exclusion",
-    "refused",
-    "refused-bytes",
-    "refused-connections",
-    "refused-frames",
-    "released",
-    "sampled",
-    "scenario-over",
-    "source",
-    "stalled",
-    "started",
-    "started-cold",
-    "state-lost",
-    "state-recovered",
-    "stepped",
-    "stopped",
-    "synchronised",
-    "syndrome",
-    "unforced",
-    "unknown-command",
-    "unprotected",
-    "unsendable-frames",
-    "value-fault",
-    "voided",
-];
+/// Every value of [`Description::event`], each once.
+pub(crate) fn event_names() -> BTreeSet<&'static str> {
+    let all = [
+        members::station::NAMES,
+        members::remote_io::NAMES,
+        members::plant::NAMES,
+        processes::host::NAMES,
+        processes::run::NAMES,
+    ];
+    // A listing shows a deadline whose source changed as an event of its own.
+    let names = all.into_iter().flatten().copied();
+    names.chain(["source"]).collect()
+}
 
 /// Describes a record with the names of its cluster.
 pub fn describe(record: &Record, names: &Members) -> Description {
@@ -130,6 +97,24 @@ pub(crate) fn missing_text(missing: Missing) -> &'static str {
         }
         Missing::SecondFailure => "two stations have failed (S2)",
     }
+}
+
+/// The source of applied outputs in words: where they came from, or why no output was provable.
+pub(crate) fn source_text(
+    source: Source,
+    word_of: Option<StationId>,
+    missing: Option<Missing>,
+    members: &Members,
+) -> String {
+    let mut text = source_word(source).to_owned();
+    if let Some(station) = word_of {
+        let name = members.name(Member::Station(station));
+        text += &format!(" from a parity word of {name}");
+    }
+    if let Some(missing) = missing {
+        text += &format!(": {}", missing_text(missing));
+    }
+    text
 }
 
 /// A program has the name of its controller.

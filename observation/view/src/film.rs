@@ -4,6 +4,7 @@
 
 mod picture;
 
+use understudy_typed::Elementary;
 use understudy_wire::{Image, Member, ProgramId, Source, StationId};
 
 use crate::error::ViewError;
@@ -218,17 +219,16 @@ impl Model {
         let Some(images) = self.series().outputs(program) else {
             return Vec::new();
         };
-        let names = self.cluster().controllers()[program.index()]
-            .circuit
-            .outputs();
-        let names = names.iter().take(MAXIMUM_OUTPUTS).enumerate();
-        names
-            .map(|(place, output)| Output {
+        let interface = &self.cluster().controllers()[program.index()].interface;
+        let bits = interface.outputs.iter();
+        let bits = bits.filter(|output| output.of == Elementary::Bool);
+        bits.take(MAXIMUM_OUTPUTS)
+            .map(|output| Output {
                 name: output.name.clone(),
                 values: joined(images.spans(from, to).map(|span| Span {
                     from: span.from,
                     to: span.to,
-                    value: Image::get(span.value, place),
+                    value: Image::get(span.value, output.bit as usize),
                 })),
             })
             .collect()

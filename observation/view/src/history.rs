@@ -76,10 +76,10 @@ impl History {
     /// Of a program of a cluster; nothing where it has no such program.
     pub(crate) fn new(cluster: &Cluster, program: ProgramId, most: usize) -> Option<Self> {
         let settings = cluster.remote_io_settings(program)?;
-        let scan = cluster.programs().get(program.index())?.scan.clone();
+        let executable = cluster.programs().get(program.index())?.executable.clone();
         Some(Self {
             program,
-            referee: Referee::new(&settings, scan),
+            referee: Referee::new(&settings, executable),
             steps: VecDeque::new(),
             most: most.max(2),
             cut: false,

@@ -31,6 +31,7 @@ mod station;
 mod terminal;
 mod timeline;
 mod timing;
+mod value;
 mod why;
 
 pub use alarm::Alarm;
@@ -56,4 +57,5 @@ pub use station::StationState;
 pub use terminal::{Key, Screen};
 pub use timeline::{Span, Timeline};
 pub use timing::CycleTiming;
+pub use value::{number_of, stored, value_of};
 pub use why::{Addend, Reason, Reconstructed, Why};

@@ -11,7 +11,7 @@ use understudy_text::spelling::suggestion;
 use understudy_wire::{Member, Moment, ProgramId, Source};
 
 use crate::cycles::Cycles;
-use crate::describe::{EVENTS, describe};
+use crate::describe::{describe, event_names};
 use crate::error::ViewError;
 use crate::event::Level;
 
@@ -88,7 +88,8 @@ impl Listing {
         };
         check("member", &filter.members, &names);
         check("program", &filter.programs, &programs);
-        check("event", &filter.events, &EVENTS);
+        let events: Vec<&str> = event_names().into_iter().collect();
+        check("event", &filter.events, &events);
         if !errors.is_empty() {
             return Err(errors);
         }

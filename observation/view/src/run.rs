@@ -127,12 +127,21 @@ impl Run {
     pub fn open(path: &Path) -> Result<Self, ViewError> {
         let path = find_run(path)?;
         let journal = path.join(JOURNAL);
-        // What else is wrong with it is said by who follows it.
-        if let Err(JournalError::Version(wrong)) = check_journal(&journal) {
-            return Err(ViewError::Version {
-                path: journal,
-                wrong,
-            });
+        match check_journal(&journal) {
+            Err(JournalError::Version(wrong)) => {
+                return Err(ViewError::Version {
+                    path: journal,
+                    wrong,
+                });
+            }
+            Err(error @ JournalError::Line { .. }) => {
+                return Err(ViewError::Journal {
+                    path: journal,
+                    reason: error.to_string(),
+                });
+            }
+            // A file that cannot be read is reported by its follower.
+            Err(JournalError::Read(_)) | Ok(()) => {}
         }
         let cluster = Arc::new(kept_cluster(&path)?);
         Ok(Self { path, cluster })

@@ -8,7 +8,8 @@ mod progress;
 
 use std::path::{Path, PathBuf};
 
-use understudy_journal::{Record, WrongVersion};
+use understudy_journal::{JournalError, Record, WrongVersion};
+use understudy_text::shortened;
 
 use channel::Channel;
 pub use channel::Feed;
@@ -41,6 +42,30 @@ pub enum Trouble {
         /// How many, where that is known.
         count: Option<u64>,
     },
+}
+
+/// Maximum number of characters of the reason why a line is not a record.
+const LONGEST_REASON: usize = 200;
+
+impl Trouble {
+    /// A line that is not a record. The reason may quote the line.
+    fn of_line(reason: serde_json::Error) -> Self {
+        Self::Line {
+            reason: shortened(&reason.to_string(), LONGEST_REASON).into_owned(),
+        }
+    }
+}
+
+impl From<JournalError> for Trouble {
+    fn from(error: JournalError) -> Self {
+        match error {
+            JournalError::Version(wrong) => Self::Version(wrong),
+            JournalError::Line { reason, .. } => Self::of_line(reason),
+            JournalError::Read(error) => Self::Line {
+                reason: error.to_string(),
+            },
+        }
+    }
 }
 
 /// Where records come from.

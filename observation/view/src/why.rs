@@ -8,6 +8,8 @@ mod text;
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_journal::source_word;
+use understudy_ladder::Program;
+use understudy_parity::reconstruct;
 use understudy_text::spelling::suggestion;
 use understudy_wire::{Member, ProgramId, Source, StationId};
 
@@ -120,8 +122,8 @@ impl Model {
     ) -> Result<Why, ViewError> {
         let step = &history.steps()[place];
         let controller = &self.cluster.controllers()[program.index()];
-        let outputs = controller.circuit.outputs();
-        let output = outputs.iter().position(|output| output.name == name);
+        let output = controller.interface.outputs.find(name);
+        let output = output.map(|output| output.bit as usize);
         let source = step.driven.as_ref().map(|driven| driven.source);
         // What is held was true in an earlier cycle; the fail-safe values were never computed.
         let explained = match source {
@@ -129,7 +131,12 @@ impl Model {
             Some(Source::FailSafe) if output.is_some() => None,
             _ => Some(place),
         };
-        let mut explainer = Explainer::new(self, history, &controller.program);
+        let ladder = controller.ladder().ok_or_else(|| ViewError::NoState {
+            cycle: step.cycle,
+            program: controller.name.clone(),
+            reason: "only a ladder can be evaluated".to_owned(),
+        })?;
+        let mut explainer = Explainer::new(self, history, ladder);
         let because = match explained {
             None => None,
             Some(explained) => Some(explainer.root(name, explained)?),
@@ -174,7 +181,7 @@ impl Model {
         for (place, controller) in controllers.iter().enumerate() {
             let prefix = format!("{}.", controller.name);
             let name = asked.strip_prefix(&prefix).unwrap_or(asked);
-            for signal in controller.program.writable() {
+            for signal in controller.ladder().into_iter().flat_map(Program::writable) {
                 known.push(signal.name.to_string());
                 let address = signal.address.as_ref().map(ToString::to_string);
                 if signal.name.as_str() == name || address.as_deref() == Some(name) {
@@ -215,19 +222,20 @@ impl Model {
         let turns = self.sent_turns(step.moment);
         let turn = turns.iter().find(|turn| turn.station == station)?;
         let word = turn.words.iter().find(|word| word.mask.contains(program))?;
-        let mut sum = word.sum.clone();
-        let mut others = Vec::new();
-        for other in word.mask.iter().filter(|other| *other != program) {
-            let own = StationId(other.0);
-            let turn = turns.iter().find(|turn| turn.station == own);
-            let published = turn.and_then(|turn| turn.words.first())?;
-            sum.add(&published.sum);
-            others.push(Addend {
-                published_by: self.members.name(Member::Station(own)).to_owned(),
-                outputs: published.sum.to_string(),
-            });
-        }
-        let sum = sum.narrowed(driven.outputs.width()).unwrap_or(sum);
+        let published = |other: ProgramId| {
+            let turn = turns
+                .iter()
+                .find(|turn| turn.station == StationId(other.0))?;
+            turn.words.first().map(|word| &word.sum)
+        };
+        let sum = reconstruct(word, program, driven.outputs.width(), published).ok()?;
+        let others = word.mask.iter().filter(|other| *other != program);
+        let others = others.filter_map(|other| {
+            Some(Addend {
+                published_by: self.program_name(other).to_owned(),
+                outputs: published(other)?.to_string(),
+            })
+        });
         let not_received = (0..self.cluster.agreement().schedule.stations() as u8)
             .map(StationId)
             .filter(|station| !driven.heard.contains(*station))
@@ -241,7 +249,7 @@ impl Model {
                 .map(|member| self.program_name(member).to_owned())
                 .collect(),
             word: word.sum.to_string(),
-            others,
+            others: others.collect(),
             lineage: sampled.map_or_else(String::new, |sampled| sampled.after.to_string()),
             proved: sampled.is_some_and(|sampled| sampled.outputs == sum),
             sum: sum.to_string(),

@@ -4,10 +4,12 @@ pub mod digraph;
 mod format;
 pub mod ldmicro;
 pub mod plcopen;
+mod source;
 pub mod structured_text;
 mod written;
 
 pub use format::{Format, Reading, parse_program, read, read_all, unknown_form};
+pub use source::{Source, read_source};
 pub use written::{Compared, USUAL_PERIOD, WriteError, Written, write};
 
 /// The examples of the codes of this crate are run with its own.

@@ -8,7 +8,7 @@ pub mod format;
 mod value;
 
 pub use fields::{Fields, unknown_key};
-pub use value::{Placed, Value};
+pub use value::{Constant, Placed, Value};
 
 use crate::{Diagnostic, MAXIMUM_FINDINGS};
 use toml::Spanned;

@@ -4,7 +4,7 @@
 use std::fmt::Write;
 
 use understudy_logic::{Circuit, Expression, Operation, Variable};
-use understudy_wire::ProgramHash;
+use understudy_typed::Program as TypedProgram;
 
 /// A circuit, line by line: its inputs, registers with initial values, outputs, and the operations that they reach.
 ///
@@ -35,9 +35,27 @@ pub(crate) fn circuit_text(circuit: &Circuit) -> String {
     walk.text
 }
 
-/// Of the canonical text; the program's own name is not in it, its role is the cluster's affair.
-pub(crate) fn program_hash(circuit: &Circuit) -> ProgramHash {
-    ProgramHash::of(circuit_text(circuit).as_bytes())
+/// A typed program: its layout, its routines with the lines that a fault names, and its initial state. Names of variables inside are not in
+/// it.
+pub(crate) fn typed_text(program: &TypedProgram) -> String {
+    let TypedProgram {
+        name: _,
+        period,
+        budget,
+        enumerations: _,
+        structures: _,
+        routines,
+        tasks,
+        variables: _,
+        inputs,
+        outputs,
+        state,
+        frames,
+        initial,
+    } = program;
+    format!(
+        "typed program\nperiod {period}\nbudget {budget}\nmemory {state} {frames}\n{inputs:#?}\n{outputs:#?}\n{tasks:#?}\n{initial:?}\n{routines:#?}\n"
+    )
 }
 
 struct Walk<'a> {

@@ -4,11 +4,13 @@ use std::collections::BTreeSet;
 use std::net::SocketAddr;
 use std::sync::Arc;
 
+use crate::code::Code;
 use crate::device::FieldDevice;
 use serde::{Deserialize, Serialize};
 use understudy_cycle::{Agreement, Mode};
+use understudy_executable::Interface;
 use understudy_ladder::Program as LadderProgram;
-use understudy_logic::{Circuit, Scan};
+use understudy_logic::Circuit;
 use understudy_node::Program;
 use understudy_parity::ParityController;
 use understudy_plant::{Followed, Plant};
@@ -43,12 +45,12 @@ pub struct Controller {
     /// The station's name.
     pub name: String,
     /// The file with its program, as the cluster file names it.
-    pub ladder: String,
-    /// Its program, under the station's name.
-    pub program: LadderProgram,
-    /// The program for the period of the cluster.
-    pub circuit: Circuit,
-    /// Of the circuit.
+    pub file: String,
+    /// Its program, under the station's name and for the period of the cluster.
+    pub code: Code,
+    /// u(i) and y(i), point by point.
+    pub interface: Interface,
+    /// Of the program.
     pub hash: ProgramHash,
     /// Where it listens, if the file says so.
     pub address: Option<SocketAddr>,
@@ -72,6 +74,18 @@ pub struct DiagnosisPlace {
     pub circuit: Circuit,
     /// Bound to the signals of its program.
     pub compiled: Arc<Diagnosis>,
+}
+
+impl Controller {
+    /// The ladder, of a program that is Boolean.
+    pub fn ladder(&self) -> Option<&LadderProgram> {
+        self.code.ladder()
+    }
+
+    /// The circuit, of a program that is Boolean.
+    pub fn circuit(&self) -> Option<&Circuit> {
+        self.code.circuit()
+    }
 }
 
 impl DiagnosisPlace {
@@ -143,7 +157,7 @@ pub struct Cluster {
     pub(crate) remote_ios: Vec<RemoteIo>,
     pub(crate) plants: Vec<Option<PlantPlace>>,
     pub(crate) programs: Arc<[Program]>,
-    pub(crate) parity: ParityController,
+    pub(crate) parity: Option<ParityController>,
 }
 
 impl Cluster {
@@ -212,9 +226,10 @@ impl Cluster {
         &self.programs
     }
 
-    /// The generated controller N+1, (7)-(9).
-    pub fn parity(&self) -> &ParityController {
-        &self.parity
+    /// The generated controller N+1, (7)-(9), where all programs are Boolean: the sum of programs with numbers is of their outputs' bits, and has no
+    /// circuit.
+    pub fn parity(&self) -> Option<&ParityController> {
+        self.parity.as_ref()
     }
 
     /// Every member: stations by rank, then remote I/Os, then plants.
@@ -282,7 +297,11 @@ impl Cluster {
             station,
             agreement: Arc::clone(&self.agreement),
             programs: Arc::clone(&self.programs),
-            generated: evaluates_generated.then(|| Arc::new(Scan::new(self.parity.circuit()))),
+            generated: self
+                .parity
+                .as_ref()
+                .filter(|_| evaluates_generated)
+                .map(|parity| Arc::new(parity.circuit().into())),
             epoch,
         })
     }
@@ -295,8 +314,10 @@ impl Cluster {
             program,
             agreement: Arc::clone(&self.agreement),
             hash: controller.hash,
-            inputs: controller.circuit.inputs().len(),
-            channels: understudy_remote_io::Channel::of_inputs(controller.circuit.inputs()),
+            inputs: controller.interface.inputs.width(),
+            channels: understudy_remote_io::Channel::of_inputs(
+                &controller.interface.inputs.bit_names(),
+            ),
             diagnosis: remote_io
                 .diagnosis
                 .as_ref()

@@ -10,6 +10,7 @@ use understudy_wire::ProgramId;
 
 use crate::canonical::circuit_text;
 use crate::cluster::Cluster;
+use crate::code::Code;
 
 /// Raised when equal texts would mean something else than before.
 const VERSION: u32 = 1;
@@ -39,10 +40,7 @@ pub(crate) fn configuration_text(cluster: &Cluster, plants: &[String]) -> String
     for (controller, ((remote_io, plant), plant_text)) in cluster.controllers.iter().zip(remote_ios)
     {
         line(format_args!("controller {}", controller.name));
-        line(format_args!(
-            "{}",
-            indented(&circuit_text(&controller.circuit))
-        ));
+        line(format_args!("{}", indented(&controller.code.text())));
         line(format_args!("remote io {}", remote_io.name));
         line(format_args!("  hold {}", remote_io.hold_cycles));
         line(format_args!("  fail-safe {}", remote_io.fail_safe));
@@ -69,6 +67,7 @@ pub(crate) fn configuration_text(cluster: &Cluster, plants: &[String]) -> String
 /// A plant's model, its signals, its feeder, and what it follows by terminal.
 pub(crate) fn plant_text(
     kind: &ModelKind,
+    code: Option<&Code>,
     signals: &Signals,
     fed_by: Option<ProgramId>,
     follows: &[(String, Followed)],
@@ -84,7 +83,9 @@ pub(crate) fn plant_text(
                 parameters.ram_cycles, parameters.feed_cycles
             )
         }
-        ModelKind::Ladder(circuit) => format!("ladder\n{}", circuit_text(circuit)),
+        ModelKind::Program(_) => {
+            format!("program\n{}", code.map(Code::text).unwrap_or_default())
+        }
     };
     for (terminal, signal) in signals {
         writeln!(text, "signal {terminal} {signal}").expect("a string takes everything");
@@ -92,7 +93,15 @@ pub(crate) fn plant_text(
     if let Some(feeder) = fed_by {
         writeln!(text, "fed by {}", feeder.0).expect("a string takes everything");
     }
-    for (terminal, Followed { from, sensor }) in follows {
+    for (
+        terminal,
+        Followed {
+            from,
+            sensor,
+            bits: _,
+        },
+    ) in follows
+    {
         writeln!(text, "follows {terminal} {} {sensor}", from.0)
             .expect("a string takes everything");
     }

@@ -11,7 +11,7 @@ use std::time::Duration;
 use toml::de::DeTable;
 use understudy_text::Diagnostic;
 pub(crate) use understudy_text::tables::Placed;
-use understudy_text::tables::{Codes, Value, unknown_key};
+use understudy_text::tables::{Codes, Constant, Value, unknown_key};
 
 use crate::format::{Key, Kind, Section};
 
@@ -204,18 +204,18 @@ impl<'a, 't> Fields<'a, 't> {
         word.map_or(0, |word| word.value)
     }
 
-    /// A table from names to bits, in the order of its places.
-    pub(crate) fn bits(
+    /// A table from names to values, in the order of its places.
+    pub(crate) fn values(
         &self,
         name: &'static str,
         diagnostics: &mut Vec<Diagnostic>,
-    ) -> Vec<(Placed<String>, bool)> {
+    ) -> Vec<(Placed<String>, Constant)> {
         let entries = self.entries(name, diagnostics).into_iter();
-        let mut bits: Vec<_> = entries
-            .filter_map(|(name, value)| Some((name, value.flag(diagnostics)?.value)))
+        let mut values: Vec<_> = entries
+            .filter_map(|(name, value)| Some((name, value.constant(diagnostics)?.value)))
             .collect();
-        bits.sort_by_key(|(name, _)| name.span.start);
-        bits
+        values.sort_by_key(|(name, _)| name.span.start);
+        values
     }
 
     /// A table from names to names.

@@ -8,6 +8,7 @@ use std::time::Duration;
 use toml::de::DeTable;
 use understudy_plant::{PressParameters, RobotParameters};
 use understudy_text::Diagnostic;
+use understudy_text::tables::Constant;
 use understudy_text::tables::{Value, unknown_key};
 
 use crate::fields::{CODES, Fields, Placed};
@@ -64,7 +65,7 @@ pub(crate) struct RemoteIoSection {
     pub(crate) name: Option<Placed<String>>,
     pub(crate) controller: Option<Placed<String>>,
     pub(crate) hold_cycles: u32,
-    pub(crate) fail_safe: Vec<(Placed<String>, bool)>,
+    pub(crate) fail_safe: Vec<(Placed<String>, Constant)>,
     /// Index into [`crate::format::RELEASES`].
     pub(crate) release: usize,
     /// Index into [`crate::format::VALUE_FAULTS`].
@@ -150,7 +151,7 @@ pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
             name: fields.name("name", diagnostics),
             controller: fields.text("controller", diagnostics),
             hold_cycles: fields.count("hold_cycles", diagnostics),
-            fail_safe: fields.bits("fail_safe", diagnostics),
+            fail_safe: fields.values("fail_safe", diagnostics),
             release: fields.word("release", diagnostics),
             value_fault: fields.word("value_fault", diagnostics),
             stale_state: fields.word("stale_state", diagnostics),

@@ -53,7 +53,7 @@ pub(crate) enum Kind {
         default: bool,
     },
     /// A table from names to `true` or `false`.
-    Bits,
+    Values,
     /// A table from names to names.
     Names,
     /// A table whose keys depend on the model.
@@ -90,6 +90,26 @@ const fn count(least: u32, most: u32, default: u32) -> Kind {
     }
 }
 
+const fn time(least: Duration, most: Duration, default: Duration) -> Kind {
+    Kind::Time {
+        least,
+        most,
+        default,
+    }
+}
+
+const fn word(words: &'static [&'static str]) -> Kind {
+    let default = true;
+    Kind::Word { words, default }
+}
+
+/// Rows of a table: `required` or `key`, name, kind and meaning.
+macro_rules! keys {
+    ($($form:ident $name:ident: $kind:expr, $meaning:literal;)*) => {
+        &[$($form(stringify!($name), $kind, $meaning)),*]
+    };
+}
+
 /// Cycles in one number of the file, at most.
 const MANY_CYCLES: u32 = 100_000;
 
@@ -105,254 +125,89 @@ pub(crate) static CLUSTER: Section = Section {
     name: "cluster",
     repeated: false,
     meaning: "what holds for all",
-    keys: &[
-        required(
-            "name",
-            Kind::Name,
-            "names the cluster; frames of other clusters on the same network are ignored",
-        ),
-        key(
-            "period",
-            Kind::Time {
-                least: SHORTEST_PERIOD,
-                most: LONGEST_PERIOD,
-                default: Duration::from_millis(10),
-            },
-            "T, from one cycle to the next; timers of the ladders count in it",
-        ),
-        key(
-            "mode",
-            Kind::Word {
-                words: &MODES,
-                default: true,
-            },
-            "masked failures: `full`, any number of controllers as long as one understudy lives; `paper`, one failure, and all outputs become fail-safe at the second",
-        ),
-        key(
-            "copies",
-            count(1, 4, 2),
-            "number of times that each cyclic frame is sent, against loss",
-        ),
-        key(
-            "history",
-            count(1, MAXIMUM_HISTORY as u32, 8),
-            "samples that a remote I/O keeps and sends along, so that lost cycles are replayed",
-        ),
-        key(
-            "flag_after",
-            count(1, MANY_CYCLES, 3),
-            "cycles without a turn after which a station is flagged, and its slot is closed",
-        ),
-        key(
-            "shadow_cycles",
-            count(0, MANY_CYCLES, 3),
-            "cycles for which a repaired station computes in shadow mode before it publishes",
-        ),
-        key(
-            "listen_cycles",
-            count(1, MANY_CYCLES, 4),
-            "cycles for which a starting station listens before it founds an epoch of its own",
-        ),
-        key(
-            "link",
-            Kind::Word {
-                words: &LINKS,
-                default: true,
-            },
-            "the transport of the frames",
-        ),
-        key(
-            "security",
-            Kind::Word {
-                words: &SECURITIES,
-                default: true,
-            },
-            "whose frames are accepted: `keys`, those of members with keys of this cluster, see `understudy keys`; `off`, all frames on the network. The laboratory makes keys of its own for each run",
-        ),
-    ],
+    keys: keys! {
+        required name: Kind::Name, "names the cluster; frames of other clusters on the same network are ignored";
+        key period: time(SHORTEST_PERIOD, LONGEST_PERIOD, Duration::from_millis(10)), "T, from one cycle to the next; timers of the ladders count in it";
+        key mode: word(&MODES), "masked failures: `full`, any number of controllers as long as one understudy lives; `paper`, one failure, and all outputs become fail-safe at the second";
+        key copies: count(1, 4, 2), "number of times that each cyclic frame is sent, against loss";
+        key history: count(1, MAXIMUM_HISTORY as u32, 8), "samples that a remote I/O keeps and sends along, so that lost cycles are replayed";
+        key flag_after: count(1, MANY_CYCLES, 3), "cycles without a turn after which a station is flagged, and its slot is closed";
+        key shadow_cycles: count(0, MANY_CYCLES, 3), "cycles for which a repaired station computes in shadow mode before it publishes";
+        key listen_cycles: count(1, MANY_CYCLES, 4), "cycles for which a starting station listens before it founds an epoch of its own";
+        key link: word(&LINKS), "the transport of the frames";
+        key security: word(&SECURITIES), "whose frames are accepted: `keys`, those of members with keys of this cluster, see `understudy keys`; `off`, all frames on the network. The laboratory makes keys of its own for each run";
+    },
 };
 
 pub(crate) static CONTROLLER: Section = Section {
     name: "controller",
     repeated: true,
     meaning: "a controller and its program; at least one, in the order of their turns",
-    keys: &[
-        required("name", Kind::Name, "names the station"),
-        required(
-            "ladder",
-            Kind::Text,
-            "the file with its program, relative to the cluster file",
-        ),
-        key(
-            "address",
-            Kind::Address,
-            "where it listens, such as `192.168.1.11:7450`; the laboratory picks a free loopback port where it is absent",
-        ),
-    ],
+    keys: keys! {
+        required name: Kind::Name, "names the station";
+        required ladder: Kind::Text, "the file with its program, relative to the cluster file";
+        key address: Kind::Address, "where it listens, such as `192.168.1.11:7450`; the laboratory picks a free loopback port where it is absent";
+    },
 };
 
 pub(crate) static UNDERSTUDY: Section = Section {
     name: "understudy",
     repeated: true,
     meaning: "a generated parity controller, which knows every program; one named `understudy` where there is no such section, none with `understudy = []`",
-    keys: &[
-        required("name", Kind::Name, "names the station"),
-        key("address", Kind::Address, "as for a controller"),
-    ],
+    keys: keys! {
+        required name: Kind::Name, "names the station";
+        key address: Kind::Address, "as for a controller";
+    },
 };
 
 pub(crate) static REMOTE_IO: Section = Section {
     name: "remote_io",
     repeated: true,
     meaning: "the plant's side of a controller; each controller has one, with or without this section",
-    keys: &[
-        required("controller", Kind::Text, "whose"),
-        key(
-            "name",
-            Kind::Name,
-            "names it; `<controller>-io` where absent",
-        ),
-        key(
-            "hold_cycles",
-            count(0, MANY_CYCLES, 3),
-            "cycles for which the last proven outputs are held when no output can be proved",
-        ),
-        key(
-            "fail_safe",
-            Kind::Bits,
-            "fail-safe values after that, by the name of the output, such as `{ grip = true }`; `false` for all others",
-        ),
-        key(
-            "release",
-            Kind::Word {
-                words: &RELEASES,
-                default: true,
-            },
-            "how the outputs are released after a cold start of the program",
-        ),
-        key(
-            "value_fault",
-            Kind::Word {
-                words: &VALUE_FAULTS,
-                default: true,
-            },
-            "the applied outputs while two stations publish different outputs of one history and there is no majority: `hold`, the last proven outputs and then the fail-safe ones, until the stations agree or the operator releases them; `alarm`, the outputs of the controller itself; `fail-safe`, the fail-safe outputs at once, until the operator releases them",
-        ),
-        key(
-            "stale_state",
-            Kind::Word {
-                words: &STALE_STATES,
-                default: true,
-            },
-            "reaction when living stations hold only states that are older than the newest applied output: `operator`, the outputs are held, then fail-safe, until the operator chooses the older state or a cold start; `cold`, the program starts from its initial state",
-        ),
-        key(
-            "diagnosis",
-            Kind::Text,
-            "the file of a ladder that detects failed input channels, relative to the cluster file, see [reconfiguration](reconfiguration.md)",
-        ),
-        key(
-            "field",
-            Kind::Device,
-            "real equipment behind it, see below; without it its plant is simulated",
-        ),
-        key("address", Kind::Address, "as for a controller"),
-    ],
+    keys: keys! {
+        required controller: Kind::Text, "whose";
+        key name: Kind::Name, "names it; `<controller>-io` where absent";
+        key hold_cycles: count(0, MANY_CYCLES, 3), "cycles for which the last proven outputs are held when no output can be proved";
+        key fail_safe: Kind::Values, "fail-safe values after that, by the name of the output, such as `{ grip = true, heating = 12.5 }`; `false` or 0 for all others";
+        key release: word(&RELEASES), "how the outputs are released after a cold start of the program";
+        key value_fault: word(&VALUE_FAULTS), "the applied outputs while two stations publish different outputs of one history and there is no majority: `hold`, the last proven outputs and then the fail-safe ones, until the stations agree or the operator releases them; `alarm`, the outputs of the controller itself; `fail-safe`, the fail-safe outputs at once, until the operator releases them";
+        key stale_state: word(&STALE_STATES), "reaction when living stations hold only states that are older than the newest applied output: `operator`, the outputs are held, then fail-safe, until the operator chooses the older state or a cold start; `cold`, the program starts from its initial state";
+        key diagnosis: Kind::Text, "the file of a ladder that detects failed input channels, relative to the cluster file, see [reconfiguration](reconfiguration.md)";
+        key field: Kind::Device, "real equipment behind it, see below; without it its plant is simulated";
+        key address: Kind::Address, "as for a controller";
+    },
 };
 
 pub(crate) static FIELD: Section = Section {
     name: "remote_io.field",
     repeated: false,
     meaning: "a device that the remote I/O reads and drives by Modbus TCP, below its `[[remote_io]]`",
-    keys: &[
-        required("modbus", Kind::Address, "where the device listens"),
-        key(
-            "unit",
-            count(0, 255, 1),
-            "the unit behind that address, where it is a gateway",
-        ),
-        key(
-            "timeout",
-            Kind::Time {
-                least: Duration::from_millis(1),
-                most: Duration::from_secs(10),
-                default: Duration::from_millis(100),
-            },
-            "maximum time of one exchange with the device; then the connection is opened again",
-        ),
-        key(
-            "stale_after",
-            Kind::Time {
-                least: Duration::from_millis(1),
-                most: Duration::from_secs(60),
-                default: Duration::from_millis(200),
-            },
-            "the age at which its last answer is too old: the outputs are held, and then fail-safe",
-        ),
-        key(
-            "inputs",
-            Kind::Points,
-            "sources of the inputs of the program; an input without one is 0",
-        ),
-        key(
-            "outputs",
-            Kind::Points,
-            "targets of the outputs of the program; each named register belongs to the remote I/O completely",
-        ),
-    ],
+    keys: keys! {
+        required modbus: Kind::Address, "where the device listens";
+        key unit: count(0, 255, 1), "the unit behind that address, where it is a gateway";
+        key timeout: time(Duration::from_millis(1), Duration::from_secs(10), Duration::from_millis(100)), "maximum time of one exchange with the device; then the connection is opened again";
+        key stale_after: time(Duration::from_millis(1), Duration::from_secs(60), Duration::from_millis(200)), "the age at which its last answer is too old: the outputs are held, and then fail-safe";
+        key inputs: Kind::Points, "sources of the inputs of the program; an input without one is 0";
+        key outputs: Kind::Points, "targets of the outputs of the program; each named register belongs to the remote I/O completely";
+    },
 };
 
 pub(crate) static PLANT: Section = Section {
     name: "plant",
     repeated: true,
     meaning: "a simulated plant behind a remote I/O, for the laboratory; at most one for each controller",
-    keys: &[
-        required("controller", Kind::Text, "whose outputs move it"),
-        key(
-            "name",
-            Kind::Name,
-            "names it; `<controller>-plant` where absent",
-        ),
-        key(
-            "model",
-            Kind::Word {
-                words: &MODELS,
-                default: false,
-            },
-            "a built-in model; either this or `ladder`",
-        ),
-        key(
-            "ladder",
-            Kind::Text,
-            "a program as the plant: its inputs have the names of the controller's outputs, its outputs those of the controller's inputs",
-        ),
-        key(
-            "fed_by",
-            Kind::Text,
-            "the plant whose finished parts come to this one; a built-in model feeds itself where absent",
-        ),
-        key(
-            "signals",
-            Kind::Names,
-            "a signal of the controller for a terminal of the model, where their names differ, such as `{ part_present = \"u10\" }`",
-        ),
-        key(
-            "follows",
-            Kind::Names,
-            "a sensor of another plant for a terminal of this one that the controller does not drive, such as `{ pilot_flame = \"pilot-burner.flame\" }`",
-        ),
-        key(
-            "parameters",
-            Kind::Parameters,
-            "of a built-in model, see below",
-        ),
-        key(
-            "watchdog_cycles",
-            count(2, MANY_CYCLES, 3),
-            "periods without an actuation after which the fail-safe outputs are in force",
-        ),
-        key("address", Kind::Address, "as for a controller"),
-    ],
+    keys: keys! {
+        required controller: Kind::Text, "whose outputs move it";
+        key name: Kind::Name, "names it; `<controller>-plant` where absent";
+        key model: Kind::Word { words: &MODELS, default: false, }, "a built-in model; either this or `ladder`";
+        key ladder: Kind::Text, "a program as the plant: its inputs have the names of the controller's outputs, its outputs those of the controller's inputs";
+        key fed_by: Kind::Text, "the plant whose finished parts come to this one; a built-in model feeds itself where absent";
+        key signals: Kind::Names, "a signal of the controller for a terminal of the model, where their names differ, such as `{ part_present = \"u10\" }`";
+        key follows: Kind::Names, "a sensor of another plant for a terminal of this one that the controller does not drive, such as `{ pilot_flame = \"pilot-burner.flame\" }`";
+        key parameters: Kind::Parameters, "of a built-in model, see below";
+        key watchdog_cycles: count(2, MANY_CYCLES, 3), "periods without an actuation after which the fail-safe outputs are in force";
+        key address: Kind::Address, "as for a controller";
+    },
 };
 
 /// In the order of the documentation.
@@ -363,41 +218,21 @@ pub(crate) static ROBOT_PARAMETERS: Section = Section {
     name: "plant.parameters",
     repeated: false,
     meaning: "of the model `robot`",
-    keys: &[
-        key(
-            "horizontal_cycles",
-            count(1, MANY_CYCLES, 10),
-            "cycles from left to right",
-        ),
-        key(
-            "vertical_cycles",
-            count(1, MANY_CYCLES, 5),
-            "cycles from up to down",
-        ),
-        key(
-            "feed_cycles",
-            count(0, MANY_CYCLES, 5),
-            "cycles between taking a part and the next one at the pick place",
-        ),
-    ],
+    keys: keys! {
+        key horizontal_cycles: count(1, MANY_CYCLES, 10), "cycles from left to right";
+        key vertical_cycles: count(1, MANY_CYCLES, 5), "cycles from up to down";
+        key feed_cycles: count(0, MANY_CYCLES, 5), "cycles between taking a part and the next one at the pick place";
+    },
 };
 
 pub(crate) static PRESS_PARAMETERS: Section = Section {
     name: "plant.parameters",
     repeated: false,
     meaning: "of the model `press`",
-    keys: &[
-        key(
-            "ram_cycles",
-            count(1, MANY_CYCLES, 8),
-            "cycles from up to down",
-        ),
-        key(
-            "feed_cycles",
-            count(0, MANY_CYCLES, 5),
-            "cycles between a finished part and the next one",
-        ),
-    ],
+    keys: keys! {
+        key ram_cycles: count(1, MANY_CYCLES, 8), "cycles from up to down";
+        key feed_cycles: count(0, MANY_CYCLES, 5), "cycles between a finished part and the next one";
+    },
 };
 
 pub(crate) static LADDER_PARAMETERS: Section = Section {
@@ -453,7 +288,9 @@ impl Kind {
                 let quoted: Vec<String> = words.iter().map(|word| format!("\"{word}\"")).collect();
                 quoted.join(" or ")
             }
-            Self::Bits => "a table from names to true or false, such as { grip = true }".into(),
+            Self::Values => {
+                "a table from names to values, such as { grip = true, heating = 12.5 }".into()
+            }
             Self::Names => "a table from names to names in quotes".into(),
             Self::Parameters => "a table, [plant.parameters]".into(),
             Self::Device => "a table, [remote_io.field]".into(),

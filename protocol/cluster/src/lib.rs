@@ -9,6 +9,7 @@
 
 mod canonical;
 mod cluster;
+mod code;
 mod configuration;
 mod device;
 mod draft;
@@ -18,8 +19,10 @@ mod format;
 mod read;
 mod schema;
 mod template;
+mod value;
 
 pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Security, Understudy};
+pub use code::Code;
 pub use device::{FieldDevice, NoPoint, Point};
 pub use draft::{Draft, DraftProgram, MAXIMUM_PROGRAM_NAME};
 pub use fields::{MAXIMUM_NAME_LENGTH, is_name, why_unreachable};

@@ -37,27 +37,29 @@ mod marks;
 mod names;
 mod plants;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_cycle::{Agreement, Mode, Schedule};
-use understudy_ladder::Program as LadderProgram;
-use understudy_logic::{Circuit, Scan};
+use understudy_executable::Interface;
+use understudy_logic::Circuit;
 use understudy_node::Program;
 use understudy_remote_io::{Release, StaleState, ValueFault};
 use understudy_text::spelling::suggestion;
+use understudy_text::tables::Constant;
 use understudy_text::{Diagnostic, Report};
 use understudy_wire::{ClusterHash, ConfigurationHash, Image, MAXIMUM_PROGRAMS};
 
 use self::ladders::Ladders;
 pub(crate) use self::marks::MARK;
 use self::names::Names;
-use crate::canonical::program_hash;
 use crate::cluster::{Cluster, Controller, Link, RemoteIo, Security, Understudy};
+use crate::code::Code;
 use crate::configuration::configuration_text;
 use crate::fields::MAXIMUM_MISFITS;
 use crate::file::{self, ClusterFile, ControllerSection};
+use crate::value::stored;
 
 /// The longest cluster file in bytes.
 pub const MAXIMUM_TEXT_BYTES: usize = 1 << 20;
@@ -130,8 +132,8 @@ pub(crate) struct Member {
     pub(crate) section: ControllerSection,
     /// The station's name, empty where it has none.
     pub(crate) name: String,
-    /// Nothing where its ladder has errors or was not found; no error about its signals follows then.
-    pub(crate) lowered: Option<(LadderProgram, Circuit)>,
+    /// What it runs, with its signals. Nothing where its program has errors or was not found; no error about its signals follows then.
+    pub(crate) code: Option<(Code, Interface)>,
 }
 
 fn build(
@@ -194,11 +196,14 @@ fn build(
 
     let controllers: Option<Vec<Controller>> = members.into_iter().map(controller).collect();
     let (controllers, name) = (controllers?, cluster.name.as_ref()?.value.clone());
-    let circuits: Vec<&Circuit> = controllers
-        .iter()
-        .map(|controller| &controller.circuit)
-        .collect();
-    let parity = match understudy_parity::generate(&circuits) {
+    let circuits: Option<Vec<&Circuit>> = controllers.iter().map(Controller::circuit).collect();
+    if circuits.is_none() && mode == Mode::Paper {
+        let message = "the paper's mode evaluates a generated circuit, and a program has numbers";
+        let error = Diagnostic::error("U0213", message, cluster.span.clone());
+        diagnostics.push(error.with_help("leave `mode` out, or write `mode = \"full\"`"));
+    }
+    let parity = circuits.map(|circuits| understudy_parity::generate(&circuits));
+    let parity = match parity.transpose() {
         Ok(parity) => parity,
         // Names of stations are unique here unless that was reported; only dots in names of signals could still collide.
         Err(error) => {
@@ -213,7 +218,7 @@ fn build(
         .iter()
         .map(|controller| Program {
             hash: controller.hash,
-            scan: Scan::new(&controller.circuit),
+            executable: controller.code.executable(),
         })
         .collect();
     let agreement = Agreement {
@@ -267,27 +272,30 @@ fn members(
             None => String::new(),
         };
         names.listen(section.address.as_ref(), diagnostics);
-        let lowered = section
+        let code = section
             .ladder
             .as_ref()
-            .and_then(|file| ladders.lower(file, &name, period, diagnostics));
+            .and_then(|file| ladders.code(file, &name, period, diagnostics));
         members.push(Member {
             section,
             name,
-            lowered,
+            code: code.map(|code| {
+                let interface = code.interface();
+                (code, interface)
+            }),
         });
     }
     members
 }
 
 fn controller(member: Member) -> Option<Controller> {
-    let (program, circuit) = member.lowered?;
+    let (code, interface) = member.code?;
     Some(Controller {
         name: member.name,
-        ladder: member.section.ladder?.value,
-        hash: program_hash(&circuit),
-        program,
-        circuit,
+        file: member.section.ladder?.value,
+        hash: code.hash(),
+        interface,
+        code,
         address: member.section.address.map(|address| address.value),
     })
 }
@@ -403,20 +411,24 @@ fn default_remote_io_name(member: &Member) -> String {
 /// y(i) from the names that are set.
 fn fail_safe(
     member: &Member,
-    entries: &[(crate::fields::Placed<String>, bool)],
+    entries: &[(crate::fields::Placed<String>, Constant)],
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Image {
-    let Some((_, circuit)) = &member.lowered else {
+    let Some((_, interface)) = &member.code else {
         return Image::default();
     };
-    let outputs = circuit.outputs().iter();
-    let outputs: Vec<&str> = outputs.map(|output| output.name.as_str()).collect();
-    let places: HashMap<&str, usize> = outputs.iter().copied().zip(0..).collect();
-    let mut bits = vec![false; outputs.len()];
+    let outputs = &interface.outputs;
+    let mut image = Image::zero(outputs.width().min(understudy_wire::MAXIMUM_IMAGE_BITS));
     let mut misfits = 0;
-    for (name, bit) in entries {
-        if let Some(place) = places.get(name.value.as_str()) {
-            bits[*place] = *bit;
+    for (name, value) in entries {
+        if let Some(output) = outputs.find(&name.value) {
+            match stored(value, output.of) {
+                Ok(stored) => output.set(image.words_mut(), stored),
+                Err(expected) => {
+                    let message = format!("`{}` is {}: {expected}", output.name, output.of);
+                    diagnostics.push(Diagnostic::error("U0204", message, name.span.clone()));
+                }
+            }
             continue;
         }
         misfits += 1;
@@ -424,7 +436,7 @@ fn fail_safe(
             let message = format!("`{}` has no output `{}`", member.name, name.value);
             diagnostics.push(
                 Diagnostic::error("U0209", message, name.span.clone())
-                    .with_help(suggestion(&name.value, outputs.iter().copied())),
+                    .with_help(suggestion(&name.value, outputs.names())),
             );
         }
     }
@@ -434,8 +446,7 @@ fn fail_safe(
         let span = member.section.span.clone();
         diagnostics.push(Diagnostic::error("U0209", message, span));
     }
-    bits.truncate(understudy_wire::MAXIMUM_IMAGE_BITS);
-    Image::from_bits(bits)
+    image
 }
 
 fn check_understudies(

@@ -73,7 +73,9 @@ fn property(key: &Key) -> Value {
             json!({ "type": "string", "pattern": duration::pattern() })
         }
         Kind::Word { words, .. } => json!({ "enum": words }),
-        Kind::Bits => json!({ "type": "object", "additionalProperties": { "type": "boolean" } }),
+        Kind::Values => {
+            json!({ "type": "object", "additionalProperties": { "type": ["boolean", "number", "string"] } })
+        }
         Kind::Device => table(&FIELD),
         Kind::Points => json!({
             "type": "object",

@@ -30,10 +30,11 @@ pub struct Agreement {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
-    /// One parity word over the programs whose controllers were received, and one for each other program: any number of failed
-    /// controllers, as long as one understudy is synchronised.
+    /// One parity word over the programs whose controllers were received, and one for each other program: any number of
+    /// failed controllers, as long as one understudy is synchronised.
     #[default]
     Full,
-    /// The paper's mode: one parity word over all programs. The second failure is the paper's state S2, and all outputs fall safe.
+    /// The paper's mode: one parity word over all programs. The second failure is the paper's state S2, and all outputs
+    /// fall safe.
     Paper,
 }

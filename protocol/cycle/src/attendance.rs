@@ -1,7 +1,7 @@
 //! Which stations published in this cycle, and which were not received for too long: the paper's failure flags θ.
 //!
-//! Detection is by turns alone. Each member keeps its own view. It decides only which slots are closed, which stations the
-//! successor of the cycle master waits for, and which stations count as living.
+//! Detection is by turns alone. Each member keeps its own view. It decides only which slots are closed, which stations
+//! the successor of the cycle master waits for, and which stations count as living.
 
 use understudy_wire::{StationId, StationSet};
 
@@ -25,7 +25,7 @@ pub enum Change {
 }
 
 impl Attendance {
-    /// Nobody has published yet, so all `stations` are flagged.
+    /// No station has published yet, so all `stations` are flagged.
     pub fn new(stations: usize, flag_after: u32) -> Self {
         Self {
             flag_after,
@@ -35,8 +35,8 @@ impl Attendance {
         }
     }
 
-    /// Notes that a turn of this cycle was received. True for the first of a station in a cycle.
-    pub fn heard(&mut self, station: StationId) -> bool {
+    /// Notes that a turn of this cycle was received; true for the first one of a station in a cycle.
+    pub fn receive_turn(&mut self, station: StationId) -> bool {
         let first = station.index() < self.silent.len() && !self.published.contains(station);
         if first {
             self.published.insert(station);
@@ -82,15 +82,15 @@ mod tests {
 
     /// Every pattern of eight cycles of one station against counting by hand.
     #[test]
-    fn a_flag_is_the_last_so_many_cycles_of_silence() {
+    fn a_station_is_flagged_after_flag_after_cycles_of_silence() {
         for flag_after in 1..=4_u32 {
             for pattern in 0..1_u32 << 8 {
                 let mut attendance = Attendance::new(1, flag_after);
                 let mut silence = flag_after;
                 for cycle in 0..8 {
                     if pattern >> cycle & 1 == 1 {
-                        assert!(attendance.heard(StationId(0)));
-                        assert!(!attendance.heard(StationId(0)));
+                        assert!(attendance.receive_turn(StationId(0)));
+                        assert!(!attendance.receive_turn(StationId(0)));
                         silence = 0;
                     } else {
                         silence += 1;
@@ -108,6 +108,6 @@ mod tests {
 
     #[test]
     fn a_station_that_is_not_in_the_cluster_is_not_counted() {
-        assert!(!Attendance::new(2, 3).heard(StationId(2)));
+        assert!(!Attendance::new(2, 3).receive_turn(StationId(2)));
     }
 }

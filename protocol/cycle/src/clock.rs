@@ -1,9 +1,9 @@
 //! In which cycle a member is, and when that cycle started on its own clock.
 //!
-//! Any frame of a later cycle starts that cycle, so a lost Sync costs nothing. A member never goes back, with one exception:
-//! a member that has received no other one in its epoch for a few periods gives that epoch up for an epoch with several members.
-//! So a restarted station whose link comes up late does not renumber the cluster's cycles, and no member waits indefinitely in
-//! an epoch that its founder has left.
+//! Any frame of a later cycle starts that cycle, so a lost Sync costs nothing. A member never goes back, with one
+//! exception: a member that has received no other one in its epoch for a few periods gives that epoch up for an epoch
+//! with several members. So a restarted station whose link comes up late does not renumber the cluster's cycles, and no
+//! member waits indefinitely in an epoch that its founder has left.
 
 use std::time::Duration;
 
@@ -21,7 +21,7 @@ pub struct CycleClock {
     founder: bool,
 }
 
-/// Periods without a frame of another member after which an epoch binds no more.
+/// Periods without a frame of another member after which an epoch no longer binds this member.
 const LONELY_PERIODS: u32 = 4;
 
 /// Meaning of a frame's moment for this member.
@@ -31,7 +31,8 @@ pub enum Arrival {
     Stale,
     /// Of the current cycle.
     Present,
-    /// Its cycle starts with it, and started on this member's clock at the time given; [`CycleClock::begin`] makes it so.
+    /// Its cycle starts with it, and started on this member's clock at the time given; [`CycleClock::begin`] makes it
+    /// so.
     Begins(Time),
 }
 
@@ -88,7 +89,7 @@ impl CycleClock {
         }
     }
 
-    /// Goes to a cycle that a frame has started, which came at `now`.
+    /// Enters a cycle that a frame has started, which arrived at `now`.
     pub fn begin(&mut self, now: Time, moment: Moment, anchor: Time) {
         self.moment = Some(moment);
         self.anchor = anchor;

@@ -1,7 +1,7 @@
-//! The copies of a cyclic frame that are still to be sent.
+//! Copies of cyclic frames that are still to be sent.
 //!
-//! Bounded: a member has at most two kinds of cyclic frames, and an older frame's copies are dropped when a newer one of the
-//! same kind is sent.
+//! Bounded: a member has at most two kinds of cyclic frames, and an older frame's copies are dropped when a newer one
+//! of the same kind is sent.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use smallvec::SmallVec;
 use crate::schedule::Schedule;
 use understudy_wire::{Frame, Time};
 
-/// Frames of this cycle, each with the times at which it leaves again.
+/// Frames of this cycle, each with the times of its copies.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub struct Copies {
     pending: SmallVec<[Pending; 2]>,
@@ -51,12 +51,12 @@ impl Copies {
         Some(Arc::clone(&pending.frame))
     }
 
-    /// When the next copy is due.
+    /// Time of the next copy.
     pub fn wakeup(&self) -> Option<Time> {
         self.pending.iter().map(|pending| pending.due).min()
     }
 
-    /// Sends no more of them: the cycle that they belong to is over.
+    /// Drops all copies: the cycle that they belong to is over.
     pub fn clear(&mut self) {
         self.pending.clear();
     }

@@ -1,9 +1,9 @@
 //! What every member of a cluster shares, whether it is a station, a remote I/O or a plant.
 //!
 //! All members agree on the same configuration ([`Agreement`]) and compute the same [`Schedule`] from it. A member is a
-//! [`Machine`]. Each is built on an [`Endpoint`], which admits frames and sends frames; those that take part in the cycle are built on a
-//! [`Participant`], which also knows its cycle and epoch ([`CycleClock`]) and the stations that it receives ([`Attendance`]), and repeats
-//! its cyclic frames ([`Copies`]).
+//! [`Machine`]. Each is built on an [`Endpoint`], which admits frames and sends frames; those that take part in the
+//! cycle are built on a [`Participant`], which also knows its cycle and epoch ([`CycleClock`]) and the stations that it
+//! receives ([`Attendance`]), and repeats its cyclic frames ([`Copies`]).
 
 mod agreement;
 mod attendance;

@@ -1,8 +1,8 @@
 //! The shape of every member: a pure state machine with time as an argument.
 //!
-//! Feed it with [`Machine::handle_input`], then drain it with [`Machine::poll_output`] until it has no more outputs, then
-//! wait until [`Machine::wakeup`] or the next input. The same machine runs on real clocks and networks, in the simulator
-//! and under a model checker.
+//! Feed it with [`Machine::handle_input`], then drain it with [`Machine::poll_output`] until it has no more outputs,
+//! then wait until [`Machine::wakeup`] or the next input. The same machine runs on real clocks and networks, in the
+//! simulator and under a model checker.
 
 use std::sync::Arc;
 
@@ -22,17 +22,17 @@ pub enum Input<'a> {
 /// An input of a remote I/O, from its field equipment or from the operator.
 #[derive(Debug, Clone, Copy)]
 pub enum RemoteIoInput<'a> {
-    /// What its sensors see now.
+    /// Current values of its sensors.
     Field(&'a Image),
-    /// What its sensors see is not known.
+    /// The values of its sensors are not known.
     FieldLost,
     /// The operator releases the outputs of a program that was started cold.
     Release,
     /// The operator chooses the state that a program continues from.
     Choose(StateChoice),
-    /// The operator puts a value in the place of a signal.
+    /// The operator forces a signal.
     Force(&'a Force),
-    /// The operator takes it back.
+    /// The operator removes a force.
     Unforce(SignalPlace),
 }
 
@@ -41,7 +41,7 @@ pub enum RemoteIoInput<'a> {
 pub enum Output<Event> {
     /// A frame for all members that take its kind.
     Send(Arc<Frame>),
-    /// What a remote I/O drives now.
+    /// Outputs that a remote I/O drives from now on.
     Drive(Image),
     /// An event for the journal.
     Report(Event),

@@ -1,7 +1,8 @@
-//! What every member does in the same way: it admits frames, makes headers, knows its cycle, counts the stations that it receives,
-//! repeats its cyclic frames, and notices when its host has suspended it.
+//! What every member does in the same way: it admits frames, makes headers, knows its cycle, counts the stations that
+//! it receives, repeats its cyclic frames, and notices when its host has suspended it.
 //!
-//! A plant is an [`Endpoint`]: it takes frames and sends frames. A station and a remote I/O are each a [`Participant`] of the cycle.
+//! A plant is an [`Endpoint`]: it takes frames and sends frames. A station and a remote I/O are each a [`Participant`]
+//! of the cycle.
 
 use std::collections::VecDeque;
 use std::hash::{Hash, Hasher};
@@ -262,7 +263,7 @@ impl<Event: From<Refusal> + From<Notice>> Participant<Event> {
     }
 }
 
-/// Two participants of equal configurations that are drained and hash alike go on alike.
+/// Two participants of equal configurations that are drained and hash alike behave alike.
 impl<Event> Hash for Participant<Event> {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
         let Self {

@@ -19,10 +19,10 @@ pub(crate) struct Reception {
 /// Decision on a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Admission {
-    /// It counts.
+    /// It is accepted.
     Admitted,
-    /// Of another cluster, of no member of this one, of this member itself, or of a member that was refused before: dropped
-    /// without a report.
+    /// Of another cluster, of no member of this one, of this member itself, or of a member that was refused before:
+    /// dropped without a report.
     Dropped,
     /// The first of a member with another configuration: dropped and reported.
     Refused {
@@ -32,7 +32,7 @@ pub(crate) enum Admission {
 }
 
 impl Reception {
-    /// For one member.
+    /// Admission of frames at the member `own`.
     pub(crate) fn new(own: Member, agreement: &Agreement) -> Self {
         Self {
             own,

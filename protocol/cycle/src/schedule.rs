@@ -6,8 +6,8 @@
 //!                                                      last call
 //! ```
 //!
-//! A station publishes when its slot starts, or earlier when its predecessor has published. A station that does not know its
-//! outputs by then, because a sample is late, waits for it until the last call. Copies of a frame follow it
+//! A station publishes when its slot starts, or earlier when its predecessor has published. A station that does not
+//! know its outputs by then, because a sample is late, waits for it until the last call. Copies of a frame follow it
 //! `copy_spacing` apart, and the last copy of the last turn leaves before the deadline.
 
 use std::time::Duration;
@@ -21,7 +21,7 @@ pub struct Schedule {
     controllers: usize,
     understudies: usize,
     copies: u32,
-    /// By rank. Computed once, because every frame asks for them.
+    /// Slots by rank, computed once, because every frame needs them.
     slots: Vec<Duration>,
     last_call: Duration,
     copy_spacing: Duration,
@@ -38,7 +38,7 @@ pub enum ScheduleError {
     /// The period is out of bounds.
     #[error("a period of {period:?} is outside 200us to 10s")]
     Period {
-        /// As asked for.
+        /// Requested period.
         period: Duration,
     },
     /// Too many or too few stations.
@@ -47,15 +47,15 @@ pub enum ScheduleError {
          and at most {MAXIMUM_STATIONS} stations"
     )]
     Stations {
-        /// N.
+        /// Number of controllers, N.
         controllers: usize,
-        /// S.
+        /// Number of understudies, S.
         understudies: usize,
     },
     /// Too many copies.
     #[error("{copies} copies of each frame: there must be 1 to 4")]
     Copies {
-        /// As asked for.
+        /// Requested number of copies.
         copies: u32,
     },
 }
@@ -116,22 +116,22 @@ impl Schedule {
         })
     }
 
-    /// T.
+    /// The period T.
     pub fn period(&self) -> Duration {
         self.period
     }
 
-    /// N.
+    /// Number of controllers, N.
     pub fn controllers(&self) -> usize {
         self.controllers
     }
 
-    /// S.
+    /// Number of understudies, S.
     pub fn understudies(&self) -> usize {
         self.understudies
     }
 
-    /// N + S.
+    /// Number of stations, N + S.
     pub fn stations(&self) -> usize {
         self.controllers + self.understudies
     }
@@ -141,12 +141,12 @@ impl Schedule {
         station.index() >= self.controllers
     }
 
-    /// How often each cyclic frame is sent.
+    /// Number of times that each cyclic frame is sent.
     pub fn copies(&self) -> u32 {
         self.copies
     }
 
-    /// When `station` waits for its predecessors no more.
+    /// Start of the slot of `station`, after which it no longer waits for its predecessors.
     ///
     /// # Panics
     /// If it is not in the cluster; only frames of the cluster's members are admitted.
@@ -154,37 +154,37 @@ impl Schedule {
         self.slots[station.index()]
     }
 
-    /// When a station speaks whatever it knows.
+    /// Last call: a station publishes the outputs that it knows.
     pub fn last_call(&self) -> Duration {
         self.last_call
     }
 
-    /// Between a frame and its copy, and between copies.
+    /// Time between a frame and its copy, and between copies.
     pub fn copy_spacing(&self) -> Duration {
         self.copy_spacing
     }
 
-    /// When a remote I/O decides and drives.
+    /// Deadline: a remote I/O selects outputs and drives them.
     pub fn deadline(&self) -> Duration {
         self.deadline
     }
 
-    /// When those who lack a state ask for it.
+    /// Start of the rest: stations ask for the states that they lack.
     pub fn rest(&self) -> Duration {
         self.rest
     }
 
-    /// How long the next rank waits for a silent cycle master.
+    /// Time for which the next rank waits for a cycle master that is not received.
     pub fn guard(&self) -> Duration {
         self.guard
     }
 
-    /// How long whoever takes over the pace from silent stations may need for it, at most a period.
+    /// Maximum time that a new cycle master may need to replace silent stations, at most a period.
     pub fn grace(&self) -> Duration {
         self.grace
     }
 
-    /// How late a host may wake a member before it has to say so.
+    /// Delay of a wake-up from which a member reports a host stall.
     pub fn stall(&self) -> Duration {
         self.stall
     }
@@ -194,7 +194,7 @@ impl Schedule {
 mod tests {
     use super::*;
 
-    /// Every cluster that is allowed: slots ascend by rank, and the last copy leaves before the deadline.
+    /// Every cluster within the bounds: slots ascend by rank, and the last copy is sent before the deadline.
     #[test]
     fn slots_ascend_and_copies_leave_in_time() {
         for controllers in 1..=MAXIMUM_PROGRAMS {

@@ -8,25 +8,25 @@ use understudy_wire::Time;
 /// The next wake-up of one member.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub(crate) struct Waking {
-    /// When it wants to be woken, as of its last input.
+    /// Time at which the member wants to be woken, as of its last input.
     asked: Time,
-    /// What it had asked for when it last noticed a stall.
+    /// Time that it had asked for when it last noticed a stall.
     stalled: Time,
 }
 
 impl Waking {
-    /// From now on it wants to be woken at `asked`.
+    /// Asks to be woken at `asked`.
     pub(crate) fn ask(&mut self, asked: Time) {
         self.asked = asked;
     }
 
-    /// When it wants to be woken.
+    /// Time at which the member wants to be woken.
     pub(crate) fn asked(&self) -> Time {
         self.asked
     }
 
-    /// By how much an input that comes at `now`, whatever it is, shows the host to have missed what was asked for. Once for each
-    /// time that was asked for, and nothing up to [`Schedule::stall`].
+    /// Delay of the host if any input at `now` comes too late after the time that was asked for; once for each such
+    /// time, and `None` up to [`Schedule::stall`].
     pub(crate) fn stall(&mut self, now: Time, schedule: &Schedule) -> Option<Duration> {
         let due = self.asked;
         if now <= due || due == self.stalled {

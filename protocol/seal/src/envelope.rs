@@ -1,9 +1,9 @@
-//! What stands before and behind a frame in its datagram; drawn in the documentation of the crate.
+//! The bytes before and behind a frame in its datagram; the documentation of the crate draws them.
 
 use understudy_wire::{Member, ProgramId, StationId};
 
 pub(crate) const MAGIC: [u8; 4] = *b"UNDS";
-/// With which a frame begins that nobody has sealed.
+/// Magic of a frame that is not sealed.
 pub(crate) const UNSEALED_MAGIC: [u8; 4] = *b"UNDR";
 pub(crate) const VERSION: u8 = 1;
 pub(crate) const HEADER_BYTES: usize = 20;
@@ -11,14 +11,14 @@ pub(crate) const AUTHENTICATOR_BYTES: usize = 16;
 pub(crate) const TAG_BYTES: usize = 16;
 const EVERYBODY: u8 = 255;
 
-/// A sealed frame is longer than the frame by so many bytes at most.
+/// Maximum number of bytes by which a sealed frame is longer than the frame.
 pub const OVERHEAD_BYTES: usize = HEADER_BYTES + TAG_BYTES + AUTHENTICATOR_BYTES;
 
-/// The readable part.
+/// The readable header of a sealed frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Envelope {
     pub(crate) sender: Member,
-    /// Nobody in particular, or the station for whom alone the frame is.
+    /// `None`, or the station for which alone the frame is.
     pub(crate) to: Option<StationId>,
     pub(crate) life: u32,
     pub(crate) number: u64,
@@ -42,7 +42,7 @@ impl Envelope {
         bytes
     }
 
-    /// Nothing where there is no such kind of sender, magic or version.
+    /// `None` for an unknown kind of sender, magic or version.
     pub(crate) fn read(bytes: &[u8; HEADER_BYTES]) -> Option<Self> {
         if bytes[..4] != MAGIC || bytes[4] != VERSION {
             return None;
@@ -62,7 +62,7 @@ impl Envelope {
         })
     }
 
-    /// Of the cipher: unique for a key as long as no life and number is used twice.
+    /// Nonce of the cipher: unique for a key as long as no pair of life and number is used twice.
     pub(crate) fn nonce(self) -> [u8; 12] {
         let mut nonce = [0; 12];
         nonce[..4].copy_from_slice(&self.life.to_le_bytes());

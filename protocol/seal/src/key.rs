@@ -1,46 +1,46 @@
-//! Keys, and what they are derived from.
+//! Keys and their derivation.
 
 use std::fmt;
 
 use ring::aead::{CHACHA20_POLY1305, LessSafeKey, UnboundKey};
 
-/// Of every key here.
+/// Length of every key, in bytes.
 pub const KEY_BYTES: usize = 32;
 
-/// Raised when equal secrets and titles would mean other keys than before.
+/// Version of the derivation, raised when equal secrets and titles would give other keys than before.
 const FRAME_CONTEXT: &str = "understudy 2026-11 the authenticator of a sender's frames, version 1";
 const TRANSFER_CONTEXT: &str = "understudy 2026-11 a state from one station to another, version 1";
 
-/// Under what name a member holds its keys.
+/// Name under which a member holds its keys.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Title<'a> {
     /// The name of the cluster.
     pub cluster: &'a str,
     /// The name of the member in it.
     pub member: &'a str,
-    /// Which of its keys: one more each time that it is issued new ones.
+    /// Generation of its keys: one more each time that it is issued new ones.
     pub generation: u32,
 }
 
-/// What all keys of a cluster come from; only the authority that issues keys has it.
+/// Secret from which all keys of a cluster are derived; only the authority that issues keys has it.
 #[derive(Clone, PartialEq, Eq)]
 pub struct ClusterSecret([u8; KEY_BYTES]);
 
-/// With which the frames of one sender are sealed and opened.
+/// Key with which the frames of one sender are sealed and opened.
 #[derive(Clone, PartialEq, Eq)]
 pub struct FrameKey([u8; KEY_BYTES]);
 
-/// With which one station gives states to another.
+/// Key with which one station encrypts states for another one.
 #[derive(Clone, PartialEq, Eq)]
 pub struct TransferKey([u8; KEY_BYTES]);
 
 impl ClusterSecret {
-    /// From bytes that nobody else knows.
+    /// A secret from random bytes.
     pub fn new(bytes: [u8; KEY_BYTES]) -> Self {
         Self(bytes)
     }
 
-    /// For the file that keeps it.
+    /// Bytes for the file that keeps it.
     pub fn bytes(&self) -> &[u8; KEY_BYTES] {
         &self.0
     }
@@ -50,7 +50,7 @@ impl ClusterSecret {
         FrameKey(self.derive(FRAME_CONTEXT, &[sender]))
     }
 
-    /// The key of the states that `from` gives to `to`; another one than the other way round.
+    /// The key of the states that `from` transfers to `to`; the other direction has another key.
     pub fn transfer_key(&self, from: Title<'_>, to: Title<'_>) -> TransferKey {
         TransferKey(self.derive(TRANSFER_CONTEXT, &[from, to]))
     }
@@ -71,24 +71,24 @@ impl ClusterSecret {
 }
 
 impl FrameKey {
-    /// From the file that keeps it.
+    /// A key from the file that keeps it.
     pub fn new(bytes: [u8; KEY_BYTES]) -> Self {
         Self(bytes)
     }
 
-    /// For the file that keeps it.
+    /// Bytes for the file that keeps it.
     pub fn bytes(&self) -> &[u8; KEY_BYTES] {
         &self.0
     }
 }
 
 impl TransferKey {
-    /// From the file that keeps it.
+    /// A key from the file that keeps it.
     pub fn new(bytes: [u8; KEY_BYTES]) -> Self {
         Self(bytes)
     }
 
-    /// For the file that keeps it.
+    /// Bytes for the file that keeps it.
     pub fn bytes(&self) -> &[u8; KEY_BYTES] {
         &self.0
     }

@@ -1,4 +1,4 @@
-//! The receiver's side.
+//! The receiving side.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,61 +16,61 @@ use crate::key::{FrameKey, TransferKey};
 use crate::revocations::Revocations;
 use crate::window::{Verdict, Window};
 
-/// Why a datagram does not count.
+/// Reason why a datagram is refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
-    /// Anything at all.
+    /// Neither a sealed nor an unsealed frame.
     #[error("{bytes} bytes are no sealed frame")]
     Bytes {
-        /// How many.
+        /// Number of its bytes.
         bytes: usize,
     },
-    /// A frame, and nobody has sealed it: a member without keys, or of another cluster.
+    /// A frame that is not sealed: from a member without keys, or of another cluster.
     #[error("a frame without an authenticator")]
     Unsealed,
-    /// In the name of a member whose frames do not concern this one, or that is in no cluster of this size.
+    /// From a member whose frames this one does not receive, or that is in no cluster of this size.
     #[error("{sender:?} has nothing to say to this member")]
     Foreign {
-        /// The name that it bears.
+        /// Sender that it names.
         sender: Member,
     },
-    /// The authenticator is not the one of the sender that it names: made by somebody else, or changed on its way.
+    /// The authenticator is not the one of the sender that it names: forged, or changed on its way.
     #[error("the authenticator is not by {sender:?}")]
     Forged {
-        /// The name that it bears.
+        /// Sender that it names.
         sender: Member,
     },
-    /// It counted before, or is older than anything that may still come.
+    /// It was accepted before, or is older than any frame that may still arrive.
     #[error("a frame of {sender:?} came again, or too late")]
     Replayed {
-        /// Who said it when it was new.
+        /// Its sender.
         sender: Member,
     },
-    /// New, and of a life before the newest one: two processes have the keys of its sender.
+    /// New, but of a life before the newest one: two processes have the keys of its sender.
     #[error(
         "{sender:?} sends in two lives at once: two processes have its keys, or its frames were recorded"
     )]
     OfAnotherLife {
-        /// Whose keys they have.
+        /// Member whose keys they have.
         sender: Member,
     },
-    /// By a member whose keys were revoked.
+    /// From a member whose keys were revoked.
     #[error("the keys of {sender:?} are revoked")]
     Revoked {
-        /// Who.
+        /// Its sender.
         sender: Member,
     },
-    /// Authentic, and no frame: a mistake in the sender's program, or another version of it.
+    /// Authentic, but not a frame: an error in the sender's program, or another version of it.
     #[error("{sender:?} sealed what is no frame: {error}")]
     Broken {
-        /// Who.
+        /// Its sender.
         sender: Member,
-        /// What is wrong with it.
+        /// Reason why it cannot be decoded.
         error: FrameError,
     },
 }
 
-/// Opens what arrives at one member.
+/// Opens the datagrams that arrive at one member.
 pub struct Opener {
     own: Member,
     senders: BTreeMap<Member, (FrameKey, Window)>,
@@ -80,7 +80,8 @@ pub struct Opener {
 }
 
 impl Opener {
-    /// `senders` are those whom this member hears; `transfers` the keys of the states that it is given, by who gives.
+    /// `senders` are the members that this one receives; `transfers` the keys of the states transferred to it, by their
+    /// sender.
     pub fn new(
         own: Member,
         senders: impl IntoIterator<Item = (Member, FrameKey)>,
@@ -102,7 +103,8 @@ impl Opener {
         }
     }
 
-    /// Takes a new life of a sender from a frame of this configuration only: an old copy of a station does not shut out the station.
+    /// Accepts a new life of a sender only from a frame of this configuration: a station of an earlier configuration
+    /// cannot shut out its successor.
     #[must_use]
     pub fn of_configuration(
         mut self,
@@ -113,10 +115,10 @@ impl Opener {
         self
     }
 
-    /// The frame in a datagram, which is decrypted in place; nothing where it is authentic and for another station.
+    /// The frame in a datagram, which is decrypted in place; `None` where it is authentic and for another station.
     ///
     /// # Errors
-    /// [`Refusal`]; the datagram is as if it had never come then.
+    /// [`Refusal`]; the datagram then has no effect.
     pub fn open(&mut self, datagram: &mut [u8]) -> Result<Option<Frame>, Refusal> {
         let length = datagram.len();
         let nothing = || Refusal::Bytes { bytes: length };
@@ -172,7 +174,7 @@ impl Opener {
         let agrees = self
             .agreed
             .is_none_or(|agreed| agreed == (cluster, configuration));
-        // What does not agree is refused by who gets it, and its life is as if it had never begun.
+        // A frame of another configuration is refused by its receiver, and does not begin a life.
         if begins && agrees {
             take(window, envelope)?;
         }
@@ -207,7 +209,7 @@ fn decrypt<'t>(
     Some(decrypted)
 }
 
-/// Takes as long for every difference, so that nobody learns an authenticator byte by byte.
+/// Compares in constant time, so that an authenticator cannot be guessed byte by byte.
 fn same(one: &[u8], other: &[u8]) -> bool {
     let differs = one.iter().zip(other).fold(0, |all, (a, b)| all | (a ^ b));
     one.len() == other.len() && std::hint::black_box(differs) == 0

@@ -1,4 +1,4 @@
-//! Whose keys no longer count.
+//! Members whose keys were revoked.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -13,7 +13,7 @@ pub struct Revocations {
 }
 
 impl Revocations {
-    /// From now on exactly these are revoked.
+    /// From now on exactly these members are revoked.
     pub fn set(&self, revoked: impl IntoIterator<Item = Member>) {
         let mut masks = [0_u64; 3];
         for member in revoked {
@@ -25,7 +25,7 @@ impl Revocations {
         }
     }
 
-    /// Whether a member's keys no longer count.
+    /// Whether the keys of a member were revoked.
     pub fn holds(&self, member: Member) -> bool {
         let (kind, bit) = place(member);
         self.words()[kind].load(Ordering::Relaxed) & bit != 0

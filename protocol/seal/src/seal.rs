@@ -1,4 +1,4 @@
-//! The sender's side.
+//! The sending side.
 
 use std::collections::BTreeMap;
 
@@ -8,21 +8,21 @@ use understudy_wire::{Body, Frame, Member, StationId};
 use crate::envelope::{AUTHENTICATOR_BYTES, Envelope, HEADER_BYTES};
 use crate::key::{FrameKey, TransferKey};
 
-/// Why a frame cannot be sealed.
+/// Reason why a frame cannot be sealed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SealError {
-    /// A state for a station that this one shares no key with.
+    /// A state for a station with which this one shares no key.
     #[error("there is no key for states to station {}", to.0)]
     NoKey {
-        /// Who asked.
+        /// Station that asked.
         to: StationId,
     },
-    /// A frame of somebody else: a mistake in this program.
+    /// A frame of another member: an error in this program.
     #[error("a frame of {sender:?} cannot be sealed by {own:?}")]
     NotOwn {
-        /// Who seals.
+        /// Member that seals.
         own: Member,
-        /// Whose it is.
+        /// Sender of the frame.
         sender: Member,
     },
 }
@@ -37,7 +37,8 @@ pub struct Seal {
 }
 
 impl Seal {
-    /// `life` must be one that this member never had; `transfers` are the keys of the states that it gives, by who asks.
+    /// `life` must be one that this member never had; `transfers` are the keys of the states that it transfers, by
+    /// receiver.
     pub fn new(
         own: Member,
         key: FrameKey,
@@ -54,16 +55,16 @@ impl Seal {
         }
     }
 
-    /// In which it seals.
+    /// Life in which it seals.
     pub fn life(&self) -> u32 {
         self.life
     }
 
-    /// Puts the datagram of `frame`, which `encoded` are the bytes of, in place of what is in `datagram`. A copy of a frame is sealed
-    /// anew: it has a number of its own.
+    /// Replaces the content of `datagram` by the sealed `frame`, whose bytes are `encoded`. A copy of a frame is sealed
+    /// again: it has a number of its own.
     ///
     /// # Errors
-    /// [`SealError`]; there is no datagram then.
+    /// [`SealError`]; `datagram` is then empty.
     pub fn seal(
         &mut self,
         frame: &Frame,

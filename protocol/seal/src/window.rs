@@ -1,36 +1,38 @@
-//! Each number once, in about ascending order.
+//! Each number once, in approximately ascending order.
 
-/// How far a number may lie behind the newest: copies and reordering of a network fit in many times over.
+/// Maximum distance of a number behind the newest: far more than copies and reordering of a network need.
 pub const WINDOW_FRAMES: u64 = 64;
 
-/// What becomes of a number.
+/// Decision on a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Verdict {
-    /// It is taken, for the first time.
+    /// It is accepted, for the first time.
     Taken,
-    /// It was taken before, or is too old.
+    /// It was accepted before, or is too old.
     Again,
-    /// It is of a life before the newest, which goes on nevertheless.
+    /// It is of a life before the newest, of which frames still arrive.
     OfAnotherLife,
 }
 
-/// The numbers of one sender that were taken.
+/// The numbers of one sender that were accepted.
 ///
-/// Invariant: bit k of `taken` says whether `newest - k` was taken; nothing at or before `newest - 64` is taken any more.
+/// Invariant: bit k of `taken` is set where `newest - k` was accepted; nothing at or before `newest - 64` is accepted
+/// any more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Window {
     life: u32,
     newest: u64,
     taken: u64,
-    /// The last life before this one.
+    /// The life before this one.
     earlier: Earlier,
 }
 
-/// A life that has ended, unless its numbers go on: what was on its way when it ended is not more than [`WINDOW_FRAMES`].
+/// A life that has ended, unless its numbers continue: at most [`WINDOW_FRAMES`] frames were on their way when it
+/// ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 struct Earlier {
     life: u32,
-    /// No number up to here shows that it goes on.
+    /// A number up to here does not show that it continues.
     until: u64,
 }
 
@@ -40,7 +42,7 @@ impl Window {
         life > self.life
     }
 
-    /// Takes a number, once.
+    /// Decides on a number.
     pub(crate) fn take(&mut self, life: u32, number: u64) -> Verdict {
         if number == 0 {
             return Verdict::Again;
@@ -105,7 +107,7 @@ mod tests {
 
     use super::*;
 
-    /// The naive one: remembers everything.
+    /// The naive implementation: remembers every number.
     #[derive(Default)]
     struct Memory {
         newest: (u32, u64),
@@ -139,7 +141,7 @@ mod tests {
             }
         }
 
-        /// A process that was replaced, with what was still on its way; and one that goes on beside its successor.
+        /// A process that was replaced, with frames still on their way; and one that continues next to its successor.
         #[test]
         fn a_life_that_goes_on_is_told_from_one_that_has_ended(
             before in 1..500_u64,

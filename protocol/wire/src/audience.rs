@@ -1,10 +1,12 @@
-//! Who is to hear whom.
+//! Receivers of each kind of frame.
 //!
-//! Invariant: a member hears another one on one topic at most, so that one subscription and one key for each are enough.
+//! Invariant: a member receives from another one on one topic at most, so that one subscription and one key for each
+//! are enough.
 //!
-//! | topic | said by | heard by |
+//! | topic | sent by | received by |
 //! |---|---|---|
-//! | cycle | stations | all other stations and all remote I/Os; a Transfer only by the station that asked, where the link can choose |
+//! | cycle | stations | all other stations and all remote I/Os; a Transfer only by the station that asked, where the
+//! link can choose |
 //! | cycle | remote I/Os | all stations |
 //! | field | plant i | remote I/O i, and the plants that it feeds or that follow it |
 //! | actuation | remote I/O i | plant i |
@@ -12,22 +14,22 @@
 use crate::frame::Body;
 use crate::identifier::{Member, ProgramId};
 
-/// What a frame is about.
+/// Topic of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Topic {
     /// The cycle of the cluster.
     Cycle,
-    /// What a plant's sensors see.
+    /// Sensors of a plant.
     Field,
-    /// What a remote I/O drives.
+    /// Outputs that a remote I/O drives.
     Actuation,
 }
 
 impl Topic {
-    /// Each of them; its place is `topic as usize`.
+    /// All topics; the place of each is `topic as usize`.
     pub const ALL: [Self; 3] = [Self::Cycle, Self::Field, Self::Actuation];
 
-    /// What a kind of frame is about.
+    /// Topic of a kind of frame.
     pub fn of(body: &Body) -> Self {
         match body {
             Body::Sync | Body::Sample(_) | Body::Turn(_) | Body::Join(_) | Body::Transfer(_) => {
@@ -38,18 +40,18 @@ impl Topic {
         }
     }
 
-    /// On which topic `listener` hears `speaker`, if at all; a pair (i, j) in `neighbours` says that plant j
-    /// hears plant i.
+    /// Topic on which `receiver` receives from `sender`, if any; a pair (i, j) in `neighbours` means that plant j
+    /// receives from plant i.
     pub fn between(
-        speaker: Member,
-        listener: Member,
+        sender: Member,
+        receiver: Member,
         neighbours: &[(ProgramId, ProgramId)],
     ) -> Option<Self> {
-        if speaker == listener {
+        if sender == receiver {
             return None;
         }
-        match (speaker, listener) {
-            // What a remote I/O samples concerns no other one.
+        match (sender, receiver) {
+            // A sample of a remote I/O concerns no other remote I/O.
             (Member::RemoteIo(_), Member::RemoteIo(_)) => None,
             (
                 Member::Station(_) | Member::RemoteIo(_),
@@ -61,8 +63,8 @@ impl Topic {
             (Member::Plant(plant), Member::RemoteIo(program)) => {
                 (program == plant).then_some(Self::Field)
             }
-            (Member::Plant(speaker), Member::Plant(listener)) => neighbours
-                .contains(&(speaker, listener))
+            (Member::Plant(sender), Member::Plant(receiver)) => neighbours
+                .contains(&(sender, receiver))
                 .then_some(Self::Field),
             (Member::Station(_), Member::Plant(_)) | (Member::Plant(_), Member::Station(_)) => None,
         }

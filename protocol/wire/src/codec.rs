@@ -8,8 +8,8 @@
 //!    5+n     4  CRC-32 (IEEE) of everything before it, little-endian
 //! ```
 //!
-//! Two stages: any bytes may arrive; [`decode`] answers with a frame only where every bound and every promise of
-//! [`crate::frame`] holds, so that the cores never see another. What the sender promises is asserted in [`encode`].
+//! Two stages: any bytes may arrive; [`decode`] returns a frame only where every bound and every rule of
+//! [`crate::frame`] holds, so that the members never process another one. [`encode`] asserts the same of what is sent.
 
 use bincode::config::{Configuration, Limit};
 
@@ -17,14 +17,14 @@ use crate::frame::{Body, Frame, Holding, MAXIMUM_HISTORY, Recalled, Relayed, Sam
 use crate::identifier::{MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, Member};
 use crate::set::ProgramSet;
 
-/// A frame is never longer; one UDP datagram can carry it.
+/// Maximum length of a frame; one UDP datagram can carry it.
 pub const MAXIMUM_FRAME_BYTES: usize = 32 * 1024;
 
 const MAGIC: [u8; 4] = *b"UNDR";
 const VERSION: u8 = 4;
 const PREFIX_BYTES: usize = 5;
 const CHECKSUM_BYTES: usize = 4;
-/// Positions that a plant may show, at most.
+/// Maximum number of positions that a plant shows.
 const MAXIMUM_POSITIONS: usize = 16;
 
 type Layout = Configuration<
@@ -37,36 +37,36 @@ fn layout() -> Layout {
     bincode::config::standard().with_limit::<MAXIMUM_FRAME_BYTES>()
 }
 
-/// Why bytes are no frame.
+/// Reason why bytes are not a frame.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum FrameError {
     /// Too short for any frame, or longer than [`MAXIMUM_FRAME_BYTES`].
     #[error("{bytes} bytes are no frame (at most {MAXIMUM_FRAME_BYTES})")]
     Length {
-        /// How many came.
+        /// Number of bytes that arrived.
         bytes: usize,
     },
-    /// Something else than a frame of ours.
+    /// Not a frame of this project.
     #[error("the bytes do not start with the magic of a frame")]
     Magic,
     /// A frame of another version of this layout.
     #[error("a frame of version {found}; this program speaks version {VERSION}")]
     Version {
-        /// The version that came.
+        /// Version that arrived.
         found: u8,
     },
     /// Changed on its way.
     #[error("checksum {found:08x} where {computed:08x} was computed")]
     Checksum {
-        /// The checksum that came.
+        /// Checksum in the frame.
         found: u32,
-        /// The checksum of the bytes that came.
+        /// Checksum of the bytes that arrived.
         computed: u32,
     },
-    /// The checksum is right and the bytes are no header and body.
+    /// The checksum is right, but the bytes cannot be decoded as header and body.
     #[error("the bytes are no header and body: {0}")]
     Layout(String),
-    /// It can be read and breaks a promise of the layout.
+    /// The frame can be decoded, but breaks a rule of the layout.
     #[error("a frame that breaks a promise: {0}")]
     Promise(&'static str),
 }
@@ -128,7 +128,7 @@ pub fn decode(bytes: &[u8]) -> Result<Frame, FrameError> {
     Ok(frame)
 }
 
-/// The promises that types alone cannot keep.
+/// Rules that types alone cannot express.
 fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
     let kept = |holds: bool, promise: &'static str| {
         if holds {

@@ -1,18 +1,19 @@
-//! What an operator puts in the place of one signal of a program, for a while.
+//! Values that an operator puts in the place of a signal of a program, for a limited time.
 //!
-//! An input is forced before it is sampled: the sample, its lineage and everything that follows from them are those of the forced
-//! value, so that all copies of the program agree about it. An output is forced behind the selection, where it is driven: what
-//! is judged as true stays as it is. Invariant: every force ends by itself, and is gone when its remote I/O starts again.
+//! An input is forced before it is sampled: the sample, its lineage and everything that follows from them are those of
+//! the forced value, so that all replicas of the program agree about it. An output is forced after the selection, where
+//! it is driven: the recorded proven output stays as it is. Invariant: every force ends by itself, and is gone when its
+//! remote I/O starts again.
 
 use serde::{Deserialize, Serialize};
 
-/// The longest time for which a signal can be forced at once.
+/// Maximum duration of one force, in seconds.
 pub const MAXIMUM_FORCE_SECONDS: u32 = 3600;
 
-/// Characters of the name of who forces, at most.
+/// Maximum number of characters of the operator's name.
 pub const MAXIMUM_OWNER_LENGTH: usize = 40;
 
-/// Characters of the reason, at most.
+/// Maximum number of characters of the reason.
 pub const MAXIMUM_REASON_LENGTH: usize = 120;
 
 /// A signal of the program of a remote I/O, counted from 0.
@@ -25,40 +26,40 @@ pub enum SignalPlace {
     Output(u16),
 }
 
-/// A value in the place of a signal's own.
+/// Value in the place of a signal's own.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Force {
-    /// Which signal.
+    /// Signal that is forced.
     pub signal: SignalPlace,
-    /// What it is from now on.
+    /// Forced value.
     pub value: bool,
-    /// For so long, 1 to [`MAXIMUM_FORCE_SECONDS`].
+    /// Duration in seconds, 1 to [`MAXIMUM_FORCE_SECONDS`].
     pub seconds: u32,
-    /// Who wants it.
+    /// Operator who forces it.
     pub owner: String,
-    /// Why.
+    /// Reason.
     pub reason: String,
 }
 
-/// Why a force is none.
+/// Reason why a force is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ForceError {
-    /// It would last for no time, or for too long.
+    /// Its duration is zero or too long.
     #[error("a force lasts 1 to {MAXIMUM_FORCE_SECONDS} seconds, not {0}")]
     Seconds(u32),
-    /// Nobody, or a name that is too long or not readable.
+    /// Its operator is missing, too long or not readable.
     #[error("who forces is 1 to {MAXIMUM_OWNER_LENGTH} readable characters")]
     Owner,
-    /// No reason, or one that is too long or not readable.
+    /// Its reason is missing, too long or not readable.
     #[error("the reason is 1 to {MAXIMUM_REASON_LENGTH} readable characters")]
     Reason,
 }
 
 impl Force {
-    /// Whether it says for how long, who and why.
+    /// Checks duration, operator and reason.
     ///
     /// # Errors
-    /// The first of them that it does not.
+    /// The first of them that is invalid.
     pub fn check(&self) -> Result<(), ForceError> {
         let readable = |text: &str, most: usize| {
             let length = text.chars().count();

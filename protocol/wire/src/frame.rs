@@ -1,13 +1,13 @@
-//! What is said in a cycle. The bytes are in [`crate::encode`].
+//! Frames of a cycle. Their bytes are in [`crate::encode`].
 //!
 //! ```text
 //!  0 ─ Sync ─ Samples ─┬─ Turn of controller 1 ─ … ─ Turn of controller N ─ Turn of each understudy ─┬─ Join, Transfer ─ T
-//!      cycle master       │  the token: speaking passes it on, a silent holder is passed over by time   │  rest
+//!      cycle master    │  the token: a turn passes it on, as does the end of a slot without a turn      │  rest
 //!                      └─ Field comes before, Actuation at the deadline ──────────────────────────────┘
 //! ```
 //!
-//! A controller's output is a [`Word`] whose mask is its own program; an understudy's words have wider masks. So one kind of
-//! [`Turn`] serves both, and what may be applied is decided on words alone.
+//! A controller's output is a [`Word`] whose mask is its own program; an understudy's words have wider masks. So one
+//! kind of [`Turn`] serves both, and what may be applied is decided on words alone.
 
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
@@ -22,44 +22,45 @@ use crate::set::{ProgramSet, StationSet};
 /// Samples that one [`Sample`] may carry, this cycle's included.
 pub const MAXIMUM_HISTORY: usize = 32;
 
-/// One datagram.
+/// Content of one datagram.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Frame {
-    /// Who, when, and of which cluster.
+    /// Sender, cycle and cluster.
     pub header: Header,
-    /// What.
+    /// Content.
     pub body: Body,
 }
 
-/// Stands before every body.
+/// Header of every frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Header {
-    /// The cluster it is meant for.
+    /// Cluster that it is sent to.
     pub cluster: ClusterHash,
-    /// The sender's configuration; another one is refused.
+    /// Configuration of the sender; a frame of another configuration is refused.
     pub configuration: ConfigurationHash,
-    /// Epoch and cycle in which it was made.
+    /// Epoch and cycle in which it was sent.
     pub moment: Moment,
-    /// Who made it.
+    /// Sender.
     pub sender: Member,
-    /// Whether the sender has heard nobody else in this epoch yet; an epoch that only its founder knows binds nobody.
+    /// Whether the sender has received no other member in this epoch yet; an epoch that only its founder knows binds no
+    /// member.
     pub alone: bool,
 }
 
-/// The kinds of frames.
+/// Content of a frame, by kind.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Body {
     /// The cycle master starts a cycle.
     Sync,
-    /// A remote I/O says what it sampled.
+    /// A remote I/O sends its sample.
     Sample(Sample),
-    /// A station says its outputs, and passes the token by it.
+    /// A station publishes its outputs and passes the token.
     Turn(Turn),
-    /// A station asks for states that it lacks, and says which it has.
+    /// A station asks for states that it lacks, and reports those that it holds.
     Join(Join),
-    /// A station gives a state to one that asked.
+    /// A station transfers a state to the station that asked.
     Transfer(Transfer),
-    /// A simulated plant says what its sensors see.
+    /// A simulated plant sends its sensors.
     Field(Field),
     /// A remote I/O drives its simulated plant.
     Actuation(Actuation),
@@ -68,50 +69,51 @@ pub enum Body {
 /// u(i) of this and of the last few cycles, with the lineage before the oldest of them.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Sample {
-    /// When this program was last started cold; its genesis lineage is a function of it.
+    /// Moment of the last cold start of this program; its genesis lineage is a function of it.
     pub born: Moment,
     /// The lineage before the oldest sample of `history`.
     pub base: Lineage,
     /// The lineage before this cycle's sample, the last of `history`: L(i)(t).
     pub before: Lineage,
-    /// The lineage after it, L(i)(t+1): what does not lead there has been changed since it was sampled.
+    /// The lineage after it, L(i)(t+1): a sample that does not lead to it was changed after it was sampled.
     pub after: Lineage,
     /// Oldest first; the last is u(i)(t). Never empty.
     pub history: SmallVec<[Image; 2]>,
-    /// The cycle of the newest sample whose outputs were applied, direct or reconstructed: the history never continues from a
-    /// state before it. Nothing where no output of this history was applied.
+    /// The cycle of the newest sample whose outputs were applied, direct or reconstructed: the history never continues
+    /// from a state before it. `None` where no output of this history was applied.
     pub applied: Option<Moment>,
-    /// Stations whose state of this program is proved to be faulty: they say nothing of it until the operator releases them.
+    /// Stations whose state of this program was found faulty: they publish none of its outputs until the operator
+    /// releases them.
     pub excluded: StationSet,
-    /// Stations that can hold this program and that were not received for so long that none of them can come back without a
-    /// state from another one.
+    /// Stations that can hold this program and that were not received for so long that none of them can come back
+    /// without a state from another one.
     pub gone: StationSet,
 }
 
-/// Where an applied output came from.
+/// Source of an applied output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Source {
-    /// From the controller itself, in this cycle and of the true lineage.
+    /// Received from the controller, in this cycle and of the true lineage.
     Direct,
-    /// By (12), from a parity word.
+    /// Reconstructed from a parity word by (12).
     Reconstructed,
-    /// The last true output, kept.
+    /// The last proven output, applied again.
     Held,
-    /// The configured values.
+    /// The configured fail-safe values.
     FailSafe,
 }
 
-/// What a station says when it holds the token.
+/// Frame of the station that holds the token.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Turn {
-    /// Whom it heard in this cycle before it published.
+    /// Stations that it received in this cycle before it published.
     pub heard: StationSet,
-    /// The states that it has, one for each program at most, in the order of programs.
+    /// The states that it holds, one for each program at most, in the order of programs.
     pub holdings: SmallVec<[Holding; 2]>,
     /// Its outputs of this cycle; members are among `holdings`, and stepped with this cycle's sample.
     pub words: SmallVec<[Word; 2]>,
-    /// Of programs whose remote I/Os have said nothing in this cycle; one for each at most.
+    /// Recalled samples of programs whose remote I/Os were not received in this cycle; one for each at most.
     pub recalled: Vec<Recalled>,
     /// Programs that it runs and whose samples did not come from their remote I/Os in this cycle: others relay them.
     pub lacks: ProgramSet,
@@ -119,27 +121,27 @@ pub struct Turn {
     pub relayed: Vec<Relayed>,
 }
 
-/// The sample of a program in this cycle, from a station that has received it to those that have not.
+/// Sample of a program in this cycle, from a station that has received it, for stations that have not.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Relayed {
-    /// Whose sample.
+    /// Program of the sample.
     pub program: ProgramId,
     /// As its remote I/O sent it.
     pub sample: Sample,
 }
 
-/// A copy of a program's state that a station has.
+/// State of a program that a station holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Holding {
-    /// Whose state.
+    /// Program of the state.
     pub program: ProgramId,
-    /// When that program was last started cold.
+    /// Moment of the last cold start of that program.
     pub born: Moment,
-    /// After the last sample that the copy was stepped with: L(i)(t+1) where that was this cycle's.
+    /// Lineage after the last sample in the state: L(i)(t+1) where that was the sample of this cycle.
     pub lineage: Lineage,
-    /// The cycle of that last sample.
+    /// Cycle of that last sample.
     pub stepped: Moment,
-    /// Of the state *before* that step, x(i)(t): the state that the words of this turn were computed from.
+    /// Digest of the state *before* that step, x(i)(t): the state that the words of this turn were computed from.
     pub digest: Digest,
 }
 
@@ -152,12 +154,12 @@ pub struct Word {
     pub sum: Image,
 }
 
-/// Said in the rest of a cycle by a station that lacks a state or does not speak yet.
+/// Sent in the rest of a cycle by a station that lacks a state or does not publish yet.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Join {
-    /// The programs whose state it asks for.
+    /// Programs whose state it asks for.
     pub wants: ProgramSet,
-    /// What it has.
+    /// States that it holds.
     pub holdings: SmallVec<[Holding; 2]>,
     /// As in a [`Turn`].
     pub recalled: Vec<Recalled>,
@@ -165,63 +167,63 @@ pub struct Join {
     pub lacks: ProgramSet,
 }
 
-/// What the newest sample of a program said, from a station that has heard none in this cycle: the program's remote I/O may
-/// have lost its memory, and then takes it up from here.
+/// The newest sample of a program as recalled by a station that has received none in this cycle: the program's remote
+/// I/O may have lost its memory, and restores it from here.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Recalled {
-    /// Whose sample.
+    /// Program of the sample.
     pub program: ProgramId,
-    /// Whether this station has received samples of two cycles of the program since it started: what it proved in an earlier life is in
-    /// `applied` then.
+    /// Whether this station has received samples of two cycles of the program since it started: outputs that it proved
+    /// in an earlier life are then covered by `applied`.
     pub witnessed: bool,
     /// The newest applied sample that it knows of, as in a [`Sample`].
     pub applied: Option<Moment>,
-    /// Stations that it excluded.
+    /// Stations that the remote I/O had excluded.
     pub excluded: StationSet,
-    /// Stations that can have proved no output of a newer sample: gone, as in a [`Sample`], or received after this program's remote
-    /// I/O had become silent, with a state that is no newer.
+    /// Stations that cannot have proved an output of a newer sample: gone, as in a [`Sample`], or received after the
+    /// remote I/O had become silent, with a state that is no newer.
     pub accounted_for: StationSet,
     /// u(i), with the channels that were failed and the values that they kept.
     pub inputs: Image,
 }
 
-/// x(i), from one who has it to one who asked.
+/// x(i), for the station that asked.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Transfer {
-    /// Who asked.
+    /// Station that asked.
     pub to: StationId,
-    /// Whose state.
+    /// Program of the state.
     pub program: ProgramId,
-    /// The program that it is a state of.
+    /// Hash of that program.
     pub hash: ProgramHash,
-    /// When that program was last started cold.
+    /// Moment of the last cold start of that program.
     pub born: Moment,
-    /// The state's own lineage.
+    /// Lineage of the state.
     pub lineage: Lineage,
-    /// The cycle of the last sample in it.
+    /// Cycle of the last sample in it.
     pub stepped: Moment,
-    /// Of the state before that sample, as in [`Holding`].
+    /// Digest of the state before that sample, as in [`Holding`].
     pub digest: Digest,
     /// x(i) after that sample.
     pub state: Image,
 }
 
-/// What a simulated plant's sensors see.
+/// Sensors and counts of a simulated plant.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Field {
     /// u(i).
     pub sensors: Image,
-    /// Parts that it has handed on to the plant it feeds, since its start.
+    /// Parts handed over to the plant that it feeds, since its start.
     pub handed_over: u64,
-    /// Parts that it has finished, since its start.
+    /// Parts finished, since its start.
     pub finished: u64,
-    /// Things that must not happen to a plant and did (a part dropped, a crash against an end), since its start.
+    /// Plant faults, such as a dropped part or a collision with an end stop, since its start.
     pub plant_faults: u64,
-    /// Where its moving parts are, for the figures; each from 0 to 1000.
+    /// Positions of its moving parts, for the figures; each from 0 to 1000.
     pub positions: SmallVec<[u16; 4]>,
 }
 
-/// What a remote I/O drives.
+/// Outputs that a remote I/O drives.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Actuation {
     /// y(i).

@@ -1,22 +1,23 @@
-//! Who, and when.
+//! Identifiers of members, programs and moments.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// Programs in one cluster, at most: a [`crate::ProgramSet`] is one 64-bit word.
+/// Maximum number of programs in one cluster: a [`crate::ProgramSet`] is one 64-bit word.
 pub const MAXIMUM_PROGRAMS: usize = 64;
 
-/// Stations in one cluster, at most: a [`crate::StationSet`] is one 64-bit word.
+/// Maximum number of stations in one cluster: a [`crate::StationSet`] is one 64-bit word.
 pub const MAXIMUM_STATIONS: usize = 64;
 
-/// A program's 0-based index in the cluster; the paper's i is `index + 1`. Controller i, remote I/O i and plant i share it.
+/// A program's 0-based index in the cluster; the paper's i is `index + 1`. Controller i, remote I/O i and plant i share
+/// it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct ProgramId(pub u8);
 
 impl ProgramId {
-    /// For indexing.
+    /// The index, as a `usize`.
     pub fn index(self) -> usize {
         usize::from(self.0)
     }
@@ -28,13 +29,13 @@ impl ProgramId {
 pub struct StationId(pub u8);
 
 impl StationId {
-    /// For indexing.
+    /// The rank, as a `usize`.
     pub fn index(self) -> usize {
         usize::from(self.0)
     }
 }
 
-/// Who speaks.
+/// Sender of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Member {
@@ -60,19 +61,19 @@ pub struct Epoch(pub u64);
 #[serde(transparent)]
 pub struct Cycle(pub u64);
 
-/// A cycle of an epoch, the cluster's own notion of when. Later epochs are later, whatever their cycles.
+/// A cycle of an epoch. Moments of a later epoch are later, whatever their cycles.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize,
 )]
 pub struct Moment {
-    /// The life of the cluster.
+    /// Epoch.
     pub epoch: Epoch,
-    /// The cycle in it.
+    /// Cycle of the epoch.
     pub cycle: Cycle,
 }
 
 impl Moment {
-    /// The moment `cycles` later in the same epoch; stays at the last cycle there is.
+    /// The moment `cycles` later in the same epoch, at most the last cycle that can be numbered.
     #[must_use]
     pub fn plus(self, cycles: u64) -> Self {
         Self {
@@ -96,7 +97,7 @@ macro_rules! hashes {
         pub struct $name(pub u64);
 
         impl $name {
-            /// The hash of the canonical text of what it stands for.
+            /// The hash of the canonical text of the named object.
             pub fn of(text: &[u8]) -> Self {
                 Self(xxhash_rust::xxh3::xxh3_64(text))
             }
@@ -111,10 +112,10 @@ macro_rules! hashes {
 }
 
 hashes! {
-    /// Names a cluster; frames of other clusters on the same network are foreign.
+    /// Identifies a cluster; frames of other clusters on the same network are dropped.
     ClusterHash;
-    /// Names all programs, roles and timings of a cluster; a station that has another one is refused.
+    /// Identifies all programs, roles and timings of a cluster; a member with another one is refused.
     ConfigurationHash;
-    /// Names one program's circuit.
+    /// Identifies one program's circuit.
     ProgramHash;
 }

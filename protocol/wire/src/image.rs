@@ -1,14 +1,14 @@
 //! Bit vectors of a fixed width: u(i), x(i) and y(i).
 //!
-//! Invariant: there are exactly as many words as the width needs, and the bits past the width are 0; so equal images have
-//! equal words, and words of unequal width can be added as if the absent high bits were 0 (as (9) does).
+//! Invariant: there are exactly as many words as the width needs, and the bits past the width are 0; so equal images
+//! have equal words, and words of unequal width can be added as if the absent high bits were 0 (as (9) does).
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
-/// Bits in one image, at most: a state of this size still fits into one frame.
+/// Maximum number of bits of one image: a state of this size still fits into one frame.
 pub const MAXIMUM_IMAGE_BITS: usize = 64 * 1024;
 
 /// Bit k of word k / 64 is element k + 1 of the vector.
@@ -19,34 +19,34 @@ pub struct Image {
     words: SmallVec<[u64; 2]>,
 }
 
-/// An image as it travels, not yet believed.
+/// An image as it is sent, before it is checked.
 #[derive(Serialize, Deserialize)]
 struct RawImage {
     width: u32,
     words: SmallVec<[u64; 2]>,
 }
 
-/// Bits that are no image.
+/// Reason why bits are not an image.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ImageError {
     /// Wider than [`MAXIMUM_IMAGE_BITS`].
     #[error("an image of {width} bits is wider than {MAXIMUM_IMAGE_BITS}")]
     TooWide {
-        /// The width that was asked for.
+        /// Requested width.
         width: usize,
     },
     /// Words that do not fit the width, or bits that are set past it.
     #[error("{words} words are no image of {width} bits")]
     Malformed {
-        /// The width that was claimed.
+        /// Width in the frame.
         width: usize,
-        /// The words that came.
+        /// Number of words in the frame.
         words: usize,
     },
 }
 
 impl Image {
-    /// All 0.
+    /// An image whose bits are all 0.
     ///
     /// # Panics
     /// If wider than [`MAXIMUM_IMAGE_BITS`]; widths are checked where a cluster is configured.
@@ -58,7 +58,7 @@ impl Image {
         }
     }
 
-    /// From packed words, bit k of word k / 64 being element k + 1.
+    /// An image from packed words, bit k of word k / 64 being element k + 1.
     pub fn from_words(width: usize, words: &[u64]) -> Result<Self, ImageError> {
         if width > MAXIMUM_IMAGE_BITS {
             return Err(ImageError::TooWide { width });
@@ -81,7 +81,7 @@ impl Image {
         })
     }
 
-    /// From its bits in order.
+    /// An image from its bits in order.
     ///
     /// # Panics
     /// If there are more than [`MAXIMUM_IMAGE_BITS`].
@@ -94,7 +94,7 @@ impl Image {
         image
     }
 
-    /// Bits.
+    /// Number of bits.
     pub fn width(&self) -> usize {
         self.width as usize
     }
@@ -104,7 +104,7 @@ impl Image {
         &self.words
     }
 
-    /// Packed words to be written by one who keeps the bits past the width at 0, as a circuit's step does.
+    /// Packed words for a writer that keeps the bits past the width at 0, as the step of a circuit does.
     pub fn words_mut(&mut self) -> &mut [u64] {
         &mut self.words
     }
@@ -128,7 +128,7 @@ impl Image {
         }
     }
 
-    /// In order.
+    /// The bits in order.
     pub fn bits(&self) -> impl ExactSizeIterator<Item = bool> + '_ {
         (0..self.width()).map(|index| self.get(index))
     }
@@ -154,7 +154,7 @@ impl Image {
         Self::from_words(width, &self.words[..needed]).ok()
     }
 
-    /// Whether every bit is 0: what a syndrome is when nothing is wrong.
+    /// Whether every bit is 0, as in the syndrome of consistent outputs.
     pub fn is_zero(&self) -> bool {
         self.words.iter().all(|&word| word == 0)
     }

@@ -1,6 +1,6 @@
-//! What travels between the members of a cluster: identifiers, images, lineages and frames.
+//! Data that the members of a cluster exchange: identifiers, images, lineages and frames.
 //!
-//! Everything that two members must agree on is here and nowhere else: who they are ([`Member`]), which states are the same
+//! All definitions that two members must share are in this crate only: members ([`Member`]), equality of states
 //! ([`Lineage`]), and the bytes of a [`Frame`] ([`encode`], [`decode`]).
 
 mod audience;

@@ -1,8 +1,8 @@
-//! Which states are the same, without sending or hashing a state.
+//! Equality of states, without sending or hashing a state.
 //!
-//! L(i)(0) = H(program, birth), L(i)(t+1) = H(L(i)(t), u(i)(t)). A state is a function of its first state and of the inputs
-//! since, so equal lineages mean equal states, up to a collision of 64 bits and to a value fault; a [`Digest`] of the state
-//! itself travels beside it and differs from its twin only after a value fault.
+//! L(i)(0) = H(program, birth), L(i)(t+1) = H(L(i)(t), u(i)(t)). A state is a function of its first state and of the
+//! inputs since, so equal lineages mean equal states, up to a collision of 64 bits and to a value fault; a [`Digest`]
+//! of the state itself is sent with it, and differs between replicas of equal lineage only after a value fault.
 
 use std::fmt;
 
@@ -12,7 +12,7 @@ use xxhash_rust::xxh3::xxh3_64_with_seed;
 use crate::identifier::{Moment, ProgramHash};
 use crate::image::Image;
 
-/// Names a first state and all inputs since.
+/// Identifies an initial state and all inputs since.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Lineage(pub u64);
@@ -28,7 +28,7 @@ impl Lineage {
     /// L(i)(t+1), from L(i)(t) and u(i)(t).
     #[must_use]
     pub fn after(self, inputs: &Image) -> Self {
-        // A program without inputs steps all the same, and each of its states has a name of its own.
+        // A program without inputs steps too, and each of its states has its own lineage.
         let first = self.fold(inputs.width() as u64);
         inputs.words().iter().copied().fold(first, Self::fold)
     }
@@ -38,13 +38,13 @@ impl Lineage {
     }
 }
 
-/// A hash of a state.
+/// Hash of a state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Digest(pub u64);
 
 impl Digest {
-    /// Of x(i).
+    /// The digest of x(i).
     pub fn of(state: &Image) -> Self {
         let words = state.words().iter();
         Self(words.fold(0, |digest, word| {

@@ -8,11 +8,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::identifier::{ProgramId, StationId};
 
-/// What a [`Set`] may hold: an index below 64.
+/// Member of a [`Set`]: an index below 64.
 pub trait Element: Copy {
-    /// From an index below 64.
+    /// The member with an index below 64.
     fn from_index(index: u8) -> Self;
-    /// Its index; a member at 64 or above is in no set.
+    /// Its index; a member with an index of 64 or above is in no set.
     fn to_index(self) -> u8;
 }
 
@@ -39,14 +39,14 @@ impl Element for StationId {
 #[serde(transparent)]
 pub struct Set<E>(u64, #[serde(skip)] PhantomData<E>);
 
-/// Which programs, such as the mask of a parity word.
+/// A set of programs, such as the mask of a parity word.
 pub type ProgramSet = Set<ProgramId>;
 
-/// Which stations, such as those heard in a cycle.
+/// A set of stations, such as those received in a cycle.
 pub type StationSet = Set<StationId>;
 
 impl<E: Element> Set<E> {
-    /// No member.
+    /// The empty set.
     pub const EMPTY: Self = Self(0, PhantomData);
 
     /// The members of a bit mask.
@@ -68,7 +68,7 @@ impl<E: Element> Set<E> {
         })
     }
 
-    /// One member.
+    /// The set of one member.
     pub fn only(member: E) -> Self {
         Self::from_bits(bit(member))
     }
@@ -83,40 +83,40 @@ impl<E: Element> Set<E> {
         self.0 |= bit(member);
     }
 
-    /// Takes a member out.
+    /// Removes a member.
     pub fn remove(&mut self, member: E) {
         self.0 &= !bit(member);
     }
 
-    /// Those of this set that are not in `other`.
+    /// The members of this set that are not in `other`.
     #[must_use]
     pub fn without(self, other: Self) -> Self {
         Self::from_bits(self.0 & !other.0)
     }
 
-    /// Those in both.
+    /// The members of both sets.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
         Self::from_bits(self.0 & other.0)
     }
 
-    /// Those in either.
+    /// The members of either set.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
         Self::from_bits(self.0 | other.0)
     }
 
-    /// How many.
+    /// Number of members.
     pub fn len(self) -> usize {
         self.0.count_ones() as usize
     }
 
-    /// None.
+    /// Whether the set has no member.
     pub fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// In ascending order.
+    /// The members in ascending order.
     pub fn iter(self) -> impl Iterator<Item = E> {
         let mut rest = self.0;
         std::iter::from_fn(move || {

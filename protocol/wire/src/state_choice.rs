@@ -1,10 +1,10 @@
-//! The operator's answer where the state of a program is lost: where it continues.
+//! The operator's choice where the state of a program is lost: the state from which it continues.
 
 use serde::{Deserialize, Serialize};
 
 use crate::identifier::Cycle;
 
-/// From which state a program continues whose own state no living station can prove.
+/// State from which a program continues when no living station can prove the true one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StateChoice {
@@ -12,7 +12,8 @@ pub enum StateChoice {
     Cold,
     /// From the newest state that a living station holds, although outputs of later samples were applied.
     Newest {
-        /// The cycle of that state as the operator has seen it; another one is refused. Whatever it is where this is absent.
+        /// Cycle of that state as the operator has seen it; another one is refused. Any cycle is accepted where this is
+        /// absent.
         cycle: Option<Cycle>,
     },
 }

@@ -1,11 +1,11 @@
-//! Monotonic time of one host, as the cores are given it.
+//! Monotonic time of one host, as an argument of the members.
 
 use std::ops::Add;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-/// Nanoseconds since a start that only its own host knows; never compared between hosts, never a wall clock.
+/// Nanoseconds since the start of a host; never compared between hosts, never a wall clock.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize,
 )]
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 pub struct Time(pub u64);
 
 impl Time {
-    /// How long after `earlier`; zero where it is not after.
+    /// Time since `earlier`; zero where that is not earlier.
     pub fn since(self, earlier: Self) -> Duration {
         Duration::from_nanos(self.0.saturating_sub(earlier.0))
     }

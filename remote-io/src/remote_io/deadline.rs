@@ -7,16 +7,16 @@ use super::knowledge::Run;
 use super::{Applied, Authority, Deadline, Question, RemoteIo};
 use crate::event::{Event, Missing};
 use crate::history::History;
-use crate::selection::{Heard, Selection};
+use crate::selection::{Received, Selection};
 use crate::settings::ValueFault;
 use crate::trust::Accusation;
 
 impl RemoteIo {
-    /// The deadline of a cycle that was started. What was heard is worth nothing when it comes a period late.
+    /// The deadline of a cycle that was started. Turns that were received are discarded if it comes a period late.
     pub(super) fn decide(&mut self, now: Time) {
         let late = now.since(self.decides_at()) > self.settings.agreement.schedule.period();
         self.deadline = Deadline::Passed { idle: 0 };
-        let heard = Heard {
+        let received = Received {
             turns: &self.turns,
             controllers: self.settings.agreement.schedule.controllers(),
             mode: self.settings.agreement.mode,
@@ -37,7 +37,7 @@ impl RemoteIo {
             Some(Run { history, .. }) => {
                 let (truth, answer) = (history.head(), settings.value_fault);
                 let (selected, found) =
-                    heard.select(settings.program, truth, width, &mut self.trust, answer);
+                    received.select(settings.program, truth, width, &mut self.trust, answer);
                 accusation = found;
                 let selection = match self.authority {
                     Authority::Proof => selected,
@@ -65,8 +65,8 @@ impl RemoteIo {
         self.watch_protection();
     }
 
-    fn heard(&self) -> Heard<'_> {
-        Heard {
+    fn received(&self) -> Received<'_> {
+        Received {
             turns: &self.turns,
             controllers: self.settings.agreement.schedule.controllers(),
             mode: self.settings.agreement.mode,
@@ -75,8 +75,8 @@ impl RemoteIo {
 
     /// Reports words and states of any program that do not agree, when they begin to differ.
     fn report_differences(&mut self, moment: Moment) {
-        let syndromes: Vec<_> = self.heard().syndromes().collect();
-        let states = self.heard().digest_differences();
+        let syndromes: Vec<_> = self.received().syndromes().collect();
+        let states = self.received().digest_differences();
         let before = std::mem::take(&mut self.differed);
         for (syndrome, accused) in syndromes {
             self.differed.push((None, accused));
@@ -160,7 +160,7 @@ impl RemoteIo {
         });
     }
 
-    /// The next deadline: of this cycle, or of one that nobody has started in time.
+    /// The next deadline: of this cycle, or of one that no station has started in time.
     pub(super) fn decides_at(&self) -> Time {
         let schedule = &self.settings.agreement.schedule;
         let deadline = self.member.clock.anchor() + schedule.deadline();

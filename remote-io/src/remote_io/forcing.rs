@@ -1,6 +1,6 @@
-//! The signals that the operator has forced, and until when.
+//! Signals that the operator has forced, each with its end.
 //!
-//! Invariant: at most one force for each signal, and none after its time.
+//! Invariant: at most one force for each signal, and none after its end.
 
 use std::time::Duration;
 
@@ -38,13 +38,13 @@ impl Forcing {
         self.active.len() < before
     }
 
-    /// Takes one away whose time is over.
+    /// Removes a force whose time is over.
     fn take_expired(&mut self, now: Time) -> Option<SignalPlace> {
         let expired = self.active.iter().position(|active| active.until <= now)?;
         Some(self.active.remove(expired).signal)
     }
 
-    /// u(i) as it is sampled.
+    /// u(i) with the forced values, as it is sampled.
     pub(super) fn inputs(&self, field: &Image) -> Image {
         self.with(field, |signal| match signal {
             SignalPlace::Input(place) => Some(place),
@@ -52,7 +52,7 @@ impl Forcing {
         })
     }
 
-    /// y(i) as it is driven.
+    /// y(i) with the forced values, as it is driven.
     pub(super) fn outputs(&self, applied: &Image) -> Image {
         self.with(applied, |signal| match signal {
             SignalPlace::Output(place) => Some(place),
@@ -72,7 +72,7 @@ impl Forcing {
 }
 
 impl RemoteIo {
-    /// A force of a signal that the program does not have, or without an end, is none.
+    /// A force of a signal that the program does not have, or without an end, is refused.
     pub(super) fn force(&mut self, now: Time, force: &Force) {
         let width = match force.signal {
             SignalPlace::Input(_) => self.settings.inputs,

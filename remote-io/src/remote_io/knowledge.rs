@@ -6,14 +6,15 @@
 //!       └── a state is adopted ──────────────────────────┴─────────────────────────────────────┘
 //! ```
 //!
-//! It never forgets: a program that is started cold from `Known` keeps its [`Floor`] until an output is applied (*Never back*).
+//! It never forgets: a program that is started cold from `Known` keeps its [`Floor`] until an output is applied (*Never
+//! back*).
 
 use understudy_wire::{Lineage, Moment};
 
 use crate::history::History;
 
-/// The newest sample whose outputs were applied: an applied output has moved the plant, so the history never continues from a
-/// state before it. A cold start of which no output was applied moves nothing.
+/// The newest sample whose outputs were applied: an applied output has moved the plant, so the history never continues
+/// from a state before it. A cold start of which no output was applied moves nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct Floor {
     /// Its cycle.
@@ -129,7 +130,8 @@ impl Knowledge {
         }
     }
 
-    /// The operator releases all stations: those that other stations recall as excluded too, where the floor is not known.
+    /// The operator releases all stations: those that other stations recall as excluded too, where the floor is not
+    /// known.
     pub(super) fn pardon(&mut self) {
         match self {
             Self::Listening { pardons, .. } | Self::ColdStarted { pardons, .. } => *pardons = true,

@@ -1,5 +1,6 @@
-//! Whether the failure of one station would be masked now: the controller and an understudy, or two understudies, prove this
-//! program's output in this cycle. What is lost for `flag_after` cycles in a row is reported at once, with the reason.
+//! Whether the failure of one station would be masked now: the controller and an understudy, or two understudies, prove
+//! the output of this program in this cycle. Protection lost for `flag_after` cycles in a row is reported, with the
+//! reason.
 
 use smallvec::SmallVec;
 use understudy_cycle::Mode;
@@ -8,36 +9,36 @@ use understudy_wire::{Body, Lineage, Moment, StationId, StationSet, Turn};
 use super::RemoteIo;
 use crate::event::{Event, Lacking, LackingReason};
 
-/// Stations of which each one alone proves the output.
+/// Sets of stations, each of which proves the output by itself.
 const STATIONS_NEEDED: usize = 2;
 
-/// Kept from deadline to deadline.
+/// State kept from deadline to deadline.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub(super) struct Protection {
-    /// As it was reported last; nothing before the program was protected for the first time.
+    /// Last reported state; `None` before the program was protected for the first time.
     reported: Option<bool>,
-    /// Deadlines in a row at which it was not protected, and the cycle of the first of them.
+    /// Deadlines in a row without protection, and the cycle of the first of them.
     missed: u32,
     since: Moment,
 }
 
 impl RemoteIo {
-    /// Looks at the turns of a cycle at its deadline, where it was sampled.
+    /// Evaluates the turns of a cycle at its deadline, where it was sampled.
     pub(super) fn watch_protection(&mut self) {
         if let Some(run) = self.knowledge.run().filter(|run| run.sampled) {
             self.note_protection(self.lacking(run.history.head()));
         }
     }
 
-    /// A deadline without a cycle: no station proves anything.
+    /// A deadline without a cycle: no station proves an output.
     pub(super) fn note_idle(&mut self) {
         let reason = LackingReason::NotReceived;
-        let all = self.witnesses.stations();
+        let all = self.holders.stations();
         self.note_protection(all.map(|station| Lacking { station, reason }).collect());
     }
 
     fn note_protection(&mut self, lacking: SmallVec<[Lacking; 2]>) {
-        let stations = self.witnesses.stations().count();
+        let stations = self.holders.stations().count();
         if stations < STATIONS_NEEDED {
             return;
         }
@@ -70,17 +71,17 @@ impl RemoteIo {
         }
     }
 
-    /// The stations that do not prove this program's output in this cycle, and why; in the paper's mode also the failed ones that
-    /// have no part in this program.
+    /// Stations that do not prove this program's output in this cycle, with the reason; in the paper's mode also failed
+    /// stations of other programs.
     fn lacking(&self, head: Lineage) -> SmallVec<[Lacking; 2]> {
-        let own = self.witnesses.stations().filter_map(|station| {
+        let own = self.holders.stations().filter_map(|station| {
             let reason = self.lacks(station, head)?;
             Some(Lacking { station, reason })
         });
         let mut lacking: SmallVec<[Lacking; 2]> = own.collect();
         if self.settings.agreement.mode == Mode::Paper {
             let all = StationSet::first(self.turns.len());
-            let part: StationSet = self.witnesses.stations().collect();
+            let part: StationSet = self.holders.stations().collect();
             let failed = all.without(part).without(self.member.published());
             let reason = LackingReason::Failed;
             lacking.extend(failed.iter().map(|station| Lacking { station, reason }));
@@ -88,14 +89,14 @@ impl RemoteIo {
         lacking
     }
 
-    /// Why a station does not prove this program's output in this cycle, if it does not.
+    /// Reason why a station does not prove this program's output in this cycle.
     fn lacks(&self, station: StationId, head: Lineage) -> Option<LackingReason> {
         if self.trust.excluded().contains(station) {
             return Some(LackingReason::Excluded);
         }
         let Some(turn) = self.turn_of(station) else {
             let joins = self.member.flagged().contains(station);
-            return Some(if joins && self.witnesses.is_living(station) {
+            return Some(if joins && self.holders.is_living(station) {
                 LackingReason::Joining
             } else {
                 LackingReason::NotReceived

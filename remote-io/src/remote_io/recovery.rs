@@ -1,11 +1,12 @@
-//! From which state the program continues: after a restart of this remote I/O, or when no living station is on its history.
+//! The state from which the program continues: after a restart of this remote I/O, or when no living station is on its
+//! history.
 //!
 //! ```text
 //!   no living station holds a state ───────────────────── cold start
 //!   a state at the floor, or one that covers it ────────── adopted
 //!   different states of one cycle after a restart ──────── the operator chooses (`release`)
-//!   only states before the floor, or none that is proved
-//!   to cover it after a restart ────────────────────────── the state is lost: see `StaleState`
+//!   only states before the floor, or none that provably
+//!   covers it after a restart ──────────────────────────── the state is lost: see `StaleState`
 //! ```
 
 use understudy_wire::{Holding, Moment, StateChoice, StationId, StationSet, Time};
@@ -17,7 +18,7 @@ use crate::history::History;
 use crate::settings::{Release, StaleState};
 use crate::trust::Trust;
 
-/// What the living stations allow.
+/// What the states of the living stations allow.
 enum Verdict {
     Cold,
     Adopt(StationId, Holding),
@@ -26,10 +27,11 @@ enum Verdict {
 }
 
 impl RemoteIo {
-    /// Listens until it is known which station holds which state; notices when no living station is on this history any more.
+    /// Listens until the states of the stations are known; detects that no living station is on this history any more.
     pub(super) fn find_history(&mut self, now: Time, moment: Moment) {
         let listen_cycles = self.settings.agreement.listen_cycles;
-        // What was received while this remote I/O was stopped is read at once, and counts as one cycle: the present may differ.
+        // Frames received while this remote I/O was suspended are read at once and count as one cycle: the stations may
+        // have changed.
         let period = self.settings.agreement.schedule.period();
         let counted = now.since(self.looked) * 2 >= period;
         if counted {
@@ -44,10 +46,10 @@ impl RemoteIo {
                 } = run;
                 let on_it = |holding: &Holding| history.place(holding.lineage).is_some();
                 let follower = self
-                    .witnesses
+                    .holders
                     .holdings()
                     .find_map(|(station, holding)| on_it(holding).then_some(station));
-                *unfollowed = if follower.is_some() || !self.witnesses.anybody() {
+                *unfollowed = if follower.is_some() || !self.holders.any_living() {
                     0
                 } else {
                     unfollowed.saturating_add(u32::from(counted))
@@ -61,24 +63,24 @@ impl RemoteIo {
                 waited
             }
             Knowledge::Listening { cycles, held, .. } => {
-                let holds = self.witnesses.newest().is_some();
-                // The station that held a state may come back, or have given it to another one.
+                let holds = self.holders.newest().is_some();
+                // The station that held a state may come back, or may have transferred it to another one.
                 if *held && !holds {
                     *cycles = 0;
                 }
                 *held = holds;
-                *cycles = cycles.saturating_add(u32::from(counted && self.witnesses.anybody()));
+                *cycles = cycles.saturating_add(u32::from(counted && self.holders.any_living()));
                 *cycles
             }
         };
-        // A station that could hold the state and is not there gets longer: it may be the only one that does.
-        let patience = if self.witnesses.everybody() { 1 } else { 5 };
+        // A missing station that could hold the state gets longer: it may be the only one that does.
+        let patience = if self.holders.all_living() { 1 } else { 5 };
         // A history without a sample is one that no station can follow.
         if waited < listen_cycles * patience || waited == 0 || self.sensors.is_none() {
             return;
         }
         match self.verdict() {
-            // The operator has been asked: a state that cannot be seen for a moment is no reason to start cold.
+            // The operator has been asked: a state that is not received for a moment is no reason to start cold.
             Verdict::Cold if self.question == Some(Question::StateLost) => {}
             Verdict::Cold => self.start(moment, None),
             Verdict::Adopt(from, holding) => self.start(moment, Some((from, holding))),
@@ -92,22 +94,22 @@ impl RemoteIo {
     }
 
     fn verdict(&self) -> Verdict {
-        let Some((from, newest)) = self.witnesses.newest() else {
+        let Some((from, newest)) = self.holders.newest() else {
             return Verdict::Cold;
         };
         let proved = match &self.knowledge {
             Knowledge::Known { floor, .. } => {
-                let mut holdings = self.witnesses.holdings();
+                let mut holdings = self.holders.holdings();
                 return match holdings.find(|(_, holding)| holding.lineage == floor.lineage) {
                     Some((from, holding)) => Verdict::Adopt(from, *holding),
                     None => Verdict::Stale(from, *newest),
                 };
             }
-            Knowledge::Listening { .. } => self.witnesses.covers_all_applied(newest),
-            // What was applied before the cold start is not known, and nothing was applied since.
+            Knowledge::Listening { .. } => self.holders.covers_all_applied(newest),
+            // Outputs applied before the cold start are not known, and none was applied since.
             Knowledge::ColdStarted { run, .. } => newest.born == run.history.born(),
         };
-        match self.witnesses.disputed() {
+        match self.holders.disputed() {
             Some(stations) => Verdict::Disputed(stations),
             None if !proved => Verdict::Stale(from, *newest),
             None => Verdict::Adopt(from, *newest),
@@ -133,13 +135,10 @@ impl RemoteIo {
         }
     }
 
-    /// The operator's answer.
+    /// Applies the operator's choice.
     pub(super) fn choose(&mut self, choice: StateChoice) {
         let moment = self.moment();
-        let newest = self
-            .witnesses
-            .newest()
-            .map(|(from, newest)| (from, *newest));
+        let newest = self.holders.newest().map(|(from, newest)| (from, *newest));
         match (self.question, choice, newest) {
             (Some(Question::StateLost), StateChoice::Cold, _) => self.start(moment, None),
             (Some(_), StateChoice::Newest { cycle }, Some((from, newest)))
@@ -194,14 +193,14 @@ impl RemoteIo {
         self.knowledge.start(history, adopted);
     }
 
-    /// After a restart: takes up from what the stations recall.
+    /// After a restart: restores what the stations recall.
     fn remember(&mut self, moment: Moment, from: Option<StationId>) {
-        self.witnesses.recall_gone();
-        if let Some(inputs) = from.and_then(|station| self.witnesses.inputs(station)) {
+        self.holders.recall_gone();
+        if let Some(inputs) = from.and_then(|station| self.holders.inputs(station)) {
             self.diagnosing.recall(inputs);
             self.field = inputs.clone();
         }
-        let stations = self.witnesses.excluded();
+        let stations = self.holders.excluded();
         if !self.knowledge.pardons() && !stations.is_empty() {
             self.trust = Trust::excluding(stations);
             self.report(Event::RecalledExclusion { moment, stations });

@@ -4,25 +4,25 @@ use understudy_wire::{Body, Image, Moment, Sample, Source, Time};
 
 use super::RemoteIo;
 use crate::channel;
-use crate::diagnosis::Sight;
+use crate::diagnosis::Observation;
 use crate::event::Event;
 
 impl RemoteIo {
-    /// What the program sees from now on, by what the sensors show and what the diagnosis finds of it.
+    /// The inputs that the program reads from now on, from the sensors and the findings of the diagnosis.
     fn see(&mut self, moment: Moment, sensors: &Image) {
         let mut shown = sensors.clone();
         let mut unsteady = None;
         if let Some(diagnosis) = &self.settings.diagnosis {
             let applied = self.applied.as_ref();
             let outputs = applied.map_or(&self.settings.fail_safe, |applied| &applied.outputs);
-            let sight = Sight {
+            let observation = Observation {
                 sensors,
                 driven: &self.forcing.outputs(outputs),
                 is_true: applied.is_some_and(|applied| {
                     matches!(applied.source, Source::Direct | Source::Reconstructed)
                 }),
             };
-            let found = self.diagnosing.scan(diagnosis, sight);
+            let found = self.diagnosing.scan(diagnosis, observation);
             for status in (0..shown.width()).filter(|&place| found.failed.get(place)) {
                 shown.set(status, true);
             }
@@ -37,8 +37,8 @@ impl RemoteIo {
         self.field = channel::seen(channels, &self.field, &shown, unsteady.as_ref());
     }
 
-    /// Takes u(i)(t) and says it. Where it is not known nothing is said, so that nobody steps the program: it goes on from
-    /// its state when the sensors can be seen again.
+    /// Takes u(i)(t) and sends it. Where the sensors are not known no sample is sent, so that no station steps the
+    /// program: it continues from its state when the sensors are known again.
     pub(super) fn sample(&mut self, now: Time) {
         if self.knowledge.run().is_none() {
             return;
@@ -55,7 +55,7 @@ impl RemoteIo {
         };
         let history = &mut run.history;
         let places = self
-            .witnesses
+            .holders
             .holdings()
             .filter_map(|(_, holding)| history.place(holding.lineage));
         let living = places.fold(None, |range: Option<(usize, usize)>, place| {
@@ -74,7 +74,7 @@ impl RemoteIo {
             history: history.samples(),
             applied: floor.map(|floor| floor.moment),
             excluded: self.trust.excluded(),
-            gone: self.witnesses.gone(),
+            gone: self.holders.gone(),
         });
         if void > 0 {
             self.report(Event::Voided {

@@ -1,14 +1,13 @@
 //! The table of a remote I/O: each reachable named state, with each input, and the state that follows.
 //!
-//! The states are found from a remote I/O that has just started, breadth first. The drawing in `docs/pictures/remote-io.dot`
-//! is made from the same table.
+//! The states are found from a remote I/O that has just started, breadth first. The drawing in
+//! `docs/pictures/remote-io.dot` is made from the same table.
 
-use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_cycle::{Agreement, Input, Machine, Mode, Output, RemoteIoInput, Schedule};
+use understudy_testing::states::Table;
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
     Join, Lineage, Member, Moment, ProgramHash, ProgramId, ProgramSet, Recalled, Sample,
@@ -247,66 +246,18 @@ fn turn(holding: Holding, output: bool) -> Body {
     })
 }
 
-/// For each reachable state, the states that follow, in the order of [`ALL`].
-fn table() -> Vec<(String, Vec<String>)> {
-    let start = Bench::new();
-    let mut found = vec![start.state()];
-    let mut benches = vec![start];
-    let mut rows = Vec::new();
-    while let Some(bench) = benches.get(rows.len()).cloned() {
-        let mut next = Vec::new();
-        for (happening, _) in ALL {
-            let mut bench = bench.clone();
-            bench.happens(happening);
-            let state = bench.state();
-            if !found.contains(&state) {
-                found.push(state.clone());
-                benches.push(bench);
-            }
-            next.push(state);
-        }
-        rows.push((bench.state(), next));
-    }
-    rows
-}
-
-fn drawing(table: &[(String, Vec<String>)]) -> String {
-    let mut text = String::from(
-        "// The states of a remote I/O. The test remote-io/src/remote_io/states.rs makes this file.\n\
-         digraph \"remote I/O\" {\n  node [shape=box, style=rounded];\n",
-    );
-    for (state, next) in table {
-        let mut edges: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
-        let changes = next.iter().zip(ALL).filter(|(next, _)| *next != state);
-        for (next, (_, input)) in changes {
-            edges.entry(next).or_default().push(input);
-        }
-        for (next, inputs) in edges {
-            let label = inputs.join("\\n");
-            let _ = writeln!(text, "  \"{state}\" -> \"{next}\" [label=\"{label}\"];");
-        }
-    }
-    text.push_str("}\n");
-    text
+fn table() -> Table {
+    Table::explore(Bench::new(), &ALL, Bench::happens, Bench::state)
 }
 
 #[test]
 fn each_state_answers_each_input() {
-    let table = table();
-    let mut text = String::new();
-    for (state, next) in &table {
-        let _ = writeln!(text, "{state}");
-        for (next, (_, input)) in next.iter().zip(ALL) {
-            let next = if next == state { "." } else { next };
-            let _ = writeln!(text, "  {input:<34} {next}");
-        }
-    }
-    insta::assert_snapshot!(text);
+    insta::assert_snapshot!(table().text());
 }
 
 #[test]
 fn the_drawing_is_the_table() {
-    let drawing = drawing(&table());
+    let drawing = table().drawing("remote I/O", "remote-io/src/remote_io/states.rs");
     let drawn = include_str!("../../../docs/pictures/remote-io.dot");
     assert!(
         drawing == drawn,

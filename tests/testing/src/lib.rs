@@ -1,7 +1,8 @@
-//! What the tests of several crates share: the press cell, skipped tests, random numbers and random programs.
+//! What the tests of several crates share: the press cell, skipped tests, random numbers, random programs and tables of states.
 
 mod cells;
 pub mod random;
+pub mod states;
 
 use std::fmt::Display;
 use std::fs::OpenOptions;

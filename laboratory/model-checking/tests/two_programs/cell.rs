@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_cycle::{Agreement, Mode, Schedule};
-use understudy_logic::{Circuit, CircuitBuilder, Scan};
+use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_plant::{ModelKind, Plant, Signals};
 use understudy_remote_io::{Release, StaleState, ValueFault};
 use understudy_simulator::Parts;
@@ -57,7 +57,7 @@ pub(crate) fn parts(understudies: usize) -> Parts {
         .zip(1..)
         .map(|(circuit, hash)| understudy_node::Program {
             hash: ProgramHash(hash),
-            scan: Scan::new(circuit),
+            executable: circuit.into(),
         })
         .collect();
     let stations = (0..circuits.len() + understudies).map(|rank| understudy_node::Settings {
@@ -82,8 +82,8 @@ pub(crate) fn parts(understudies: usize) -> Parts {
         stale_state: StaleState::Operator,
     });
     let plants = circuits.iter().map(|circuit| {
-        let kind = ModelKind::Ladder(Box::new(plant()));
-        Plant::new(&kind, circuit, &Signals::new(), false).0
+        let kind = ModelKind::Program(Box::new((&plant()).into()));
+        Plant::new(&kind, &circuit.into(), &Signals::new(), false).0
     });
     Parts {
         stations: stations.collect(),

@@ -40,7 +40,7 @@ fn referee() -> Referee {
         value_fault: ValueFault::Hold,
         stale_state: StaleState::Operator,
     };
-    Referee::new(&settings, Scan::new(&circuit))
+    Referee::new(&settings, (&circuit).into())
 }
 
 fn moment(cycle: u64) -> Moment {

@@ -13,11 +13,15 @@ use crate::labels::{OfLacking, OfMember, OfProgram, OfSource, OfState, OfTurn};
 impl Metrics {
     /// Sets every metric but the times of cycles.
     pub fn show(&self, model: &Model, snapshot: &Snapshot) {
-        self.cycle.set(snapshot.cycle.unwrap_or_default());
-        self.survives.set(i64::from(snapshot.margin.survives));
-        self.open_alarms.set(whole(snapshot.alarms.len() as u64));
-        self.records.set(whole(snapshot.records));
-        self.left_out.set(whole(snapshot.left_out));
+        self.values.cycle.set(snapshot.cycle.unwrap_or_default());
+        self.values
+            .survives
+            .set(i64::from(snapshot.margin.survives));
+        self.values
+            .open_alarms
+            .set(whole(snapshot.alarms.len() as u64));
+        self.values.records.set(whole(snapshot.records));
+        self.values.left_out.set(whole(snapshot.left_out));
         self.station_states(snapshot);
         self.members(model.counters());
         self.turns(model.counters());
@@ -36,7 +40,8 @@ impl Metrics {
                     station: station.name.clone(),
                     state: state.word(),
                 };
-                self.station_states
+                self.values
+                    .station_states
                     .get_or_create(&of_state)
                     .set(i64::from(state == station.state));
             }
@@ -50,21 +55,27 @@ impl Metrics {
             };
             let counted = counters.member(member);
             let seconds = counted.stalled.as_secs_f64();
-            let stalled = self.stall_seconds.get_or_create(&of_member);
+            let stalled = self.values.stall_seconds.get_or_create(&of_member);
             stalled.inner().store(seconds.to_bits(), Ordering::Relaxed);
             drop(stalled);
-            set(&self.stalls.get_or_create(&of_member), counted.stalls);
-            let refused = self.refused_frames.get_or_create(&of_member);
+            set(
+                &self.values.stalls.get_or_create(&of_member),
+                counted.stalls,
+            );
+            let refused = self.values.refused_frames.get_or_create(&of_member);
             set(&refused, counted.refused_frames);
             drop(refused);
-            let lost = self.records_lost.get_or_create(&of_member);
+            let lost = self.values.records_lost.get_or_create(&of_member);
             set(&lost, counted.records_lost);
             drop(lost);
             if !matches!(member, Member::Plant(_)) {
-                let differences = self.digest_differences.get_or_create(&of_member);
+                let differences = self.values.digest_differences.get_or_create(&of_member);
                 set(&differences, counted.digest_differences);
                 drop(differences);
-                set(&self.flagged.get_or_create(&of_member), counted.flagged);
+                set(
+                    &self.values.flagged.get_or_create(&of_member),
+                    counted.flagged,
+                );
             }
         }
     }
@@ -76,7 +87,7 @@ impl Metrics {
                 station: name(Member::Station(station)),
                 remote_io: name(Member::RemoteIo(program)),
             };
-            set(&self.silent_turns.get_or_create(&turn), count);
+            set(&self.values.silent_turns.get_or_create(&turn), count);
         }
     }
 
@@ -92,7 +103,7 @@ impl Metrics {
                 program: program.program.clone(),
                 source,
             };
-            set(&self.deadlines.get_or_create(&of_source), count);
+            set(&self.values.deadlines.get_or_create(&of_source), count);
         }
     }
 
@@ -100,11 +111,11 @@ impl Metrics {
         let of_program = of(program);
         let counted = counters.program(id);
         for (family, count) in [
-            (&self.voided_samples, counted.voided_samples),
-            (&self.substituted_inputs, counted.substituted_inputs),
-            (&self.value_faults, counted.value_faults),
-            (&self.protection_losses, counted.protection_losses),
-            (&self.state_losses, counted.state_losses),
+            (&self.values.voided_samples, counted.voided_samples),
+            (&self.values.substituted_inputs, counted.substituted_inputs),
+            (&self.values.value_faults, counted.value_faults),
+            (&self.values.protection_losses, counted.protection_losses),
+            (&self.values.state_losses, counted.state_losses),
         ] {
             set(&family.get_or_create(&of_program), count);
         }
@@ -112,19 +123,23 @@ impl Metrics {
 
     fn program(&self, program: &ProgramSnapshot) {
         let of_program = of(program);
-        self.awaits_release
+        self.values
+            .awaits_release
             .get_or_create(&of_program)
             .set(i64::from(program.awaits_release));
-        self.forced
+        self.values
+            .forced
             .get_or_create(&of_program)
             .set(whole(program.forced.len() as u64));
         if let Some(finished) = program.finished {
-            self.finished
+            self.values
+                .finished
                 .get_or_create(&of_program)
                 .set(whole(finished));
         }
         if let Some(plant_faults) = program.plant_faults {
-            self.plant_faults
+            self.values
+                .plant_faults
                 .get_or_create(&of_program)
                 .set(whole(plant_faults));
         }
@@ -134,10 +149,10 @@ impl Metrics {
     fn protection(&self, snapshot: &Snapshot) {
         // No exposition is written meanwhile.
         let _registry = self.registry.lock().unwrap_or_else(PoisonError::into_inner);
-        self.protected.clear();
-        self.unprotected_since.clear();
-        self.lacking.clear();
-        self.lost_state_age.clear();
+        self.values.protected.clear();
+        self.values.unprotected_since.clear();
+        self.values.lacking.clear();
+        self.values.lost_state_age.clear();
         for program in &snapshot.programs {
             self.protection_of(program);
         }
@@ -146,22 +161,26 @@ impl Metrics {
     fn protection_of(&self, program: &ProgramSnapshot) {
         let of_program = of(program);
         let lost = program.lost.as_ref();
-        self.state_lost
+        self.values
+            .state_lost
             .get_or_create(&of_program)
             .set(i64::from(lost.is_some()));
         if let Some(age) = lost.and_then(|lost| lost.age_cycles) {
-            self.lost_state_age
+            self.values
+                .lost_state_age
                 .get_or_create(&of_program)
                 .set(whole(age));
         }
         let Some(protection) = &program.protection else {
             return;
         };
-        self.protected
+        self.values
+            .protected
             .get_or_create(&of_program)
             .set(i64::from(protection.protected));
         if !protection.protected {
-            self.unprotected_since
+            self.values
+                .unprotected_since
                 .get_or_create(&of_program)
                 .set(protection.since);
         }
@@ -172,7 +191,7 @@ impl Metrics {
                 reason: lacking.reason,
                 link: lacking.link.clone().unwrap_or_default(),
             };
-            self.lacking.get_or_create(&of_lacking).set(1);
+            self.values.lacking.get_or_create(&of_lacking).set(1);
         }
     }
 }

@@ -2,6 +2,9 @@
 
 use opcua::types::Variant;
 use understudy_cluster::Controller;
+use understudy_logic::Circuit;
+use understudy_typed::{Elementary, Point};
+use understudy_view::stored;
 
 use super::{Kind, Tree};
 use crate::trust;
@@ -11,36 +14,32 @@ const WORD_BITS: usize = 64;
 
 impl Tree {
     pub(super) fn signals(&mut self, place: usize, controller: &Controller) {
-        let circuit = &controller.circuit;
         self.enter(&["Programs", &controller.name, "Inputs"]);
-        let inputs = circuit.inputs();
-        for (bit, name) in inputs.iter().enumerate() {
-            let channel = format!("{name}.failed");
-            let status_bit = inputs.iter().position(|input| *input == channel);
-            let own_name = name.clone();
-            self.add(name, Kind::Boolean, "as last sampled", move |seen| {
+        let inputs = &controller.interface.inputs;
+        for point in inputs {
+            let status = inputs.find(&format!("{}.failed", point.name)).cloned();
+            let (name, own) = (point.name.clone(), point.clone());
+            self.add(&name, kind_of(point.of), "as last sampled", move |seen| {
                 let program = seen.program(place);
                 let image = program.and_then(|program| program.inputs.as_deref());
-                let value = bit_of(image, bit);
-                let has_failed = status_bit.and_then(|place| bit_of(image, place)) == Some(true);
-                let own = program.map(|program| trust::input(program, &own_name, has_failed));
-                seen.present(value.map(Variant::from), own.unwrap_or_default())
+                let failed = status.as_ref().and_then(|status| stored(status, image?));
+                let trust = program.map(|it| trust::input(it, &own.name, failed == Some(1)));
+                seen.present(variant_of(&own, image), trust.unwrap_or_default())
             });
         }
         self.enter(&["Programs", &controller.name, "Outputs"]);
-        for (bit, output) in circuit.outputs().iter().enumerate() {
-            let name = output.name.clone();
-            self.add(&output.name, Kind::Boolean, "as driven", move |seen| {
+        for point in &controller.interface.outputs {
+            let (name, own) = (point.name.clone(), point.clone());
+            self.add(&name, kind_of(point.of), "as driven", move |seen| {
                 let program = seen.program(place);
                 let image = program.and_then(|program| program.outputs.as_deref());
-                let own = program.map(|program| trust::output(program, &name));
-                let value = bit_of(image, bit).map(Variant::from);
-                seen.present(value, own.unwrap_or_default())
+                let trust = program.map(|program| trust::output(program, &own.name));
+                seen.present(variant_of(&own, image), trust.unwrap_or_default())
             });
         }
         self.enter(&["Programs", &controller.name, "Markers"]);
-        let names: Vec<&str> = circuit
-            .registers()
+        let registers = controller.circuit().map_or(&[][..], Circuit::registers);
+        let names: Vec<&str> = registers
             .iter()
             .map(|register| register.name.as_str())
             .collect();
@@ -119,9 +118,26 @@ fn word_of(kind: Kind, bits: &[usize], state: &[bool]) -> Option<Variant> {
     Some(number.into())
 }
 
-/// A bit of a text such as `0110`.
-fn bit_of(image: Option<&str>, place: usize) -> Option<bool> {
-    image?.as_bytes().get(place).map(|bit| *bit == b'1')
+/// The type of a point's variable: times are nanoseconds.
+fn kind_of(of: Elementary) -> Kind {
+    match of {
+        Elementary::Bool => Kind::Boolean,
+        of if of.is_real() => Kind::Double,
+        of if of.is_signed() => Kind::Int64,
+        _ => Kind::UInt64,
+    }
+}
+
+/// The value of a point in an image such as `0110`.
+fn variant_of(point: &Point, image: Option<&str>) -> Option<Variant> {
+    let value = stored(point, image?)?;
+    Some(match (point.of, kind_of(point.of)) {
+        (_, Kind::Boolean) => Variant::from(value != 0),
+        (Elementary::Real, _) => f64::from(f32::from_bits(value as u32)).into(),
+        (_, Kind::Double) => f64::from_bits(value).into(),
+        (of, Kind::Int64) => (of.signed(value) as i64).into(),
+        _ => value.into(),
+    })
 }
 
 #[cfg(test)]

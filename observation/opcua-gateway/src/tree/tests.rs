@@ -48,7 +48,7 @@ fn check(faults: &str, cycle: i64, feed: Feed, source: &str, statuses: [StatusCo
     };
     let of = |path: &str| reading(&cluster, &seen, path);
     assert_eq!(of("Programs/robot/Source").value, Some(text(source)));
-    let robot = &cluster.controllers()[0].circuit;
+    let robot = cluster.controllers()[0].circuit().expect("a ladder");
     let paths = [
         format!("Programs/robot/Outputs/{}", robot.outputs()[0].name),
         format!("Programs/robot/Inputs/{}", robot.inputs()[0]),
@@ -134,8 +134,8 @@ fn every_signal_has_one_place_and_a_value_of_its_kind() {
     assert_eq!(paths.len(), variables.len());
     for controller in cluster.controllers() {
         for (kind, count) in [
-            ("Inputs", controller.circuit.inputs().len()),
-            ("Outputs", controller.circuit.outputs().len()),
+            ("Inputs", controller.interface.inputs.len()),
+            ("Outputs", controller.interface.outputs.len()),
         ] {
             let folder = format!("Programs/{}/{kind}/", controller.name);
             let found = paths.iter().filter(|path| path.starts_with(&folder));

@@ -215,8 +215,8 @@ impl Dice<'_> {
         heard: StationSet,
         missing: Option<Missing>,
     ) -> Happening {
-        let circuit = &self.cluster.controllers()[program.index()].circuit;
-        let (inputs, outputs) = (circuit.inputs().len(), circuit.outputs().len());
+        let interface = &self.cluster.controllers()[program.index()].interface;
+        let (inputs, outputs) = (interface.inputs.width(), interface.outputs.width());
         let source = match (missing, self.one_in(2)) {
             (None, true) => Source::Direct,
             (None, false) => Source::Reconstructed,

@@ -299,9 +299,9 @@ fn check_modbus(cluster: &Cluster, top: &Snapshot, snapshot: &Snapshot, context:
             &name("plant_faults"),
             program.plant_faults.unwrap_or_default(),
         );
-        let circuit = &controller.circuit;
-        inputs.extend(bits(program.inputs.as_deref(), circuit.inputs().len()));
-        coils.extend(bits(program.outputs.as_deref(), circuit.outputs().len()));
+        let interface = &controller.interface;
+        inputs.extend(bits(program.inputs.as_deref(), interface.inputs.width()));
+        coils.extend(bits(program.outputs.as_deref(), interface.outputs.width()));
     }
     assert_eq!((image.inputs, image.coils), (inputs, coils), "{context}");
 }
@@ -346,7 +346,7 @@ fn check_opcua(cluster: &Cluster, top: &Snapshot, observation: &Observation, con
         check(&path("Held"), Some(program.held.into()));
         check(&path("FailSafe"), Some(program.fail_safe.into()));
         check(&path("Finished"), program.finished.map(Variant::from));
-        let outputs = controller.circuit.outputs().iter().enumerate();
+        let outputs = controller.interface.outputs.iter().enumerate();
         for (place, output) in outputs {
             let image = program.outputs.as_deref();
             let bit = image.map(|image| image.as_bytes()[place] == b'1');

@@ -1,325 +1,160 @@
 //! Events of stations, remote I/Os and plants.
 
-use understudy_journal::{Members, source_word};
+use understudy_journal::Members;
 use understudy_node::Event as StationEvent;
+use understudy_plant::Event as PlantEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason, ValueFault};
-use understudy_wire::{Member, SignalPlace, StationId};
+use understudy_wire::{Member, Moment, ProgramSet, SignalPlace, StationId, StationSet, Word};
 
-use super::{Words, list, missing_text, program_name, programs, stations};
-use crate::event::Level;
+use super::{Words, list, program_name, programs, source_text, stations};
 
-pub(super) fn station(event: &StationEvent, members: &Members) -> Words {
-    use Level::{Alarm, Info, Notice, Warning};
-    match event {
-        StationEvent::Published { words, .. } => {
-            let words: Vec<String> = words
-                .iter()
-                .map(|word| format!("{} {}", programs(word.mask, members), word.sum))
-                .collect();
-            ("published", Info, format!("publishes {}", list(&words)))
-        }
-        StationEvent::Holds {
-            program, lineage, ..
-        } => {
-            let whose = program_name(*program, members);
-            (
-                "holds",
-                Info,
-                format!("holds the state of {whose} at lineage {lineage}"),
-            )
-        }
-        StationEvent::BecameCycleMaster { .. } => (
-            "became-cycle-master",
-            Notice,
-            "is the cycle master".to_owned(),
-        ),
-        StationEvent::Flagged { station, .. } => flagged(*station, members),
-        StationEvent::Cleared { station, .. } => cleared(*station, members),
-        StationEvent::Joins { wants, .. } => {
-            let text = if wants.is_empty() {
-                "listens".to_owned()
-            } else {
-                format!(
-                    "listens and requests the state of {}",
-                    programs(*wants, members)
-                )
-            };
-            ("joins", Notice, text)
-        }
-        StationEvent::Adopted {
-            program,
-            from,
-            lineage,
-            ..
-        } => {
-            let whose = program_name(*program, members);
-            let text = match from {
-                Some(from) => {
-                    let from = members.name(Member::Station(*from));
-                    format!("has received the state of {whose} from {from}, at lineage {lineage}")
-                }
-                None => format!("starts {whose} from its initial state"),
-            };
-            ("adopted", Notice, text)
-        }
-        StationEvent::Synchronised { program, .. } => {
-            let whose = program_name(*program, members);
-            (
-                "synchronised",
-                Notice,
-                format!("is synchronised with {whose} and publishes for it"),
-            )
-        }
-        StationEvent::DigestDiffers {
-            program, station, ..
-        } => {
-            let other = members.name(Member::Station(*station));
-            let whose = program_name(*program, members);
-            (
-                "digest-differs",
-                Warning,
-                format!("has a different state of {whose} than {other} after the same inputs"),
-            )
-        }
-        StationEvent::Excluded { program, .. } => {
-            let whose = program_name(*program, members);
-            (
-                "excluded",
-                Alarm,
-                format!("does not publish for {whose}: its state was found faulty"),
-            )
-        }
-        StationEvent::Readmitted { program, .. } => {
-            let whose = program_name(*program, members);
-            (
-                "readmitted",
-                Notice,
-                format!("is readmitted and requests the state of {whose}"),
-            )
-        }
-        StationEvent::Refused {
-            member,
-            theirs,
-            ours,
-        } => refused(*member, theirs.to_string(), ours.to_string(), members),
-        StationEvent::Stalled { late, .. } => stalled(*late),
-    }
+descriptions! { station: StationEvent, members;
+    Published { words, .. } => "published" Info format!("publishes {}", words_text(words, members));
+    Holds { program, lineage, .. } => "holds" Info
+        format!("holds the state of {} at lineage {lineage}", program_name(*program, members));
+    BecameCycleMaster { .. } => "became-cycle-master" Notice "is the cycle master";
+    Flagged { station, .. } => "flagged" Warning flagged_text(*station, members);
+    Cleared { station, .. } => "cleared" Notice cleared_text(*station, members);
+    Joins { wants, .. } => "joins" Notice joins_text(*wants, members);
+    Adopted { program, from: None, .. } => "adopted" Notice
+        format!("starts {} from its initial state", program_name(*program, members));
+    Adopted { program, from: Some(from), lineage, .. } => "adopted" Notice {
+        let (whose, from) = (program_name(*program, members), name(*from, members));
+        format!("has received the state of {whose} from {from}, at lineage {lineage}")
+    };
+    Synchronised { program, .. } => "synchronised" Notice
+        format!("is synchronised with {} and publishes for it", program_name(*program, members));
+    DigestDiffers { program, station, .. } => "digest-differs" Warning {
+        let (whose, other) = (program_name(*program, members), name(*station, members));
+        format!("has a different state of {whose} than {other} after the same inputs")
+    };
+    Excluded { program, .. } => "excluded" Alarm
+        format!("does not publish for {}: its state was found faulty", program_name(*program, members));
+    Readmitted { program, .. } => "readmitted" Notice
+        format!("is readmitted and requests the state of {}", program_name(*program, members));
+    Refused { member, theirs, ours } => "refused" Warning refused_text(*member, theirs, ours, members);
+    Stalled { late, .. } => "stalled" Notice format!("host stall: woken {late:.1?} late");
 }
 
-pub(super) fn remote_io(event: &RemoteIoEvent, members: &Members) -> Words {
-    use Level::{Alarm, Info, Notice, Warning};
-    match event {
-        RemoteIoEvent::Sampled { inputs, .. } => ("sampled", Info, format!("samples {inputs}")),
-        RemoteIoEvent::Applied {
-            outputs,
-            source,
-            word_of,
-            missing,
-            ..
-        } => {
-            let mut text = format!("drives {outputs}, {}", source_word(*source));
-            if let Some(station) = word_of {
-                text += &format!(
-                    " from a parity word of {}",
-                    members.name(Member::Station(*station))
-                );
-            }
-            if let Some(missing) = missing {
-                text += &format!(": {}", missing_text(*missing));
-            }
-            ("applied", Info, text)
-        }
-        RemoteIoEvent::StartedCold { awaits_release, .. } => {
-            let release = if *awaits_release {
-                "; the operator has to release its outputs"
-            } else {
-                ""
-            };
-            (
-                "started-cold",
-                Notice,
-                format!("starts its program from the initial state{release}"),
-            )
-        }
-        RemoteIoEvent::AdoptedLineage { lineage, from, .. } => {
-            let from = members.name(Member::Station(*from));
-            (
-                "adopted-lineage",
-                Notice,
-                format!("continues from the state of {from}, at lineage {lineage}"),
-            )
-        }
-        RemoteIoEvent::Disputed { stations: who, .. } => {
-            let who = stations(*who, members);
-            (
-                "disputed",
-                Alarm,
-                format!(
-                    "{who} hold different states of the same cycle: the operator has to decide by releasing its outputs"
-                ),
-            )
-        }
-        RemoteIoEvent::StateLost {
-            applied,
-            newest,
-            holder,
-            asks,
-            ..
-        } => {
-            let holder = members.name(Member::Station(*holder));
-            let behind = applied.map_or_else(
-                || "it is not known whether newer outputs were applied".to_owned(),
-                |applied| format!("outputs of cycle {} were applied", applied.cycle.0),
-            );
-            let next = if *asks {
-                "the operator chooses this state (accept-state) or a cold start (cold-start)"
-            } else {
-                "the program starts cold, as configured"
-            };
-            let text = format!(
-                "the state of its program is lost: the newest available state, of {holder}, is from cycle {} of the cluster, and {behind}; {next}",
-                newest.cycle.0
-            );
-            ("state-lost", Alarm, text)
-        }
-        RemoteIoEvent::StateRecovered { from, .. } => {
-            let from = members.name(Member::Station(*from));
-            let text = format!("{from} has returned with the state of its program");
-            ("state-recovered", Notice, text)
-        }
-        RemoteIoEvent::ChoiceRefused { newest, .. } => {
-            let text = match newest {
-                Some(newest) => format!(
-                    "refuses the operator's choice: the newest available state is from cycle {}",
-                    newest.cycle.0
-                ),
-                None => {
-                    "refuses the operator's choice: the state of its program is not lost".to_owned()
-                }
-            };
-            ("choice-refused", Warning, text)
-        }
-        RemoteIoEvent::Protected { .. } => (
-            "protected",
-            Notice,
-            "its program is protected: the failure of one station would be masked".to_owned(),
-        ),
-        RemoteIoEvent::Unprotected { lacking, .. } => {
-            let reasons: Vec<String> = lacking
-                .iter()
-                .map(|one| lacking_text(one, members))
-                .collect();
-            let text = format!("its program is not protected: {}", reasons.join(", "));
-            ("unprotected", Alarm, text)
-        }
-        RemoteIoEvent::Voided {
-            samples, lineage, ..
-        } => (
-            "voided",
-            Warning,
-            format!(
-                "{samples} samples that no station received are void; it continues from lineage {lineage}"
-            ),
-        ),
-        RemoteIoEvent::Released { .. } => (
-            "released",
-            Notice,
-            "the operator has released its outputs and the stations that it excluded".to_owned(),
-        ),
-        RemoteIoEvent::RecalledExclusion { stations: who, .. } => {
-            let who = stations(*who, members);
-            let text = format!(
-                "{who} remains excluded, as other stations recall, until the operator releases it"
-            );
-            ("recalled-exclusion", Alarm, text)
-        }
-        RemoteIoEvent::Diagnosed { failed, .. } => {
-            let text = format!("diagnoses these channels as failed: {failed}");
-            ("diagnosed", Warning, text)
-        }
-        RemoteIoEvent::Flagged { station, .. } => flagged(*station, members),
-        RemoteIoEvent::Cleared { station, .. } => cleared(*station, members),
-        RemoteIoEvent::Syndrome {
-            syndrome, accused, ..
-        } => {
-            let who = stations(*accused, members);
-            (
-                "syndrome",
-                Warning,
-                format!("the syndrome is {syndrome}, not 0: one of {who} is wrong"),
-            )
-        }
-        RemoteIoEvent::ValueFault {
-            accused,
-            located,
-            answer,
-            ..
-        } => {
-            let who = stations(*accused, members);
-            let text = if *located {
-                format!("{who} is wrong by majority and excluded until the operator releases it")
-            } else {
-                {
-                    let reaction = value_fault_word(*answer);
-                    format!(
-                        "{who} disagree and no majority exists; configured reaction: {reaction}"
-                    )
-                }
-            };
-            ("value-fault", Alarm, text)
-        }
-        RemoteIoEvent::DigestDiffers {
-            program, accused, ..
-        } => {
-            let who = stations(*accused, members);
-            let whose = program_name(*program, members);
-            (
-                "digest-differs",
-                Warning,
-                format!("{who} have different states of {whose} after the same inputs"),
-            )
-        }
-        RemoteIoEvent::Refused {
-            member,
-            theirs,
-            ours,
-        } => refused(*member, theirs.to_string(), ours.to_string(), members),
-        RemoteIoEvent::Stalled { late, .. } => stalled(*late),
-        RemoteIoEvent::Forced { force, .. } => {
-            let text = format!(
-                "{} is forced to {} for {} s by {}: {}",
-                place(force.signal),
-                u8::from(force.value),
-                force.seconds,
-                force.owner,
-                force.reason
-            );
-            ("forced", Alarm, text)
-        }
-        RemoteIoEvent::Unforced {
-            signal, expired, ..
-        } => {
-            let why = if *expired {
-                "its time has elapsed"
-            } else {
-                "removed by the operator"
-            };
-            (
-                "unforced",
-                Notice,
-                format!("{} is no longer forced: {why}", place(*signal)),
-            )
-        }
-    }
+descriptions! { remote_io: RemoteIoEvent, members;
+    Sampled { inputs, .. } => "sampled" Info format!("samples {inputs}");
+    Applied { outputs, source, word_of, missing, .. } => "applied" Info
+        format!("drives {outputs}, {}", source_text(*source, *word_of, *missing, members));
+    StartedCold { awaits_release: false, .. } => "started-cold" Notice
+        "starts its program from the initial state";
+    StartedCold { awaits_release: true, .. } => "started-cold" Notice
+        "starts its program from the initial state; the operator has to release its outputs";
+    AdoptedLineage { lineage, from, .. } => "adopted-lineage" Notice
+        format!("continues from the state of {}, at lineage {lineage}", name(*from, members));
+    Disputed { stations: who, .. } => "disputed" Alarm format!(
+        "{} hold different states of the same cycle: the operator has to decide by releasing its outputs",
+        stations(*who, members)
+    );
+    StateLost { applied, newest, holder, asks, .. } => "state-lost" Alarm
+        state_lost_text(*applied, *newest, name(*holder, members), *asks);
+    StateRecovered { from, .. } => "state-recovered" Notice
+        format!("{} has returned with the state of its program", name(*from, members));
+    ChoiceRefused { newest: Some(newest), .. } => "choice-refused" Warning format!(
+        "refuses the operator's choice: the newest available state is from cycle {}",
+        newest.cycle.0
+    );
+    ChoiceRefused { newest: None, .. } => "choice-refused" Warning
+        "refuses the operator's choice: the state of its program is not lost";
+    Protected { .. } => "protected" Notice
+        "its program is protected: the failure of one station would be masked";
+    Unprotected { lacking, .. } => "unprotected" Alarm {
+        let reasons: Vec<String> = lacking.iter().map(|one| lacking_text(one, members)).collect();
+        format!("its program is not protected: {}", reasons.join(", "))
+    };
+    Voided { samples, lineage, .. } => "voided" Warning format!(
+        "{samples} samples that no station received are void; it continues from lineage {lineage}"
+    );
+    Released { .. } => "released" Notice
+        "the operator has released its outputs and the stations that it excluded";
+    RecalledExclusion { stations: who, .. } => "recalled-exclusion" Alarm format!(
+        "{} remains excluded, as other stations recall, until the operator releases it",
+        stations(*who, members)
+    );
+    Diagnosed { failed, .. } => "diagnosed" Warning format!("diagnoses these channels as failed: {failed}");
+    Flagged { station, .. } => "flagged" Warning flagged_text(*station, members);
+    Cleared { station, .. } => "cleared" Notice cleared_text(*station, members);
+    Syndrome { syndrome, accused, .. } => "syndrome" Warning
+        format!("the syndrome is {syndrome}, not 0: one of {} is wrong", stations(*accused, members));
+    ValueFault { accused, located, answer, .. } => "value-fault" Alarm
+        value_fault_text(*accused, *located, *answer, members);
+    DigestDiffers { program, accused, .. } => "digest-differs" Warning {
+        let (who, whose) = (stations(*accused, members), program_name(*program, members));
+        format!("{who} have different states of {whose} after the same inputs")
+    };
+    Refused { member, theirs, ours } => "refused" Warning refused_text(*member, theirs, ours, members);
+    Stalled { late, .. } => "stalled" Notice format!("host stall: woken {late:.1?} late");
+    Forced { force, .. } => "forced" Alarm {
+        let (signal, value) = (place(force.signal), u8::from(force.value));
+        format!("{signal} is forced to {value} for {} s by {}: {}", force.seconds, force.owner, force.reason)
+    };
+    Unforced { signal, expired: true, .. } => "unforced" Notice
+        format!("{} is no longer forced: its time has elapsed", place(*signal));
+    Unforced { signal, expired: false, .. } => "unforced" Notice
+        format!("{} is no longer forced: removed by the operator", place(*signal));
 }
 
-/// A reaction as the cluster file names it.
-fn value_fault_word(reaction: ValueFault) -> &'static str {
-    match reaction {
+descriptions! { plant: PlantEvent, members;
+    Stepped { field, .. } => "stepped" Info
+        format!("sensors {}, {} parts finished", field.sensors, field.finished);
+    Refused { member, theirs, ours } => "refused" Warning refused_text(*member, theirs, ours, members);
+}
+
+fn name(station: StationId, members: &Members) -> &str {
+    members.name(Member::Station(station))
+}
+
+fn words_text(words: &[Word], members: &Members) -> String {
+    let words = words.iter();
+    let words = words.map(|word| format!("{} {}", programs(word.mask, members), word.sum));
+    list(&words.collect::<Vec<_>>())
+}
+
+fn joins_text(wants: ProgramSet, members: &Members) -> String {
+    if wants.is_empty() {
+        return "listens".to_owned();
+    }
+    let whose = programs(wants, members);
+    format!("listens and requests the state of {whose}")
+}
+
+fn state_lost_text(applied: Option<Moment>, newest: Moment, holder: &str, asks: bool) -> String {
+    let behind = applied.map_or_else(
+        || "it is not known whether newer outputs were applied".to_owned(),
+        |applied| format!("outputs of cycle {} were applied", applied.cycle.0),
+    );
+    let next = if asks {
+        "the operator chooses this state (accept-state) or a cold start (cold-start)"
+    } else {
+        "the program starts cold, as configured"
+    };
+    format!(
+        "the state of its program is lost: the newest available state, of {holder}, is from cycle {} of the cluster, and {behind}; {next}",
+        newest.cycle.0
+    )
+}
+
+fn value_fault_text(
+    accused: StationSet,
+    located: bool,
+    reaction: ValueFault,
+    members: &Members,
+) -> String {
+    let who = stations(accused, members);
+    if located {
+        return format!("{who} is wrong by majority and excluded until the operator releases it");
+    }
+    // The reaction as the cluster file names it.
+    let reaction = match reaction {
         ValueFault::Hold => "hold",
         ValueFault::Alarm => "alarm",
         ValueFault::FailSafe => "fail-safe",
-    }
+    };
+    format!("{who} disagree and no majority exists; configured reaction: {reaction}")
 }
 
 fn place(signal: SignalPlace) -> String {
@@ -329,61 +164,29 @@ fn place(signal: SignalPlace) -> String {
     }
 }
 
-pub(super) fn plant(event: &understudy_plant::Event, members: &Members) -> Words {
-    match event {
-        understudy_plant::Event::Stepped { field, .. } => {
-            let text = format!(
-                "sensors {}, {} parts finished",
-                field.sensors, field.finished
-            );
-            ("stepped", Level::Info, text)
-        }
-        understudy_plant::Event::Refused {
-            member,
-            theirs,
-            ours,
-        } => refused(*member, theirs.to_string(), ours.to_string(), members),
-    }
+fn flagged_text(station: StationId, members: &Members) -> String {
+    let name = name(station, members);
+    format!("{name} was not received for too long and is flagged: its slot is closed")
 }
 
-fn flagged(station: StationId, members: &Members) -> Words {
-    let name = members.name(Member::Station(station));
-    (
-        "flagged",
-        Level::Warning,
-        format!("{name} was not received for too long and is flagged: its slot is closed"),
-    )
+fn cleared_text(station: StationId, members: &Members) -> String {
+    let name = name(station, members);
+    format!("{name} is received again, and its slot is open")
 }
 
-fn cleared(station: StationId, members: &Members) -> Words {
-    let name = members.name(Member::Station(station));
-    (
-        "cleared",
-        Level::Notice,
-        format!("{name} is received again, and its slot is open"),
-    )
-}
-
-fn refused(member: Member, theirs: String, ours: String, members: &Members) -> Words {
+fn refused_text<H: std::fmt::Display>(
+    member: Member,
+    theirs: &H,
+    ours: &H,
+    members: &Members,
+) -> String {
     let name = members.name(member);
-    (
-        "refused",
-        Level::Warning,
-        format!("{name} runs configuration {theirs} instead of {ours}; its frames are dropped"),
-    )
-}
-
-fn stalled(late: std::time::Duration) -> Words {
-    (
-        "stalled",
-        Level::Notice,
-        format!("host stall: woken {late:.1?} late"),
-    )
+    format!("{name} runs configuration {theirs} instead of {ours}; its frames are dropped")
 }
 
 /// Why a station cannot prove the outputs of a program.
 fn lacking_text(lacking: &Lacking, members: &Members) -> String {
-    let name = members.name(Member::Station(lacking.station));
+    let name = name(lacking.station, members);
     match lacking.reason {
         LackingReason::NotReceived => {
             format!("{name} is not received: it or its link has failed")

@@ -143,10 +143,10 @@ impl Model {
         let controller = &self.cluster.controllers()[program.index()];
         let period = self.cluster.agreement().schedule.period();
         let observer = self.observers[program.index()]
-            .get_or_init(|| Observer::new(&controller.program, period).ok());
+            .get_or_init(|| Observer::new(controller.ladder()?, period).ok());
         let observer = observer
             .as_ref()
-            .ok_or_else(|| no_state("its ladder cannot be evaluated"))?;
+            .ok_or_else(|| no_state("only a ladder can be evaluated"))?;
         let mut scratch = Scratch::default();
         Ok(observer.evaluate(&mut scratch, sampled.state.words(), sampled.inputs.words()))
     }

@@ -247,7 +247,7 @@ impl Model {
                 .cluster
                 .controllers()
                 .iter()
-                .map(|controller| controller.circuit.outputs().len())
+                .map(|controller| controller.interface.outputs.width())
                 .collect(),
             holds: holds.collect(),
             heard,

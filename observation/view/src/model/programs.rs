@@ -1,6 +1,6 @@
 //! What remote I/Os and plants report.
 
-use understudy_journal::{Record, moment, source_word};
+use understudy_journal::{Record, moment};
 use understudy_plant::Event as PlantEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_wire::{Image, Member, Moment, ProgramId, Source, StationId, StationSet};
@@ -8,7 +8,7 @@ use understudy_wire::{Image, Member, Moment, ProgramId, Source, StationId, Stati
 use super::Model;
 use super::standing::{Change, ProgramChange, StationChange};
 use super::tally::Tally;
-use crate::describe::{describe, missing_text};
+use crate::describe::{describe, source_text};
 use crate::event::{Event, Level};
 
 /// Cycles that are closed at once, at most.
@@ -107,15 +107,17 @@ impl Model {
 
     /// Whether the images of a report are as wide as those of the program: a journal of other programs does not belong to this cluster.
     fn fits(&self, place: usize, event: &RemoteIoEvent) -> bool {
-        let circuit = &self.cluster.controllers()[place].circuit;
-        let inputs = |image: &Image| image.width() == circuit.inputs().len();
+        let interface = &self.cluster.controllers()[place].interface;
+        let inputs = |image: &Image| image.width() == interface.inputs.width();
         match event {
             RemoteIoEvent::Sampled {
                 inputs: sampled, ..
             } => inputs(sampled),
             RemoteIoEvent::Applied {
                 sampled, outputs, ..
-            } => sampled.as_ref().is_none_or(inputs) && outputs.width() == circuit.outputs().len(),
+            } => {
+                sampled.as_ref().is_none_or(inputs) && outputs.width() == interface.outputs.width()
+            }
             _ => true,
         }
     }
@@ -244,14 +246,8 @@ impl Model {
             return;
         };
         let source = *source;
-        let mut text = format!("its outputs are {}", source_word(source));
-        if let Some(station) = word_of {
-            let name = self.members.name(Member::Station(*station));
-            text += &format!(" from a parity word of {name}");
-        }
-        if let Some(missing) = missing {
-            text += &format!(": {}", missing_text(*missing));
-        }
+        let from = source_text(source, *word_of, *missing, &self.members);
+        let text = format!("its outputs are {from}");
         let level = match source {
             Source::Direct | Source::Reconstructed => Level::Notice,
             Source::Held => Level::Warning,
@@ -291,18 +287,7 @@ impl Model {
 
     /// Something that must never happen.
     fn violated(&mut self, record: &Record, cycle: i64, what: &str) {
-        self.events.push(Event {
-            number: 0,
-            cycle,
-            at_ns: record.at_ns,
-            name: record.name.clone(),
-            event: "wrong",
-            level: Level::Alarm,
-            text: what.to_owned(),
-            cause: None,
-        });
-        let subject = (record.name.clone(), "wrong");
-        self.alarms.raise(subject, cycle, what.to_owned());
+        self.alarmed(record, cycle, "wrong", what.to_owned());
     }
 
     pub(super) fn plant(&mut self, record: &Record, program: ProgramId, event: &PlantEvent) {
@@ -338,14 +323,19 @@ impl Model {
 
     fn plant_fault(&mut self, record: &Record, cycle: i64, plant_faults: u64) {
         let text = format!("a plant fault occurred: {plant_faults} so far");
-        let subject = (record.name.clone(), "plant_fault");
+        self.alarmed(record, cycle, "plant_fault", text);
+    }
+
+    /// An event that is an alarm too.
+    fn alarmed(&mut self, record: &Record, cycle: i64, event: &'static str, text: String) {
+        let subject = (record.name.clone(), event);
         self.alarms.raise(subject, cycle, text.clone());
         self.events.push(Event {
             number: 0,
             cycle,
             at_ns: record.at_ns,
             name: record.name.clone(),
-            event: "plant_fault",
+            event,
             level: Level::Alarm,
             text,
             cause: None,

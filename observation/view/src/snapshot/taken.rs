@@ -238,14 +238,12 @@ impl Picture<'_> {
     }
 
     fn signal_name(&self, program: ProgramId, signal: SignalPlace) -> String {
-        let circuit = &self.model.cluster().controllers()[program.index()].circuit;
-        let name = match signal {
-            SignalPlace::Input(place) => circuit.inputs().get(usize::from(place)).cloned(),
-            SignalPlace::Output(place) => {
-                let output = circuit.outputs().get(usize::from(place));
-                output.map(|output| output.name.clone())
-            }
+        let interface = &self.model.cluster().controllers()[program.index()].interface;
+        let (points, place) = match signal {
+            SignalPlace::Input(place) => (&interface.inputs, place),
+            SignalPlace::Output(place) => (&interface.outputs, place),
         };
+        let name = points.bit_names().into_iter().nth(usize::from(place));
         name.unwrap_or_else(|| "an unknown signal".to_owned())
     }
 

@@ -14,7 +14,6 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
 use understudy_journal::{Record, check_header, closed_segments};
-use understudy_text::shortened;
 
 use super::Trouble;
 use super::progress::Progress;
@@ -24,9 +23,6 @@ const PIECE: usize = 1 << 20;
 
 /// A line without an end is left out when it has so many bytes.
 const LONGEST_LINE: usize = 1 << 20;
-
-/// Characters of the reason why a line is no record.
-const LONGEST_REASON: usize = 200;
 
 #[derive(Debug)]
 pub(super) struct Follower {
@@ -324,21 +320,18 @@ impl Follower {
             }
             if !std::mem::take(&mut self.skipping) && self.line.len() > 1 {
                 if open.header != Header::Accepted {
-                    if let (Header::Unread, Err(wrong)) = (open.header, check_header(&self.line)) {
-                        open.header = Header::Refused;
-                        take(Err(wrong.into()));
-                        taken += 1;
-                    } else if open.header == Header::Unread {
+                    if open.header == Header::Unread {
                         open.header = Header::Accepted;
+                        if let Err(error) = check_header(&self.line) {
+                            open.header = Header::Refused;
+                            take(Err(error.into()));
+                            taken += 1;
+                        }
                     }
                     self.line.clear();
                     continue;
                 }
-                let record = serde_json::from_slice(&self.line);
-                // The message may quote the line.
-                take(record.map_err(|error: serde_json::Error| Trouble::Line {
-                    reason: shortened(&error.to_string(), LONGEST_REASON).into_owned(),
-                }));
+                take(serde_json::from_slice(&self.line).map_err(Trouble::of_line));
                 taken += 1;
             }
             self.line.clear();

@@ -146,10 +146,12 @@ impl<'m> Explainer<'m> {
 
     /// The last step before the one at `place` whose scan changed a signal to `value`; the first step that is known where none did.
     fn changed(&self, name: &str, value: bool, place: usize) -> Result<usize, usize> {
-        let registers = self.model.cluster.controllers()[self.history.program().index()]
-            .circuit
-            .registers();
-        let register = registers.iter().position(|register| register.name == name);
+        let controller = &self.model.cluster.controllers()[self.history.program().index()];
+        let circuit = controller.circuit();
+        let register = circuit.and_then(|circuit| {
+            let mut registers = circuit.registers().iter();
+            registers.position(|register| register.name == name)
+        });
         let mut at = place;
         for _ in 0..FARTHEST {
             let before = self.history.before(at).ok_or(at)?;

@@ -20,7 +20,8 @@ fn every_scan_is_the_one_that_was_evaluated() {
         let program = ProgramId(place as u8);
         let history = model.history(program).expect("it is there");
         assert!(!history.is_cut());
-        let mut naive = Interpreter::new(&controller.program, period).expect("a right program");
+        let ladder = controller.ladder().expect("a ladder");
+        let mut naive = Interpreter::new(ladder, period).expect("a right program");
         let mut scans = 0;
         for step in history.steps() {
             let Some(sampled) = &step.sampled else {

@@ -10,7 +10,8 @@ use axum::extract::{Extension, Query, State};
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
-use understudy_ladder::Signal;
+use understudy_cluster::Controller;
+use understudy_typed::Points;
 use understudy_view::Event;
 use understudy_wire::{Member, ProgramId};
 
@@ -61,6 +62,11 @@ struct ProgramFacts {
 #[derive(Debug, Serialize)]
 struct SignalFacts {
     name: String,
+    /// Its type, `BOOL`.
+    #[serde(rename = "type")]
+    of: &'static str,
+    /// Its first bit in the image.
+    bit: u32,
     address: Option<String>,
     comment: Option<String>,
 }
@@ -116,25 +122,43 @@ pub(super) async fn run(
 fn program_facts(known: &Known, program: ProgramId) -> ProgramFacts {
     let cluster = known.run.cluster();
     let plant = Member::Plant(program);
-    let ladder = cluster.controllers().get(program.index());
+    let controller = cluster.controllers().get(program.index());
     let name = |member| known.run.members().name(member).to_owned();
-    let signals = |signals: &[Signal]| signals.iter().map(signal_facts).collect();
     ProgramFacts {
         index: program.index(),
         name: shown::program_name(&known.run, program),
         remote_io: name(Member::RemoteIo(program)),
         plant: cluster.member_name(plant).map(str::to_owned),
-        inputs: ladder.map_or_else(Vec::new, |own| signals(&own.program.inputs)),
-        outputs: ladder.map_or_else(Vec::new, |own| signals(&own.program.outputs)),
+        inputs: controller.map_or_else(Vec::new, |own| signal_facts(own, &own.interface.inputs)),
+        outputs: controller.map_or_else(Vec::new, |own| signal_facts(own, &own.interface.outputs)),
     }
 }
 
-fn signal_facts(signal: &Signal) -> SignalFacts {
-    SignalFacts {
-        name: signal.name.to_string(),
-        address: signal.address.as_ref().map(ToString::to_string),
-        comment: signal.description.clone(),
-    }
+fn signal_facts(controller: &Controller, points: &Points) -> Vec<SignalFacts> {
+    let described = |name: &str| {
+        let ladder = controller.ladder()?;
+        let mut signals = ladder.inputs.iter().chain(&ladder.outputs);
+        let signal = signals.find(|signal| signal.name.as_str() == name)?;
+        let address = signal.address.as_ref().map(ToString::to_string);
+        Some((address, signal.description.clone()))
+    };
+    let declared = |name: &str| {
+        let mut variables = controller.code.typed()?.variables.iter();
+        let variable = variables.find(|variable| variable.name == name)?;
+        Some((variable.address.clone(), variable.description.clone()))
+    };
+    let facts = points.iter().map(|point| {
+        let known = described(&point.name).or_else(|| declared(&point.name));
+        let (address, comment) = known.unwrap_or_default();
+        SignalFacts {
+            name: point.name.clone(),
+            of: point.of.name(),
+            bit: point.bit,
+            address,
+            comment,
+        }
+    });
+    facts.collect()
 }
 
 /// A cycle; by default the newest.

@@ -69,7 +69,12 @@ fn ladder_of(known: &Known, program: ProgramId) -> Answered<&Program> {
             program.0
         ))
     })?;
-    Ok(&controller.program)
+    controller.ladder().ok_or_else(|| {
+        Problem::unknown(format!(
+            "`{}` is a program with numbers, not a ladder",
+            controller.name
+        ))
+    })
 }
 
 fn draw(known: &Known, program: ProgramId, cycle: i64, wanted: &Wanted) -> Answered<Picture> {

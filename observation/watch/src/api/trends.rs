@@ -6,8 +6,10 @@ use axum::Json;
 use axum::extract::rejection::QueryRejection;
 use axum::extract::{Query, State};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use understudy_journal::source_word;
-use understudy_view::Timeline;
+use understudy_typed::Point;
+use understudy_view::{Timeline, number_of};
 use understudy_wire::{Image, ProgramId};
 
 use super::Answered;
@@ -52,7 +54,7 @@ pub(super) struct Trends {
 struct Trend {
     name: String,
     /// From this cycle on it is this value, up to the next one; nothing where it is not known.
-    runs: Vec<(i64, Option<u8>)>,
+    runs: Vec<(i64, Option<Value>)>,
 }
 
 #[derive(Debug, Serialize)]
@@ -122,21 +124,26 @@ fn trend(known: &Known, name: &str, from: i64, to: i64) -> Option<Trend> {
     let index: usize = parts.next()?.parse().ok()?;
     let controller = known.run.cluster().controllers().get(program.index())?;
     let series = known.run.series();
-    let (signals, timeline) = match kind {
-        "input" => (&controller.program.inputs, series.inputs(program)?),
-        "output" => (&controller.program.outputs, series.outputs(program)?),
+    let (points, timeline) = match kind {
+        "input" => (&controller.interface.inputs, series.inputs(program)?),
+        "output" => (&controller.interface.outputs, series.outputs(program)?),
         _ => return None,
     };
-    let signal = signals.get(index)?;
+    let point = points.iter().nth(index)?;
     Some(Trend {
-        name: format!("{}.{}", controller.name, signal.name),
-        runs: runs(timeline, index, from, to),
+        name: format!("{}.{}", controller.name, point.name),
+        runs: runs(timeline, point, from, to),
     })
 }
 
-fn runs(timeline: &Timeline<Image>, index: usize, from: i64, to: i64) -> Vec<(i64, Option<u8>)> {
-    let mut runs: Vec<(i64, Option<u8>)> = Vec::new();
-    let mut push = |cycle: i64, value: Option<u8>| {
+fn runs(
+    timeline: &Timeline<Image>,
+    point: &Point,
+    from: i64,
+    to: i64,
+) -> Vec<(i64, Option<Value>)> {
+    let mut runs: Vec<(i64, Option<Value>)> = Vec::new();
+    let mut push = |cycle: i64, value: Option<Value>| {
         if runs.last().is_none_or(|(_, last)| *last != value) {
             runs.push((cycle, value));
         }
@@ -146,7 +153,7 @@ fn runs(timeline: &Timeline<Image>, index: usize, from: i64, to: i64) -> Vec<(i6
         if span.from > known_up_to {
             push(known_up_to, None);
         }
-        push(span.from, Some(u8::from(span.value.get(index))));
+        push(span.from, Some(number_of(point, span.value.words())));
         known_up_to = span.to;
     }
     if known_up_to <= to {

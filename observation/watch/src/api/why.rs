@@ -21,14 +21,15 @@ pub(super) async fn why(
     let Query(when) = when?;
     at_cycle(&app, when.cycle, |known, cycle| {
         let controller = known.run.cluster().controllers().get(program);
-        let signal = controller
-            .and_then(|controller| Some((controller, controller.program.outputs.get(output)?)));
+        let signal = controller.and_then(|controller| {
+            Some((controller, controller.interface.outputs.iter().nth(output)?))
+        });
         let (controller, signal) = signal.ok_or_else(|| {
             Problem::unknown(format!(
                 "the cluster has no output {output} of program {program}"
             ))
         })?;
-        let name = format!("{}.{}", controller.name, &*signal.name);
+        let name = format!("{}.{}", controller.name, signal.name);
         let why = known.run.why(&name, Some(cycle));
         why.map_err(|error| Problem::of_view(&error))
     })

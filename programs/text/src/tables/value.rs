@@ -32,6 +32,19 @@ impl<T> Placed<T> {
     }
 }
 
+/// A value as it is written, before anybody knows of which type it is to be.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Constant {
+    /// `true` or `false`.
+    Flag(bool),
+    /// A whole number.
+    Whole(i64),
+    /// A number with a fraction.
+    Number(f64),
+    /// A text.
+    Text(String),
+}
+
 /// The value of a key, or one in its list.
 #[derive(Clone, Copy)]
 pub struct Value<'a, 't> {
@@ -86,6 +99,21 @@ impl<'a, 't> Value<'a, 't> {
             "`true` or `false`",
             diagnostics,
         )
+    }
+
+    /// A value of a signal: yes or no, a number, or a text such as a duration.
+    pub fn constant(self, diagnostics: &mut Vec<Diagnostic>) -> Option<Placed<Constant>> {
+        let whole = |number: &toml::de::DeInteger<'_>| {
+            i64::from_str_radix(number.as_str(), number.radix()).ok()
+        };
+        let found = match self.value.get_ref() {
+            DeValue::Boolean(bit) => Some(Constant::Flag(*bit)),
+            DeValue::Integer(number) => whole(number).map(Constant::Whole),
+            DeValue::Float(number) => number.as_str().parse().ok().map(Constant::Number),
+            DeValue::String(text) => Some(Constant::Text(text.to_string())),
+            _ => None,
+        };
+        self.expect(found, "`true`, `false` or a number", diagnostics)
     }
 
     /// A whole number in its bounds.

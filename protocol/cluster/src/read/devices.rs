@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use understudy_logic::Circuit;
 use understudy_text::Diagnostic;
 use understudy_text::spelling::suggestion;
 
@@ -19,10 +18,10 @@ pub(super) fn device(
     member: &Member,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<FieldDevice> {
-    let (_, circuit) = member.lowered.as_ref()?;
+    let (_, interface) = member.code.as_ref()?;
     let before = diagnostics.len();
-    let inputs: Vec<&str> = circuit.inputs().iter().map(String::as_str).collect();
-    let outputs: Vec<&str> = output_names(circuit);
+    let inputs: Vec<&str> = interface.inputs.names().collect();
+    let outputs: Vec<&str> = interface.outputs.names().collect();
     let sensors = places(&section.inputs, &inputs, "input", member, diagnostics);
     let actuators = places(&section.outputs, &outputs, "output", member, diagnostics);
     let mut driven: BTreeMap<Point, &str> = BTreeMap::new();
@@ -98,11 +97,6 @@ pub(super) fn check_simulated(
             );
         }
     }
-}
-
-fn output_names(circuit: &Circuit) -> Vec<&str> {
-    let outputs = circuit.outputs().iter();
-    outputs.map(|output| output.name.as_str()).collect()
 }
 
 /// The places of `names`, in their order.

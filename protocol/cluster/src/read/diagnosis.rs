@@ -20,11 +20,10 @@ pub(super) fn read(
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<DiagnosisPlace> {
     let name = format!("{}.diagnosis", member.name);
-    let (_, circuit) = ladders.lower(file, &name, period, diagnostics)?;
-    let (_, program) = member.lowered.as_ref()?;
-    let outputs = program.outputs().iter();
-    let outputs: Vec<String> = outputs.map(|output| output.name.clone()).collect();
-    match Diagnosis::new(&circuit, program.inputs(), &outputs) {
+    let (_, circuit) = ladders.ladder(file, &name, period, diagnostics)?;
+    let (_, program) = member.code.as_ref()?;
+    let (inputs, outputs) = (program.inputs.bit_names(), program.outputs.bit_names());
+    match Diagnosis::new(&circuit, &inputs, &outputs) {
         Ok(compiled) => Some(DiagnosisPlace {
             ladder: file.value.clone(),
             circuit,

@@ -59,16 +59,16 @@ fn followed(
         return None;
     };
     // Where the other plant's controller has no circuit, that was reported there.
-    let (_, controller) = members[other.program].lowered.as_ref()?;
-    let inputs = controller.inputs();
-    let Some(place) = inputs.iter().position(|input| input == signal) else {
+    let (_, controller) = members[other.program].code.as_ref()?;
+    let inputs = &controller.inputs;
+    let Some(point) = inputs.find(signal) else {
         let message = format!("the plant `{plant}` has no sensor `{signal}`");
-        let known = inputs.iter().map(String::as_str);
-        report("U0209", message, &suggestion(signal, known));
+        report("U0209", message, &suggestion(signal, inputs.names()));
         return None;
     };
     Some(Followed {
         from: ProgramId(other.program as u8),
-        sensor: place,
+        sensor: point.bit as usize,
+        bits: point.of.bits() as usize,
     })
 }

@@ -1,23 +1,33 @@
-//! The ladders that a cluster file names: each is read and parsed once, however many controllers run it.
+//! The programs that a cluster file names: each is read and parsed once, however many controllers run it.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_interchange::parse_program;
-use understudy_ladder::{Parsed, Program};
+use understudy_interchange::{Source, read_source};
+use understudy_ladder::Program;
 use understudy_logic::Circuit;
-use understudy_text::{Diagnostic, Report, has_errors};
+use understudy_text::{Diagnostic, Report};
 
+use crate::code::Code;
 use crate::fields::Placed;
 
 /// Gives the text of a file by its name, or says why it cannot.
 type Open<'a> = &'a mut dyn FnMut(&str) -> Result<String, String>;
 
+/// A file and what it says.
+struct File {
+    name: String,
+    text: String,
+    source: Option<Source>,
+    diagnostics: Vec<Diagnostic>,
+}
+
 pub(crate) struct Ladders<'a> {
     open: Open<'a>,
     /// By file: its place in `read`, or why there is none.
     places: BTreeMap<String, Result<usize, String>>,
-    read: Vec<(String, String, Parsed)>,
+    read: Vec<File>,
 }
 
 impl<'a> Ladders<'a> {
@@ -29,18 +39,18 @@ impl<'a> Ladders<'a> {
         }
     }
 
-    /// The program of `file` under the name `name`, and its circuit.
-    pub(crate) fn lower(
+    /// The program of `file` under the name `name`.
+    pub(crate) fn code(
         &mut self,
         file: &Placed<String>,
         name: &str,
         period: Duration,
         diagnostics: &mut Vec<Diagnostic>,
-    ) -> Option<(Program, Circuit)> {
-        let place = match self.place(&file.value) {
+    ) -> Option<Code> {
+        let place = match self.place(&file.value, period) {
             Ok(place) => place,
             Err(reason) => {
-                let message = format!("cannot read the ladder `{}`: {reason}", file.value);
+                let message = format!("cannot read the program `{}`: {reason}", file.value);
                 diagnostics.push(
                     Diagnostic::error("U0211", message, file.span.clone())
                         .with_help("the name is relative to the cluster file"),
@@ -48,20 +58,21 @@ impl<'a> Ladders<'a> {
                 return None;
             }
         };
-        let (_, _, parsed) = &mut self.read[place];
-        if has_errors(&parsed.diagnostics) {
-            return None;
-        }
+        let read = &mut self.read[place];
+        let program = match read.source.as_ref()? {
+            Source::Ladder(program) => program,
+            Source::Typed(program) => return Some(Code::Typed(Arc::clone(program))),
+        };
         // Several controllers may run one ladder.
-        for warning in parsed.program.preset_warnings(period) {
-            if !parsed.diagnostics.contains(&warning) {
-                parsed.diagnostics.push(warning);
+        for warning in program.preset_warnings(period) {
+            if !read.diagnostics.contains(&warning) {
+                read.diagnostics.push(warning);
             }
         }
-        let mut program = parsed.program.clone();
+        let mut program = program.clone();
         program.name = name.into();
         match program.lower(period) {
-            Ok(circuit) => Some((program, circuit)),
+            Ok(circuit) => Some(Code::Ladder(program, circuit)),
             Err(error) => {
                 let message = format!("`{}`: {error}", file.value);
                 diagnostics.push(Diagnostic::error("U0212", message, file.span.clone()));
@@ -70,13 +81,36 @@ impl<'a> Ladders<'a> {
         }
     }
 
-    fn place(&mut self, file: &str) -> Result<usize, String> {
+    /// As [`Self::code`], where only a ladder will do: the program and its circuit.
+    pub(crate) fn ladder(
+        &mut self,
+        file: &Placed<String>,
+        name: &str,
+        period: Duration,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Option<(Program, Circuit)> {
+        match self.code(file, name, period, diagnostics)? {
+            Code::Ladder(program, circuit) => Some((program, circuit)),
+            Code::Typed(_) => {
+                let message = format!("`{}` has numbers, and a ladder is wanted", file.value);
+                diagnostics.push(Diagnostic::error("U0212", message, file.span.clone()));
+                None
+            }
+        }
+    }
+
+    fn place(&mut self, file: &str, period: Duration) -> Result<usize, String> {
         if let Some(place) = self.places.get(file) {
             return place.clone();
         }
         let place = (self.open)(file).map(|text| {
-            let parsed = parse_program(file, &text);
-            self.read.push((file.to_owned(), text, parsed));
+            let (source, diagnostics) = read_source(file, &text, period);
+            self.read.push(File {
+                name: file.to_owned(),
+                text,
+                source,
+                diagnostics,
+            });
             self.read.len() - 1
         });
         self.places.insert(file.to_owned(), place.clone());
@@ -84,10 +118,10 @@ impl<'a> Ladders<'a> {
     }
 
     pub(crate) fn into_reports(self) -> impl Iterator<Item = Report> {
-        self.read.into_iter().map(|(name, text, parsed)| Report {
-            name,
-            text,
-            diagnostics: parsed.diagnostics,
+        self.read.into_iter().map(|file| Report {
+            name: file.name,
+            text: file.text,
+            diagnostics: file.diagnostics,
         })
     }
 }

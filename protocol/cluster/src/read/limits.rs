@@ -2,11 +2,11 @@
 //!
 //! The bounds are those of the layout at its longest: an integer takes at most 9 bytes, and a frame has a header besides.
 
-use understudy_logic::Circuit;
 use understudy_text::Diagnostic;
 use understudy_wire::{MAXIMUM_FRAME_BYTES, MAXIMUM_IMAGE_BITS};
 
 use super::Member;
+use crate::code::Code;
 
 /// Of an integer as it travels.
 const INTEGER_BYTES: usize = 9;
@@ -43,15 +43,15 @@ fn turn_bytes(programs: usize, widest_inputs: usize, widest_outputs: usize) -> u
 pub(crate) fn check(members: &[Member], history: u32, diagnostics: &mut Vec<Diagnostic>) {
     let (mut widest, mut widest_inputs) = (0, 0);
     for member in members {
-        let Some((_, circuit)) = &member.lowered else {
+        let Some((code, interface)) = &member.code else {
             continue;
         };
-        let inputs = circuit.inputs().len();
-        let registers = circuit.registers().len();
-        let outputs = circuit.outputs().len();
+        let inputs = interface.inputs.width();
+        let registers = code.state_bits();
+        let outputs = interface.outputs.width();
         widest = widest.max(outputs);
         widest_inputs = widest_inputs.max(inputs);
-        if let Some(message) = too_wide(&member.name, circuit) {
+        if let Some(message) = too_wide(&member.name, code) {
             let span = member.section.span.clone();
             diagnostics.push(Diagnostic::error("U0213", message, span));
         }
@@ -88,11 +88,12 @@ pub(crate) fn check(members: &[Member], history: u32, diagnostics: &mut Vec<Diag
 }
 
 /// What is to be said of a program with more inputs, state bits or outputs than an image may have.
-pub(crate) fn too_wide(name: &str, circuit: &Circuit) -> Option<String> {
+pub(crate) fn too_wide(name: &str, code: &Code) -> Option<String> {
+    let interface = code.interface();
     let widths = [
-        ("inputs", circuit.inputs().len()),
-        ("state bits", circuit.registers().len()),
-        ("outputs", circuit.outputs().len()),
+        ("inputs", interface.inputs.width()),
+        ("state bits", code.state_bits()),
+        ("outputs", interface.outputs.width()),
     ];
     let mut widths = widths.into_iter();
     let (what, bits) = widths.find(|(_, bits)| *bits > MAXIMUM_IMAGE_BITS)?;

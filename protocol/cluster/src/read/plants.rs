@@ -4,8 +4,10 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_logic::Circuit;
-use understudy_plant::{BindingProblem, Direction, Followed, ModelKind, Plant, Signals};
+use understudy_executable::Interface;
+use understudy_plant::{
+    BindingProblem, Direction, Followed, ModelKind, Plant, PlantProgram, Signals,
+};
 use understudy_text::Diagnostic;
 use understudy_text::spelling::{nearest, suggestion};
 use understudy_wire::ProgramId;
@@ -16,6 +18,7 @@ use super::ladders::Ladders;
 use super::limits::too_wide;
 use super::names::{Names, find_controller};
 use crate::cluster::{PlantPlace, RemoteIo};
+use crate::code::Code;
 use crate::configuration::plant_text;
 use crate::fields::{MAXIMUM_MISFITS, Placed};
 use crate::file::{ModelSection, PlantSection};
@@ -32,6 +35,8 @@ pub(crate) struct Draft {
     pub(crate) name: String,
     pub(crate) program: usize,
     kind: Option<ModelKind>,
+    /// Of a model that is a program.
+    code: Option<Code>,
 }
 
 pub(crate) fn place(
@@ -63,20 +68,23 @@ pub(crate) fn place(
             names.declare(&name, controller.span.clone(), diagnostics);
             name
         });
+        let mut code = None;
         let kind = match &section.model {
             Some(ModelSection::Robot(parameters)) => Some(ModelKind::Robot(parameters.clone())),
             Some(ModelSection::Press(parameters)) => Some(ModelKind::Press(parameters.clone())),
             Some(ModelSection::Ladder(file)) => {
-                let lowered = ladders.lower(file, &name, period, diagnostics);
-                let circuit = lowered.map(|(_, circuit)| circuit);
-                let too_wide = circuit
-                    .as_ref()
-                    .and_then(|circuit| too_wide(&file.value, circuit));
-                let circuit = circuit.filter(|_| too_wide.is_none());
+                let read = ladders.code(file, &name, period, diagnostics);
+                let too_wide = read.as_ref().and_then(|code| too_wide(&file.value, code));
+                code = read.filter(|_| too_wide.is_none());
                 if let Some(message) = too_wide {
                     diagnostics.push(Diagnostic::error("U0213", message, file.span.clone()));
                 }
-                circuit.map(|circuit| ModelKind::Ladder(Box::new(circuit)))
+                code.as_ref().map(|code| {
+                    ModelKind::Program(Box::new(PlantProgram {
+                        executable: code.executable(),
+                        interface: code.interface(),
+                    }))
+                })
             }
             None => None,
         };
@@ -86,6 +94,7 @@ pub(crate) fn place(
                 name,
                 program,
                 kind,
+                code,
             });
         }
     }
@@ -96,15 +105,20 @@ pub(crate) fn place(
     for draft in &drafts {
         let fed_by = feeder(draft, &drafts, diagnostics);
         let follows = follows::resolve(draft, &drafts, members, diagnostics);
-        let (Some(kind), Some((_, circuit))) = (&draft.kind, &members[draft.program].lowered)
-        else {
+        let (Some(kind), Some((_, interface))) = (&draft.kind, &members[draft.program].code) else {
             continue;
         };
-        plants.texts[draft.program] = plant_text(kind, &signals(&draft.section), fed_by, &follows);
+        plants.texts[draft.program] = plant_text(
+            kind,
+            draft.code.as_ref(),
+            &signals(&draft.section),
+            fed_by,
+            &follows,
+        );
         plants.places[draft.program] = bound(
             draft,
             kind,
-            circuit,
+            interface,
             fed_by,
             follows,
             &remote_ios[draft.program],
@@ -125,7 +139,7 @@ fn signals(section: &PlantSection) -> Signals {
 fn bound(
     draft: &Draft,
     kind: &ModelKind,
-    circuit: &Circuit,
+    interface: &Interface,
     fed_by: Option<ProgramId>,
     follows: Vec<(String, Followed)>,
     remote_io: &RemoteIo,
@@ -135,7 +149,7 @@ fn bound(
     let (terminals, follows): (Vec<_>, Vec<_>) = follows.into_iter().unzip();
     let signals = signals(section);
     let (plant, mut problems) =
-        Plant::following(kind, circuit, &signals, &terminals, fed_by.is_some());
+        Plant::following(kind, interface, &signals, &terminals, fed_by.is_some());
     if let Some(diagnosis) = &remote_io.diagnosis {
         problems.retain(|problem| match problem {
             BindingProblem::InputStaysZero { input } => !diagnosis.drives(input),
@@ -264,6 +278,18 @@ fn describe(problem: BindingProblem, draft: &Draft) -> Diagnostic {
                 _ => known_names(&signal, &known),
             };
             Diagnostic::error("U0209", message, signal_span(&terminal)).with_help(help)
+        }
+        BindingProblem::OtherType {
+            terminal,
+            signal,
+            of,
+        } => {
+            let message = format!(
+                "`{signal}` of `{controller}` is {of}, and `{}` of the plant `{}` is {}",
+                terminal.name, draft.name, terminal.of
+            );
+            Diagnostic::error("U0216", message, signal_span(&terminal.name))
+                .with_help("declare both with one type")
         }
         BindingProblem::DrivenTwice { terminal, signal } => {
             let message = format!("two sensors drive the input `{signal}` of `{controller}`");

@@ -1,7 +1,7 @@
 //! Reading clusters from texts in memory.
 
 use understudy_cluster::{Cluster, Loaded, Overrides, TemplateFile, read_with};
-use understudy_logic::Scratch;
+use understudy_executable::Scratch;
 use understudy_plant::Plant;
 use understudy_text::Report;
 use understudy_wire::{Image, ProgramId};
@@ -68,16 +68,16 @@ pub(crate) fn run(cluster: &Cluster, cycles: usize) -> Vec<(u64, u64)> {
         .programs()
         .iter()
         .map(|program| {
-            let width = program.scan.register_count();
-            Image::from_words(width, program.scan.initial()).expect("in bounds")
+            let width = program.executable.state_count();
+            Image::from_words(width, program.executable.initial()).expect("in bounds")
         })
         .collect();
     let mut scratch = Scratch::default();
     for _ in 0..cycles {
         let mut arrived = 0;
         for (index, program) in cluster.programs().iter().enumerate() {
-            let mut outputs = Image::zero(program.scan.output_count());
-            program.scan.step(
+            let mut outputs = Image::zero(program.executable.output_count());
+            program.executable.step(
                 &mut scratch,
                 states[index].words_mut(),
                 fields[index].sensors.words(),

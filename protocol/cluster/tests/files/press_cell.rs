@@ -61,7 +61,7 @@ fn its_agreement_and_its_understudy_are_those_of_the_paper() {
     let agreement = cell.agreement();
     assert_eq!(agreement.schedule.period(), Duration::from_millis(10));
     assert_eq!((agreement.mode, cell.link()), (Mode::Full, Link::Udp));
-    let parity = cell.parity().circuit();
+    let parity = cell.parity().expect("all Boolean").circuit();
     let shape = (
         parity.registers().len(),
         parity.inputs().len(),

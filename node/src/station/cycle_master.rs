@@ -1,0 +1,76 @@
+//! Where one cycle ends and the next begins.
+//!
+//! The cycle master is the lowest-ranked living station. Every other one waits a guard time for each that comes before
+//! it, so that the next rank takes over when the cycle master is not received; two that start the same cycle at once do
+//! no harm.
+
+use understudy_wire::{Body, StationSet, Time};
+
+use super::{CycleNotes, Role, Station, Token};
+use crate::event::Event;
+
+impl Station {
+    /// Ends the current cycle: updates the flags, and the replicas in shadow mode.
+    pub(super) fn close_cycle(&mut self) {
+        let Some(moment) = self.member.clock.moment() else {
+            return;
+        };
+        if self.cycle.token == Token::Passed {
+            self.member.attendance.receive_turn(self.own());
+        }
+        self.member.close_cycle();
+        for replica in &mut self.replicas {
+            if replica.close_cycle(moment) {
+                let program = replica.id();
+                self.member.report(Event::Synchronised { moment, program });
+            }
+        }
+        self.joining = self.cycle.joiners;
+        self.close_relay();
+        self.differed = std::mem::take(&mut self.cycle.differs);
+        self.cycle = CycleNotes::default();
+    }
+
+    /// Time at which this station starts the next cycle if no other one does: a guard time later for each living lower
+    /// rank.
+    pub(super) fn starts_cycle_at(&self) -> Time {
+        let agreement = &self.settings.agreement;
+        let (schedule, own) = (&agreement.schedule, self.own());
+        let lower = StationSet::first(own.index());
+        if self.role == Role::Listening {
+            let listens = schedule.period() * agreement.listen_cycles;
+            return self.started + listens + schedule.guard() * u32::from(own.0);
+        }
+        let all = StationSet::first(schedule.stations());
+        let living = all.without(self.member.flagged());
+        let first = if self.publishes() {
+            living.and(lower)
+        } else {
+            living
+                .or(self.joining.and(lower))
+                .without(StationSet::only(own))
+        };
+        self.member.clock.anchor() + schedule.period() + schedule.guard() * first.len() as u32
+    }
+
+    pub(super) fn start_cycle(&mut self, now: Time, planned: Time) {
+        self.close_cycle();
+        // A cycle master keeps to its plan, so that late wake-ups do not add up; one that is far behind starts from
+        // now.
+        let schedule = &self.settings.agreement.schedule;
+        let anchor = if now.since(planned) < schedule.guard() {
+            planned
+        } else {
+            now
+        };
+        let moment = self
+            .member
+            .clock
+            .pace(now, self.settings.epoch, anchor, schedule.period());
+        if self.role != Role::CycleMaster {
+            self.role = Role::CycleMaster;
+            self.report(Event::BecameCycleMaster { moment });
+        }
+        self.member.send_cyclic(now, Body::Sync);
+    }
+}

@@ -1,0 +1,102 @@
+//! A program as a station executes it, whatever it was written in: a circuit of bits, or a typed program.
+
+use understudy_logic::{Circuit, Scan};
+
+use understudy_typed::{Elementary, Points, Program};
+
+/// A compiled program; cheap to share, it holds no state.
+#[derive(Debug, Clone)]
+pub enum Executable {
+    /// All Boolean.
+    Circuit(Scan),
+}
+
+/// Working memory of an [`Executable`], whichever; one per thread, reused.
+#[derive(Debug, Clone, Default)]
+pub struct Scratch {
+    circuit: understudy_logic::Scratch,
+}
+
+impl From<&Circuit> for Executable {
+    fn from(circuit: &Circuit) -> Self {
+        Self::Circuit(Scan::new(circuit))
+    }
+}
+
+impl Executable {
+    /// Width of u in bits.
+    pub fn input_count(&self) -> usize {
+        match self {
+            Self::Circuit(scan) => scan.input_count(),
+        }
+    }
+
+    /// Width of x in bits.
+    pub fn state_count(&self) -> usize {
+        match self {
+            Self::Circuit(scan) => scan.register_count(),
+        }
+    }
+
+    /// Width of y in bits.
+    pub fn output_count(&self) -> usize {
+        match self {
+            Self::Circuit(scan) => scan.output_count(),
+        }
+    }
+
+    /// x(0), packed.
+    pub fn initial(&self) -> &[u64] {
+        match self {
+            Self::Circuit(scan) => scan.initial(),
+        }
+    }
+
+    /// One step: reads u, replaces x(t) by x(t+1), writes y(t); all packed, unused high bits 0.
+    ///
+    /// # Panics
+    /// If a slice is shorter than its image; widths are the caller's promise.
+    pub fn step(
+        &self,
+        scratch: &mut Scratch,
+        state: &mut [u64],
+        inputs: &[u64],
+        outputs: &mut [u64],
+    ) {
+        match self {
+            Self::Circuit(scan) => scan.step(&mut scratch.circuit, state, inputs, outputs),
+        }
+    }
+}
+
+/// What a program reads and writes.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Interface {
+    /// u, point by point.
+    pub inputs: Points,
+    /// y, point by point.
+    pub outputs: Points,
+}
+
+/// Each input and output is a BOOL of its own name.
+impl From<&Circuit> for Interface {
+    fn from(circuit: &Circuit) -> Self {
+        let mut interface = Self::default();
+        for name in circuit.inputs() {
+            interface.inputs.push(name, Elementary::Bool, 0);
+        }
+        for output in circuit.outputs() {
+            interface.outputs.push(&output.name, Elementary::Bool, 0);
+        }
+        interface
+    }
+}
+
+impl From<&Program> for Interface {
+    fn from(program: &Program) -> Self {
+        Self {
+            inputs: program.inputs.clone(),
+            outputs: program.outputs.clone(),
+        }
+    }
+}

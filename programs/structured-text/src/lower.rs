@@ -1,0 +1,311 @@
+//! Syntax to typed programs: layout of memory, types of expressions, statements.
+//!
+//! Units are lowered on demand, beginning with the programs: the memory of a block when a variable of it is declared, a body when
+//! it is called. A name is looked up in the unit, then among the global variables, the values of enumerations and the units. A body is
+//! lowered once for each block that has it, so a method of a base calls the methods of the block it runs on.
+
+mod blocks;
+mod body;
+mod calls;
+mod chains;
+mod constants;
+mod convert;
+mod fold;
+mod images;
+mod initial;
+mod names;
+mod numbers;
+mod places;
+mod programs;
+mod routines;
+mod standard;
+mod statements;
+mod types;
+
+use std::collections::HashMap;
+use std::ops::Range;
+use std::rc::Rc;
+
+use understudy_text::{Diagnostic, Lines, MAXIMUM_FINDINGS};
+use understudy_typed::{Elementary, EnumerationId, Program, Type};
+
+use crate::library;
+use crate::syntax::{File, Unit};
+
+use self::blocks::{Block, Key, Routine};
+use self::constants::ConstantState;
+use self::names::{Scope, Symbol};
+use self::types::{StructureInfo, TypeState};
+
+/// The state of a program takes at most so many slots: 256 KiB.
+pub const MAXIMUM_SLOTS: u32 = 256 * 1024 / 8;
+
+/// The frames of all routines of a program together take at most so many slots: 1 MiB.
+const MAXIMUM_FRAMES: u32 = 1024 * 1024 / 8;
+
+/// Bodies that a program may have.
+const MAXIMUM_ROUTINES: usize = 20_000;
+
+/// Declarations in each other, such as types of types, that are followed.
+const MAXIMUM_NESTING: u32 = 64;
+
+/// Operations that the loops of one scan may take together.
+pub const BUDGET: u64 = 1_000_000;
+
+/// The period where neither the file nor the options name one: 10 ms.
+pub const DEFAULT_PERIOD: i64 = 10_000_000;
+
+/// How a text is lowered.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Options<'a> {
+    /// The text of the file, for the lines of its statements.
+    pub text: &'a str,
+    /// The PROGRAM to be taken from a file with several ones and no CONFIGURATION.
+    pub program: Option<&'a str>,
+    /// Nanoseconds from one scan to the next, in place of those in the file.
+    pub period: Option<i64>,
+}
+
+/// What was lowered.
+#[derive(Debug, Clone, Default)]
+pub struct Lowered {
+    /// The program; `None` where there are errors, and for a library.
+    pub program: Option<Program>,
+    /// The units of a library, a file without a PROGRAM, which were checked one by one.
+    pub checked: Vec<String>,
+    /// What was found, in the order of the text.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// Lowers the programs of a file, or checks the units of a library.
+pub fn lower(file: &File, options: &Options<'_>) -> Lowered {
+    let library = library::file();
+    let mut lowering = Lowering::new(file, library, options.text);
+    lowering.declare(file, library);
+    let checked = lowering.programs(file, options);
+    lowering.finish(checked)
+}
+
+/// A unit with what is known of it.
+struct UnitEntry<'a> {
+    unit: &'a Unit,
+    /// It is one of the library that comes with this crate.
+    is_library: bool,
+    block: BlockState,
+}
+
+enum BlockState {
+    New,
+    Busy,
+    Faulty,
+    Done(Rc<Block>),
+}
+
+struct Lowering<'a> {
+    lines: Lines<'a>,
+    library_lines: Lines<'static>,
+    diagnostics: Vec<Diagnostic>,
+    program: Program,
+    units: Vec<UnitEntry<'a>>,
+    unit_names: HashMap<String, usize>,
+    types: HashMap<String, TypeState<'a>>,
+    /// By the ids of the program's structures.
+    structures: Vec<Rc<StructureInfo>>,
+    /// Values of enumerations by their names.
+    enumerators: HashMap<String, Vec<(EnumerationId, Elementary, i64)>>,
+    globals: HashMap<String, Symbol>,
+    global_declarations: HashMap<String, &'a crate::syntax::Declaration>,
+    /// Variables at addresses.
+    addresses: HashMap<String, Symbol>,
+    constants: HashMap<(Option<usize>, String), ConstantState>,
+    routines: HashMap<Key, Rc<Routine>>,
+    /// Bodies that are still to be lowered.
+    queue: Vec<(Key, Rc<Routine>)>,
+    /// Which routines each routine calls, and where it first does.
+    calls: Vec<Vec<(u32, Range<usize>)>>,
+    scope: Scope<'a>,
+    nesting: u32,
+    /// The length of the expressions around this one.
+    length: usize,
+    /// Where there is one: diagnostics are dropped, since something is only tried.
+    silent: u32,
+}
+
+impl<'a> Lowering<'a> {
+    fn new(file: &'a File, library: &'static File, text: &'a str) -> Self {
+        let program = Program {
+            period: DEFAULT_PERIOD,
+            budget: BUDGET,
+            state: Program::HEADER,
+            ..Program::default()
+        };
+        let mut units = Vec::new();
+        let mut unit_names = HashMap::new();
+        let own = file.units.iter().map(|unit| (unit, false));
+        let standard = library.units.iter().map(|unit| (unit, true));
+        for (unit, is_library) in own.chain(standard) {
+            let key = unit.name.key();
+            if is_library && unit_names.contains_key(&key) {
+                continue;
+            }
+            unit_names.entry(key).or_insert(units.len());
+            units.push(UnitEntry {
+                unit,
+                is_library,
+                block: BlockState::New,
+            });
+        }
+        Self {
+            lines: Lines::new(text),
+            library_lines: Lines::new(library::TEXT),
+            diagnostics: Vec::new(),
+            program,
+            units,
+            unit_names,
+            types: HashMap::new(),
+            structures: Vec::new(),
+            enumerators: HashMap::new(),
+            globals: HashMap::new(),
+            global_declarations: HashMap::new(),
+            addresses: HashMap::new(),
+            constants: HashMap::new(),
+            routines: HashMap::new(),
+            queue: Vec::new(),
+            calls: Vec::new(),
+            scope: Scope::default(),
+            nesting: 0,
+            length: 0,
+            silent: 0,
+        }
+    }
+
+    fn finish(mut self, checked: Vec<String>) -> Lowered {
+        self.diagnostics
+            .sort_by_key(|found| (found.span.start, found.span.end));
+        self.diagnostics.dedup();
+        if self.diagnostics.len() > MAXIMUM_FINDINGS {
+            self.diagnostics.truncate(MAXIMUM_FINDINGS);
+            self.diagnostics.push(Diagnostic::too_many(0));
+        }
+        let is_whole = checked.is_empty() && !understudy_text::has_errors(&self.diagnostics);
+        let is_whole = is_whole && !self.program.tasks.is_empty();
+        Lowered {
+            program: is_whole.then_some(self.program),
+            checked,
+            diagnostics: self.diagnostics,
+        }
+    }
+
+    /// Whether what is being lowered comes from the library, where nothing is warned of.
+    fn in_library(&self) -> bool {
+        let unit = self.scope.unit.and_then(|unit| self.units.get(unit));
+        unit.is_some_and(|entry| entry.is_library)
+    }
+
+    fn report(&mut self, found: Diagnostic) {
+        if self.silent == 0 && self.diagnostics.len() <= MAXIMUM_FINDINGS {
+            self.diagnostics.push(found);
+        }
+    }
+
+    fn error(&mut self, code: &'static str, message: impl Into<String>, span: Range<usize>) {
+        self.report(Diagnostic::error(code, message, span));
+    }
+
+    fn error_with(
+        &mut self,
+        code: &'static str,
+        message: impl Into<String>,
+        span: Range<usize>,
+        help: impl Into<String>,
+    ) {
+        self.report(Diagnostic::error(code, message, span).with_help(help));
+    }
+
+    fn warn(
+        &mut self,
+        code: &'static str,
+        message: impl Into<String>,
+        span: Range<usize>,
+        help: impl Into<String>,
+    ) {
+        if !self.in_library() {
+            self.report(Diagnostic::warning(code, message, span).with_help(help));
+        }
+    }
+
+    /// The line of a place, from 1.
+    fn line(&self, span: &Range<usize>) -> u32 {
+        let lines = if self.in_library() {
+            &self.library_lines
+        } else {
+            &self.lines
+        };
+        u32::try_from(lines.index(span.start) + 1).unwrap_or(u32::MAX)
+    }
+
+    /// Runs something one level deeper; `None` where that is too deep.
+    fn deeper<T>(
+        &mut self,
+        span: &Range<usize>,
+        run: impl FnOnce(&mut Self) -> Option<T>,
+    ) -> Option<T> {
+        if self.nesting >= MAXIMUM_NESTING {
+            let message = format!("declarations are nested more than {MAXIMUM_NESTING} deep");
+            self.error("U1033", message, span.clone());
+            return None;
+        }
+        self.nesting += 1;
+        let result = run(self);
+        self.nesting -= 1;
+        result
+    }
+
+    /// Takes slots of the state.
+    fn state(&mut self, slots: u64, span: &Range<usize>) -> Option<u32> {
+        let start = self.program.state;
+        let end = u64::from(start) + slots;
+        if end > u64::from(MAXIMUM_SLOTS) {
+            self.too_large(end, span);
+            return None;
+        }
+        self.program.state = end as u32;
+        Some(start)
+    }
+
+    fn too_large(&mut self, slots: u64, span: &Range<usize>) {
+        let needed = slots.saturating_mul(8).div_ceil(1024);
+        let message = format!(
+            "the variables take {needed} KiB; a program has at most {} KiB of state",
+            MAXIMUM_SLOTS / 128
+        );
+        self.error_with("U1048", message, span.clone(), "use smaller arrays");
+    }
+
+    /// A type as it is written.
+    fn describe(&self, of: &Type) -> String {
+        match of {
+            Type::Elementary(elementary) => elementary.name().to_owned(),
+            Type::Enumeration(id, elementary) => {
+                match self.program.enumerations.get(id.0 as usize) {
+                    Some(found) if !found.name.is_empty() => found.name.clone(),
+                    _ => format!("an enumeration of {elementary}"),
+                }
+            }
+            Type::Text(capacity) => format!("STRING[{capacity}]"),
+            Type::Array(array) => {
+                let ranges = array
+                    .ranges
+                    .iter()
+                    .map(|(low, high)| format!("{low}..{high}"));
+                let ranges: Vec<String> = ranges.collect();
+                let element = self.describe(&array.element);
+                format!("ARRAY [{}] OF {element}", ranges.join(", "))
+            }
+            Type::Structure(id, _) => match self.program.structures.get(id.0 as usize) {
+                Some(found) if !found.name.is_empty() => found.name.clone(),
+                _ => "a structure".to_owned(),
+            },
+        }
+    }
+}

@@ -1,0 +1,583 @@
+//! Expressions: literals, operators, and the types that they give.
+
+use std::sync::Arc;
+
+use understudy_typed::{Comparison, Elementary, Expression, Operation, TextOperation, Type};
+
+use crate::syntax::{self, ExpressionKind, Literal, Operator, Span};
+
+use super::Lowering;
+use super::convert::{as_bits, as_integer, common, comparable, is_number, is_whole, limits};
+use super::fold::{apply, boolean, choose, convert, not, reinterpret, text};
+use super::names::number;
+use super::numbers::{Number, Operand};
+
+/// Operators around and beside each other that an expression may have.
+const MAXIMUM_LENGTH: usize = 400;
+
+/// Operands from which on `a OR b OR …` becomes a tree of little depth.
+const LONG: usize = 16;
+
+impl Lowering<'_> {
+    /// An expression whose value is wanted as a type; `None` where an error is reported.
+    pub(super) fn expression(
+        &mut self,
+        expression: &syntax::Expression,
+        of: &Type,
+    ) -> Option<Expression> {
+        let operand = self.operand(expression, Some(of));
+        self.coerce(operand, of, &expression.span)
+    }
+
+    /// A condition.
+    pub(super) fn condition(&mut self, expression: &syntax::Expression) -> Option<Expression> {
+        self.expression(expression, &Type::Elementary(Elementary::Bool))
+    }
+
+    /// An expression of whatever type; the hint settles what is open in it.
+    pub(super) fn typed(
+        &mut self,
+        expression: &syntax::Expression,
+        hint: Option<&Type>,
+    ) -> Option<Expression> {
+        let operand = self.operand(expression, hint);
+        self.settle(operand, hint)
+    }
+
+    pub(super) fn operand(&mut self, expression: &syntax::Expression, hint: Option<&Type>) -> Operand {
+        let span = &expression.span;
+        let found = match &expression.kind {
+            ExpressionKind::Literal(literal) => return self.literal(literal, span),
+            ExpressionKind::Variable(path) => self.variable(path, hint),
+            ExpressionKind::Qualified(of, value) => self.qualified(of, value),
+            ExpressionKind::Not(inner) => self.not(inner, hint),
+            ExpressionKind::Minus(inner) => return self.minus(inner, hint, span),
+            ExpressionKind::Chain(first, rest) => return self.chain(first, rest, hint, span),
+            ExpressionKind::Call(path, arguments) => {
+                return self.call(path, arguments, hint, span);
+            }
+            ExpressionKind::Faulty => None,
+        };
+        found.map_or(Operand::Faulty, Operand::Typed)
+    }
+
+    fn literal(&mut self, literal: &Literal, span: &Span) -> Operand {
+        Operand::Typed(match literal {
+            Literal::Boolean(value) => boolean(*value),
+            Literal::Integer { value, of: None } => return Operand::Number(Number::Integer(*value)),
+            Literal::Integer {
+                value,
+                of: Some(of),
+            } => {
+                let value = Operand::Number(Number::Integer(*value));
+                match self.coerce(value, &Type::Elementary(*of), span) {
+                    Some(value) => value,
+                    None => return Operand::Faulty,
+                }
+            }
+            Literal::Real { text, of } => {
+                let Some(value) = Number::written(text) else {
+                    let message = format!("`{text}` is not a number");
+                    self.error("U1032", message, span.clone());
+                    return Operand::Faulty;
+                };
+                match of {
+                    Some(of) if of.is_real() => value.in_real(*of),
+                    _ => return Operand::Number(value),
+                }
+            }
+            Literal::Time { nanoseconds, of } => {
+                number(Type::Elementary(*of), *nanoseconds as u64)
+            }
+            Literal::Text { bytes, .. } => {
+                let capacity = u16::try_from(bytes.len()).unwrap_or(u16::MAX).max(1);
+                Expression {
+                    of: Type::Text(capacity),
+                    kind: understudy_typed::ExpressionKind::Text(Arc::from(bytes.as_slice())),
+                }
+            }
+        })
+    }
+
+    fn not(&mut self, inner: &syntax::Expression, hint: Option<&Type>) -> Option<Expression> {
+        let operand = self.operand(inner, hint);
+        if let Operand::Number(_) = operand
+            && hint.and_then(Type::elementary) == Some(Elementary::Bool)
+        {
+            let of = Type::Elementary(Elementary::Bool);
+            return self.coerce(operand, &of, &inner.span).map(not);
+        }
+        let value = self.settle(operand, hint)?;
+        match value.of.elementary() {
+            Some(of) if of.is_bit_string() || of.is_integer() => {
+                let bits = as_bits(of);
+                let value = reinterpret(value, bits);
+                let value = apply(Operation::Not(bits), vec![value], Type::Elementary(bits));
+                Some(reinterpret(value, of))
+            }
+            _ => {
+                let found = self.describe(&value.of);
+                self.mismatch(&found, &Type::Elementary(Elementary::Bool), &inner.span)
+            }
+        }
+    }
+
+    fn minus(&mut self, inner: &syntax::Expression, hint: Option<&Type>, span: &Span) -> Operand {
+        match self.operand(inner, hint) {
+            Operand::Faulty => Operand::Faulty,
+            Operand::Number(value) => match value.negated() {
+                Some(value) => Operand::Number(value),
+                None => self.no_result(span),
+            },
+            Operand::Typed(value) => match value.of.elementary() {
+                Some(of) if is_number(of) || of == Elementary::Time => {
+                    let of = as_integer(of);
+                    let value = reinterpret(value, of);
+                    Operand::Typed(apply(
+                        Operation::Negate(of),
+                        vec![value],
+                        Type::Elementary(of),
+                    ))
+                }
+                _ => {
+                    let found = self.describe(&value.of);
+                    let message = format!("`-` needs a number, and this is {found}");
+                    self.error("U1043", message, inner.span.clone());
+                    Operand::Faulty
+                }
+            },
+        }
+    }
+
+    fn chain(
+        &mut self,
+        first: &syntax::Expression,
+        rest: &[(Operator, syntax::Expression)],
+        hint: Option<&Type>,
+        span: &Span,
+    ) -> Operand {
+        let is_flat = rest.len() > LONG
+            && rest.iter().all(|(operator, _)| *operator == rest[0].0)
+            && matches!(rest[0].0, Operator::And | Operator::Or | Operator::Xor);
+        let length = if is_flat { LONG } else { rest.len() };
+        let outside = self.length;
+        if outside + length > MAXIMUM_LENGTH {
+            let message = format!("an expression of more than {MAXIMUM_LENGTH} operators");
+            let help = "assign parts of it to variables";
+            self.error_with("U1033", message, span.clone(), help);
+            return Operand::Faulty;
+        }
+        self.length += length;
+        let found = if is_flat {
+            self.flat_chain(first, rest, hint, span)
+        } else {
+            self.left_chain(first, rest, hint)
+        };
+        self.length = outside;
+        found
+    }
+
+    fn left_chain(
+        &mut self,
+        first: &syntax::Expression,
+        rest: &[(Operator, syntax::Expression)],
+        hint: Option<&Type>,
+    ) -> Operand {
+        let compares = rest.iter().any(|(operator, _)| matches!(operator, Operator::Compare(_)));
+        let outer = hint.filter(|_| !compares);
+        let mut whole = first.span.clone();
+        let mut left = self.operand(first, outer);
+        for (operator, right) in rest {
+            let right_hint = match &left {
+                Operand::Typed(value) => Some(value.of.clone()),
+                _ => outer.cloned(),
+            };
+            let value = self.operand(right, right_hint.as_ref());
+            left = self.binary(*operator, (left, &whole), (value, &right.span), outer);
+            whole.end = right.span.end;
+        }
+        left
+    }
+
+    /// `a OR b OR …`: as a tree of little depth where all have one type.
+    fn flat_chain(
+        &mut self,
+        first: &syntax::Expression,
+        rest: &[(Operator, syntax::Expression)],
+        hint: Option<&Type>,
+        span: &Span,
+    ) -> Operand {
+        let operator = rest[0].0;
+        let parts = std::iter::once(first).chain(rest.iter().map(|(_, part)| part));
+        let mut parts: Vec<(Operand, Span)> = parts
+            .map(|part| (self.operand(part, hint), part.span.clone()))
+            .collect();
+        while parts.len() > 1 {
+            let mut halved = Vec::with_capacity(parts.len().div_ceil(2));
+            let mut pending = parts.into_iter();
+            while let Some((left, left_span)) = pending.next() {
+                match pending.next() {
+                    Some((right, right_span)) => {
+                        let both = left_span.start..right_span.end;
+                        let joined =
+                            self.binary(operator, (left, &left_span), (right, &right_span), hint);
+                        halved.push((joined, both));
+                    }
+                    None => halved.push((left, left_span)),
+                }
+            }
+            parts = halved;
+        }
+        match parts.pop() {
+            Some((whole, _)) => whole,
+            None => self.no_result(span),
+        }
+    }
+
+    fn no_result(&mut self, span: &Span) -> Operand {
+        let message = "the value of this expression has more than 64 bits, or none";
+        self.error("U1043", message, span.clone());
+        Operand::Faulty
+    }
+
+    /// An operator between two operands.
+    pub(super) fn binary(
+        &mut self,
+        operator: Operator,
+        (left, left_span): (Operand, &Span),
+        (right, right_span): (Operand, &Span),
+        hint: Option<&Type>,
+    ) -> Operand {
+        let span = left_span.start..right_span.end;
+        let (left, right) = match (left, right) {
+            (Operand::Faulty, _) | (_, Operand::Faulty) => return Operand::Faulty,
+            (Operand::Number(left), Operand::Number(right)) => {
+                return self.literals(operator, left, right, &span);
+            }
+            (Operand::Typed(left), Operand::Typed(right)) => (left, right),
+            (Operand::Typed(left), Operand::Number(right)) => {
+                match self.beside(&left, right, operator, hint) {
+                    Some(right) => (left, right),
+                    None => return Operand::Faulty,
+                }
+            }
+            (Operand::Number(left), Operand::Typed(right)) => {
+                match self.beside(&right, left, operator, hint) {
+                    Some(left) => (left, right),
+                    None => return Operand::Faulty,
+                }
+            }
+        };
+        let found = match operator {
+            Operator::Compare(comparison) => self.comparison(comparison, left, right, &span),
+            Operator::And | Operator::Or | Operator::Xor => {
+                self.bitwise(operator, left, right, &span)
+            }
+            Operator::AndThen | Operator::OrElse => {
+                let of = Type::Elementary(Elementary::Bool);
+                let left = self.coerce(Operand::Typed(left), &of, left_span);
+                let right = self.coerce(Operand::Typed(right), &of, right_span);
+                match (left, right) {
+                    (Some(left), Some(right)) if operator == Operator::AndThen => {
+                        Some(choose(left, right, boolean(false)))
+                    }
+                    (Some(left), Some(right)) => Some(choose(left, boolean(true), right)),
+                    _ => None,
+                }
+            }
+            Operator::Power => self.power(left, right, hint, &span),
+            _ => self.arithmetic(operator, left, right, &span),
+        };
+        found.map_or(Operand::Faulty, Operand::Typed)
+    }
+
+    fn literals(&mut self, operator: Operator, left: Number, right: Number, span: &Span) -> Operand {
+        if let Operator::Compare(comparison) = operator {
+            let ordering = match (left, right) {
+                (Number::Integer(left), Number::Integer(right)) => Some(left.cmp(&right)),
+                _ => {
+                    let (left, right) = (
+                        left.in_real(Elementary::Lreal),
+                        right.in_real(Elementary::Lreal),
+                    );
+                    let of = Type::Elementary(Elementary::Bool);
+                    let operation = Operation::Compare(comparison, Elementary::Lreal);
+                    return Operand::Typed(apply(operation, vec![left, right], of));
+                }
+            };
+            let holds = ordering.is_some_and(|ordering| match comparison {
+                Comparison::Equal => ordering.is_eq(),
+                Comparison::NotEqual => ordering.is_ne(),
+                Comparison::Less => ordering.is_lt(),
+                Comparison::LessOrEqual => ordering.is_le(),
+                Comparison::Greater => ordering.is_gt(),
+                Comparison::GreaterOrEqual => ordering.is_ge(),
+            });
+            return Operand::Typed(boolean(holds));
+        }
+        let is_zero = matches!(right, Number::Integer(0)) && matches!(left, Number::Integer(_));
+        if is_zero && matches!(operator, Operator::Divide | Operator::Modulo) {
+            self.error("U1046", "division of a whole number by 0", span.clone());
+            return Operand::Faulty;
+        }
+        match left.operate(operator, right) {
+            Some(value) => Operand::Number(value),
+            None => self.no_result(span),
+        }
+    }
+
+    /// A literal as it is beside a typed value.
+    fn beside(
+        &mut self,
+        typed: &Expression,
+        literal: Number,
+        operator: Operator,
+        hint: Option<&Type>,
+    ) -> Option<Expression> {
+        let settled = literal.default_type();
+        let Some(of) = typed.of.elementary() else {
+            return self.settle(Operand::Number(literal), None);
+        };
+        let target = match literal {
+            Number::Real(..) if of.is_real() => of,
+            Number::Real(..) if is_whole(of) => {
+                let hinted = hint.and_then(Type::elementary).filter(|of| of.is_real());
+                let single = if of.bits() == 64 {
+                    Elementary::Lreal
+                } else {
+                    Elementary::Real
+                };
+                hinted.unwrap_or(single)
+            }
+            Number::Integer(_) if of.is_real() => of,
+            Number::Integer(value) if is_whole(of) || of == Elementary::Bool => {
+                let (least, most) = limits(of);
+                match least <= value && value <= most {
+                    true => of,
+                    false => settled,
+                }
+            }
+            // A time is scaled by a number.
+            Number::Real(..) => Elementary::Lreal,
+            Number::Integer(_) if matches!(operator, Operator::Power) => Elementary::Lreal,
+            Number::Integer(_) => Elementary::Lint,
+        };
+        Some(match literal {
+            _ if target.is_real() => literal.in_real(target),
+            Number::Integer(value) => {
+                number(Type::Elementary(target), value as u64 & target.mask())
+            }
+            Number::Real(..) => return None,
+        })
+    }
+
+    fn comparison(
+        &mut self,
+        comparison: Comparison,
+        left: Expression,
+        right: Expression,
+        span: &Span,
+    ) -> Option<Expression> {
+        let of = Type::Elementary(Elementary::Bool);
+        if let (Type::Text(_), Type::Text(_)) = (&left.of, &right.of) {
+            return Some(text(TextOperation::Compare(comparison), vec![left, right], of));
+        }
+        let are_enumerations = matches!(
+            (&left.of, &right.of),
+            (Type::Enumeration(..), Type::Enumeration(..))
+        );
+        let kinds = left.of.elementary().zip(right.of.elementary());
+        let common = match kinds {
+            Some(_) if are_enumerations && left.of != right.of => None,
+            Some((left, right)) if left == right => Some(left),
+            Some((left, right)) => comparable(left, right),
+            None => None,
+        };
+        let Some(common) = common else {
+            return self.do_not_fit("compared", &left, &right, span);
+        };
+        let operands = vec![convert(left, common), convert(right, common)];
+        Some(apply(Operation::Compare(comparison, common), operands, of))
+    }
+
+    fn do_not_fit<T>(
+        &mut self,
+        what: &str,
+        left: &Expression,
+        right: &Expression,
+        span: &Span,
+    ) -> Option<T> {
+        let (left, right) = (self.describe(&left.of), self.describe(&right.of));
+        let message = format!("{left} and {right} cannot be {what}");
+        let is_elementary = |name: &str| Elementary::ALL.iter().any(|of| of.name() == name);
+        let help = if is_elementary(&left) && is_elementary(&right) {
+            format!("convert one of them, such as with {right}_TO_{left}(…)")
+        } else {
+            "use values of one type".to_owned()
+        };
+        self.error_with("U1043", message, span.clone(), help);
+        None
+    }
+
+    fn bitwise(
+        &mut self,
+        operator: Operator,
+        left: Expression,
+        right: Expression,
+        span: &Span,
+    ) -> Option<Expression> {
+        let kinds = left.of.elementary().zip(right.of.elementary());
+        let result = match kinds {
+            Some((Elementary::Bool, Elementary::Bool)) => Some(Elementary::Bool),
+            Some((left, right)) if is_whole(left) && is_whole(right) => {
+                match (left.is_bit_string(), right.is_bit_string()) {
+                    (true, false) if left.bits() >= right.bits() => Some(left),
+                    (false, true) if right.bits() >= left.bits() => Some(right),
+                    _ => common(left, right),
+                }
+            }
+            _ => None,
+        };
+        let Some(result) = result else {
+            return self.do_not_fit("combined bit by bit", &left, &right, span);
+        };
+        let bits = as_bits(result);
+        let operation = match operator {
+            Operator::And => Operation::And(bits),
+            Operator::Or => Operation::Or(bits),
+            _ => Operation::Xor(bits),
+        };
+        let operands = [left, right].map(|value| reinterpret(convert(value, result), bits));
+        let value = apply(operation, operands.into(), Type::Elementary(bits));
+        Some(reinterpret(value, result))
+    }
+
+    fn arithmetic(
+        &mut self,
+        operator: Operator,
+        left: Expression,
+        right: Expression,
+        span: &Span,
+    ) -> Option<Expression> {
+        let kinds = left.of.elementary().zip(right.of.elementary());
+        if let Some((from, to)) = kinds
+            && (from.is_time() || to.is_time())
+        {
+            return match self.time_arithmetic(operator, left, right) {
+                Ok(value) => Some(value),
+                Err(operands) => self.do_not_fit("calculated with so", &operands.0, &operands.1, span),
+            };
+        }
+        let found = kinds.and_then(|(left, right)| {
+            let known = is_number(left) && is_number(right);
+            common(left, right).filter(|_| known)
+        });
+        let Some(result) = found else {
+            return self.do_not_fit("calculated with", &left, &right, span);
+        };
+        let of = as_integer(result);
+        if let Some((left, right)) = kinds
+            && matches!(operator, Operator::Divide | Operator::Modulo)
+            && !of.is_real()
+        {
+            let leaves = |from: Elementary| limits(from).0 < limits(of).0 || limits(from).1 > limits(of).1;
+            if leaves(left) || leaves(right) {
+                let message = format!("{left} and {right} are divided as {of}");
+                let help = "convert both to a type that has all their numbers";
+                self.warn("U1080", message, span.clone(), help);
+            }
+        }
+        let operation = match operator {
+            Operator::Add => Operation::Add(of),
+            Operator::Subtract => Operation::Subtract(of),
+            Operator::Multiply => Operation::Multiply(of),
+            Operator::Divide => Operation::Divide(of),
+            _ if of.is_real() => {
+                let message = format!("MOD needs whole numbers, and this is {of}");
+                let help = "convert both, such as with REAL_TO_DINT(…), or write x - y * FLOOR(x / y)";
+                self.error_with("U1043", message, span.clone(), help);
+                return None;
+            }
+            _ => Operation::Modulo(of),
+        };
+        let divides = matches!(operator, Operator::Divide | Operator::Modulo) && !of.is_real();
+        let is_zero = matches!(right.kind, understudy_typed::ExpressionKind::Constant(0));
+        if divides && is_zero {
+            self.error("U1046", "division of a whole number by 0", span.clone());
+            return None;
+        }
+        let operands = vec![convert(left, of), convert(right, of)];
+        let value = apply(operation, operands, Type::Elementary(of));
+        Some(reinterpret(value, result))
+    }
+
+    fn power(
+        &mut self,
+        left: Expression,
+        right: Expression,
+        hint: Option<&Type>,
+        span: &Span,
+    ) -> Option<Expression> {
+        let kinds = left.of.elementary().zip(right.of.elementary());
+        let Some((base, exponent)) = kinds.filter(|(left, right)| is_number(*left) && is_number(*right))
+        else {
+            return self.do_not_fit("raised to a power", &left, &right, span);
+        };
+        let hinted = hint.and_then(Type::elementary).filter(|of| of.is_real());
+        let of = match (base.is_real(), exponent.is_real()) {
+            (true, _) => base,
+            (false, true) => exponent,
+            (false, false) => hinted.unwrap_or(Elementary::Lreal),
+        };
+        let operands = vec![convert(left, of), convert(right, of)];
+        Some(apply(Operation::Power(of), operands, Type::Elementary(of)))
+    }
+
+    fn time_arithmetic(
+        &mut self,
+        operator: Operator,
+        left: Expression,
+        right: Expression,
+    ) -> Result<Expression, (Expression, Expression)> {
+        use Elementary::{Lint, Lreal, Time};
+        let (Some(from), Some(to)) = (left.of.elementary(), right.of.elementary()) else {
+            return Err((left, right));
+        };
+        let plain = |operation: fn(Elementary) -> Operation, left, right, result| {
+            let operands = vec![reinterpret(left, Lint), reinterpret(right, Lint)];
+            let value = apply(operation(Lint), operands, Type::Elementary(Lint));
+            Ok(reinterpret(value, result))
+        };
+        match operator {
+            Operator::Add if to == Time && from.is_time() => {
+                plain(Operation::Add, left, right, from)
+            }
+            Operator::Add if from == Time && to.is_time() => {
+                plain(Operation::Add, left, right, to)
+            }
+            Operator::Subtract if to == Time && from.is_time() => {
+                plain(Operation::Subtract, left, right, from)
+            }
+            Operator::Subtract if from == to => plain(Operation::Subtract, left, right, Time),
+            Operator::Modulo if from == Time && to == Time => {
+                plain(Operation::Modulo, left, right, Time)
+            }
+            Operator::Multiply if to == Time && is_number(from) => {
+                self.time_arithmetic(operator, right, left)
+            }
+            Operator::Multiply | Operator::Divide if from == Time && is_number(to) => {
+                let operation = match operator {
+                    Operator::Multiply => Operation::Multiply,
+                    _ => Operation::Divide,
+                };
+                if to.is_real() {
+                    let operands = vec![convert(left, Lreal), convert(right, Lreal)];
+                    let value = apply(operation(Lreal), operands, Type::Elementary(Lreal));
+                    return Ok(convert(value, Time));
+                }
+                plain(operation, left, convert(right, Lint), Time)
+            }
+            _ => Err((left, right)),
+        }
+    }
+}

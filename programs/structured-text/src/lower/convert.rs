@@ -1,0 +1,280 @@
+//! Which types fit each other: implicit conversions, and the common type of operands.
+
+use understudy_typed::{Elementary, Expression, ExpressionKind, Type};
+
+use crate::syntax::Span;
+
+use super::Lowering;
+use super::fold;
+use super::names::number;
+use super::numbers::{Number, Operand};
+
+/// The least and the greatest number of an integer, a bit string or a time.
+pub(super) fn limits(of: Elementary) -> (i128, i128) {
+    let mask = i128::from(of.mask());
+    match of.is_signed() {
+        true => (-(mask >> 1) - 1, mask >> 1),
+        false => (0, mask),
+    }
+}
+
+/// How a type fits another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Fit {
+    /// Nothing is lost.
+    Whole,
+    /// The bits stay, the number may become another.
+    Sign,
+    /// Digits may be lost.
+    Rounded,
+    No,
+}
+
+/// An integer or a bit string of several bits.
+pub(super) fn is_whole(of: Elementary) -> bool {
+    of.is_integer() || of.is_bit_string() && of != Elementary::Bool
+}
+
+/// Something to calculate with: integers, bit strings of several bits, reals.
+pub(super) fn is_number(of: Elementary) -> bool {
+    is_whole(of) || of.is_real()
+}
+
+fn fit(from: Elementary, to: Elementary) -> Fit {
+    if from == to {
+        return Fit::Whole;
+    }
+    if is_whole(from) && is_whole(to) {
+        let ((least, most), (from_least, from_most)) = (limits(to), limits(from));
+        return if least <= from_least && from_most <= most {
+            Fit::Whole
+        } else if to.bits() >= from.bits() {
+            Fit::Sign
+        } else {
+            Fit::No
+        };
+    }
+    if is_whole(from) && to.is_real() {
+        let exact = if to == Elementary::Real { 16 } else { 32 };
+        return if from.bits() <= exact {
+            Fit::Whole
+        } else {
+            Fit::Rounded
+        };
+    }
+    if (from, to) == (Elementary::Real, Elementary::Lreal) {
+        return Fit::Whole;
+    }
+    Fit::No
+}
+
+/// The unsigned integer of a bit string's width; other types stay.
+pub(super) fn as_integer(of: Elementary) -> Elementary {
+    match of {
+        Elementary::Byte => Elementary::Usint,
+        Elementary::Word => Elementary::Uint,
+        Elementary::Dword => Elementary::Udint,
+        Elementary::Lword => Elementary::Ulint,
+        _ => of,
+    }
+}
+
+/// The bit string of a type's width.
+pub(super) fn as_bits(of: Elementary) -> Elementary {
+    match of.bits() {
+        1 => Elementary::Bool,
+        8 => Elementary::Byte,
+        16 => Elementary::Word,
+        32 => Elementary::Dword,
+        _ => Elementary::Lword,
+    }
+}
+
+/// The type in which two operands are calculated; of two integers of one width and different signs that with the sign.
+pub(super) fn common(left: Elementary, right: Elementary) -> Option<Elementary> {
+    if left == right {
+        return Some(left);
+    }
+    if !is_number(left) || !is_number(right) {
+        return None;
+    }
+    if left.is_real() || right.is_real() {
+        let double = left == Elementary::Lreal || right == Elementary::Lreal;
+        let long = |of: Elementary| is_whole(of) && of.bits() == 64;
+        let double = double || long(left) || long(right);
+        return Some(match double {
+            true => Elementary::Lreal,
+            false => Elementary::Real,
+        });
+    }
+    if left.is_bit_string() && right.is_bit_string() {
+        return Some(if left.bits() >= right.bits() { left } else { right });
+    }
+    let (left, right) = (as_integer(left), as_integer(right));
+    Some(match left.bits().cmp(&right.bits()) {
+        std::cmp::Ordering::Greater => left,
+        std::cmp::Ordering::Less => right,
+        std::cmp::Ordering::Equal if left.is_signed() => left,
+        std::cmp::Ordering::Equal => right,
+    })
+}
+
+/// The type in which two numbers are compared: one that has both, where there is one.
+pub(super) fn comparable(left: Elementary, right: Elementary) -> Option<Elementary> {
+    let found = common(left, right)?;
+    if fit(left, found) == Fit::Whole && fit(right, found) == Fit::Whole || found.is_real() {
+        return Some(found);
+    }
+    let wider = [Elementary::Int, Elementary::Dint, Elementary::Lint];
+    let has_both = |of: &Elementary| fit(left, *of) == Fit::Whole && fit(right, *of) == Fit::Whole;
+    Some(wider.into_iter().find(has_both).unwrap_or(Elementary::Lint))
+}
+
+impl Lowering<'_> {
+    /// The value as one of a type, where the languages convert by themselves.
+    pub(super) fn coerce(&mut self, operand: Operand, to: &Type, span: &Span) -> Option<Expression> {
+        match operand {
+            Operand::Faulty => None,
+            Operand::Number(number) => self.coerce_number(number, to, span),
+            Operand::Typed(value) => self.coerce_typed(value, to, span),
+        }
+    }
+
+    fn coerce_number(&mut self, value: Number, to: &Type, span: &Span) -> Option<Expression> {
+        if let (Type::Enumeration(id, of), Number::Integer(value)) = (to, value) {
+            let values = &self.program.enumerations[id.0 as usize].values;
+            if values.iter().any(|(_, known)| i128::from(*known) == value) {
+                return Some(number(to.clone(), value as u64 & of.mask()));
+            }
+            let message = format!("{} has no value {value}", self.describe(to));
+            let shown: Vec<&str> = values.iter().map(|(name, _)| name.as_str()).take(20).collect();
+            let help = format!("write one of its names: {}", shown.join(", "));
+            self.error_with("U1043", message, span.clone(), help);
+            return None;
+        }
+        let elementary = match to {
+            Type::Elementary(of) => *of,
+            _ => return self.mismatch("a number", to, span),
+        };
+        if elementary.is_real() {
+            return Some(value.in_real(elementary));
+        }
+        if elementary.is_time() {
+            return self.mismatch("a number without a unit", to, span);
+        }
+        let Number::Integer(value) = value else {
+            let message = format!("expected {elementary}, found a number with a decimal point");
+            let help = format!("write a whole number, or LREAL_TO_{elementary}(…)");
+            self.error_with("U1043", message, span.clone(), help);
+            return None;
+        };
+        let (least, most) = limits(elementary);
+        if value < least || value > most {
+            let message = match elementary {
+                Elementary::Bool => format!("expected BOOL, found the number {value}"),
+                _ => format!("{value} is not a {elementary}, which is {least} to {most}"),
+            };
+            let help = match elementary {
+                Elementary::Bool => "write TRUE or FALSE, or compare the number".to_owned(),
+                _ if value >= 0 && value <= i128::from(elementary.mask()) => {
+                    let bits = as_bits(elementary);
+                    format!("write {bits}_TO_{elementary}({bits}#{value}) if its bits are meant")
+                }
+                _ => "use a wider type".to_owned(),
+            };
+            self.error_with("U1043", message, span.clone(), help);
+            return None;
+        }
+        Some(number(to.clone(), value as u64 & elementary.mask()))
+    }
+
+    fn coerce_typed(&mut self, value: Expression, to: &Type, span: &Span) -> Option<Expression> {
+        if value.of == *to {
+            return Some(value);
+        }
+        let found = self.describe(&value.of);
+        let (from, target) = match (&value.of, to) {
+            (Type::Text(_), Type::Text(_)) => return Some(value),
+            (Type::Elementary(from), Type::Elementary(to))
+            | (Type::Enumeration(_, from), Type::Elementary(to)) => (*from, *to),
+            (Type::Elementary(from), Type::Enumeration(_, target)) if is_whole(*from) => {
+                let wanted = self.describe(to);
+                let message = format!("{found} becomes {wanted}, whether or not it has that value");
+                let help = "compare with its names, or use CASE";
+                self.warn("U1080", message, span.clone(), help);
+                let mut value = fold::convert(value, *target);
+                value.of = to.clone();
+                return Some(value);
+            }
+            _ => return self.mismatch(&found, to, span),
+        };
+        if let ExpressionKind::Constant(stored) = value.kind
+            && is_whole(from)
+            && is_whole(target)
+        {
+            let (least, most) = limits(target);
+            let known = from.signed(stored);
+            if least <= known && known <= most {
+                return Some(fold::convert(value, target));
+            }
+        }
+        match fit(from, target) {
+            Fit::Whole => {}
+            Fit::Sign => {
+                let message = format!("{found} becomes {target}: the bits stay, the number may change");
+                let help = format!("write {from}_TO_{target}(…) if that is meant");
+                self.warn("U1080", message, span.clone(), help);
+            }
+            Fit::Rounded => {
+                let message = format!("{found} becomes {target}, which has fewer digits");
+                let help = format!("write {from}_TO_{target}(…) if that is meant");
+                self.warn("U1080", message, span.clone(), help);
+            }
+            Fit::No => return self.mismatch(&found, to, span),
+        }
+        Some(fold::convert(value, target))
+    }
+
+    /// Reports a value of another type than the one wanted.
+    pub(super) fn mismatch<T>(&mut self, found: &str, to: &Type, span: &Span) -> Option<T> {
+        let wanted = self.describe(to);
+        let message = format!("expected {wanted}, found {found}");
+        let is_elementary = |name: &str| Elementary::ALL.iter().any(|of| of.name() == name);
+        let help = match to {
+            Type::Elementary(_) | Type::Text(_) if is_elementary(found) => {
+                let wanted = if matches!(to, Type::Text(_)) { "STRING" } else { &wanted };
+                format!("write {found}_TO_{wanted}(…)")
+            }
+            Type::Elementary(of) if of.is_time() => "write a unit, such as T#500ms".to_owned(),
+            Type::Elementary(of) if found.starts_with("STRING") => format!("write STRING_TO_{of}(…)"),
+            _ => format!("use a value of {wanted}"),
+        };
+        self.error_with("U1043", message, span.clone(), help);
+        None
+    }
+
+    /// A value of the type that it has by itself, or of the one that its surroundings suggest.
+    pub(super) fn settle(&mut self, operand: Operand, hint: Option<&Type>) -> Option<Expression> {
+        match operand {
+            Operand::Faulty => None,
+            Operand::Typed(value) => Some(value),
+            Operand::Number(value) => {
+                let hinted = hint.and_then(Type::elementary).filter(|of| match value {
+                    Number::Real(..) => of.is_real(),
+                    Number::Integer(value) => {
+                        let (least, most) = limits(*of);
+                        of.is_real() || is_whole(*of) && least <= value && value <= most
+                    }
+                });
+                let of = hinted.unwrap_or_else(|| value.default_type());
+                if of.is_real() {
+                    return Some(value.in_real(of));
+                }
+                let Number::Integer(value) = value else {
+                    return None;
+                };
+                Some(number(Type::Elementary(of), value as u64 & of.mask()))
+            }
+        }
+    }
+}

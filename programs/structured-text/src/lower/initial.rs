@@ -1,0 +1,176 @@
+//! Initial values of variables, whatever their type.
+
+use understudy_typed::{Array, Type};
+
+use crate::syntax::{Expression, Initializer, Name, Span};
+
+use super::Lowering;
+use super::images::{Builder, Image};
+use super::names::Constant;
+use super::types::Resolved;
+
+impl Lowering<'_> {
+    /// The initial content of a variable of a type.
+    pub(super) fn initial_image(
+        &mut self,
+        initial: &Initializer,
+        resolved: &Resolved,
+    ) -> Option<Image> {
+        let mut image = Builder::of(&resolved.image);
+        self.initialize(initial, &resolved.of, 0, &mut image)?;
+        Some(image.done())
+    }
+
+    fn initialize(
+        &mut self,
+        initial: &Initializer,
+        of: &Type,
+        bit: u64,
+        image: &mut Builder,
+    ) -> Option<()> {
+        match (initial, of) {
+            (Initializer::Value(value), Type::Array(_) | Type::Structure(..)) => {
+                let wanted = self.describe(of);
+                let message = format!("an initial value of {wanted} is expected");
+                let help = match of {
+                    Type::Array(_) => "write the elements in brackets, such as `[1, 2, 8(0)]`",
+                    _ => "write the parts, such as `(speed := 5, run := TRUE)`",
+                };
+                self.error_with("U1043", message, value.span.clone(), help);
+                None
+            }
+            (Initializer::Value(value), _) => self.initial_value(value, of, bit, image),
+            (Initializer::Array(entries, span), Type::Array(array)) => {
+                let mut at = 0;
+                self.entries(entries, array, bit, &mut at, image, span)
+            }
+            (Initializer::Structure(parts, span), Type::Structure(id, _)) => {
+                let info = self.structures[id.0 as usize].clone();
+                for (name, part) in parts {
+                    let Some(&field) = info.fields.get(&name.key()) else {
+                        self.no_such_part(name, of);
+                        return None;
+                    };
+                    let field = self.program.structures[id.0 as usize].fields[field].clone();
+                    if field.is_reference {
+                        let message = format!("`{name}` is a VAR_IN_OUT and has no initial value");
+                        self.error("U1043", message, span.clone());
+                        return None;
+                    }
+                    self.initialize(part, &field.of, bit + u64::from(field.slot) * 64, image)?;
+                }
+                Some(())
+            }
+            (Initializer::Array(_, span) | Initializer::Structure(_, span), _) => {
+                let wanted = self.describe(of);
+                let message = format!("an initial value of {wanted} is expected");
+                self.error("U1043", message, span.clone());
+                None
+            }
+        }
+    }
+
+    fn initial_value(
+        &mut self,
+        value: &Expression,
+        of: &Type,
+        bit: u64,
+        image: &mut Builder,
+    ) -> Option<()> {
+        match self.constant_of(value, of)? {
+            Constant::Number(of, value) => {
+                image.set(bit, of.elementary()?.bits(), value);
+            }
+            Constant::Text(capacity, bytes) => {
+                image.put(bit, &Type::Text(capacity), &super::images::zero());
+                image.text(bit, &bytes);
+            }
+        }
+        Some(())
+    }
+
+    /// Elements from `at` on; repetitions are made here.
+    fn entries(
+        &mut self,
+        entries: &[(Option<Expression>, Vec<Initializer>)],
+        array: &Array,
+        bit: u64,
+        at: &mut u64,
+        image: &mut Builder,
+        span: &Span,
+    ) -> Option<()> {
+        for (times, values) in entries {
+            let times = match times {
+                Some(times) => {
+                    let value = self.constant_integer(times)?;
+                    match u64::try_from(value) {
+                        Ok(value) if value <= array.length() => value,
+                        _ => {
+                            let message =
+                                format!("{value} repetitions; the array has {} elements", array.length());
+                            self.error("U1036", message, times.span.clone());
+                            return None;
+                        }
+                    }
+                }
+                None => 1,
+            };
+            if values.is_empty() {
+                *at += times;
+            }
+            for _ in 0..times {
+                if values.is_empty() {
+                    break;
+                }
+                for value in values {
+                    self.element(value, array, bit, at, image, span)?;
+                }
+            }
+        }
+        Some(())
+    }
+
+    fn element(
+        &mut self,
+        value: &Initializer,
+        array: &Array,
+        bit: u64,
+        at: &mut u64,
+        image: &mut Builder,
+        span: &Span,
+    ) -> Option<()> {
+        // Rows of an array of several dimensions may stand in brackets of their own.
+        if let (Initializer::Array(entries, span), false) =
+            (value, matches!(array.element, Type::Array(_)))
+        {
+            return self.entries(entries, array, bit, at, image, span);
+        }
+        if *at >= array.length() {
+            let message = format!(
+                "more initial values than the array has elements: {}",
+                array.length()
+            );
+            self.error("U1036", message, span.clone());
+            return None;
+        }
+        self.initialize(value, &array.element, bit + *at * array.stride(), image)?;
+        *at += 1;
+        Some(())
+    }
+
+    /// Reports a part that a structure or block does not have.
+    pub(super) fn no_such_part(&mut self, name: &Name, of: &Type) {
+        let mut help = "check the type of the variable".to_owned();
+        if let Type::Structure(id, _) = of {
+            let fields = &self.program.structures[id.0 as usize].fields;
+            let shown = fields.iter().map(|field| field.name.as_str());
+            help = understudy_text::spelling::suggestion(
+                name.as_str(),
+                shown.filter(|name| !name.contains('.')),
+            );
+        }
+        let whole = self.describe(of);
+        let message = format!("{whole} has no part `{name}`");
+        self.error_with("U1041", message, name.span(), help);
+    }
+}

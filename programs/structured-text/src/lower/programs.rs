@@ -1,0 +1,508 @@
+//! What a file says beside its bodies: global variables, addresses, programs and their tasks.
+
+use std::rc::Rc;
+
+use understudy_text::spelling;
+use understudy_typed::{Elementary, Root, Task, Type, Variable as Shown};
+
+use crate::syntax::{Class, Declaration, File, Name, Span, Unit, UnitKind};
+
+use super::blocks::{Block, Key};
+use super::images::initial;
+use super::names::{Owner, Symbol, Variable};
+use super::types::{Resolved, TypeState};
+use super::{DEFAULT_PERIOD, Lowering, Options};
+
+/// A PROGRAM that is run.
+struct Instance<'a> {
+    name: &'a Name,
+    unit: usize,
+    /// Nanoseconds, and how urgent it is.
+    interval: Option<i64>,
+    priority: i64,
+}
+
+impl<'a> Lowering<'a> {
+    /// Types, constants and global variables.
+    pub(super) fn declare(&mut self, file: &'a File, library: &'static File) {
+        for definition in &library.types {
+            let state = TypeState::New(definition);
+            self.types.insert(definition.name.key(), state);
+        }
+        let mut first: std::collections::HashMap<String, Span> = std::collections::HashMap::new();
+        let units = file.units.iter().map(|unit| &unit.name);
+        for name in units.chain(file.types.iter().map(|definition| &definition.name)) {
+            if let Some(before) = first.insert(name.key(), name.span()) {
+                let message = format!("`{name}` is declared twice");
+                let found = understudy_text::Diagnostic::error("U1042", message, name.span());
+                self.report(found.with_related(before, "declared here first"));
+            }
+        }
+        for definition in &file.types {
+            let state = TypeState::New(definition);
+            self.types.insert(definition.name.key(), state);
+        }
+        for declaration in &file.globals {
+            let key = declaration.name.key();
+            if self.global_declarations.insert(key, declaration).is_some() {
+                let message = format!("`{}` is declared twice in VAR_GLOBAL", declaration.name);
+                let help = "remove or rename one of them";
+                self.error_with("U1042", message, declaration.name.span(), help);
+            }
+        }
+        for definition in &file.types {
+            let span = definition.name.span();
+            let kind = crate::syntax::TypeKind::Named(definition.name.clone());
+            self.resolve(&crate::syntax::TypeName { kind, span });
+        }
+        for declaration in &file.globals {
+            self.global_variable(declaration);
+        }
+    }
+
+    fn global_variable(&mut self, declaration: &'a Declaration) {
+        let key = declaration.name.key();
+        if self.globals.contains_key(&key) {
+            return;
+        }
+        if declaration.constant
+            && let Symbol::Constant(_) = self.constant_symbol(None, declaration)
+        {
+            return;
+        }
+        let symbol = self.global_symbol(declaration);
+        self.globals.insert(key, symbol.unwrap_or(Symbol::Faulty));
+    }
+
+    fn global_symbol(&mut self, declaration: &Declaration) -> Option<Symbol> {
+        let resolved = self.declared_type(declaration)?;
+        if declaration.address.is_some() {
+            let symbol = self.located(declaration, &resolved);
+            self.publish(declaration.name.as_str(), declaration, &symbol);
+            return Some(symbol);
+        }
+        let slot = self.state(resolved.of.slots(), &declaration.name.span())?;
+        self.program.initial.extend(initial(&resolved.image, slot));
+        let symbol = variable(declaration, Root::Global(slot), &resolved.of, false);
+        self.publish(declaration.name.as_str(), declaration, &symbol);
+        Some(symbol)
+    }
+
+    /// Shows a variable to people.
+    fn publish(&mut self, name: &str, declaration: &Declaration, symbol: &Symbol) {
+        if let Symbol::Variable(variable) = symbol
+            && let Root::Global(slot) = variable.root
+        {
+            self.program.variables.push(Shown {
+                name: name.to_owned(),
+                of: variable.of.clone(),
+                slot,
+                address: declaration.address.as_ref().map(|found| found.as_str().to_owned()),
+                description: declaration.description.clone(),
+                is_retained: declaration.retained,
+            });
+        }
+    }
+
+    /// A variable at an address: `%I` is an input point, `%Q` an output point, `%M` memory.
+    pub(super) fn located(&mut self, declaration: &Declaration, resolved: &Resolved) -> Symbol {
+        let Some(address) = &declaration.address else {
+            return Symbol::Faulty;
+        };
+        let name = &declaration.name;
+        let key = normal(address.as_str());
+        // An incomplete address is one of its own.
+        let key = match key.contains('*') {
+            true => format!("{key} {}", name.key()),
+            false => key,
+        };
+        if let Some(known) = self.addresses.get(&key).cloned() {
+            if let Symbol::Variable(first) = &known
+                && first.of != resolved.of
+            {
+                let (own, other) = (self.describe(&resolved.of), self.describe(&first.of));
+                let message = format!(
+                    "`{name}` is {own} at {address}, where `{}` is {other}",
+                    first.name
+                );
+                let found = understudy_text::Diagnostic::error("U1083", message, address.span());
+                let found = found.with_related(first.span.clone(), "declared here");
+                self.report(found.with_help("give both one type, or two addresses"));
+                return Symbol::Faulty;
+            }
+            return known;
+        }
+        let symbol = self
+            .at_address(name, address, resolved)
+            .unwrap_or(Symbol::Faulty);
+        self.addresses.insert(key, symbol.clone());
+        symbol
+    }
+
+    fn at_address(&mut self, name: &Name, address: &Name, resolved: &Resolved) -> Option<Symbol> {
+        let kind = address.as_str().chars().nth(1).map(|kind| kind.to_ascii_uppercase());
+        let is_input = kind == Some('I');
+        let is_point = is_input || kind == Some('Q');
+        if !is_point && kind != Some('M') {
+            let message = format!("`{address}` is not an address");
+            let help = "write an input such as %IX0.0, an output such as %QW3 or a memory such as %MD8";
+            self.error_with("U1083", message, address.span(), help);
+            return None;
+        }
+        let elementary = resolved.of.elementary();
+        if is_point && elementary.is_none() {
+            let found = self.describe(&resolved.of);
+            let message = format!("`{name}` at {address} is {found}; a point is one number, bit or time");
+            let help = "declare each element as a variable with an address of its own";
+            self.error_with("U1083", message, name.span(), help);
+            return None;
+        }
+        if let Some(of) = elementary {
+            self.fits_address(name, address, of);
+        }
+        let slot = self.state(resolved.of.slots(), &name.span())?;
+        self.program.initial.extend(initial(&resolved.image, slot));
+        if let Some(of) = elementary.filter(|_| is_point) {
+            let points = match is_input {
+                true => &mut self.program.inputs,
+                false => &mut self.program.outputs,
+            };
+            let mut shown = name.as_str().to_owned();
+            if points.iter().any(|point| point.name.eq_ignore_ascii_case(&shown)) {
+                shown = format!("{name} {address}");
+            }
+            points.push(shown, of, slot);
+        }
+        Some(Symbol::Variable(Rc::new(Variable {
+            name: name.as_str().to_owned(),
+            root: Root::Global(slot),
+            of: resolved.of.clone(),
+            class: Class::Local,
+            is_constant: false,
+            is_point: is_input,
+            span: name.span(),
+        })))
+    }
+
+    /// Warns where the size in an address is not that of the variable.
+    fn fits_address(&mut self, name: &Name, address: &Name, of: Elementary) {
+        let size = normal(address.as_str()).chars().nth(2);
+        let bits = match size {
+            Some('X') => 1,
+            Some('B') => 8,
+            Some('W') => 16,
+            Some('D') => 32,
+            Some('L') => 64,
+            _ => return,
+        };
+        if bits != of.bits() {
+            let message = format!("`{name}` is {of}, and {address} has {bits} bits");
+            let help = "the type counts: write the letter of its width, X, B, W, D or L";
+            self.warn("U1083", message, address.span(), help);
+        }
+    }
+
+    /// An address in a body.
+    pub(super) fn direct(&mut self, address: &Name) -> Symbol {
+        let key = normal(address.as_str());
+        if let Some(known) = self.addresses.get(&key) {
+            return known.clone();
+        }
+        let of = match key.chars().nth(2) {
+            Some('B') => Elementary::Byte,
+            Some('W') => Elementary::Word,
+            Some('D') => Elementary::Dword,
+            Some('L') => Elementary::Lword,
+            _ => Elementary::Bool,
+        };
+        let resolved: Resolved = Type::Elementary(of).into();
+        let symbol = self
+            .at_address(address, address, &resolved)
+            .unwrap_or(Symbol::Faulty);
+        self.addresses.insert(key, symbol.clone());
+        symbol
+    }
+
+    /// Lowers the programs that run; for a library its units, whose names are the answer.
+    pub(super) fn programs(&mut self, file: &'a File, options: &Options<'_>) -> Vec<String> {
+        let is_program = |unit: &&Unit| unit.kind == UnitKind::Program;
+        let programs: Vec<&Unit> = file.units.iter().filter(is_program).collect();
+        if programs.is_empty() {
+            if options.program.is_some() || file.units.is_empty() {
+                let message = "the file has no PROGRAM";
+                self.error_with("U1051", message, 0..0, "add a PROGRAM that calls its blocks");
+            }
+            return self.library(file);
+        }
+        let instances = self.instances(file, &programs, options);
+        if instances.is_empty() {
+            return Vec::new();
+        }
+        let base = instances.iter().filter_map(|instance| instance.interval).min();
+        self.program.period = options.period.or(base).unwrap_or(DEFAULT_PERIOD);
+        let name = instances[0].name;
+        self.program.name = match instances.len() {
+            1 => self.units[instances[0].unit].unit.name.as_str().to_owned(),
+            _ => name.as_str().to_owned(),
+        };
+        let are_several = instances.len() > 1;
+        for instance in &instances {
+            let every = match (instance.interval, base) {
+                (Some(interval), Some(base)) => self.every(instance.name, interval, base),
+                _ => 1,
+            };
+            self.run(instance, every, are_several);
+        }
+        self.bodies();
+        self.recursion();
+        self.program.initial.sort_by_key(|initial| initial.slot);
+        Vec::new()
+    }
+
+    /// The programs that run, in the order of a scan.
+    fn instances(
+        &mut self,
+        file: &'a File,
+        programs: &[&'a Unit],
+        options: &Options<'_>,
+    ) -> Vec<Instance<'a>> {
+        let names = || programs.iter().map(|program| program.name.as_str());
+        let whole = |unit: &'a Unit, index: usize| Instance {
+            name: &unit.name,
+            unit: index,
+            interval: None,
+            priority: 0,
+        };
+        if let Some(chosen) = options.program {
+            let found = programs.iter().find(|program| program.name.is(chosen));
+            let Some(unit) = found else {
+                let message = format!("the file has no PROGRAM `{chosen}`");
+                let help = spelling::suggestion(chosen, names());
+                self.error_with("U1013", message, 0..0, help);
+                return Vec::new();
+            };
+            let mut instance = whole(unit, self.unit_names[&unit.name.key()]);
+            let declared = file.instances.iter().find(|found| found.of.is(chosen));
+            if let Some(task) = declared.and_then(|found| found.task.as_ref()) {
+                let task = file.tasks.iter().find(|found| found.name == *task);
+                instance.interval = task.and_then(|task| task.interval);
+            }
+            return vec![instance];
+        }
+        if file.instances.is_empty() {
+            if let [unit] = programs {
+                let mut instance = whole(unit, self.unit_names[&unit.name.key()]);
+                if let [task] = file.tasks.as_slice() {
+                    instance.interval = task.interval;
+                }
+                return vec![instance];
+            }
+            let list: Vec<&str> = names().collect();
+            let message = format!(
+                "the file has {} programs and no CONFIGURATION that says which of them run",
+                programs.len()
+            );
+            let help = format!("choose one with --program, of {}", list.join(", "));
+            let span = programs[1].name.span();
+            self.error_with("U1013", message, span, help);
+            return Vec::new();
+        }
+        let mut instances = Vec::new();
+        for declared in &file.instances {
+            let Some(unit) = programs.iter().find(|program| program.name == declared.of) else {
+                let message = format!("the file has no PROGRAM `{}`", declared.of);
+                let help = spelling::suggestion(declared.of.as_str(), names());
+                self.error_with("U1013", message, declared.of.span(), help);
+                continue;
+            };
+            let mut instance = whole(unit, self.unit_names[&unit.name.key()]);
+            instance.name = &declared.name;
+            instance.priority = i64::MAX;
+            if let Some(name) = &declared.task {
+                let Some(task) = file.tasks.iter().find(|task| task.name == *name) else {
+                    let message = format!("the task `{name}` is not declared");
+                    let known = file.tasks.iter().map(|task| task.name.as_str());
+                    let help = spelling::suggestion(name.as_str(), known);
+                    self.error_with("U1041", message, name.span(), help);
+                    continue;
+                };
+                if task.single.is_some() && task.interval.is_none() {
+                    let message = format!("the task `{name}` is run by an event (SINGLE)");
+                    let help = "give it an INTERVAL, and look for the event with R_TRIG";
+                    self.error_with("U1084", message, task.name.span(), help);
+                    continue;
+                }
+                instance.interval = task.interval;
+                instance.priority = task.priority.unwrap_or(i64::MAX);
+            }
+            instances.push(instance);
+        }
+        instances.sort_by_key(|instance| instance.priority);
+        instances
+    }
+
+    /// In every so many-th scan a task runs.
+    fn every(&mut self, name: &Name, interval: i64, base: i64) -> u32 {
+        let times = interval.checked_div(base).unwrap_or(0);
+        if base > 0 && interval % base == 0 && let Ok(times) = u32::try_from(times) {
+            return times.max(1);
+        }
+        let shown = |nanoseconds: i64| format!("{} ms", nanoseconds as f64 / 1e6);
+        let message = format!(
+            "the interval of `{name}` is {}, which is not a multiple of the fastest one, {}",
+            shown(interval),
+            shown(base)
+        );
+        let help = "choose intervals that are multiples of the fastest one";
+        self.error_with("U1084", message, name.span(), help);
+        1
+    }
+
+    fn run(&mut self, instance: &Instance<'a>, every: u32, are_several: bool) {
+        let span = instance.name.span();
+        let Some(block) = self.block(instance.unit, &span) else {
+            return;
+        };
+        let Some(own) = self.state(block.of.slots(), &span) else {
+            return;
+        };
+        let key = Key {
+            owner: Owner {
+                unit: instance.unit,
+                method: None,
+            },
+            class: Some(instance.unit),
+            open: Vec::new(),
+        };
+        let Some(routine) = self.routine(key, &span) else {
+            return;
+        };
+        self.program.initial.extend(initial(&block.image, own));
+        self.program.tasks.push(Task {
+            routine: routine.id,
+            own,
+            every,
+        });
+        let prefix = match are_several {
+            true => format!("{}.", instance.name),
+            false => String::new(),
+        };
+        self.program_variables(&block, own, &prefix);
+    }
+
+    fn program_variables(&mut self, block: &Block, own: u32, prefix: &str) {
+        for name in &block.order {
+            let Some(member) = block.members.get(name) else {
+                continue;
+            };
+            let Symbol::Variable(variable) = &member.symbol else {
+                continue;
+            };
+            let parameter = block.parameters.iter().find(|found| found.name == variable.name);
+            let slot = match (variable.root, parameter) {
+                (_, Some(parameter)) => own + parameter.slot,
+                (Root::Own(slot), None) => own + slot,
+                (Root::Global(slot), None) if member.class != Class::External => slot,
+                _ => continue,
+            };
+            let shown = format!("{prefix}{}", variable.name);
+            if matches!(variable.root, Root::Own(_))
+                && let Class::Input | Class::Output = member.class
+            {
+                self.point(&shown, variable, slot, member.class == Class::Input);
+            }
+            self.program.variables.push(Shown {
+                name: shown,
+                of: variable.of.clone(),
+                slot,
+                address: member.address.clone(),
+                description: member.description.clone(),
+                is_retained: member.is_retained,
+            });
+        }
+    }
+
+    fn point(&mut self, name: &str, variable: &Variable, slot: u32, is_input: bool) {
+        let Some(of) = variable.of.elementary() else {
+            let found = self.describe(&variable.of);
+            let message = format!("`{name}` is a point of {found}; a point is one number, bit or time");
+            let help = "declare each of its parts as an input or output, or use VAR";
+            self.error_with("U1083", message, variable.span.clone(), help);
+            return;
+        };
+        let points = match is_input {
+            true => &mut self.program.inputs,
+            false => &mut self.program.outputs,
+        };
+        points.push(name, of, slot);
+    }
+
+    /// Lowers each unit of a file without a PROGRAM by itself.
+    fn library(&mut self, file: &'a File) -> Vec<String> {
+        let mut checked = Vec::new();
+        for unit in &file.units {
+            let index = self.unit_names[&unit.name.key()];
+            let class = (unit.kind == UnitKind::FunctionBlock).then_some(index);
+            self.check(index, None, class, unit);
+            for method in 0..unit.methods.len() {
+                self.check(index, Some(method), class, &unit.methods[method]);
+            }
+            checked.push(unit.name.as_str().to_owned());
+            self.bodies();
+        }
+        self.recursion();
+        checked
+    }
+
+    fn check(&mut self, index: usize, method: Option<usize>, class: Option<usize>, unit: &'a Unit) {
+        let owner = Owner {
+            unit: index,
+            method,
+        };
+        let mut open = Vec::new();
+        let outside = self.leave_unit();
+        self.scope.unit = Some(index);
+        self.scope.method = method;
+        for declaration in &unit.declarations {
+            let dimensions = match (&declaration.of.kind, declaration.class) {
+                (crate::syntax::TypeKind::OpenArray(..), Class::InOut | Class::Input)
+                | (crate::syntax::TypeKind::Text { .. }, Class::InOut) => {
+                    self.reference_type(&declaration.of)
+                }
+                _ => None,
+            };
+            open.extend(dimensions.map(|(resolved, _)| match resolved.of {
+                Type::Array(array) => {
+                    let mut array = (*array).clone();
+                    array.ranges.fill((-100, 100));
+                    Type::Array(std::sync::Arc::new(array))
+                }
+                other => other,
+            }));
+        }
+        self.scope = outside;
+        let key = Key { owner, class, open };
+        self.routine(key, &unit.name.span());
+    }
+}
+
+/// An address in capitals, with the X that may be left out.
+fn normal(address: &str) -> String {
+    let mut key = address.to_ascii_uppercase();
+    if key.chars().nth(2).is_some_and(|digit| digit.is_ascii_digit()) {
+        key.insert(2, 'X');
+    }
+    key
+}
+
+fn variable(declaration: &Declaration, root: Root, of: &Type, is_point: bool) -> Symbol {
+    Symbol::Variable(Rc::new(Variable {
+        name: declaration.name.as_str().to_owned(),
+        root,
+        of: of.clone(),
+        class: declaration.class,
+        is_constant: declaration.constant,
+        is_point,
+        span: declaration.name.span(),
+    }))
+}

@@ -1,0 +1,631 @@
+//! The standard functions of IEC 61131-3, overloaded as they are there.
+
+mod conversions;
+mod selection;
+mod texts;
+mod times;
+
+use understudy_typed::{Comparison, Elementary, Expression, Operation, RealFunction, Type};
+
+use crate::syntax::{self, Argument, Operator, Span};
+
+use super::Lowering;
+use super::convert::{as_bits, as_integer, common, is_number, is_whole, limits};
+use super::fold::{apply, choose, boolean, convert, reinterpret};
+use super::names::number;
+use super::numbers::{Number, Operand};
+
+/// The names that are known here, for suggestions; conversions come on top.
+pub(super) const NAMES: [&str; 91] = [
+    "ABS", "SQRT", "LN", "LOG", "EXP", "SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "ATAN2",
+    "ADD", "MUL", "SUB", "DIV", "MOD", "EXPT", "MOVE", "SHL", "SHR", "ROL", "ROR", "AND", "OR",
+    "XOR", "NOT", "SEL", "MAX", "MIN", "LIMIT", "MUX", "GT", "GE", "EQ", "LE", "LT", "NE", "LEN",
+    "LEFT", "RIGHT", "MID", "CONCAT", "INSERT", "DELETE", "REPLACE", "FIND", "UPPER_CASE",
+    "LOWER_CASE", "TRUNC", "FLOOR", "CEIL", "ROUND", "ADD_TIME", "ADD_LTIME", "ADD_TOD_TIME",
+    "ADD_LTOD_LTIME", "ADD_DT_TIME", "ADD_LDT_LTIME", "SUB_TIME", "SUB_LTIME", "SUB_DATE_DATE",
+    "SUB_LDATE_LDATE", "SUB_TOD_TIME", "SUB_LTOD_LTIME", "SUB_TOD_TOD", "SUB_LTOD_LTOD",
+    "SUB_DT_TIME", "SUB_LDT_LTIME", "SUB_DT_DT", "SUB_LDT_LDT", "MULTIME", "MUL_TIME", "MUL_LTIME",
+    "DIVTIME", "DIV_TIME", "DIV_LTIME", "CONCAT_DATE_TOD", "CONCAT_DATE_LTOD", "TIME", "SIZEOF",
+    "UPPER_BOUND", "LOWER_BOUND", "ADR", "FRAC", "BCD_TO_INT", "INT_TO_BCD", "TRUNC_INT", "TO_UPPER",
+    "TO_LOWER", "LTIME",
+];
+
+/// Whether a name in capitals is that of a standard function.
+pub(super) fn is_standard(key: &str) -> bool {
+    NAMES.contains(&key) || conversions::Conversion::of(key).is_some()
+}
+
+fn real_function(key: &str) -> Option<RealFunction> {
+    Some(match key {
+        "SQRT" => RealFunction::SquareRoot,
+        "LN" => RealFunction::NaturalLogarithm,
+        "LOG" => RealFunction::Logarithm,
+        "EXP" => RealFunction::Exponential,
+        "SIN" => RealFunction::Sine,
+        "COS" => RealFunction::Cosine,
+        "TAN" => RealFunction::Tangent,
+        "ASIN" => RealFunction::ArcSine,
+        "ACOS" => RealFunction::ArcCosine,
+        "ATAN" => RealFunction::ArcTangent,
+        _ => return None,
+    })
+}
+
+/// The operator of a function in the place of one, and whether it takes more than two operands.
+fn operator(key: &str) -> Option<(Operator, bool)> {
+    Some(match key {
+        "ADD" | "ADD_TIME" | "ADD_LTIME" | "ADD_TOD_TIME" | "ADD_LTOD_LTIME" | "ADD_DT_TIME"
+        | "ADD_LDT_LTIME" => (Operator::Add, key == "ADD"),
+        "MUL" | "MULTIME" | "MUL_TIME" | "MUL_LTIME" => (Operator::Multiply, key == "MUL"),
+        "DIV" | "DIVTIME" | "DIV_TIME" | "DIV_LTIME" => (Operator::Divide, false),
+        "MOD" => (Operator::Modulo, false),
+        "EXPT" => (Operator::Power, false),
+        "AND" => (Operator::And, true),
+        "OR" => (Operator::Or, true),
+        "XOR" => (Operator::Xor, true),
+        _ if key == "SUB" || key.starts_with("SUB_") => (Operator::Subtract, false),
+        _ => return None,
+    })
+}
+
+fn comparison(key: &str) -> Option<Comparison> {
+    Some(match key {
+        "GT" => Comparison::Greater,
+        "GE" => Comparison::GreaterOrEqual,
+        "EQ" => Comparison::Equal,
+        "LE" => Comparison::LessOrEqual,
+        "LT" => Comparison::Less,
+        "NE" => Comparison::NotEqual,
+        _ => return None,
+    })
+}
+
+/// The values of a call by the names of its inputs.
+pub(super) struct Values<'s> {
+    pub(super) of: Vec<&'s syntax::Expression>,
+    enable: Option<&'s syntax::Expression>,
+}
+
+impl Lowering<'_> {
+    /// A call of a standard function.
+    pub(super) fn standard(
+        &mut self,
+        key: &str,
+        arguments: &[Argument],
+        hint: Option<&Type>,
+        span: &Span,
+    ) -> Operand {
+        let Some(values) = self.values(key, arguments, span) else {
+            return Operand::Faulty;
+        };
+        let operand = self.standard_value(key, &values.of, hint, span);
+        if values.enable.is_none() {
+            return operand;
+        }
+        match self.settle(operand, hint) {
+            Some(value) => self.permitted(value, values.enable),
+            None => Operand::Faulty,
+        }
+    }
+
+    fn standard_value(
+        &mut self,
+        key: &str,
+        values: &[&syntax::Expression],
+        hint: Option<&Type>,
+        span: &Span,
+    ) -> Operand {
+        if let Some((operator, _)) = operator(key) {
+            return self.operator_call(operator, values, hint);
+        }
+        let found = if let Some(comparison) = comparison(key) {
+            self.comparison_call(comparison, values)
+        } else if let Some(function) = real_function(key) {
+            self.real_call(function, values[0], hint)
+        } else if let Some(conversion) = conversions::Conversion::of(key) {
+            self.conversion(&conversion, values[0], hint)
+        } else {
+            match key {
+                "MOVE" => return self.operand(values[0], hint),
+                "ABS" => self.absolute(values[0], hint),
+                "NOT" => self.not_call(values[0], hint),
+                "SHL" | "SHR" | "ROL" | "ROR" => self.shift(key, values, hint),
+                "SEL" | "MAX" | "MIN" | "LIMIT" | "MUX" => self.selection(key, values, hint, span),
+                "ATAN2" => self.arc_tangent_of_two(values, hint, span),
+                "FLOOR" | "CEIL" | "ROUND" | "FRAC" => self.rounded(key, values[0], hint),
+                "TIME" | "LTIME" => Some(apply(
+                    Operation::Elapsed,
+                    Vec::new(),
+                    Type::Elementary(Elementary::Time),
+                )),
+                "CONCAT_DATE_TOD" | "CONCAT_DATE_LTOD" => self.date_and_time(values),
+                "SIZEOF" => return self.size_of(values[0]),
+                "UPPER_BOUND" | "LOWER_BOUND" => return self.array_bound(key, values),
+                "ADR" => {
+                    let help = "pass the variable as VAR_IN_OUT";
+                    let message = "addresses and pointers are not supported";
+                    self.error_with("U1040", message, span.clone(), help);
+                    None
+                }
+                _ => self.text_call(key, values, hint),
+            }
+        };
+        found.map_or(Operand::Faulty, Operand::Typed)
+    }
+
+    /// The arguments in the order of the function's inputs.
+    fn values<'s>(
+        &mut self,
+        key: &str,
+        arguments: &'s [Argument],
+        span: &Span,
+    ) -> Option<Values<'s>> {
+        let (names, least, extensible) = inputs(key);
+        let mut found: Vec<Option<&'s syntax::Expression>> = Vec::new();
+        let mut enable = None;
+        let mut placed = 0;
+        for argument in arguments {
+            let (at, value) = match argument {
+                Argument::Placed(value) => {
+                    placed += 1;
+                    (placed - 1, value)
+                }
+                Argument::Given(name, value) if name.is("EN") => {
+                    enable = Some(value);
+                    continue;
+                }
+                Argument::Given(name, value) => match input(&name.key(), names, extensible) {
+                    Some(at) => (at, value),
+                    None => {
+                        let message = format!("{key} has no input `{name}`");
+                        let help = format!("its inputs: {}", names.join(", "));
+                        self.error_with("U1049", message, name.span(), help);
+                        return None;
+                    }
+                },
+                Argument::Taken { from, .. } => {
+                    let message = format!("{key} has no output `{from}`");
+                    let help = "assign its result with `:=`; ENO is for calls that stand alone";
+                    self.error_with("U1049", message, from.span(), help);
+                    return None;
+                }
+            };
+            if at >= found.len() && at < 1_000 {
+                found.resize(at + 1, None);
+            }
+            match found.get_mut(at) {
+                Some(place @ None) => *place = Some(value),
+                _ => {
+                    let message = format!("{key} is given one input twice, or too many");
+                    self.error("U1049", message, value.span.clone());
+                    return None;
+                }
+            }
+        }
+        let most = if extensible { 1_000 } else { names.len() };
+        if found.len() < least || found.len() > most || found.iter().any(Option::is_none) {
+            let wanted = match (extensible, least == most) {
+                (true, _) => format!("at least {least}"),
+                (false, true) => format!("{least}"),
+                _ => format!("{least} to {most}"),
+            };
+            let message = format!("{key} needs {wanted} inputs, and {} are given", found.len());
+            let help = format!("its inputs: {}", names.join(", "));
+            self.error_with("U1049", message, span.clone(), help);
+            return None;
+        }
+        Some(Values {
+            of: found.into_iter().flatten().collect(),
+            enable,
+        })
+    }
+
+    fn operator_call(
+        &mut self,
+        operator: Operator,
+        values: &[&syntax::Expression],
+        hint: Option<&Type>,
+    ) -> Operand {
+        let mut left = self.operand(values[0], hint);
+        let mut whole = values[0].span.clone();
+        for right in &values[1..] {
+            let own = match &left {
+                Operand::Typed(value) => Some(value.of.clone()),
+                _ => hint.cloned(),
+            };
+            let value = self.operand(right, own.as_ref());
+            left = self.binary(operator, (left, &whole), (value, &right.span), hint);
+            whole.end = right.span.end;
+        }
+        left
+    }
+
+    fn comparison_call(
+        &mut self,
+        comparison: Comparison,
+        values: &[&syntax::Expression],
+    ) -> Option<Expression> {
+        let mut all: Option<Expression> = None;
+        for pair in values.windows(2) {
+            let left = self.operand(pair[0], None);
+            let hint = match &left {
+                Operand::Typed(value) => Some(value.of.clone()),
+                _ => None,
+            };
+            let right = self.operand(pair[1], hint.as_ref());
+            let operator = Operator::Compare(comparison);
+            let one = self.binary(operator, (left, &pair[0].span), (right, &pair[1].span), None);
+            let one = self.settle(one, None)?;
+            all = Some(match all {
+                Some(before) => choose(before, one, boolean(false)),
+                None => one,
+            });
+        }
+        all
+    }
+
+    /// A value as a real: what is whole becomes the real type of the hint, else LREAL.
+    fn real_value(
+        &mut self,
+        value: &syntax::Expression,
+        hint: Option<&Type>,
+    ) -> Option<(Expression, Elementary)> {
+        let hint = hint.filter(|of| of.elementary().is_some_and(Elementary::is_real));
+        let hinted = hint.and_then(Type::elementary);
+        let operand = self.operand(value, hint);
+        if let Operand::Number(value) = operand {
+            let of = hinted.unwrap_or(Elementary::Lreal);
+            return Some((value.in_real(of), of));
+        }
+        let found = self.settle(operand, hint)?;
+        match found.of.elementary() {
+            Some(of) if of.is_real() => Some((found, of)),
+            Some(of) if is_number(of) => {
+                let of = hinted.unwrap_or(Elementary::Lreal);
+                Some((convert(found, of), of))
+            }
+            _ => {
+                let found = self.describe(&found.of);
+                let message = format!("expected a REAL or LREAL, found {found}");
+                let help = "convert it first, such as with TO_REAL(…)";
+                self.error_with("U1043", message, value.span.clone(), help);
+                None
+            }
+        }
+    }
+
+    fn real_call(
+        &mut self,
+        function: RealFunction,
+        value: &syntax::Expression,
+        hint: Option<&Type>,
+    ) -> Option<Expression> {
+        let (value, of) = self.real_value(value, hint)?;
+        Some(apply(
+            Operation::Real(function, of),
+            vec![value],
+            Type::Elementary(of),
+        ))
+    }
+
+    /// FLOOR, CEIL, ROUND: of the type that is wanted, DINT where none is.
+    fn rounded(
+        &mut self,
+        key: &str,
+        value: &syntax::Expression,
+        hint: Option<&Type>,
+    ) -> Option<Expression> {
+        let (value, of) = self.real_value(value, hint)?;
+        let real = |function, value| {
+            apply(Operation::Real(function, of), vec![value], Type::Elementary(of))
+        };
+        let rounded = match key {
+            "FLOOR" => real(RealFunction::Floor, value),
+            "CEIL" => real(RealFunction::Ceiling, value),
+            "ROUND" => real(RealFunction::Round, value),
+            _ => {
+                let whole = apply(
+                    Operation::Truncate(of, Elementary::Lint),
+                    vec![value.clone()],
+                    Type::Elementary(Elementary::Lint),
+                );
+                let operands = vec![value, convert(whole, of)];
+                return Some(apply(Operation::Subtract(of), operands, Type::Elementary(of)));
+            }
+        };
+        match hint.and_then(Type::elementary) {
+            Some(wanted) if wanted.is_real() => Some(rounded),
+            Some(wanted) if wanted.is_integer() => Some(convert(rounded, wanted)),
+            _ => Some(convert(rounded, Elementary::Dint)),
+        }
+    }
+
+    fn absolute(&mut self, value: &syntax::Expression, hint: Option<&Type>) -> Option<Expression> {
+        let found = self.typed(value, hint)?;
+        match found.of.elementary() {
+            Some(of) if is_number(of) || of == Elementary::Time => {
+                let of = as_integer(of);
+                let found = reinterpret(found, of);
+                Some(apply(
+                    Operation::Absolute(of),
+                    vec![found],
+                    Type::Elementary(of),
+                ))
+            }
+            _ => self.not_a_number(&found, &value.span),
+        }
+    }
+
+    pub(super) fn not_a_number<T>(&mut self, found: &Expression, span: &Span) -> Option<T> {
+        let found = self.describe(&found.of);
+        let message = format!("expected a number, found {found}");
+        self.error("U1043", message, span.clone());
+        None
+    }
+
+    fn not_call(&mut self, value: &syntax::Expression, hint: Option<&Type>) -> Option<Expression> {
+        let not = syntax::Expression {
+            kind: syntax::ExpressionKind::Not(Box::new(value.clone())),
+            span: value.span.clone(),
+        };
+        self.typed(&not, hint)
+    }
+
+    fn shift(
+        &mut self,
+        key: &str,
+        values: &[&syntax::Expression],
+        hint: Option<&Type>,
+    ) -> Option<Expression> {
+        let found = self.typed(values[0], hint);
+        let by = self.long(values[1]);
+        let (found, by) = (found?, by?);
+        let Some(of) = found.of.elementary().filter(|of| is_whole(*of) || *of == Elementary::Bool)
+        else {
+            let shown = self.describe(&found.of);
+            let message = format!("{key} needs a bit string, and this is {shown}");
+            let help = "convert it first, such as with TO_DWORD(…)";
+            self.error_with("U1043", message, values[0].span.clone(), help);
+            return None;
+        };
+        let bits = as_bits(of);
+        let operation = match key {
+            "SHL" => Operation::ShiftLeft(bits),
+            "SHR" => Operation::ShiftRight(bits),
+            "ROL" => Operation::RotateLeft(bits),
+            _ => Operation::RotateRight(bits),
+        };
+        let operands = vec![reinterpret(found, bits), by];
+        Some(reinterpret(
+            apply(operation, operands, Type::Elementary(bits)),
+            of,
+        ))
+    }
+
+    /// A whole number as a LINT.
+    pub(super) fn long(&mut self, value: &syntax::Expression) -> Option<Expression> {
+        let found = self.typed(value, None)?;
+        match found.of.elementary() {
+            Some(of) if is_whole(of) => Some(convert(found, Elementary::Lint)),
+            _ => {
+                let found = self.describe(&found.of);
+                let message = format!("expected a whole number, found {found}");
+                self.error("U1043", message, value.span.clone());
+                None
+            }
+        }
+    }
+
+    fn size_of(&mut self, value: &syntax::Expression) -> Operand {
+        let of = match &value.kind {
+            syntax::ExpressionKind::Variable(path)
+                if path.steps.is_empty() && self.lookup(&path.root).is_none() =>
+            {
+                let kind = syntax::TypeKind::Named(path.root.clone());
+                let span = value.span.clone();
+                self.resolve(&syntax::TypeName { kind, span }).map(|found| found.of)
+            }
+            _ => self.typed(value, None).map(|found| found.of),
+        };
+        match of {
+            Some(of) => Operand::Number(Number::Integer(i128::from(self.bytes(&of)))),
+            None => Operand::Faulty,
+        }
+    }
+
+    /// Bytes of a type as other compilers count them, without gaps.
+    fn bytes(&self, of: &Type) -> u64 {
+        match of {
+            Type::Elementary(of) | Type::Enumeration(_, of) => u64::from(of.bits().div_ceil(8)),
+            Type::Text(capacity) => u64::from(*capacity) + 1,
+            Type::Array(array) => array.length().saturating_mul(self.bytes(&array.element)),
+            Type::Structure(id, _) => {
+                let fields = &self.program.structures[id.0 as usize].fields;
+                fields.iter().map(|field| self.bytes(&field.of)).sum()
+            }
+        }
+    }
+
+    fn array_bound(&mut self, key: &str, values: &[&syntax::Expression]) -> Operand {
+        let Some(found) = self.typed(values[0], None) else {
+            return Operand::Faulty;
+        };
+        let Some(dimension) = self.constant_integer(values[1]) else {
+            return Operand::Faulty;
+        };
+        let range = match &found.of {
+            Type::Array(array) => {
+                let at = usize::try_from(dimension - 1).ok();
+                at.and_then(|at| array.ranges.get(at).copied())
+            }
+            _ => None,
+        };
+        let Some((low, high)) = range else {
+            let found = self.describe(&found.of);
+            let message = format!("{found} has no dimension {dimension}");
+            self.error("U1043", message, values[1].span.clone());
+            return Operand::Faulty;
+        };
+        let bound = if key == "LOWER_BOUND" { low } else { high };
+        Operand::Number(Number::Integer(i128::from(bound)))
+    }
+
+    /// Operands in the type that all of them fit.
+    pub(super) fn alike(
+        &mut self,
+        values: &[&syntax::Expression],
+        hint: Option<&Type>,
+    ) -> Option<(Vec<Expression>, Type)> {
+        let mut hint = hint.cloned();
+        let mut operands = Vec::with_capacity(values.len());
+        let mut of: Option<Type> = None;
+        let mut is_whole_call = true;
+        for value in values {
+            let operand = self.operand(value, hint.as_ref());
+            match &operand {
+                Operand::Faulty => is_whole_call = false,
+                Operand::Typed(found) => {
+                    let joined = match &of {
+                        None => Some(found.of.clone()),
+                        Some(of) => self.joined(of, &found.of),
+                    };
+                    if joined.is_none() {
+                        let wanted = of.clone()?;
+                        let found = self.describe(&found.of);
+                        return self.mismatch(&found, &wanted, &value.span);
+                    }
+                    of = joined;
+                    if matches!(found.of, Type::Enumeration(..)) {
+                        hint = of.clone();
+                    }
+                }
+                Operand::Number(_) => {}
+            }
+            operands.push(operand);
+        }
+        if !is_whole_call {
+            return None;
+        }
+        let of = self.with_literals(of, &operands, hint.as_ref());
+        let mut lowered = Vec::with_capacity(values.len());
+        for (operand, value) in operands.into_iter().zip(values) {
+            lowered.push(match operand {
+                Operand::Typed(found) if found.of == of => found,
+                Operand::Typed(found) => match (of.elementary(), &of) {
+                    (Some(to), Type::Elementary(_)) => convert(found, to),
+                    _ => found,
+                },
+                other => self.coerce(other, &of, &value.span)?,
+            });
+        }
+        Some((lowered, of))
+    }
+
+    fn joined(&self, left: &Type, right: &Type) -> Option<Type> {
+        match (left, right) {
+            _ if left == right => Some(left.clone()),
+            (Type::Text(left), Type::Text(right)) => Some(Type::Text(*left.max(right))),
+            (Type::Enumeration(..), Type::Enumeration(..)) => None,
+            _ => {
+                let (left, right) = (left.elementary()?, right.elementary()?);
+                common(left, right).map(Type::Elementary)
+            }
+        }
+    }
+
+    /// The type of operands among which there are literals.
+    fn with_literals(&self, of: Option<Type>, operands: &[Operand], hint: Option<&Type>) -> Type {
+        let hinted = hint.and_then(Type::elementary).filter(|of| is_number(*of));
+        let mut of = of.and_then(|of| match of.elementary() {
+            Some(found) if is_number(found) && matches!(of, Type::Elementary(_)) => Some(Ok(found)),
+            _ => Some(Err(of)),
+        });
+        for operand in operands {
+            let Operand::Number(value) = operand else {
+                continue;
+            };
+            let settled = match (value, hinted) {
+                (Number::Real(..), Some(hinted)) if hinted.is_real() => hinted,
+                (Number::Integer(value), Some(hinted)) if of.is_none() => {
+                    let fits = hinted.is_real() || {
+                        let (least, most) = limits(hinted);
+                        least <= *value && *value <= most
+                    };
+                    if fits { hinted } else { Number::Integer(*value).default_type() }
+                }
+                _ => value.default_type(),
+            };
+            of = match (of, value) {
+                (None, _) => Some(Ok(settled)),
+                (Some(Ok(found)), _) if found.is_real() => Some(Ok(found)),
+                (Some(Ok(found)), Number::Integer(value)) => {
+                    let (least, most) = limits(found);
+                    if least <= *value && *value <= most {
+                        Some(Ok(found))
+                    } else {
+                        Some(Ok(common(found, settled).unwrap_or(found)))
+                    }
+                }
+                (Some(Ok(found)), Number::Real(..)) => Some(Ok(match hinted {
+                    Some(hinted) if hinted.is_real() => hinted,
+                    _ if found.bits() == 64 => Elementary::Lreal,
+                    _ if is_whole(found) => Elementary::Real,
+                    _ => found,
+                })),
+                (other, _) => other,
+            };
+        }
+        match of {
+            Some(Ok(of)) => Type::Elementary(of),
+            Some(Err(of)) => of,
+            None => Type::Elementary(Elementary::Int),
+        }
+    }
+}
+
+/// The names of a function's inputs, how many it needs, and whether it takes more.
+fn inputs(key: &str) -> (&'static [&'static str], usize, bool) {
+    match key {
+        _ if operator(key).is_some_and(|(_, extensible)| extensible) => (&["IN1", "IN2"], 1, true),
+        _ if operator(key).is_some() => (&["IN1", "IN2"], 2, false),
+        "NE" => (&["IN1", "IN2"], 2, false),
+        _ if comparison(key).is_some() => (&["IN1", "IN2"], 2, true),
+        "MAX" | "MIN" => (&["IN1", "IN2"], 1, true),
+        "CONCAT" => (&["IN1", "IN2"], 1, true),
+        "SHL" | "SHR" | "ROL" | "ROR" => (&["IN", "N"], 2, false),
+        "SEL" => (&["G", "IN0", "IN1"], 3, false),
+        "LIMIT" => (&["MN", "IN", "MX"], 3, false),
+        "MUX" => (&["K", "IN0", "IN1"], 2, true),
+        "LEFT" | "RIGHT" => (&["IN", "L"], 2, false),
+        "MID" | "DELETE" => (&["IN", "L", "P"], 3, false),
+        "INSERT" => (&["IN1", "IN2", "P"], 3, false),
+        "REPLACE" => (&["IN1", "IN2", "L", "P"], 4, false),
+        "FIND" => (&["IN1", "IN2"], 2, false),
+        "ATAN2" => (&["Y", "X"], 2, false),
+        "UPPER_BOUND" | "LOWER_BOUND" => (&["ARR", "DIM"], 2, false),
+        "CONCAT_DATE_TOD" | "CONCAT_DATE_LTOD" => (&["IN1", "IN2"], 2, false),
+        "TIME" | "LTIME" => (&[], 0, false),
+        _ => (&["IN"], 1, false),
+    }
+}
+
+/// The place of an input by its name.
+fn input(name: &str, names: &[&str], extensible: bool) -> Option<usize> {
+    if let Some(at) = names.iter().position(|known| *known == name) {
+        return Some(at);
+    }
+    if names == ["IN"] {
+        return (name == "IN1").then_some(0);
+    }
+    let number: usize = name.strip_prefix("IN")?.parse().ok()?;
+    match names.first() {
+        _ if !extensible => None,
+        Some(&"K") => number.checked_add(1),
+        _ => number.checked_sub(1),
+    }
+}
+
+/// A constant LINT.
+fn lint(value: i64) -> Expression {
+    number(Type::Elementary(Elementary::Lint), value as u64)
+}

@@ -1,0 +1,308 @@
+//! Statements.
+
+use understudy_typed::{
+    Branch, Case, Elementary, Expression, For, Operation, Statement, StatementKind, Type,
+};
+
+use crate::syntax::{self, ExpressionKind, Label, Span};
+
+use super::Lowering;
+use super::convert::{as_integer, is_whole, limits};
+use super::fold::{apply, convert, reinterpret};
+use super::names::number;
+use super::numbers::{Number, Operand};
+use super::places::{Target, insert, load};
+
+impl Lowering<'_> {
+    pub(super) fn statements(
+        &mut self,
+        statements: &[syntax::Statement],
+        body: &mut Vec<Statement>,
+    ) {
+        for statement in statements {
+            self.statement(statement, body);
+        }
+    }
+
+    fn block_of(&mut self, statements: &[syntax::Statement]) -> Vec<Statement> {
+        let mut body = Vec::with_capacity(statements.len());
+        self.statements(statements, &mut body);
+        body
+    }
+
+    fn statement(&mut self, statement: &syntax::Statement, body: &mut Vec<Statement>) {
+        let line = self.line(&statement.span);
+        if let Some(kind) = self.statement_kind(statement, line, body) {
+            body.push(Statement { line, kind });
+        }
+    }
+
+    fn statement_kind(
+        &mut self,
+        statement: &syntax::Statement,
+        line: u32,
+        body: &mut Vec<Statement>,
+    ) -> Option<StatementKind> {
+        use syntax::StatementKind as S;
+        match &statement.kind {
+            S::Assign(path, value) => {
+                if let ExpressionKind::Call(callee, arguments) = &value.kind
+                    && self.has_enable(callee, arguments)
+                {
+                    self.enabled_assignment(path, value, line, body);
+                    return None;
+                }
+                self.assign(path, value)
+            }
+            S::Call(path, arguments) => {
+                self.call_statement(path, arguments, &statement.span, line, body);
+                None
+            }
+            S::If(branches, otherwise) => {
+                let mut lowered = Vec::with_capacity(branches.len());
+                for (condition, statements) in branches {
+                    let condition = self.condition(condition);
+                    let body = self.block_of(statements);
+                    if let Some(condition) = condition {
+                        lowered.push(Branch { condition, body });
+                    }
+                }
+                let otherwise = self.block_of(otherwise);
+                Some(StatementKind::If(lowered, otherwise))
+            }
+            S::Case(selector, cases, otherwise) => self.case(selector, cases, otherwise),
+            S::For(written) => self.counted(written),
+            S::While(condition, statements) => {
+                let condition = self.condition(condition);
+                let body = self.looped(statements);
+                Some(StatementKind::While(condition?, body))
+            }
+            S::Repeat(statements, condition) => {
+                let body = self.looped(statements);
+                Some(StatementKind::Repeat(body, self.condition(condition)?))
+            }
+            S::Exit => self.in_loop("EXIT", &statement.span, StatementKind::Exit),
+            S::Continue => self.in_loop("CONTINUE", &statement.span, StatementKind::Continue),
+            S::Return => Some(StatementKind::Return),
+            S::Nothing => None,
+        }
+    }
+
+    fn in_loop(&mut self, word: &str, span: &Span, kind: StatementKind) -> Option<StatementKind> {
+        if self.scope.loops > 0 {
+            return Some(kind);
+        }
+        let message = format!("{word} stands in no loop");
+        let help = "remove it, or write RETURN";
+        self.error_with("U1035", message, span.clone(), help);
+        None
+    }
+
+    fn looped(&mut self, statements: &[syntax::Statement]) -> Vec<Statement> {
+        self.scope.loops += 1;
+        let body = self.block_of(statements);
+        self.scope.loops -= 1;
+        body
+    }
+
+    pub(super) fn assign(
+        &mut self,
+        path: &syntax::Path,
+        value: &syntax::Expression,
+    ) -> Option<StatementKind> {
+        let target = self.target(path);
+        let writable = match &target {
+            Some(target) => self.writable(target, path),
+            None => None,
+        };
+        let hint = target.as_ref().map(Target::of);
+        let operand = self.operand(value, hint.as_ref());
+        let value = self.coerce(operand, &hint?, &value.span)?;
+        writable?;
+        self.has_no_references(&value.of, &path.span)?;
+        Some(self.store(target?, value))
+    }
+
+    /// A block whose VAR_IN_OUT stand for variables cannot be copied.
+    fn has_no_references(&mut self, of: &Type, span: &Span) -> Option<()> {
+        let Type::Structure(id, _) = of else {
+            return Some(());
+        };
+        let fields = &self.program.structures[id.0 as usize].fields;
+        if fields.iter().any(|field| field.is_reference) {
+            let message = "a block with VAR_IN_OUT cannot be assigned";
+            self.error_with("U1040", message, span.clone(), "assign its parts");
+            return None;
+        }
+        Some(())
+    }
+
+    /// Writes a value of the target's type.
+    pub(super) fn store(&mut self, target: Target, value: Expression) -> StatementKind {
+        match target.bits {
+            Some((part, at)) => {
+                let old = load(target.place.clone());
+                StatementKind::Assign(target.place, insert(old, value, part, at))
+            }
+            None => StatementKind::Assign(target.place, value),
+        }
+    }
+
+    fn case(
+        &mut self,
+        selector: &syntax::Expression,
+        cases: &[(Vec<Label>, Vec<syntax::Statement>)],
+        otherwise: &[syntax::Statement],
+    ) -> Option<StatementKind> {
+        let value = self.typed(selector, None);
+        let of = value.as_ref().map(|value| value.of.clone());
+        let elementary = of.as_ref().and_then(Type::elementary);
+        let elementary = elementary.filter(|of| is_whole(*of));
+        if let (Some(of), None) = (&of, elementary) {
+            let found = self.describe(of);
+            let message = format!("CASE needs a whole number or an enumeration, and this is {found}");
+            let help = "use IF … ELSIF";
+            self.error_with("U1043", message, selector.span.clone(), help);
+        }
+        let mut lowered = Vec::with_capacity(cases.len());
+        for (labels, statements) in cases {
+            let mut ranges = Vec::with_capacity(labels.len());
+            for label in labels {
+                let range = of.as_ref().zip(elementary);
+                ranges.extend(range.and_then(|(of, elementary)| self.label(label, of, elementary)));
+            }
+            let body = self.block_of(statements);
+            lowered.push(Case { ranges, body });
+        }
+        let otherwise = self.block_of(otherwise);
+        elementary?;
+        let mut value = value?;
+        if let Some(of) = elementary.filter(|of| of.is_bit_string()) {
+            value = reinterpret(value, as_integer(of));
+        }
+        Some(StatementKind::Case(value, lowered, otherwise))
+    }
+
+    fn label(&mut self, label: &Label, of: &Type, elementary: Elementary) -> Option<(i64, i64)> {
+        let first = self.label_value(&label.first, of);
+        let last = match &label.last {
+            Some(last) => self.label_value(last, of),
+            None => first,
+        };
+        let (first, last) = (first?, last?);
+        if first > last {
+            let message = format!("the range {first}..{last} is empty");
+            let span = label.first.span.clone();
+            self.error_with("U1036", message, span, "write the lower value first");
+            return None;
+        }
+        let (least, most) = limits(elementary);
+        if last < least || first > most {
+            let message = format!("{elementary} never has the value {first}");
+            let span = label.first.span.clone();
+            let help = format!("{elementary} is {least} to {most}");
+            self.warn("U1080", message, span, help);
+            return None;
+        }
+        let clamp = |value: i128| i64::try_from(value).unwrap_or(i64::MAX);
+        Some((clamp(first.max(least)), clamp(last.min(most))))
+    }
+
+    fn label_value(&mut self, value: &syntax::Expression, of: &Type) -> Option<i128> {
+        let operand = self.operand(value, Some(of));
+        let found = match operand {
+            Operand::Faulty => return None,
+            Operand::Number(Number::Integer(value)) => return Some(value),
+            Operand::Number(_) => None,
+            Operand::Typed(value) => match (&value.kind, value.of.elementary()) {
+                (understudy_typed::ExpressionKind::Constant(stored), Some(of)) if is_whole(of) => {
+                    Some(of.signed(*stored))
+                }
+                _ => None,
+            },
+        };
+        if found.is_none() {
+            let message = "a value of CASE is a whole number that is known when the program is read";
+            let help = "write a literal, a constant or a value of the enumeration";
+            self.error_with("U1082", message, value.span.clone(), help);
+        }
+        found
+    }
+
+    fn counted(&mut self, written: &syntax::For) -> Option<StatementKind> {
+        let target = self.target(&written.counter);
+        let of = target.as_ref().map(Target::of);
+        let elementary = of.as_ref().and_then(Type::elementary);
+        let elementary = elementary.filter(|of| is_whole(*of));
+        let Some((target, of)) = target.zip(elementary) else {
+            if let Some(of) = of {
+                let found = self.describe(&of);
+                let message = format!("FOR counts with a whole number, and this is {found}");
+                let span = written.counter.span.clone();
+                self.error_with("U1043", message, span, "use an INT or DINT");
+            }
+            self.looped(&written.body);
+            return None;
+        };
+        let writable = self.writable(&target, &written.counter);
+        if target.bits.is_some() {
+            let message = "FOR counts with a whole variable";
+            self.error("U1043", message, written.counter.span.clone());
+            return None;
+        }
+        let counter = as_integer(of);
+        let wanted = Type::Elementary(of);
+        let from = self.expression(&written.from, &wanted);
+        let to = self.bound(&written.to, counter);
+        let by = match &written.by {
+            Some(by) => self.bound(by, counter),
+            None => Some(number(Type::Elementary(counter), 1)),
+        };
+        let statements = self.looped(&written.body);
+        let (from, to, by) = (from?, to?, by?);
+        writable?;
+        // A bit string counts as the unsigned number of its width, which is stored alike.
+        let mut place = target.place;
+        place.of = Type::Elementary(counter);
+        Some(StatementKind::For(Box::new(For {
+            counter: place,
+            from: reinterpret(from, counter),
+            to,
+            by,
+            body: statements,
+        })))
+    }
+
+    /// A bound or a step, which may be of a wider type than the counter: then it is limited to it.
+    fn bound(&mut self, written: &syntax::Expression, counter: Elementary) -> Option<Expression> {
+        let wanted = Type::Elementary(counter);
+        let operand = self.operand(written, Some(&wanted));
+        let Operand::Typed(value) = &operand else {
+            return self.coerce(operand, &wanted, &written.span);
+        };
+        let from = value.of.elementary().filter(|of| is_whole(*of)).map(as_integer);
+        match (from, operand) {
+            (Some(from), Operand::Typed(value)) => {
+                let ((least, most), (low, high)) = (limits(counter), limits(from));
+                let mut value = reinterpret(value, from);
+                let constant = |limit: i128| number(Type::Elementary(from), limit as u64 & from.mask());
+                if high > most {
+                    value = apply(
+                        Operation::Minimum(from),
+                        vec![value, constant(most)],
+                        Type::Elementary(from),
+                    );
+                }
+                if low < least {
+                    value = apply(
+                        Operation::Maximum(from),
+                        vec![value, constant(least.max(low))],
+                        Type::Elementary(from),
+                    );
+                }
+                Some(convert(value, counter))
+            }
+            (_, operand) => self.coerce(operand, &wanted, &written.span),
+        }
+    }
+}

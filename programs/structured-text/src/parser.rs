@@ -1,0 +1,549 @@
+//! Lexemes to syntax. What cannot be read is diagnosed, skipped up to the next statement or declaration, and reading goes on,
+//! so that one run shows everything. Depth, and so recursion, is bounded by [`MAXIMUM_NESTING`].
+//!
+//! Besides both editions of IEC 61131-3 these rules of other compilers are taken without a warning, since they change nothing:
+//!
+//! - a semicolon may be left out behind `END_IF` and its like, and before `END_VAR`, `END_STRUCT` and `END_TYPE`;
+//! - inputs without a value (`IN := ,`) and outputs without a target (`Q => ,`) are as if they were not written;
+//! - `a += b` is `a := a + b`, and `a S= b` is `IF b THEN a := TRUE; END_IF`;
+//! - access words (`PUBLIC`, `FINAL`, …), namespaces and `USING` are read past; a CLASS is a function block without a body;
+//! - an action of a unit that is not a chart is a method of it;
+//! - in Siemens SCL a quoted name is a name, in which `_` replaces what a name cannot have; `NOT` binds as there, `DIV` divides
+//!   integers, organization blocks are programs and data blocks are global variables.
+
+mod chart;
+mod configuration;
+mod declaration;
+mod expression;
+mod initial;
+mod instruction;
+mod siemens;
+mod statement;
+mod types;
+mod unit;
+
+use std::collections::HashSet;
+
+use understudy_text::{Diagnostic, MAXIMUM_FINDINGS};
+
+use crate::lexer::{Lexeme, Lexemes, Placed, lex};
+use crate::syntax::{
+    Body, Declaration, Expression, ExpressionKind, File, Instruction, Literal, Name, Span,
+    Statement, TypeName,
+};
+
+/// The largest text.
+pub const MAXIMUM_TEXT_BYTES: usize = 16 << 20;
+
+/// The deepest nesting of brackets, types and statements.
+pub const MAXIMUM_NESTING: usize = 64;
+
+/// Words of the language that no variable can have for its name.
+const KEYWORDS: [&str; 72] = [
+    "AND",
+    "AND_THEN",
+    "ARRAY",
+    "AT",
+    "BY",
+    "CASE",
+    "CONFIGURATION",
+    "CONSTANT",
+    "CONTINUE",
+    "DO",
+    "ELSE",
+    "ELSIF",
+    "END_ACTION",
+    "END_CASE",
+    "END_CLASS",
+    "END_CONFIGURATION",
+    "END_FOR",
+    "END_FUNCTION",
+    "END_FUNCTION_BLOCK",
+    "END_IF",
+    "END_INTERFACE",
+    "END_METHOD",
+    "END_NAMESPACE",
+    "END_PROGRAM",
+    "END_PROPERTY",
+    "END_REPEAT",
+    "END_RESOURCE",
+    "END_STEP",
+    "END_STRUCT",
+    "END_TRANSITION",
+    "END_TYPE",
+    "END_UNION",
+    "END_VAR",
+    "END_WHILE",
+    "EXIT",
+    "FALSE",
+    "FOR",
+    "FUNCTION",
+    "FUNCTION_BLOCK",
+    "IF",
+    "INITIAL_STEP",
+    "MOD",
+    "NOT",
+    "OF",
+    "OR",
+    "OR_ELSE",
+    "PROGRAM",
+    "REPEAT",
+    "RETURN",
+    "STRUCT",
+    "THEN",
+    "TO",
+    "TRUE",
+    "TYPE",
+    "UNTIL",
+    "VAR",
+    "VAR_ACCESS",
+    "VAR_CONFIG",
+    "VAR_EXTERNAL",
+    "VAR_GLOBAL",
+    "VAR_INPUT",
+    "VAR_INST",
+    "VAR_IN_OUT",
+    "VAR_OUTPUT",
+    "VAR_STAT",
+    "VAR_TEMP",
+    "WHILE",
+    "XOR",
+    "END_ORGANIZATION_BLOCK",
+    "END_DATA_BLOCK",
+    "ORGANIZATION_BLOCK",
+    "DATA_BLOCK",
+];
+
+/// Whether no variable can be called so.
+pub fn is_keyword(word: &str) -> bool {
+    KEYWORDS
+        .iter()
+        .any(|keyword| keyword.eq_ignore_ascii_case(word))
+}
+
+/// A whole text: programs, blocks, functions, types, configurations. With everything that was wrong with it.
+pub fn parse(text: &str) -> (File, Vec<Diagnostic>) {
+    read(text, |parser| parser.file())
+}
+
+/// The declaration part of a unit, a type or a list of variables, as TwinCAT and CODESYS keep them: the header of a unit with
+/// its blocks of variables and without its end, `VAR_GLOBAL … END_VAR`, `TYPE … END_TYPE`. A METHOD is a unit of the file.
+pub fn parse_declarations(text: &str) -> (File, Vec<Diagnostic>) {
+    read(text, |parser| {
+        parser.headers_only = true;
+        parser.file()
+    })
+}
+
+/// Blocks of variables alone, `VAR_INPUT … END_VAR VAR … END_VAR`.
+pub fn parse_variables(text: &str) -> (Vec<Declaration>, Vec<Diagnostic>) {
+    read(text, |parser| {
+        let mut declarations = Vec::new();
+        parser.declaration_blocks(&mut declarations);
+        parser.need_end("a block of variables");
+        declarations
+    })
+}
+
+/// The body of a unit: statements, a chart or an instruction list.
+pub fn parse_body(text: &str) -> (Body, Vec<Diagnostic>) {
+    read(text, |parser| {
+        let mut body = parser.body(&[]);
+        while *parser.peek() != Lexeme::End {
+            // What ends a statement is where no statement is open.
+            parser.expected("a statement");
+            parser.skip();
+            let more = parser.statements(&[]);
+            if let Body::Statements(statements) = &mut body {
+                statements.extend(more);
+            }
+        }
+        body
+    })
+}
+
+/// Statements alone.
+pub fn parse_statements(text: &str) -> (Vec<Statement>, Vec<Diagnostic>) {
+    read(text, |parser| {
+        let mut statements = parser.statements(&[]);
+        while *parser.peek() != Lexeme::End {
+            parser.expected("a statement");
+            parser.skip();
+            statements.extend(parser.statements(&[]));
+        }
+        statements
+    })
+}
+
+/// An instruction list.
+pub fn parse_instructions(text: &str) -> (Vec<Instruction>, Vec<Diagnostic>) {
+    read(text, |parser| {
+        let instructions = parser.instructions(&[]);
+        parser.need_end("an instruction");
+        instructions
+    })
+}
+
+/// One type, such as `INT (0..9)`.
+pub fn parse_type(text: &str) -> (Option<TypeName>, Vec<Diagnostic>) {
+    read(text, |parser| {
+        let found = parser.type_name();
+        parser.need_end("the end of the type");
+        found
+    })
+}
+
+/// One expression.
+pub fn parse_expression(text: &str) -> (Expression, Vec<Diagnostic>) {
+    read(text, |parser| {
+        let found = parser.expression();
+        parser.need_end("the end of the value");
+        found
+    })
+}
+
+/// One initial value, `[1, 2, 3(0)]` and its like.
+pub fn parse_initializer(text: &str) -> (Option<crate::syntax::Initializer>, Vec<Diagnostic>) {
+    read(text, |parser| {
+        let found = parser.initializer();
+        parser.need_end("the end of the value");
+        found
+    })
+}
+
+fn read<T: Absent>(text: &str, read: impl FnOnce(&mut Parser<'_>) -> T) -> (T, Vec<Diagnostic>) {
+    if text.len() > MAXIMUM_TEXT_BYTES {
+        let message = format!(
+            "the text has {} bytes; at most {MAXIMUM_TEXT_BYTES} are read",
+            text.len()
+        );
+        return (T::absent(), vec![Diagnostic::error("U1033", message, 0..0)]);
+    }
+    let mut parser = Parser::new(text);
+    let found = read(&mut parser);
+    (found, parser.finish())
+}
+
+/// What is answered where nothing was read.
+trait Absent {
+    fn absent() -> Self;
+}
+
+impl<T: Default> Absent for T {
+    fn absent() -> Self {
+        Self::default()
+    }
+}
+
+impl Absent for Expression {
+    fn absent() -> Self {
+        let kind = ExpressionKind::Faulty;
+        Self { kind, span: 0..0 }
+    }
+}
+
+struct Parser<'a> {
+    text: &'a str,
+    lexemes: Vec<Placed<'a>>,
+    place: usize,
+    depth: usize,
+    /// Whether quoted words are names, as in Siemens SCL.
+    is_siemens: bool,
+    /// Whether units end without their end, as in the files of TwinCAT.
+    headers_only: bool,
+    diagnostics: Vec<Diagnostic>,
+}
+
+impl<'a> Parser<'a> {
+    fn new(text: &'a str) -> Self {
+        let Lexemes {
+            placed,
+            has_local_marks,
+            diagnostics,
+        } = lex(text);
+        let is_siemens = has_local_marks || siemens::is_siemens(&placed);
+        Self {
+            text,
+            lexemes: placed,
+            place: 0,
+            depth: 0,
+            is_siemens,
+            headers_only: false,
+            diagnostics,
+        }
+    }
+
+    /// What was found, once a place.
+    fn finish(self) -> Vec<Diagnostic> {
+        let mut seen = HashSet::new();
+        let mut diagnostics = self.diagnostics;
+        diagnostics.retain(|found| seen.insert((found.code, found.span.clone())));
+        diagnostics.sort_by_key(|found| found.span.start);
+        diagnostics
+    }
+
+    fn placed(&self) -> &Placed<'a> {
+        &self.lexemes[self.place]
+    }
+
+    fn peek(&self) -> &Lexeme<'a> {
+        &self.placed().lexeme
+    }
+
+    /// The lexeme `ahead` places further on.
+    fn ahead(&self, ahead: usize) -> &Lexeme<'a> {
+        let last = self.lexemes.len() - 1;
+        &self.lexemes[last.min(self.place + ahead)].lexeme
+    }
+
+    fn at_end(&self) -> bool {
+        *self.peek() == Lexeme::End
+    }
+
+    fn span(&self) -> Span {
+        self.placed().span.clone()
+    }
+
+    /// The end of what was read last.
+    fn end(&self) -> usize {
+        match self.place {
+            0 => 0,
+            place => self.lexemes[place - 1].span.end,
+        }
+    }
+
+    /// From `start` to the end of what was read last.
+    fn since(&self, start: usize) -> Span {
+        start..self.end().max(start)
+    }
+
+    /// The comments above the lexeme.
+    fn comments(&self) -> Vec<String> {
+        let comments = self.placed().comments.as_deref();
+        comments
+            .map(|comments| comments.above.clone())
+            .unwrap_or_default()
+    }
+
+    /// The comment behind what was read last.
+    fn remark(&self) -> Option<String> {
+        let last = self.place.checked_sub(1)?;
+        self.lexemes[last].comments.as_ref()?.behind.clone()
+    }
+
+    /// Steps over a lexeme, never over the end.
+    fn skip(&mut self) {
+        if self.at_end() {
+            return;
+        }
+        self.place += 1;
+        if self.diagnostics.len() >= MAXIMUM_FINDINGS {
+            let place = self.span().start;
+            self.diagnostics.push(Diagnostic::too_many(place));
+            self.place = self.lexemes.len() - 1;
+        }
+    }
+
+    fn word(&self) -> Option<&'a str> {
+        match self.peek() {
+            Lexeme::Word(word) => Some(word),
+            _ => None,
+        }
+    }
+
+    fn at_word(&self, word: &str) -> bool {
+        matches!(self.peek(), Lexeme::Word(found) if found.eq_ignore_ascii_case(word))
+    }
+
+    fn at_any(&self, words: &[&str]) -> bool {
+        matches!(self.peek(), Lexeme::Word(found)
+            if words.iter().any(|word| found.eq_ignore_ascii_case(word)))
+    }
+
+    fn take_word(&mut self, word: &str) -> bool {
+        let found = self.at_word(word);
+        self.place += usize::from(found);
+        found
+    }
+
+    fn at_sign(&self, sign: &'static str) -> bool {
+        *self.peek() == Lexeme::Sign(sign)
+    }
+
+    fn take_sign(&mut self, sign: &'static str) -> bool {
+        let found = self.at_sign(sign);
+        self.place += usize::from(found);
+        found
+    }
+
+    fn error(&mut self, code: &'static str, message: impl Into<String>, span: Span) {
+        self.diagnostics
+            .push(Diagnostic::error(code, message, span));
+    }
+
+    /// A construct that is understood and not supported.
+    fn refuse(&mut self, what: &str, span: Span, help: Option<&str>) {
+        let finding = Diagnostic::error("U1040", format!("{what} not supported"), span);
+        self.diagnostics.push(match help {
+            Some(help) => finding.with_help(help),
+            None => finding,
+        });
+    }
+
+    /// A part of a declaration that is read past.
+    fn read_past(&mut self, message: impl Into<String>, span: Span) {
+        self.diagnostics
+            .push(Diagnostic::warning("U1055", message, span));
+    }
+
+    /// Reports the lexeme found in place of `what`; a lexeme that was reported already is not reported again.
+    fn expected(&mut self, what: &str) {
+        let found = match self.peek() {
+            Lexeme::Faulty => return,
+            Lexeme::End => "the end of the text".to_owned(),
+            _ => {
+                let written: String = self.text[self.span()].chars().take(60).collect();
+                format!("`{}`", written.escape_debug())
+            }
+        };
+        self.error(
+            "U1034",
+            format!("expected {what}, found {found}"),
+            self.span(),
+        );
+    }
+
+    fn need_end(&mut self, what: &str) {
+        if !self.at_end() {
+            self.expected(what);
+        }
+    }
+
+    fn need_sign(&mut self, sign: &'static str) -> bool {
+        let found = self.take_sign(sign);
+        if !found {
+            self.expected(&format!("`{sign}`"));
+        }
+        found
+    }
+
+    fn need_word(&mut self, word: &str) -> bool {
+        let found = self.take_word(word);
+        if !found {
+            self.expected(&format!("`{word}`"));
+        }
+        found
+    }
+
+    /// Takes the semicolon at the end of a statement or declaration. Where it is missing at the end of a line, reading goes on
+    /// with the next line, otherwise behind the next semicolon.
+    fn need_semicolon(&mut self, ends: &[&str]) {
+        if self.take_sign(";") {
+            return;
+        }
+        if self.placed().starts_line && *self.peek() != Lexeme::Faulty {
+            let end = self.end();
+            let found = self.text[self.span()].chars().take(60).collect::<String>();
+            let found = match self.at_end() {
+                true => "the end of the text".to_owned(),
+                false => format!("`{}`", found.escape_debug()),
+            };
+            let message = format!("expected `;`, found {found}");
+            self.error("U1034", message, end..end);
+            return;
+        }
+        self.expected("`;`");
+        self.recover(ends);
+    }
+
+    /// An identifier.
+    fn name(&mut self, what: &str) -> Option<Name> {
+        if let Some(word) = self.word()
+            && !is_keyword(word)
+        {
+            let name = Name::new(word, self.span());
+            self.skip();
+            return Some(name);
+        }
+        if let Some(name) = self.quoted_name() {
+            return Some(name);
+        }
+        self.expected(what);
+        None
+    }
+
+    /// A name behind a point, which may be a word of the language.
+    fn part_name(&mut self, what: &str) -> Option<Name> {
+        match self.word() {
+            Some(word) => {
+                let name = Name::new(word, self.span());
+                self.skip();
+                Some(name)
+            }
+            None => self.name(what),
+        }
+    }
+
+    /// Names with points between them, of which the last is taken.
+    fn dotted_name(&mut self, what: &str) -> Option<Name> {
+        let mut name = self.name(what)?;
+        while self.take_sign(".") {
+            name = self.part_name(what)?;
+        }
+        Some(name)
+    }
+
+    /// A whole number, as for a priority.
+    fn whole_number(&mut self) -> Option<i64> {
+        let negative = self.take_sign("-");
+        if let Lexeme::Literal(literal) = self.peek()
+            && let Literal::Integer { value, .. } = **literal
+        {
+            self.skip();
+            let value = i64::try_from(value).ok()?;
+            return Some(if negative { -value } else { value });
+        }
+        self.expected("a whole number");
+        None
+    }
+
+    /// Goes one level deeper; `None`, diagnosed, past the bound.
+    fn enter<T>(&mut self, read: impl FnOnce(&mut Self) -> T) -> Option<T> {
+        if self.depth >= MAXIMUM_NESTING {
+            let message = format!("this nests deeper than {MAXIMUM_NESTING} levels");
+            self.error("U1035", message, self.span());
+            return None;
+        }
+        self.depth += 1;
+        let read = read(self);
+        self.depth -= 1;
+        Some(read)
+    }
+
+    /// Skips to behind the next semicolon, or to one of `words`, which is not consumed.
+    fn recover(&mut self, words: &[&str]) {
+        while !self.at_end() && !self.at_any(words) {
+            if self.take_sign(";") {
+                return;
+            }
+            self.skip();
+        }
+    }
+
+    /// Skips to a word, which is not consumed.
+    fn recover_to(&mut self, words: &[&str]) {
+        while !self.at_end() && !self.at_any(words) {
+            self.skip();
+        }
+    }
+
+    /// Skips what is left of the line.
+    fn skip_line(&mut self) {
+        while !self.at_end() && !self.placed().starts_line {
+            self.skip();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

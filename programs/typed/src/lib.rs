@@ -1,0 +1,36 @@
+//! Typed programs: numbers, texts, arrays and structures, beside the Boolean circuits of `understudy-logic`.
+//!
+//! ```text
+//! x(t+1) = f(x(t), u(t))      y(t) = h(x(t), u(t))
+//! ```
+//!
+//! Every language of IEC 61131-3 lowers to one form, [`Program`]; `Interpreter` gives its meaning and `Machine` executes it.
+//! x, u and y are images of bits as those of a circuit are, so everything that carries, adds and compares images holds for numbers too: a
+//! point is a name, a type and a range of bits ([`Point`]).
+
+mod cost;
+mod fault;
+mod form;
+mod image;
+mod interpreter;
+mod machine;
+mod operation;
+mod scan;
+mod types;
+mod visit;
+
+pub use self::cost::Cost;
+pub use self::fault::{Cause, Fault};
+pub use self::form::{
+    Argument, Branch, Call, Case, Expression, ExpressionKind, For, Index, Initial, Place, Program,
+    Root, Routine, RoutineId, RoutineKind, Statement, StatementKind, Task, Variable,
+};
+pub use self::image::{Point, Points};
+pub use self::interpreter::Interpreter;
+pub use self::machine::{Machine, Scratch};
+pub use self::operation::{
+    Comparison, Operand, Operation, RealFunction, Signature, TextOperand, TextOperation,
+};
+pub use self::types::{
+    Array, Elementary, Enumeration, EnumerationId, Field, Structure, StructureId, Type,
+};

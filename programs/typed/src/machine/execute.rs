@@ -1,0 +1,544 @@
+//! Executes the instructions of a compiled program.
+
+use crate::fault::Cause;
+use crate::form::Program;
+use crate::machine::instruction::{
+    Code, Element, Instruction, Loop, RELATIVE, TextApplication, TextSource,
+};
+use crate::machine::{Scratch, Tables};
+use crate::operation::TextOperand;
+use crate::operation::real::Float;
+use crate::types::Elementary;
+
+/// A scan that runs.
+pub(super) struct Run<'a> {
+    pub(super) tables: &'a Tables,
+    pub(super) row: &'a mut [u64],
+    pub(super) texts: &'a mut Vec<Vec<u8>>,
+    pub(super) returns: &'a mut Vec<u32>,
+    pub(super) budget: u64,
+}
+
+/// An instruction that has no result, and why.
+pub(super) struct Stop {
+    pub(super) at: usize,
+    pub(super) cause: Cause,
+}
+
+impl Run<'_> {
+    /// Executes from an instruction to the return that ends it. Without `OWN` no operand is relative.
+    pub(super) fn run<const OWN: bool>(&mut self, start: u32, own: u32) -> Result<(), Stop> {
+        let tables = self.tables;
+        let code: &[Instruction] = &tables.code;
+        let row: &mut [u64] = self.row;
+        let floor = self.returns.len();
+        let mut at = start as usize;
+        macro_rules! slot {
+            ($operand:expr) => {{
+                let operand = $operand;
+                if OWN && operand & RELATIVE != 0 {
+                    (operand & !RELATIVE).wrapping_add(own) as usize
+                } else {
+                    operand as usize
+                }
+            }};
+        }
+        macro_rules! get {
+            ($operand:expr) => {
+                row[slot!($operand)]
+            };
+        }
+        macro_rules! set {
+            ($operand:expr, $value:expr) => {{
+                let value: u64 = $value;
+                row[slot!($operand)] = value;
+            }};
+        }
+        macro_rules! stop {
+            ($cause:expr) => {
+                return Err(Stop {
+                    at: at - 1,
+                    cause: $cause,
+                })
+            };
+        }
+        loop {
+            let instruction = code[at];
+            let Instruction { extra, a, b, c, .. } = instruction;
+            at += 1;
+            macro_rules! integer {
+                ($type:ty, $function:ident) => {
+                    set!(a, (get!(b) as $type).$function(get!(c) as $type) as u64)
+                };
+            }
+            macro_rules! divide {
+                ($signed:ty, $unsigned:ty, $function:ident) => {{
+                    let divisor = get!(c) as $signed;
+                    if divisor == 0 {
+                        stop!(Cause::DivisionByZero {
+                            dividend: get!(b),
+                            of: Elementary::ALL[usize::from(extra)],
+                        });
+                    }
+                    set!(
+                        a,
+                        (get!(b) as $signed).$function(divisor) as $unsigned as u64
+                    )
+                }};
+            }
+            macro_rules! real {
+                ($type:ty, $function:ident) => {
+                    set!(
+                        a,
+                        <$type>::unpack(get!(b))
+                            .$function(<$type>::unpack(get!(c)))
+                            .pack()
+                    )
+                };
+            }
+            macro_rules! one_real {
+                ($type:ty, $function:ident) => {
+                    set!(a, <$type>::unpack(get!(b)).$function().pack())
+                };
+            }
+            macro_rules! best {
+                ($type:ty, $operator:tt) => {{
+                    let (first, next) = (<$type>::unpack(get!(b)), <$type>::unpack(get!(c)));
+                    let best = if next $operator first { next } else { first };
+                    set!(a, best.pack())
+                }};
+            }
+            macro_rules! is {
+                ($type:ty, $operator:tt) => {
+                    set!(a, u64::from((get!(b) as $type) $operator (get!(c) as $type)))
+                };
+            }
+            macro_rules! is_real {
+                ($type:ty, $operator:tt) => {
+                    set!(a, u64::from(<$type>::unpack(get!(b)) $operator <$type>::unpack(get!(c))))
+                };
+            }
+            macro_rules! jump {
+                ($condition:expr) => {
+                    if $condition {
+                        at = c as usize;
+                    }
+                };
+            }
+            macro_rules! jump_is {
+                ($type:ty, $operator:tt) => {
+                    jump!((get!(a) as $type) $operator (get!(b) as $type))
+                };
+            }
+            macro_rules! jump_real {
+                ($type:ty, $operator:tt, $wanted:literal) => {
+                    jump!((<$type>::unpack(get!(a)) $operator <$type>::unpack(get!(b))) == $wanted)
+                };
+            }
+            macro_rules! charge {
+                ($turn:expr) => {
+                    match self.budget.checked_sub($turn) {
+                        Some(rest) => self.budget = rest,
+                        None => stop!(Cause::BudgetExceeded {
+                            budget: tables.budget,
+                        }),
+                    }
+                };
+            }
+            macro_rules! step_up {
+                ($type:ty, $unsigned:ty) => {{
+                    let each = &tables.loops[a as usize];
+                    let (limit, by) = (get!(each.limit) as $type, get!(each.by) as $type);
+                    let counter = &mut row[slot!(each.counter)];
+                    if let Some(next) = (*counter as $type).checked_add(by) {
+                        *counter = next as $unsigned as u64;
+                        if next <= limit {
+                            charge!(each.turn);
+                            at = c as usize;
+                        }
+                    }
+                }};
+            }
+            macro_rules! element {
+                ($element:expr) => {
+                    match offset($element, get!(b)) {
+                        Ok(offset) => offset,
+                        Err(cause) => stop!(cause),
+                    }
+                };
+            }
+            match instruction.code {
+                Code::Move => set!(a, get!(b)),
+                Code::MoveIf => {
+                    if get!(c) != 0 {
+                        set!(a, get!(b));
+                    }
+                }
+                Code::Add8 => integer!(u8, wrapping_add),
+                Code::Add16 => integer!(u16, wrapping_add),
+                Code::Add32 => integer!(u32, wrapping_add),
+                Code::Add64 => integer!(u64, wrapping_add),
+                Code::Subtract8 => integer!(u8, wrapping_sub),
+                Code::Subtract16 => integer!(u16, wrapping_sub),
+                Code::Subtract32 => integer!(u32, wrapping_sub),
+                Code::Subtract64 => integer!(u64, wrapping_sub),
+                Code::Multiply8 => integer!(u8, wrapping_mul),
+                Code::Multiply16 => integer!(u16, wrapping_mul),
+                Code::Multiply32 => integer!(u32, wrapping_mul),
+                Code::Multiply64 => integer!(u64, wrapping_mul),
+                Code::DivideS16 => divide!(i16, u16, wrapping_div),
+                Code::DivideS32 => divide!(i32, u32, wrapping_div),
+                Code::DivideS64 => divide!(i64, u64, wrapping_div),
+                Code::DivideU => divide!(u64, u64, wrapping_div),
+                Code::ModuloS16 => divide!(i16, u16, wrapping_rem),
+                Code::ModuloS32 => divide!(i32, u32, wrapping_rem),
+                Code::ModuloS64 => divide!(i64, u64, wrapping_rem),
+                Code::ModuloU => divide!(u64, u64, wrapping_rem),
+                Code::And => set!(a, get!(b) & get!(c)),
+                Code::Or => set!(a, get!(b) | get!(c)),
+                Code::Xor => set!(a, get!(b) ^ get!(c)),
+                Code::ShiftLeft => {
+                    let by = get!(c);
+                    let shifted = get!(b) << (by & 63) & mask(extra);
+                    set!(a, if by < u64::from(extra) { shifted } else { 0 });
+                }
+                Code::ShiftRight => {
+                    let by = get!(c);
+                    let shifted = get!(b) >> (by & 63);
+                    set!(a, if by < u64::from(extra) { shifted } else { 0 });
+                }
+                Code::Extract => set!(a, get!(b) >> (extra & 63) & get!(c)),
+                Code::Extend => set!(a, extend(get!(b), u32::from(extra)) as u64 & get!(c)),
+                Code::AddReal => real!(f32, add),
+                Code::SubtractReal => real!(f32, subtract),
+                Code::MultiplyReal => real!(f32, multiply),
+                Code::DivideReal => real!(f32, divide),
+                Code::NegateReal => one_real!(f32, negate),
+                Code::AbsoluteReal => one_real!(f32, absolute),
+                Code::MinimumReal => best!(f32, <),
+                Code::MaximumReal => best!(f32, >),
+                Code::AddLreal => real!(f64, add),
+                Code::SubtractLreal => real!(f64, subtract),
+                Code::MultiplyLreal => real!(f64, multiply),
+                Code::DivideLreal => real!(f64, divide),
+                Code::NegateLreal => one_real!(f64, negate),
+                Code::AbsoluteLreal => one_real!(f64, absolute),
+                Code::MinimumLreal => best!(f64, <),
+                Code::MaximumLreal => best!(f64, >),
+                Code::ToReal => set!(a, (extend(get!(b), u32::from(extra)) as f32).pack()),
+                Code::ToLreal => set!(a, (extend(get!(b), u32::from(extra)) as f64).pack()),
+                Code::RealToLreal => set!(a, f64::from(f32::unpack(get!(b))).pack()),
+                Code::LrealToReal => set!(a, (f64::unpack(get!(b)) as f32).pack()),
+                Code::Equal => is!(u64, ==),
+                Code::NotEqual => is!(u64, !=),
+                Code::LessU => is!(u64, <),
+                Code::LessOrEqualU => is!(u64, <=),
+                Code::LessS8 => is!(i8, <),
+                Code::LessOrEqualS8 => is!(i8, <=),
+                Code::LessS16 => is!(i16, <),
+                Code::LessOrEqualS16 => is!(i16, <=),
+                Code::LessS32 => is!(i32, <),
+                Code::LessOrEqualS32 => is!(i32, <=),
+                Code::LessS64 => is!(i64, <),
+                Code::LessOrEqualS64 => is!(i64, <=),
+                Code::EqualReal => is_real!(f32, ==),
+                Code::NotEqualReal => is_real!(f32, !=),
+                Code::LessReal => is_real!(f32, <),
+                Code::LessOrEqualReal => is_real!(f32, <=),
+                Code::EqualLreal => is_real!(f64, ==),
+                Code::NotEqualLreal => is_real!(f64, !=),
+                Code::LessLreal => is_real!(f64, <),
+                Code::LessOrEqualLreal => is_real!(f64, <=),
+                Code::Jump => at = c as usize,
+                Code::JumpIf => jump!(get!(a) != 0),
+                Code::JumpUnless => jump!(get!(a) == 0),
+                Code::JumpEqual => jump_is!(u64, ==),
+                Code::JumpNotEqual => jump_is!(u64, !=),
+                Code::JumpLessU => jump_is!(u64, <),
+                Code::JumpLessOrEqualU => jump_is!(u64, <=),
+                Code::JumpLessS8 => jump_is!(i8, <),
+                Code::JumpLessOrEqualS8 => jump_is!(i8, <=),
+                Code::JumpLessS16 => jump_is!(i16, <),
+                Code::JumpLessOrEqualS16 => jump_is!(i16, <=),
+                Code::JumpLessS32 => jump_is!(i32, <),
+                Code::JumpLessOrEqualS32 => jump_is!(i32, <=),
+                Code::JumpLessS64 => jump_is!(i64, <),
+                Code::JumpLessOrEqualS64 => jump_is!(i64, <=),
+                Code::JumpEqualReal => jump_real!(f32, ==, true),
+                Code::JumpNotEqualReal => jump_real!(f32, !=, true),
+                Code::JumpLessReal => jump_real!(f32, <, true),
+                Code::JumpNotLessReal => jump_real!(f32, <, false),
+                Code::JumpLessOrEqualReal => jump_real!(f32, <=, true),
+                Code::JumpNotLessOrEqualReal => jump_real!(f32, <=, false),
+                Code::JumpEqualLreal => jump_real!(f64, ==, true),
+                Code::JumpNotEqualLreal => jump_real!(f64, !=, true),
+                Code::JumpLessLreal => jump_real!(f64, <, true),
+                Code::JumpNotLessLreal => jump_real!(f64, <, false),
+                Code::JumpLessOrEqualLreal => jump_real!(f64, <=, true),
+                Code::JumpNotLessOrEqualLreal => jump_real!(f64, <=, false),
+                Code::JumpInRange => {
+                    let range = &tables.ranges[b as usize];
+                    let value = range.of.signed(get!(a));
+                    jump!(i128::from(range.low) <= value && value <= i128::from(range.high));
+                }
+                Code::Charge => charge!(get!(a)),
+                Code::StepS16 => step_up!(i16, u16),
+                Code::StepS32 => step_up!(i32, u32),
+                Code::StepS64 => step_up!(i64, u64),
+                Code::Step => {
+                    let each = tables.loops[a as usize];
+                    let (counter, by) = (slot!(each.counter), get!(each.by));
+                    if let Some(next) = next(&each, row[counter], by) {
+                        row[counter] = next;
+                        if !has_passed(&each, next, get!(each.limit), by) {
+                            charge!(each.turn);
+                            at = c as usize;
+                        }
+                    }
+                }
+                Code::Passed => {
+                    let each = tables.loops[a as usize];
+                    let (limit, by) = (get!(each.limit), get!(each.by));
+                    jump!(has_passed(&each, get!(each.counter), limit, by));
+                }
+                Code::LoadBits => set!(a, get!(b) >> (extra & 63) & get!(c)),
+                Code::StoreBits => {
+                    let (value, mask, shift) = (get!(b), get!(c), extra & 63);
+                    let word = &mut row[slot!(a)];
+                    *word = *word & !(mask << shift) | (value & mask) << shift;
+                }
+                Code::LoadWord => {
+                    let element = &tables.elements[c as usize];
+                    let offset = element!(element);
+                    let from = slot!(element.base) + (offset / 64) as usize;
+                    set!(a, row[from]);
+                }
+                Code::StoreWord => {
+                    let element = &tables.elements[c as usize];
+                    let offset = element!(element);
+                    let to = slot!(element.base) + (offset / 64) as usize;
+                    row[to] = get!(a);
+                }
+                Code::LoadPacked => {
+                    let element = &tables.elements[c as usize];
+                    let offset = element!(element) + u64::from(element.bit);
+                    let from = slot!(element.base) + (offset / 64) as usize;
+                    let mask = mask(element.bits as u16);
+                    set!(a, row[from] >> (offset % 64) & mask);
+                }
+                Code::StorePacked => {
+                    let element = &tables.elements[c as usize];
+                    let offset = element!(element) + u64::from(element.bit);
+                    let to = slot!(element.base) + (offset / 64) as usize;
+                    let mask = mask(element.bits as u16);
+                    let value = get!(a) & mask;
+                    let word = &mut row[to];
+                    *word = *word & !(mask << (offset % 64)) | value << (offset % 64);
+                }
+                Code::LoadAt => {
+                    let address = get!(b);
+                    let word = row[(address / 64) as usize];
+                    set!(a, word >> (address % 64) & mask(extra));
+                }
+                Code::StoreAt => {
+                    let (address, mask) = (get!(b), mask(extra));
+                    let value = get!(a) & mask;
+                    let word = &mut row[(address / 64) as usize];
+                    *word = *word & !(mask << (address % 64)) | value << (address % 64);
+                }
+                Code::Copy => {
+                    let (to, from) = ((get!(a) / 64) as usize, (get!(b) / 64) as usize);
+                    row.copy_within(from..from + c as usize, to);
+                }
+                Code::OwnAddress => set!(a, 64 * (u64::from(own) + u64::from(b))),
+                Code::Reference => {
+                    let (address, reach) = (get!(b), get!(c));
+                    let end = address.saturating_add(reach);
+                    if address < 64 * u64::from(Program::HEADER) || end > tables.memory {
+                        stop!(Cause::UnboundReference { address });
+                    }
+                    set!(a, address);
+                }
+                Code::Index => {
+                    let offset = element!(&tables.elements[c as usize]);
+                    set!(a, get!(a).wrapping_add(offset));
+                }
+                Code::Clear => {
+                    let first = slot!(a);
+                    row[first..first + b as usize].fill(0);
+                }
+                Code::Apply => {
+                    let application = &tables.applications[b as usize];
+                    let mut operands = [0; 4];
+                    let result = match operands.get_mut(..application.operands.len()) {
+                        Some(operands) => {
+                            for (value, &operand) in operands.iter_mut().zip(&application.operands)
+                            {
+                                *value = get!(operand);
+                            }
+                            application.operation.apply(operands)
+                        }
+                        None => {
+                            let operands =
+                                application.operands.iter().map(|&operand| get!(operand));
+                            application.operation.apply(&operands.collect::<Vec<u64>>())
+                        }
+                    };
+                    match result {
+                        Ok(result) => set!(a, result),
+                        Err(cause) => stop!(cause),
+                    }
+                }
+                Code::TextConstant => {
+                    let text = &mut self.texts[a as usize];
+                    text.clear();
+                    text.extend_from_slice(&tables.texts[b as usize]);
+                }
+                Code::TextLoad => {
+                    let first = (get!(b) / 64) as usize;
+                    load_text(&row[first..], c as usize, &mut self.texts[a as usize]);
+                }
+                Code::TextStore => {
+                    let first = (get!(b) / 64) as usize;
+                    let text = &self.texts[a as usize];
+                    if text.len() > c as usize {
+                        stop!(Cause::TextTooLong {
+                            length: text.len() as u64,
+                            capacity: u64::from(c),
+                        });
+                    }
+                    store_text(&mut row[first..], c as usize, text);
+                }
+                Code::TextApply => {
+                    let application = &tables.text_applications[a as usize];
+                    apply_to_texts(application, self.texts, &mut |operand, value| {
+                        if let Some(value) = value {
+                            set!(operand, value);
+                        }
+                        get!(operand)
+                    });
+                }
+                Code::Call => {
+                    self.returns.push(at as u32);
+                    at = c as usize;
+                }
+                Code::CallOn => {
+                    let own = (get!(a) / 64) as u32;
+                    let mut inner = Run {
+                        row: &mut *row,
+                        tables,
+                        texts: &mut *self.texts,
+                        returns: &mut *self.returns,
+                        budget: self.budget,
+                    };
+                    inner.run::<true>(c, own)?;
+                    self.budget = inner.budget;
+                }
+                Code::Return => {
+                    if self.returns.len() == floor {
+                        return Ok(());
+                    }
+                    at = self.returns.pop().unwrap_or(0) as usize;
+                }
+            }
+        }
+    }
+}
+
+/// As many ones as a value has bits.
+#[inline]
+fn mask(bits: u16) -> u64 {
+    u64::MAX >> (64 - u32::from(bits).clamp(1, 64))
+}
+
+/// A number whose high bits are unused.
+#[inline]
+fn extend(value: u64, unused: u32) -> i64 {
+    (value << (unused & 63)) as i64 >> (unused & 63)
+}
+
+/// Bits from the first element of an array to the one of an index.
+#[inline]
+fn offset(element: &Element, index: u64) -> Result<u64, Cause> {
+    let index = extend(index, element.extension);
+    if index < element.low || index > element.high {
+        let is_below = index < element.low;
+        return Err(Cause::IndexOutOfRange {
+            index,
+            bound: if is_below { element.low } else { element.high },
+        });
+    }
+    Ok((index.wrapping_sub(element.low) as u64).wrapping_mul(element.stride))
+}
+
+/// The counter behind a turn; `None` where it would leave its type.
+fn next(each: &Loop, counter: u64, by: u64) -> Option<u64> {
+    let next = each.of.signed(counter) + each.of.signed(by);
+    let stored = next as u64 & each.of.mask();
+    (each.of.signed(stored) == next).then_some(stored)
+}
+
+fn has_passed(each: &Loop, counter: u64, limit: u64, by: u64) -> bool {
+    let [counter, limit, by] = [counter, limit, by].map(|stored| each.of.signed(stored));
+    if by >= 0 {
+        counter > limit
+    } else {
+        counter < limit
+    }
+}
+
+fn load_text(slots: &[u64], capacity: usize, text: &mut Vec<u8>) {
+    let length = slots[0].min(capacity as u64) as usize;
+    text.clear();
+    for word in &slots[1..1 + length.div_ceil(8)] {
+        text.extend_from_slice(&word.to_le_bytes());
+    }
+    text.truncate(length);
+}
+
+fn store_text(slots: &mut [u64], capacity: usize, text: &[u8]) {
+    slots[0] = text.len() as u64;
+    let slots = &mut slots[1..1 + capacity.div_ceil(8)];
+    slots.fill(0);
+    for (slot, bytes) in slots.iter_mut().zip(text.chunks(8)) {
+        let mut word = [0; 8];
+        word[..bytes.len()].copy_from_slice(bytes);
+        *slot = u64::from_le_bytes(word);
+    }
+}
+
+/// Applies an operation on texts; `slot` reads a slot, and writes it before where a value is given.
+fn apply_to_texts(
+    application: &TextApplication,
+    texts: &mut [Vec<u8>],
+    slot: &mut dyn FnMut(u32, Option<u64>) -> u64,
+) {
+    let mut result = match application.target {
+        TextSource::Text(target) => std::mem::take(&mut texts[target as usize]),
+        TextSource::Number(_) => Vec::new(),
+    };
+    result.clear();
+    let operands = application.operands.iter().map(|operand| match *operand {
+        TextSource::Number(operand) => TextOperand::Number(slot(operand, None)),
+        TextSource::Text(text) => TextOperand::Text(&texts[text as usize]),
+    });
+    let operands: Vec<TextOperand<'_>> = operands.collect();
+    let number = application.operation.apply(&operands, &mut result);
+    match application.target {
+        TextSource::Text(target) => texts[target as usize] = result,
+        TextSource::Number(target) => {
+            slot(target, Some(number));
+        }
+    }
+}
+
+/// Grows a row and its texts to what a program needs.
+pub(super) fn prepare(scratch: &mut Scratch, slots: usize, texts: usize) {
+    if scratch.row.len() < slots {
+        scratch.row.resize(slots, 0);
+    }
+    if scratch.texts.len() < texts {
+        scratch.texts.resize(texts, Vec::new());
+    }
+    scratch.returns.clear();
+}

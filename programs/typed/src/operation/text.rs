@@ -1,0 +1,122 @@
+//! What each operation on texts gives. A text is a row of bytes.
+
+use crate::operation::{TextOperation, number_text, real};
+use crate::types::Elementary;
+
+/// A value that an operation on texts takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TextOperand<'a> {
+    /// An elementary value, as it is stored.
+    Number(u64),
+    /// A text.
+    Text(&'a [u8]),
+}
+
+impl<'a> TextOperand<'a> {
+    fn text(self) -> &'a [u8] {
+        match self {
+            Self::Text(text) => text,
+            Self::Number(_) => &[],
+        }
+    }
+
+    fn number(self) -> u64 {
+        match self {
+            Self::Number(number) => number,
+            Self::Text(_) => 0,
+        }
+    }
+}
+
+impl TextOperation {
+    /// The result: a number is returned, as it is stored; a text is appended to `result`, and the answer is 0.
+    ///
+    /// # Panics
+    /// If there are fewer operands than [`crate::Operation::signature`] wants.
+    pub fn apply(self, operands: &[TextOperand<'_>], result: &mut Vec<u8>) -> u64 {
+        let text = |index: usize| operands[index].text();
+        // A length or a number of characters before a position, cut to a text.
+        let cut = |index: usize, text: &[u8]| {
+            let number = (operands[index].number() as i64).max(0) as u64;
+            number.min(text.len() as u64) as usize
+        };
+        // Characters before a position, which counts from 1.
+        let before = |index: usize, text: &[u8]| {
+            let number = (operands[index].number() as i64).max(1) as u64 - 1;
+            number.min(text.len() as u64) as usize
+        };
+        match self {
+            Self::Length => return text(0).len() as u64,
+            Self::Left => result.extend_from_slice(&text(0)[..cut(1, text(0))]),
+            Self::Right => {
+                let text = text(0);
+                result.extend_from_slice(&text[text.len() - cut(1, text)..]);
+            }
+            Self::Middle => {
+                let rest = &text(0)[before(2, text(0))..];
+                result.extend_from_slice(&rest[..cut(1, rest)]);
+            }
+            Self::Concatenate => {
+                for operand in operands {
+                    result.extend_from_slice(operand.text());
+                }
+            }
+            Self::Insert => {
+                let (first, rest) = text(0).split_at(cut(2, text(0)));
+                for part in [first, text(1), rest] {
+                    result.extend_from_slice(part);
+                }
+            }
+            Self::Delete => {
+                let (first, rest) = text(0).split_at(before(2, text(0)));
+                result.extend_from_slice(first);
+                result.extend_from_slice(&rest[cut(1, rest)..]);
+            }
+            Self::Replace => {
+                let (first, rest) = text(0).split_at(before(3, text(0)));
+                for part in [first, text(1), &rest[cut(2, rest)..]] {
+                    result.extend_from_slice(part);
+                }
+            }
+            Self::Find => return find(text(0), text(1)),
+            Self::Compare(comparison) => {
+                return u64::from(real::compare(comparison, text(0), text(1)));
+            }
+            Self::Select => {
+                result.extend_from_slice(text(1 + usize::from(operands[0].number() != 0)));
+            }
+            Self::From(of) => number_text::append(of, operands[0].number(), result),
+            Self::To(of) => return number_text::read(of, text(0)),
+            Self::Byte => {
+                let position = usize::try_from(operands[1].number() as i64).unwrap_or(0);
+                let byte = position.checked_sub(1).and_then(|at| text(0).get(at));
+                return u64::from(byte.copied().unwrap_or(0));
+            }
+            Self::UpperCase => result.extend(text(0).iter().map(u8::to_ascii_uppercase)),
+            Self::LowerCase => result.extend(text(0).iter().map(u8::to_ascii_lowercase)),
+        }
+        0
+    }
+
+    /// What the result is stored as, where it is a number.
+    pub fn number(self) -> Option<Elementary> {
+        match self {
+            Self::Length | Self::Find => Some(Elementary::Lint),
+            Self::Compare(_) => Some(Elementary::Bool),
+            Self::To(of) => Some(of),
+            Self::Byte => Some(Elementary::Byte),
+            _ => None,
+        }
+    }
+}
+
+/// The position of the first occurrence, from 1; 0 where there is none, or where nothing is sought.
+fn find(text: &[u8], sought: &[u8]) -> u64 {
+    if sought.is_empty() {
+        return 0;
+    }
+    let at = text
+        .windows(sought.len())
+        .position(|window| window == sought);
+    at.map_or(0, |at| at as u64 + 1)
+}

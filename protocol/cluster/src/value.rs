@@ -1,0 +1,51 @@
+//! Values that a cluster file gives to signals.
+
+use understudy_text::tables::Constant;
+use understudy_typed::Elementary;
+
+/// The value as a signal of that type stores it.
+///
+/// # Errors
+/// What is written instead for that type.
+pub(crate) fn stored(value: &Constant, of: Elementary) -> Result<u64, String> {
+    let whole = |number: i64| {
+        let stored = number as u64 & of.mask();
+        (of.signed(stored) == i128::from(number)).then_some(stored)
+    };
+    let real = |number: f64| match of {
+        Elementary::Real => Some(u64::from((number as f32).to_bits())),
+        _ => Some(number.to_bits()),
+    };
+    let found = match (of, value) {
+        (Elementary::Bool, Constant::Flag(bit)) => Some(u64::from(*bit)),
+        (_, Constant::Whole(number)) if of.is_real() => real(*number as f64),
+        (_, Constant::Number(number)) if of.is_real() && number.is_finite() => real(*number),
+        (Elementary::Time, Constant::Text(text)) => {
+            let time = understudy_text::duration::parse(text).ok();
+            time.and_then(|time| i64::try_from(time.as_nanos()).ok())
+                .map(|time| time as u64)
+        }
+        (Elementary::Bool, _) => None,
+        (_, Constant::Whole(number)) if !of.is_time() => whole(*number),
+        _ => None,
+    };
+    found.ok_or_else(|| match of {
+        Elementary::Bool => "write `true` or `false`".to_owned(),
+        Elementary::Time => "write a duration in quotes, such as \"1.5 s\"".to_owned(),
+        _ if of.is_real() => "write a finite number, such as 12.5".to_owned(),
+        _ if of.is_time() => "dates have no value here".to_owned(),
+        _ => format!(
+            "write a whole number from {} to {}",
+            if of.is_signed() {
+                -(1i128 << (of.bits() - 1))
+            } else {
+                0
+            },
+            of.signed(if of.is_signed() {
+                of.mask() >> 1
+            } else {
+                of.mask()
+            })
+        ),
+    })
+}

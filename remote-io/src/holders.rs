@@ -1,0 +1,202 @@
+//! The states of one program that living stations hold: its controller and every understudy.
+//!
+//! A station is living if a turn or a join of it was received in the last few cycles.
+
+use understudy_cycle::Agreement;
+use understudy_wire::{Holding, Image, ProgramId, Recalled, StationId, StationSet};
+
+/// One entry for each station that can hold the program's state.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) struct Holders {
+    entries: Vec<Holder>,
+    living_for: u32,
+    /// Cycles of silence after which a station cannot come back without a state from another one.
+    gone_after: u32,
+    /// Cycles since this remote I/O started.
+    listened: u32,
+    /// Stations that were gone before it started, as others recall, and not received since.
+    recalled_gone: StationSet,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+struct Holder {
+    station: StationId,
+    holding: Option<Holding>,
+    /// What it recalls of this remote I/O's last sample.
+    recalled: Option<Recalled>,
+    /// Cycles since it was received; `u32::MAX` for never.
+    silent: u32,
+}
+
+impl Holders {
+    /// For `program` in a cluster of `agreement`; a station that is silent for `flag_after` cycles lives no more.
+    pub(crate) fn new(program: ProgramId, agreement: &Agreement) -> Self {
+        let schedule = &agreement.schedule;
+        let (controllers, stations) = (schedule.controllers(), schedule.stations());
+        let living_for = agreement.flag_after;
+        let own = StationId(program.0);
+        let understudies = (controllers as u8..stations as u8).map(StationId);
+        let entries = [own]
+            .into_iter()
+            .chain(understudies)
+            .map(|station| Holder {
+                station,
+                holding: None,
+                recalled: None,
+                silent: u32::MAX,
+            })
+            .collect();
+        Self {
+            entries,
+            living_for,
+            gone_after: living_for + agreement.history as u32,
+            listened: 0,
+            recalled_gone: StationSet::EMPTY,
+        }
+    }
+
+    /// Takes the state that a station holds of this program, and what it recalls of the last sample.
+    pub(crate) fn note(
+        &mut self,
+        station: StationId,
+        holding: Option<&Holding>,
+        recalled: Option<&Recalled>,
+    ) {
+        if let Some(entry) = self
+            .entries
+            .iter_mut()
+            .find(|entry| entry.station == station)
+        {
+            entry.holding = holding.copied();
+            // A station that has restarted recalls nothing of its earlier life.
+            entry.recalled = recalled.cloned();
+            entry.silent = 0;
+            self.recalled_gone.remove(station);
+        }
+    }
+
+    /// Ends a cycle.
+    pub(crate) fn close_cycle(&mut self) {
+        self.listened = self.listened.saturating_add(1);
+        for entry in &mut self.entries {
+            entry.silent = entry.silent.saturating_add(1);
+        }
+    }
+
+    /// Stations that cannot come back without a state from another one.
+    pub(crate) fn gone(&self) -> StationSet {
+        let silent = self
+            .entries
+            .iter()
+            .filter(|entry| self.listened > self.gone_after && entry.silent > self.gone_after);
+        silent
+            .map(|entry| entry.station)
+            .collect::<StationSet>()
+            .or(self.recalled_gone)
+    }
+
+    /// Whether no output can have been applied that came of a newer state than `holding`, as far as living stations
+    /// recall: each station that could have proved one lives and has received samples in this life, or is accounted for
+    /// by one that does, and none recalls a newer applied sample.
+    ///
+    /// What remains: a remote I/O and a station that were cut off together from all others, and lost their memory
+    /// together.
+    pub(crate) fn covers_all_applied(&self, holding: &Holding) -> bool {
+        let recalling = || {
+            let living = self.entries.iter().filter(|entry| self.lives(entry));
+            living.filter_map(|entry| Some((entry.station, entry.recalled.as_ref()?)))
+        };
+        let first_hand = recalling().filter(|(_, recalled)| recalled.witnessed);
+        let accounted_for = first_hand.fold(StationSet::EMPTY, |all, (station, recalled)| {
+            all.or(StationSet::only(station)).or(recalled.accounted_for)
+        });
+        let all = self.entries.iter();
+        let newest = recalling()
+            .filter_map(|(_, recalled)| recalled.applied)
+            .max();
+        all.map(|entry| entry.station)
+            .all(|station| accounted_for.contains(station))
+            && newest.is_none_or(|applied| applied <= holding.stepped)
+    }
+
+    /// Takes up which stations were gone before this remote I/O started.
+    pub(crate) fn recall_gone(&mut self) {
+        let living = self.entries.iter().filter(|entry| self.lives(entry));
+        let recalled = living.filter_map(|entry| entry.recalled.as_ref());
+        let gone = recalled.fold(StationSet::EMPTY, |gone, one| gone.or(one.accounted_for));
+        let received = self.entries.iter().filter(|entry| entry.silent < u32::MAX);
+        let received: StationSet = received.map(|entry| entry.station).collect();
+        self.recalled_gone = gone.without(received);
+    }
+
+    /// Whether a station lives.
+    pub(crate) fn is_living(&self, station: StationId) -> bool {
+        let mut entries = self.entries.iter();
+        entries.any(|entry| entry.station == station && self.lives(entry))
+    }
+
+    /// The stations that can hold the program's state: its controller, then the understudies.
+    pub(crate) fn stations(&self) -> impl Iterator<Item = StationId> + '_ {
+        self.entries.iter().map(|entry| entry.station)
+    }
+
+    /// Whether a station lives that could hold the state.
+    pub(crate) fn any_living(&self) -> bool {
+        self.entries.iter().any(|entry| self.lives(entry))
+    }
+
+    /// Whether all stations that could hold the state live.
+    pub(crate) fn all_living(&self) -> bool {
+        self.entries.iter().all(|entry| self.lives(entry))
+    }
+
+    /// Stations that this remote I/O had excluded, as living stations recall them.
+    pub(crate) fn excluded(&self) -> StationSet {
+        let living = self.entries.iter().filter(|entry| self.lives(entry));
+        let recalled = living.filter_map(|entry| entry.recalled.as_ref());
+        recalled.fold(StationSet::EMPTY, |all, one| all.or(one.excluded))
+    }
+
+    /// u(i) of the last sample, as `station` recalls it.
+    pub(crate) fn inputs(&self, station: StationId) -> Option<&Image> {
+        let entry = self.entries.iter().find(|entry| entry.station == station)?;
+        entry.recalled.as_ref().map(|recalled| &recalled.inputs)
+    }
+
+    /// States that living stations hold.
+    pub(crate) fn holdings(&self) -> impl Iterator<Item = (StationId, &Holding)> + Clone {
+        self.entries
+            .iter()
+            .filter(|entry| self.lives(entry))
+            .filter_map(|entry| Some((entry.station, entry.holding.as_ref()?)))
+    }
+
+    /// Stations that hold the state that was stepped last, where they hold different ones: it is not known which of
+    /// them the applied outputs came from.
+    pub(crate) fn disputed(&self) -> Option<StationSet> {
+        let (_, newest) = self.newest()?;
+        let equal = self
+            .holdings()
+            .filter(|(_, other)| other.stepped == newest.stepped);
+        let differ = equal
+            .clone()
+            .any(|(_, other)| other.lineage != newest.lineage);
+        differ.then(|| equal.map(|(station, _)| station).collect())
+    }
+
+    /// The state that was stepped last. A later sample is a newer history, because only one remote I/O makes samples.
+    pub(crate) fn newest(&self) -> Option<(StationId, &Holding)> {
+        // The first of equals: the controller before the understudies.
+        self.holdings().reduce(|best, other| {
+            if other.1.stepped > best.1.stepped {
+                other
+            } else {
+                best
+            }
+        })
+    }
+
+    fn lives(&self, entry: &Holder) -> bool {
+        entry.silent <= self.living_for
+    }
+}
