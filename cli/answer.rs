@@ -136,9 +136,8 @@ impl Answer {
     pub(crate) fn and_next(mut self, arguments: &[&dyn AsRef<OsStr>]) -> Self {
         let words = arguments.iter();
         let words: Vec<_> = words.map(|word| word.as_ref().to_string_lossy()).collect();
-        self.about
-            .next
-            .push(shell_line(words.iter().map(Cow::as_ref)));
+        let line = std::iter::once("understudy").chain(words.iter().map(Cow::as_ref));
+        self.about.next.push(shell::line(line));
         self
     }
 
@@ -199,11 +198,6 @@ impl From<BusError> for Answer {
     fn from(error: BusError) -> Self {
         Self::failed(Status::Failed, error.code(), error)
     }
-}
-
-/// Command line of this program, quoted for a shell.
-pub(crate) fn shell_line<'a>(arguments: impl IntoIterator<Item = &'a str>) -> String {
-    shell::line(std::iter::once("understudy").chain(arguments))
 }
 
 /// Findings of each file, up to the maximum.
