@@ -72,7 +72,11 @@ pub(super) fn statements(
     for step in &chart.steps {
         let span = step.name.span();
         let name = step.name.as_str();
-        let last = assign(path(name, Some("last"), &span), part(name, "X", &span), &span);
+        let last = assign(
+            path(name, Some("last"), &span),
+            part(name, "X", &span),
+            &span,
+        );
         writer.statements.push(last);
     }
     (writer.declarations, writer.statements)
@@ -80,7 +84,8 @@ pub(super) fn statements(
 
 impl Writer<'_> {
     fn error(&mut self, code: &'static str, message: String, span: Span) {
-        self.diagnostics.push(Diagnostic::error(code, message, span));
+        self.diagnostics
+            .push(Diagnostic::error(code, message, span));
     }
 
     /// A hidden variable; a name with a dot is none that a person can write.
@@ -101,7 +106,8 @@ impl Writer<'_> {
             if let Some(before) = seen.insert(step.name.key(), span.clone()) {
                 let message = format!("two steps are called `{name}`");
                 let found = Diagnostic::error("U1003", message, span);
-                self.diagnostics.push(found.with_related(before, "the first"));
+                self.diagnostics
+                    .push(found.with_related(before, "the first"));
                 continue;
             }
             let fields = [
@@ -161,10 +167,16 @@ impl Writer<'_> {
             if from.is_empty() {
                 continue;
             }
-            let steps = from.iter().map(|name| part(name.as_str(), "X", &name.span()));
+            let steps = from
+                .iter()
+                .map(|name| part(name.as_str(), "X", &name.span()));
             let mut rivals = Vec::new();
             for (other, fires) in &fired {
-                if chart.transitions[*other].from.iter().any(|name| from.contains(&name)) {
+                if chart.transitions[*other]
+                    .from
+                    .iter()
+                    .any(|name| from.contains(&name))
+                {
                     rivals.push(not(variable(fires, span)));
                 }
             }
@@ -179,7 +191,11 @@ impl Writer<'_> {
         for is_end in [true, false] {
             for (at, fires) in &fired {
                 let transition = &chart.transitions[*at];
-                let steps = if is_end { &transition.from } else { &transition.to };
+                let steps = if is_end {
+                    &transition.from
+                } else {
+                    &transition.to
+                };
                 let mut body = Vec::new();
                 for step in steps.iter().filter(|name| known(name)) {
                     let (name, span) = (step.as_str(), &transition.span);
@@ -196,7 +212,8 @@ impl Writer<'_> {
                     }
                 }
                 let condition = variable(fires, &transition.span);
-                self.statements.push(when(condition, body, &transition.span));
+                self.statements
+                    .push(when(condition, body, &transition.span));
             }
         }
     }
@@ -262,9 +279,7 @@ impl Writer<'_> {
             "D" => deed
                 .drives
                 .push(join(is_active(), Operator::And, is_over())),
-            "DS" => deed
-                .sets
-                .push(join(is_active(), Operator::And, is_over())),
+            "DS" => deed.sets.push(join(is_active(), Operator::And, is_over())),
             "SD" | "SL" => {
                 let stored = self.hidden("stored", Elementary::Bool, &span);
                 let start = self.hidden("start", Elementary::Time, &span);
@@ -276,7 +291,11 @@ impl Writer<'_> {
                 let is_new = join(begins(), Operator::And, not(variable(&stored, &span)));
                 deed.before.push(when(is_new, body, &span));
                 let passed = at_least(since(variable(&start, &span), &span), duration);
-                let passed = if qualifier == "SD" { passed } else { not(passed) };
+                let passed = if qualifier == "SD" {
+                    passed
+                } else {
+                    not(passed)
+                };
                 deed.drives
                     .push(join(variable(&stored, &span), Operator::And, passed));
                 deed.memories.push(stored);
@@ -292,7 +311,11 @@ impl Writer<'_> {
 
     fn deed(&mut self, name: &Name, mut deed: Deed) {
         let span = name.span();
-        let action = self.chart.actions.iter().find(|action| action.name == *name);
+        let action = self
+            .chart
+            .actions
+            .iter()
+            .find(|action| action.name == *name);
         self.statements.append(&mut deed.before);
         let mut memories = std::mem::take(&mut deed.memories);
         if !deed.sets.is_empty() || !deed.resets.is_empty() && memories.is_empty() {

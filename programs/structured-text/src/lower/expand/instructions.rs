@@ -21,8 +21,7 @@ use crate::syntax::{
 };
 
 use super::written::{
-    assign, boolean, declare, elementary, integer, join, not, path, statement, variable,
-    when,
+    assign, boolean, declare, elementary, integer, join, not, path, statement, variable, when,
 };
 
 /// Brackets that may be open at once.
@@ -64,7 +63,10 @@ pub(super) fn statements(
         open: Vec::new(),
         diagnostics,
     };
-    for label in list.iter().filter_map(|instruction| instruction.label.as_ref()) {
+    for label in list
+        .iter()
+        .filter_map(|instruction| instruction.label.as_ref())
+    {
         let part = writer.labels.len() as i128 + 1;
         if writer.labels.insert(label.key(), part).is_some() {
             let message = format!("two labels are called `{label}`");
@@ -119,7 +121,8 @@ fn operation(word: &str) -> Option<(Operator, bool, bool)> {
 
 impl Writer<'_> {
     fn error(&mut self, code: &'static str, message: String, span: Span) {
-        self.diagnostics.push(Diagnostic::error(code, message, span));
+        self.diagnostics
+            .push(Diagnostic::error(code, message, span));
     }
 
     /// The parts as one row, or as a loop over a CASE.
@@ -184,10 +187,13 @@ impl Writer<'_> {
     fn instruction(&mut self, instruction: &Instruction) {
         let span = &instruction.span;
         let word = instruction.operator.as_str();
-        let first = instruction.operands.iter().find_map(|operand| match operand {
-            Argument::Placed(value) => Some(value.clone()),
-            _ => None,
-        });
+        let first = instruction
+            .operands
+            .iter()
+            .find_map(|operand| match operand {
+                Argument::Placed(value) => Some(value.clone()),
+                _ => None,
+            });
         match word {
             "" => {}
             ")" => self.close(span),
@@ -199,10 +205,14 @@ impl Writer<'_> {
                 self.conditional(condition, vec![kind], span);
             }
             "JMP" | "JMPC" | "JMPCN" | "JMPN" => self.jump(word, first, span),
-            _ if operation(word).is_some_and(|(_, _, opens)| opens) => self.operate(word, first, span),
+            _ if operation(word).is_some_and(|(_, _, opens)| opens) => {
+                self.operate(word, first, span)
+            }
             _ => match first {
                 Some(first) => self.with_operand(word, first, instruction),
-                None if operation(word).is_some() || matches!(word, "LD" | "LDN" | "ST" | "STN" | "S" | "R") => {
+                None if operation(word).is_some()
+                    || matches!(word, "LD" | "LDN" | "ST" | "STN" | "S" | "R") =>
+                {
                     self.error("U1017", format!("{word} has no operand"), span.clone());
                 }
                 None => self.function(instruction),
@@ -216,22 +226,34 @@ impl Writer<'_> {
             "LD" => self.result = Some(first),
             "LDN" => self.result = Some(not(first)),
             "ST" | "STN" => {
-                let Some(to) = self.stored(&first) else { return };
-                let Some(value) = self.taken(span) else { return };
+                let Some(to) = self.stored(&first) else {
+                    return;
+                };
+                let Some(value) = self.taken(span) else {
+                    return;
+                };
                 let value = if word == "STN" { not(value) } else { value };
                 self.push(assign(to, value, span));
                 self.result = Some(if word == "STN" { not(first) } else { first });
             }
             "S" | "R" => {
-                let Some(to) = self.stored(&first) else { return };
-                let Some(condition) = self.held(span) else { return };
+                let Some(to) = self.stored(&first) else {
+                    return;
+                };
+                let Some(condition) = self.held(span) else {
+                    return;
+                };
                 let value = boolean(word == "S", span);
                 self.push(when(condition, vec![assign(to, value, span)], span));
             }
             // An input of a block: it is given the result, and the block is called.
             "S1" | "R1" | "CLK" | "CU" | "CD" | "PV" | "IN" | "PT" => {
-                let Some(to) = self.stored(&first) else { return };
-                let Some(value) = self.taken(span) else { return };
+                let Some(to) = self.stored(&first) else {
+                    return;
+                };
+                let Some(value) = self.taken(span) else {
+                    return;
+                };
                 let mut input = to.clone();
                 input.steps.push(Step::Field(Name::new(word, span.clone())));
                 self.push(assign(input, value, span));
@@ -355,7 +377,9 @@ impl Writer<'_> {
         let named = |operand: &Argument| !matches!(operand, Argument::Placed(_));
         let mut arguments = Vec::new();
         if !instruction.operands.iter().any(named) {
-            let Some(value) = self.taken(span) else { return };
+            let Some(value) = self.taken(span) else {
+                return;
+            };
             arguments.push(Argument::Placed(value));
         }
         arguments.extend(instruction.operands.iter().cloned());

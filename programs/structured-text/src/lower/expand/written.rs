@@ -57,7 +57,9 @@ pub(super) fn join(left: Expression, operator: Operator, right: Expression) -> E
     let span = left.span.clone();
     match left.kind {
         // Operators of one kind stand in one chain, so the tree stays flat.
-        ExpressionKind::Chain(first, mut rest) if rest.iter().all(|(found, _)| *found == operator) && is_chained(operator) => {
+        ExpressionKind::Chain(first, mut rest)
+            if rest.iter().all(|(found, _)| *found == operator) && is_chained(operator) =>
+        {
             rest.push((operator, right));
             Expression {
                 kind: ExpressionKind::Chain(first, rest),
@@ -78,11 +80,16 @@ pub(super) fn join(left: Expression, operator: Operator, right: Expression) -> E
 }
 
 fn is_chained(operator: Operator) -> bool {
-    matches!(operator, Operator::And | Operator::Or | Operator::AndThen | Operator::Add)
+    matches!(
+        operator,
+        Operator::And | Operator::Or | Operator::AndThen | Operator::Add
+    )
 }
 
 pub(super) fn all(values: Vec<Expression>, operator: Operator, span: &Span) -> Expression {
-    let joined = values.into_iter().reduce(|left, right| join(left, operator, right));
+    let joined = values
+        .into_iter()
+        .reduce(|left, right| join(left, operator, right));
     joined.unwrap_or_else(|| boolean(operator == Operator::And, span))
 }
 
@@ -116,10 +123,7 @@ pub(super) fn assign(to: Path, value: Expression, span: &Span) -> Statement {
 }
 
 pub(super) fn when(condition: Expression, body: Vec<Statement>, span: &Span) -> Statement {
-    statement(
-        StatementKind::If(vec![(condition, body)], Vec::new()),
-        span,
-    )
+    statement(StatementKind::If(vec![(condition, body)], Vec::new()), span)
 }
 
 pub(super) fn elementary(of: Elementary, span: &Span) -> TypeName {

@@ -1,43 +1,62 @@
-//! Many troubles of one kind, one at a time, at random phases of the cycle: what a cluster has to bear without being seen to.
+//! `understudy-bench kills`: every role of the press cell killed or suspended at random phases of the cycle, on processes.
 
+use std::fmt::Write as _;
+
+use clap::Args;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use schemars::JsonSchema;
 use serde::Serialize;
+use understudy::{Answer, Console, PressCell, RunArguments, Status};
 use understudy_cycle::Schedule;
-use understudy_simulator::{Action, Fault};
+use understudy_scenarios::{Action, Expectation, Fault, Scenario, Summary};
 use understudy_wire::{Member, ProgramId, StationId};
 
-use understudy_scenarios::{Expectation, Scenario, Summary};
+/// Kill or suspend every role of the press cell at random phases
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// Kills of each role: controllers, understudies, remote I/Os
+    #[arg(long, alias = "kills", default_value_t = 100)]
+    count: u64,
+    /// Suspend for this number of cycles (SIGSTOP) in place of kill, such as 0.5,5,500
+    #[arg(long, value_name = "CYCLES", value_delimiter = ',')]
+    stop: Vec<f64>,
+    /// Seed of the phases
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    #[command(flatten)]
+    run: RunArguments,
+}
 
-/// Cycles from the end of one trouble to the next: enough for a station to come back into step.
+/// Cycles from the end of one trouble to the next: enough for a station to be synchronised again.
 const RECOVERY_CYCLES: f64 = 40.0;
 /// Cycles from a kill to the restart.
 const DOWN_CYCLES: f64 = 20.0;
 
-/// What happens to a member.
+/// Trouble of a member.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Trouble {
+pub(crate) enum Trouble {
     /// It is killed, and started again 20 cycles later.
     Kill,
-    /// It stands still (SIGSTOP) for so many cycles.
+    /// It is suspended (SIGSTOP) for this number of cycles.
     Stop(f64),
 }
 
-/// To whom it happens, one after the other.
+/// The members that it happens to, one after the other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Target {
+pub(crate) enum Target {
     /// The controllers.
     Controllers,
     /// The understudies.
     Understudies,
     /// The remote I/Os.
     RemoteIos,
+    /// The controllers and the understudies.
+    Stations,
 }
 
 impl Target {
-    /// All roles.
-    pub const ALL: [Self; 3] = [Self::Controllers, Self::Understudies, Self::RemoteIos];
+    /// Each role.
+    const ROLES: [Self; 3] = [Self::Controllers, Self::Understudies, Self::RemoteIos];
 
     fn members(self, schedule: &Schedule) -> Vec<Member> {
         let controllers = schedule.controllers() as u8;
@@ -46,6 +65,7 @@ impl Target {
         match self {
             Self::Controllers => stations(0..controllers).collect(),
             Self::Understudies => stations(controllers..schedule.stations() as u8).collect(),
+            Self::Stations => stations(0..schedule.stations() as u8).collect(),
             Self::RemoteIos => (0..controllers)
                 .map(|program| Member::RemoteIo(ProgramId(program)))
                 .collect(),
@@ -57,6 +77,7 @@ impl Target {
             Self::Controllers => "controllers",
             Self::Understudies => "understudies",
             Self::RemoteIos => "remote I/Os",
+            Self::Stations => "stations",
         }
     }
 }
@@ -71,8 +92,14 @@ impl Trouble {
 
     /// A scenario of `count` troubles of this kind.
     ///
-    /// While a remote I/O is gone nobody drives its plant, so only for stations is it expected that nothing is held.
-    pub fn scenario(self, target: Target, schedule: &Schedule, count: u64, seed: u64) -> Scenario {
+    /// While a remote I/O is down its plant is not driven, so only for stations is it expected that nothing is held.
+    pub(crate) fn scenario(
+        self,
+        target: Target,
+        schedule: &Schedule,
+        count: u64,
+        seed: u64,
+    ) -> Scenario {
         let members = target.members(schedule);
         let mut random = Pcg64Mcg::seed_from_u64(seed);
         let (lasts, begins, ends) = match self {
@@ -114,36 +141,42 @@ impl Trouble {
     }
 }
 
-/// What came of the troubles of one kind.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct TroubleRow {
-    /// What happened.
-    pub trouble: String,
-    /// To whom.
-    pub target: String,
-    /// How often.
-    pub count: u64,
-    /// What must never be driven and was.
-    pub wrong: u64,
+/// Result of the troubles of one kind, for one role.
+#[derive(Debug, Serialize)]
+struct Row {
+    link: String,
+    directory: String,
+    trouble: String,
+    target: &'static str,
+    count: u64,
+    /// Wrong outputs.
+    wrong: u64,
     /// Cycles, over all remote I/Os, with the last true output.
-    pub held: u64,
+    held: u64,
     /// Cycles with the fail-safe output.
-    pub fail_safe: u64,
-    /// Cycles in which the remote I/O was not there.
-    pub missed: u64,
-    /// Held and fail-safe cycles while the host itself stood still.
-    pub by_stall: u64,
-    /// Whether the run was whole and met what was expected.
-    pub passed: bool,
+    fail_safe: u64,
+    /// Cycles in which the remote I/O was down.
+    missed: u64,
+    /// Held and fail-safe cycles during host stalls.
+    by_stall: u64,
+    /// Whether the run was complete and met what was expected.
+    passed: bool,
 }
 
-impl TroubleRow {
-    /// Of a run of [`Trouble::scenario`].
-    pub fn new(trouble: Trouble, target: Target, count: u64, summary: &Summary) -> Self {
+impl Row {
+    fn new(
+        trouble: Trouble,
+        target: Target,
+        count: u64,
+        cell: &PressCell,
+        summary: &Summary,
+    ) -> Self {
         let total = summary.total();
         Self {
+            link: summary.circumstances.link.clone(),
+            directory: cell.path().display().to_string(),
             trouble: trouble.words(),
-            target: target.words().to_owned(),
+            target: target.words(),
             count,
             wrong: summary.violation_count,
             held: total.held,
@@ -153,6 +186,68 @@ impl TroubleRow {
             passed: summary.passed,
         }
     }
+}
+
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
+    let troubles: Vec<Trouble> = if arguments.stop.is_empty() {
+        vec![Trouble::Kill]
+    } else {
+        arguments.stop.iter().copied().map(Trouble::Stop).collect()
+    };
+    let mut rows = Vec::new();
+    for trouble in troubles {
+        for target in Target::ROLES {
+            rows.push(row(trouble, target, arguments, console)?);
+        }
+    }
+    Ok(answer(&rows))
+}
+
+fn row(
+    trouble: Trouble,
+    target: Target,
+    arguments: &Arguments,
+    console: &mut Console,
+) -> Result<Row, Answer> {
+    let cell = PressCell::write(&arguments.run)?;
+    let schedule = &cell.cluster.agreement().schedule;
+    let scenario = trouble
+        .scenario(target, schedule, arguments.count, arguments.seed)
+        .shortened(arguments.run.cycles);
+    console.note(&scenario.title);
+    let (summary, judged) = cell.judged(&scenario, &arguments.run, console)?;
+    match judged.failure {
+        Some(failure) => Err(Answer::failed(Status::Failed, failure.code(), &failure)),
+        None => Ok(Row::new(trouble, target, arguments.count, &cell, &summary)),
+    }
+}
+
+fn answer(rows: &[Row]) -> Answer {
+    let mut text = format!(
+        "{:24} {:13} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8}\n",
+        "trouble", "of", "count", "wrong", "held", "fail-safe", "missed", "by stall"
+    );
+    for row in rows {
+        let _ = writeln!(
+            text,
+            "{:24} {:13} {:>6} {:>6} {:>6} {:>9} {:>8} {:>8}{}",
+            row.trouble,
+            row.target,
+            row.count,
+            row.wrong,
+            row.held,
+            row.fail_safe,
+            row.missed,
+            row.by_stall,
+            if row.passed { "" } else { "  FAILED" }
+        );
+    }
+    text.push_str(
+        "cycles over all remote I/Os; a remote I/O that is down does not drive its plant\n",
+    );
+    let passed = rows.iter().all(|row| row.passed);
+    let status = if passed { Status::Done } else { Status::Failed };
+    Answer::done(text, rows).with_status(status)
 }
 
 #[cfg(test)]
@@ -165,7 +260,7 @@ mod tests {
     fn troubles_come_one_at_a_time_and_to_everybody_in_turn() {
         let schedule = Schedule::new(Duration::from_millis(10), 2, 1, 1).expect("within bounds");
         for trouble in [Trouble::Kill, Trouble::Stop(0.5), Trouble::Stop(500.0)] {
-            for target in Target::ALL {
+            for target in Target::ROLES {
                 let scenario = trouble.scenario(target, &schedule, 6, 1);
                 assert_eq!(scenario.steps.len(), 12);
                 let time = |step: &Fault| step.at_cycle as f64 + step.phase;

@@ -1,16 +1,16 @@
-//! `understudy bench memory`: whether a long run needs more memory than a short one.
+//! `understudy-bench memory`: whether a long run needs more memory than a short one.
 
 use std::fmt::Write as _;
 use std::fs;
 
 use clap::Args;
 use serde::Serialize;
+use understudy::{Answer, Status};
 use understudy_scenarios::{Action, Fault, Network, parts};
 use understudy_simulator::{Record, Simulation};
 use understudy_wire::{Member, StationId};
 
-use crate::answer::{Answer, Status};
-use crate::bench;
+use crate::simulate::{PATIENCE_CYCLES, not_ready, simulated_press_cell};
 
 /// Growth that the system's own counting explains: less than a byte for each cycle of a long run.
 const ALLOWED_KIB: u64 = 256;
@@ -19,12 +19,10 @@ const ALLOWED_KIB: u64 = 256;
 const FAILURE_EVERY: u64 = 100;
 const REPAIR_AFTER: u64 = 40;
 
-/// Cycles that the simulated cluster gets to come into step.
-const PATIENCE_CYCLES: u64 = 1000;
-
 /// Points at which the memory is read.
 const POINTS: u64 = 10;
 
+/// Measure the memory of a long simulated run with loss and failures
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// Cycles to run
@@ -43,12 +41,8 @@ struct Found {
 }
 
 /// The press cell over a lossy network, with a station killed and restarted again and again.
-pub(crate) fn run(arguments: &Arguments) -> Answer {
-    measured(arguments).unwrap_or_else(|failed| failed)
-}
-
-fn measured(arguments: &Arguments) -> Result<Answer, Answer> {
-    let cluster = bench::simulated_press_cell()?;
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
+    let cluster = simulated_press_cell()?;
     let stations = cluster.agreement().schedule.stations() as u64;
     let network = Network {
         loss: 0.01,
@@ -62,7 +56,7 @@ fn measured(arguments: &Arguments) -> Result<Answer, Answer> {
     };
     simulation
         .run(0, PATIENCE_CYCLES, &mut observe)
-        .map_err(|error| Answer::failed(Status::Failed, "U0530", error.to_string()))?;
+        .map_err(not_ready)?;
     let mut points = Vec::new();
     let mut next = arguments.cycles / POINTS;
     for failure in 0..arguments.cycles / FAILURE_EVERY {

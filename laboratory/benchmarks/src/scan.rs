@@ -1,4 +1,4 @@
-//! `understudy bench scan`: how long a scan of a program takes.
+//! `understudy-bench scan`: duration of the scan of a program.
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -6,14 +6,9 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
-use schemars::JsonSchema;
 use serde::Serialize;
-use understudy_interchange::parse_program;
-use understudy_logic::{Circuit, Scan, Scratch};
-
-use crate::answer::{Answer, Status};
-use crate::files;
-use crate::kind::Kind;
+use understudy::{Answer, Status, ladder};
+use understudy_logic::{Scan, Scratch};
 
 /// From one scan to the next where a program has timers; the speed does not depend on it.
 const PERIOD: Duration = Duration::from_millis(10);
@@ -22,6 +17,7 @@ const PERIOD: Duration = Duration::from_millis(10);
 const SCANS: usize = 100;
 const ROUNDS: usize = 300;
 
+/// Measure the scan of a program
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// A program
@@ -32,9 +28,8 @@ pub(crate) struct Arguments {
     seed: u64,
 }
 
-/// What `bench scan` answers.
-#[derive(Debug, Serialize, JsonSchema)]
-pub(crate) struct Found {
+#[derive(Debug, Serialize)]
+struct Found {
     rungs: usize,
     /// Runs of the program that one scan steps at once.
     runs: usize,
@@ -42,11 +37,12 @@ pub(crate) struct Found {
     nanoseconds_per_rung: f64,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
-    let (rungs, circuit) = match program(arguments) {
-        Ok(program) => program,
-        Err(answer) => return answer,
-    };
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
+    let (program, _) = ladder(&arguments.program)?;
+    let rungs = program.rungs.len();
+    let circuit = program
+        .lower(PERIOD)
+        .map_err(|error| Answer::failed(Status::BadInput, "U0436", error))?;
     let scan = Scan::new(&circuit);
     let images = images(circuit.inputs().len(), arguments.seed);
     let registers = circuit.registers().iter();
@@ -72,27 +68,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         "{rungs} rungs, 64 runs at once, random inputs: {:.0} ns a scan, {:.2} ns a rung",
         found.nanoseconds_per_scan, found.nanoseconds_per_rung
     );
-    Answer::done(text, found)
-}
-
-/// How many rungs, and what they do.
-fn program(arguments: &Arguments) -> Result<(usize, Circuit), Answer> {
-    let path = &arguments.program;
-    let source = files::text_of(Kind::Ladder, path)?;
-    let name = path.display().to_string();
-    let parsed = parse_program(&name, &source);
-    let report = understudy_text::Report {
-        name,
-        text: source,
-        diagnostics: parsed.diagnostics,
-    };
-    if report.has_errors() {
-        return Err(Answer::bad_files(vec![report]));
-    }
-    let circuit = parsed.program.lower(PERIOD);
-    let circuit =
-        circuit.map_err(|error| Answer::failed(Status::BadInput, "U0436", error.to_string()))?;
-    Ok((parsed.program.rungs.len(), circuit))
+    Ok(Answer::done(text, found))
 }
 
 /// Images of random inputs, taken in turn.

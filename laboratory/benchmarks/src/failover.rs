@@ -1,19 +1,18 @@
-//! `understudy bench failover`: the cluster beside hot-standby and active-active pairs.
+//! `understudy-bench failover`: the cluster compared with hot-standby and active-active pairs.
 
 use std::path::PathBuf;
 
 use clap::Args;
-use serde::Deserialize;
+use understudy::{Answer, Console, PressCell, RunArguments, Status, write_file};
 use understudy_baselines::{Comparison, ComparisonPlan, RealRun, compare, figure};
 use understudy_bus::LinkKind;
-use understudy_scenarios::Counts;
 
-use crate::answer::{Answer, Status};
-use crate::bench;
-use crate::console::Console;
-use crate::files;
-use crate::run::lab::RunArguments;
+use crate::kills::{Target, Trouble};
+use crate::simulate::simulated_press_cell;
 
+/// Compare the cluster with hot-standby and active-active pairs
+///
+/// Lost cycles, false take-overs, double masters, controllers, bytes.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// Failures of a box that drives, for each contender in the simulator
@@ -38,12 +37,8 @@ pub(crate) struct Arguments {
     run: RunArguments,
 }
 
-pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
-    compared(arguments, console).unwrap_or_else(|failed| failed)
-}
-
-fn compared(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
-    let cluster = bench::simulated_press_cell()?;
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
+    let cluster = simulated_press_cell()?;
     let plan = ComparisonPlan {
         failures: arguments.failures,
         cycles: arguments.loss_cycles,
@@ -53,8 +48,8 @@ fn compared(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answ
         seed: arguments.seed,
     };
     console.note("comparing in the simulator");
-    let mut comparison = compare(&cluster, &plan)
-        .map_err(|error| Answer::failed(Status::Failed, "U0530", error.to_string()))?;
+    let mut comparison =
+        compare(&cluster, &plan).map_err(|error| Answer::failed(Status::Failed, "U0530", error))?;
     if arguments.kills > 0 {
         for (link, overrides) in arguments.run.overrides.each_link() {
             console.note(&format!("killing real processes, over {link}"));
@@ -67,9 +62,9 @@ fn compared(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answ
     }
     let mut text = comparison.to_string();
     if let Some(path) = &arguments.figure {
-        let svg = figure(&comparison)
-            .map_err(|error| Answer::failed(Status::Failed, "U0602", error.to_string()))?;
-        files::write(path, &svg)?;
+        let svg =
+            figure(&comparison).map_err(|error| Answer::failed(Status::Failed, "U0602", error))?;
+        write_file(path, &svg)?;
         text.push_str(&format!("\nfigure: {}\n", path.display()));
     }
     let status = if is_right(&comparison) {
@@ -88,57 +83,47 @@ fn is_right(comparison: &Comparison) -> bool {
     ended && simulated.chain(real).all(|wrong| wrong == 0)
 }
 
-/// What is needed of the answer of a run on real processes.
-#[derive(Deserialize)]
-struct Killed {
-    summary: KilledSummary,
-}
-
-#[derive(Deserialize)]
-struct KilledSummary {
-    violation_count: u64,
-    cycles_asked: u64,
-    cycles_run: u64,
-    death_count: u64,
-    remote_ios: Vec<KilledRemoteIo>,
-}
-
-#[derive(Deserialize)]
-struct KilledRemoteIo {
-    counts: Counts,
-}
-
 fn real(
     arguments: &Arguments,
     link: LinkKind,
     run: &RunArguments,
     console: &mut Console,
 ) -> RealRun {
-    let answer = bench::kills(arguments.kills, arguments.seed, run, console);
     let mut real = RealRun {
         link: link.to_string(),
         kills: arguments.kills,
         lost: 0,
         lost_by_stall: 0,
         wrong: 0,
-        failure: answer
-            .failures
-            .first()
-            .map(|failure| failure.message.clone()),
+        failure: None,
     };
-    let Ok(Killed { summary }) = serde_json::from_value(answer.result) else {
-        real.failure.get_or_insert("it could not be run".to_owned());
-        return real;
+    let ran = PressCell::write(run).and_then(|cell| {
+        let schedule = &cell.cluster.agreement().schedule;
+        let scenario =
+            Trouble::Kill.scenario(Target::Stations, schedule, arguments.kills, arguments.seed);
+        cell.judged(&scenario, run, console)
+    });
+    let (summary, judged) = match ran {
+        Ok(ran) => ran,
+        Err(answer) => {
+            let failure = answer.first_failure().unwrap_or("the run did not start");
+            real.failure = Some(failure.to_owned());
+            return real;
+        }
     };
-    if summary.cycles_run < summary.cycles_asked {
-        let (run, asked) = (summary.cycles_run, summary.cycles_asked);
-        let early = format!("it ended after {run} of {asked} cycles");
-        real.failure.get_or_insert(early);
-    }
-    if summary.death_count > 0 {
-        let more = format!("{} members ended unexpectedly", summary.death_count);
-        real.failure.get_or_insert(more);
-    }
+    let (run, asked) = (summary.cycles_run, summary.cycles_asked);
+    real.failure = if let Some(failure) = judged.failure {
+        Some(failure.to_string())
+    } else if let Err(error) = judged.written {
+        Some(error.to_string())
+    } else if run < asked {
+        Some(format!("it ended after {run} of {asked} cycles"))
+    } else if summary.death_count > 0 {
+        let deaths = summary.death_count;
+        Some(format!("{deaths} members ended unexpectedly"))
+    } else {
+        None
+    };
     real.wrong = summary.violation_count;
     for remote_io in &summary.remote_ios {
         let counts = &remote_io.counts;

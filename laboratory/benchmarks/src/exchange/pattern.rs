@@ -1,4 +1,4 @@
-//! A machine that follows the cycle's pattern of speaking and does nothing else.
+//! A machine that sends the frames of a cycle and does nothing else.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -11,30 +11,35 @@ use understudy_wire::{
     Word,
 };
 
-/// Stations that speak in the pattern: three controllers and their understudy.
-pub const STATIONS: u8 = 4;
+use super::meter::{Exchange, Meter};
+
+/// Stations of the pattern: three controllers and their understudy.
+pub(super) const STATIONS: u8 = 4;
 /// Programs, and remote I/Os, in the pattern.
-pub const PROGRAMS: u8 = 3;
-/// Who is_cycle_master, and measures.
+pub(super) const PROGRAMS: u8 = 3;
+/// The cycle master, which measures.
 pub(super) const CYCLE_MASTER: Member = Member::Station(StationId(0));
 /// Bits of each sample and of each output.
 const WIDTH: usize = 8;
 
-/// One member of the pattern. Station 0 is_cycle_master: every period it says Sync, whether or not the last cycle was complete.
+/// One member of the pattern. The cycle master sends a Sync every period, whether or not the last cycle was complete, and reports the
+/// exchange once enough cycles are measured.
 #[derive(Debug)]
-pub struct Pattern {
+pub(crate) struct Pattern {
     own: Member,
     period: Duration,
     due: Time,
     moment: Moment,
     sampled: ProgramSet,
     published: StationSet,
-    said: VecDeque<Arc<Frame>>,
+    outputs: VecDeque<Output<Exchange>>,
+    /// Until it has reported; in the cycle master.
+    meter: Option<Meter>,
 }
 
 impl Pattern {
-    /// The part of `own`, a station below [`STATIONS`] or a remote I/O below [`PROGRAMS`]; anybody else is silent.
-    pub fn new(own: Member, period: Duration) -> Self {
+    /// The part of `own`: a station below [`STATIONS`] or a remote I/O below [`PROGRAMS`].
+    pub(crate) fn new(own: Member, period: Duration, meter: Meter) -> Self {
         Self {
             own,
             period,
@@ -46,7 +51,8 @@ impl Pattern {
             },
             sampled: ProgramSet::EMPTY,
             published: StationSet::EMPTY,
-            said: VecDeque::new(),
+            outputs: VecDeque::new(),
+            meter: (own == CYCLE_MASTER).then_some(meter),
         }
     }
 
@@ -60,13 +66,25 @@ impl Pattern {
         self.published = StationSet::EMPTY;
     }
 
-    fn say(&mut self, body: Body) {
+    fn send(&mut self, now: Time, body: Body) {
         let frame = frame(self.own, self.moment, body);
-        self.said.push_back(Arc::new(frame));
+        self.measure(now, &frame);
+        self.outputs.push_back(Output::Send(Arc::new(frame)));
+    }
+
+    fn measure(&mut self, now: Time, frame: &Frame) {
+        let Some(meter) = &mut self.meter else {
+            return;
+        };
+        meter.frame(now, frame.header.moment.cycle.0, turn_of(frame));
+        if let Some(exchange) = meter.result() {
+            self.meter = None;
+            self.outputs.push_back(Output::Report(exchange));
+        }
     }
 
     /// Takes the turn of this station where it has the token: station 0 after all samples, the others after their predecessor.
-    fn take_turn(&mut self) {
+    fn take_turn(&mut self, now: Time) {
         let Member::Station(own) = self.own else {
             return;
         };
@@ -76,27 +94,28 @@ impl Pattern {
         };
         if has_token && own.0 < STATIONS && !self.published.contains(own) {
             self.published.insert(own);
-            self.say(turn(own));
+            self.send(now, turn(own));
         }
     }
 }
 
 impl Machine for Pattern {
-    type Event = ();
+    type Event = Exchange;
 
     fn handle_input(&mut self, now: Time, input: Input<'_>) {
         match input {
             Input::Wakeup if self.is_cycle_master() && now >= self.due => {
                 self.due = now + self.period;
                 self.begin(self.moment.plus(1));
-                self.say(Body::Sync);
+                self.send(now, Body::Sync);
             }
             Input::Frame(frame) => {
+                self.measure(now, frame);
                 match (&frame.body, frame.header.sender) {
                     (Body::Sync, _) if frame.header.moment > self.moment => {
                         self.begin(frame.header.moment);
                         if matches!(self.own, Member::RemoteIo(program) if program.0 < PROGRAMS) {
-                            self.say(sample());
+                            self.send(now, sample());
                         }
                     }
                     (Body::Sample(_), Member::RemoteIo(program))
@@ -111,14 +130,14 @@ impl Machine for Pattern {
                     }
                     _ => return,
                 }
-                self.take_turn();
+                self.take_turn(now);
             }
             _ => {}
         }
     }
 
-    fn poll_output(&mut self) -> Option<Output<()>> {
-        self.said.pop_front().map(Output::Send)
+    fn poll_output(&mut self) -> Option<Output<Exchange>> {
+        self.outputs.pop_front()
     }
 
     fn wakeup(&self) -> Time {
@@ -127,6 +146,14 @@ impl Machine for Pattern {
         } else {
             Time(u64::MAX)
         }
+    }
+}
+
+/// The station whose turn a frame is.
+pub(super) fn turn_of(frame: &Frame) -> Option<StationId> {
+    match (&frame.body, frame.header.sender) {
+        (Body::Turn(_), Member::Station(station)) => Some(station),
+        _ => None,
     }
 }
 
@@ -144,7 +171,7 @@ fn frame(sender: Member, moment: Moment, body: Body) -> Frame {
     }
 }
 
-/// Eight samples, as a remote I/O with the default history says them.
+/// Eight samples, as a remote I/O with the default history sends them.
 fn sample() -> Body {
     Body::Sample(Sample {
         born: moment(),
@@ -194,7 +221,7 @@ fn moment() -> Moment {
     }
 }
 
-/// The frames of one cycle in the order in which they are said, for the yardstick that carries as many bytes.
+/// The frames of one cycle in the order in which they are sent, for the yardstick, which carries the same number of bytes.
 pub(super) fn frames_of_a_cycle() -> Vec<Frame> {
     let station = |rank| Member::Station(StationId(rank));
     let samples = (0..PROGRAMS).map(|program| (Member::RemoteIo(ProgramId(program)), sample()));

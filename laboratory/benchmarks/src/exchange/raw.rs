@@ -1,25 +1,24 @@
-//! The yardstick: the same pattern on plain sockets, with as many bytes in each datagram, and nothing of ours in between.
+//! The yardstick: the same pattern on plain sockets, with datagrams of the same length.
 
 use std::io;
 use std::net::{SocketAddr, UdpSocket};
 use std::time::Duration;
 
-use understudy_wire::{Frame, Member, Time, encode};
+use understudy_bus::Clock;
+use understudy_wire::{Member, StationId, Time, encode};
 
-use super::benchmark::ExchangeSettings;
-use super::meter::ExchangeMeter;
-use super::pattern::{CYCLE_MASTER, PROGRAMS, STATIONS, frames_of_a_cycle};
-use crate::clock::Clock;
-use crate::observer::Observer;
+use super::meter::{Exchange, Meter};
+use super::pattern::{CYCLE_MASTER, PROGRAMS, STATIONS, frames_of_a_cycle, turn_of};
 
-/// After so long without a datagram one was lost, and the cycle master starts the next cycle.
+/// Time without a datagram after which one was lost, and the cycle master starts the next cycle.
 const LOST_AFTER: Duration = Duration::from_millis(100);
 
-/// The eight datagrams of a cycle, in the order in which they are said. Byte 0 is the place in that order, bytes 1 to 8 are
-/// the cycle; what follows only has the length of the real frame.
+/// The eight datagrams of a cycle, in the order in which they are sent. Byte 0 is the place in that order, bytes 1 to 8 are the cycle; the
+/// rest only has the length of the real frame.
 struct Script {
     datagrams: Vec<Vec<u8>>,
-    frames: Vec<Frame>,
+    /// Sender of each, and the station whose turn it is.
+    senders: Vec<(Member, Option<StationId>)>,
 }
 
 impl Script {
@@ -33,26 +32,27 @@ impl Script {
         });
         Self {
             datagrams: datagrams.collect(),
-            frames,
+            senders: frames
+                .iter()
+                .map(|frame| (frame.header.sender, turn_of(frame)))
+                .collect(),
         }
     }
 
     fn place_of(&self, member: Member, which: usize) -> Option<usize> {
-        let said =
-            |(place, frame): (usize, &Frame)| (frame.header.sender == member).then_some(place);
-        self.frames.iter().enumerate().filter_map(said).nth(which)
+        let own = |(place, sent): (usize, &(Member, _))| (sent.0 == member).then_some(place);
+        self.senders.iter().enumerate().filter_map(own).nth(which)
     }
 }
 
-/// Plays the part of `own` until `cycles` were measured, where it is the cycle master, and until the process is
-/// killed, where it is not.
+/// Plays the part of `own`: the cycle master returns the exchange, the others run until their process is killed.
 pub(super) fn play(
     own: Member,
     socket: &UdpSocket,
     others: &[SocketAddr],
-    settings: ExchangeSettings,
-    meter: &mut ExchangeMeter,
-) -> io::Result<()> {
+    period: Duration,
+    mut meter: Meter,
+) -> io::Result<Exchange> {
     let mut script = Script::new();
     let is_cycle_master = own == CYCLE_MASTER;
     // The cycle master's first datagram is the Sync, and its second the turn.
@@ -65,14 +65,14 @@ pub(super) fn play(
     if is_cycle_master {
         socket.set_read_timeout(Some(LOST_AFTER))?;
     }
-    while !is_cycle_master || !meter.satisfied() {
+    loop {
         let mut heard = [false; 1 + PROGRAMS as usize + STATIONS as usize];
         let mut published = false;
         let started = clock.now();
         if is_cycle_master {
             cycle += 1;
             heard[0] = true;
-            note(meter, &script, 0, cycle, clock.now());
+            note(&mut meter, &script, 0, cycle, clock.now());
             broadcast(socket, others, &mut script.datagrams[0], cycle)?;
         }
         while !heard[heard.len() - 1] {
@@ -89,7 +89,7 @@ pub(super) fn play(
             }
             if of == cycle {
                 heard[place] = true;
-                note(meter, &script, place, cycle, clock.now());
+                note(&mut meter, &script, place, cycle, clock.now());
             }
             let token = match own {
                 CYCLE_MASTER => heard[1..=usize::from(PROGRAMS)].iter().all(|&one| one),
@@ -99,20 +99,22 @@ pub(super) fn play(
             if token && !published {
                 published = true;
                 heard[mine] = true;
-                note(meter, &script, mine, cycle, clock.now());
+                note(&mut meter, &script, mine, cycle, clock.now());
                 broadcast(socket, others, &mut script.datagrams[mine], cycle)?;
             }
         }
         if is_cycle_master {
-            let left = settings.period.saturating_sub(clock.now().since(started));
+            if let Some(exchange) = meter.result() {
+                return Ok(exchange);
+            }
+            let left = period.saturating_sub(clock.now().since(started));
             #[allow(
                 clippy::disallowed_methods,
-                reason = "the cycle_master waits for the next period"
+                reason = "the cycle master waits for the next period"
             )]
             std::thread::sleep(left);
         }
     }
-    Ok(())
 }
 
 fn place_and_cycle(datagram: &[u8], places: usize) -> Option<(usize, u64)> {
@@ -134,8 +136,7 @@ fn broadcast(
     Ok(())
 }
 
-fn note(meter: &mut ExchangeMeter, script: &Script, place: usize, cycle: u64, now: Time) {
-    let mut frame = script.frames[place].clone();
-    frame.header.moment.cycle.0 = cycle;
-    meter.frame(now, &frame);
+fn note(meter: &mut Meter, script: &Script, place: usize, cycle: u64, now: Time) {
+    let (_, turn) = script.senders[place];
+    meter.frame(now, cycle, turn);
 }
