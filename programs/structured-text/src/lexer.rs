@@ -13,6 +13,8 @@ use understudy_text::{Diagnostic, MAXIMUM_FINDINGS};
 
 use crate::syntax::Literal;
 
+pub(crate) use moment::calendar;
+
 /// What one lexeme is.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Lexeme<'a> {
@@ -337,7 +339,10 @@ impl<'a> Lexer<'a> {
             '0'..='9' => return self.number(start),
             '%' => {
                 self.place += 1;
-                self.take_while(|next| next.is_ascii_alphanumeric() || ".*_".contains(next));
+                // Behind a point it is a part, which further points follow.
+                let is_part = self.text[..start].ends_with('.');
+                let others = if is_part { "" } else { ".*_" };
+                self.take_while(|next| next.is_ascii_alphanumeric() || others.contains(next));
                 return Lexeme::Address(self.since(start));
             }
             '\'' | '"' => return self.quoted(character, start),

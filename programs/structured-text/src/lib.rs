@@ -1,10 +1,11 @@
-//! Structured Text of IEC 61131-3, with numbers: text to syntax (`parser`), syntax to the program form of `understudy-typed`
-//! (`lower`).
+//! Structured Text of IEC 61131-3, with numbers: text to syntax ([`parser`]), syntax to text ([`print`](mod@print)), syntax to the
+//! program form of `understudy-typed` (`lower`).
 
 mod lexer;
 mod library;
 pub mod lower;
 pub mod parser;
+pub mod print;
 pub mod syntax;
 
 pub use lower::{Lowered, Options, lower};

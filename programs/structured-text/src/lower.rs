@@ -10,6 +10,7 @@ mod calls;
 mod chains;
 mod constants;
 mod convert;
+mod expand;
 mod fold;
 mod images;
 mod initial;
@@ -80,7 +81,10 @@ pub struct Lowered {
 /// Lowers the programs of a file, or checks the units of a library.
 pub fn lower(file: &File, options: &Options<'_>) -> Lowered {
     let library = library::file();
+    let mut found = Vec::new();
+    let file = &*expand::expand(file, &mut found);
     let mut lowering = Lowering::new(file, library, options.text);
+    lowering.diagnostics = found;
     lowering.declare(file, library);
     let checked = lowering.programs(file, options);
     lowering.finish(checked)
@@ -124,6 +128,8 @@ struct Lowering<'a> {
     /// Which routines each routine calls, and where it first does.
     calls: Vec<Vec<(u32, Range<usize>)>>,
     scope: Scope,
+    /// The file has no PROGRAM.
+    is_library: bool,
     nesting: u32,
     /// The length of the expressions around this one.
     length: usize,
@@ -173,6 +179,7 @@ impl<'a> Lowering<'a> {
             queue: Vec::new(),
             calls: Vec::new(),
             scope: Scope::default(),
+            is_library: false,
             nesting: 0,
             length: 0,
             silent: 0,

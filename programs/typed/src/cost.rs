@@ -282,7 +282,7 @@ fn copied(of: &Type) -> u64 {
 }
 
 fn applied(operation: Operation, operands: &[Expression]) -> u64 {
-    let mut lengths = operands.iter().map(|operand| match operand.of {
+    let lengths = operands.iter().map(|operand| match operand.of {
         Type::Text(capacity) => u64::from(capacity),
         _ => 0,
     });

@@ -18,7 +18,7 @@ pub struct RoutineId(pub u32);
 
 /// A typed program.
 ///
-/// Invariants, kept by [`crate::validate`]: every place lies in memory and is of the type it claims; operands have the types their operation
+/// Invariants, checked by [`Program::validate`]: every place lies in memory and is of the type it claims; operands have the types their operation
 /// wants; no routine calls itself, directly or through others.
 #[derive(Debug, Clone, Default)]
 pub struct Program {
@@ -349,7 +349,7 @@ pub enum ExpressionKind {
 ///
 /// The instance, the arguments and the places that take the outputs are evaluated, in this order and from left to right; then the frame is set to its
 /// initial content and the arguments are stored; then the body runs; then the outputs are copied; then the result is read.
-/// Places of the routine have no computed indices; [`Root::Own`] means the instance there.
+/// Places of the routine are in its frame, without computed indices.
 #[derive(Debug, Clone)]
 pub struct Call {
     /// What is called.

@@ -14,9 +14,11 @@ mod form;
 mod image;
 mod interpreter;
 mod machine;
+mod notation;
 mod operation;
 mod scan;
 mod types;
+mod validate;
 mod visit;
 
 pub use self::cost::Cost;
@@ -34,3 +36,4 @@ pub use self::operation::{
 pub use self::types::{
     Array, Elementary, Enumeration, EnumerationId, Field, Structure, StructureId, Type,
 };
+pub use self::validate::Violation;

@@ -206,6 +206,17 @@ impl Type {
         }
     }
 
+    /// Whether a value of the other type can be stored as one of this: equal types, enumerations as their numbers, texts of whatever length.
+    pub fn is_stored_like(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Text(_), Self::Text(_)) => true,
+            _ => match (self.elementary(), other.elementary()) {
+                (Some(one), Some(other)) => one == other,
+                _ => self == other,
+            },
+        }
+    }
+
     /// Slots that a variable of it takes.
     pub fn slots(&self) -> u64 {
         match self {

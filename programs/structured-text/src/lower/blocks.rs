@@ -90,7 +90,8 @@ impl Layout {
         let slot = self.slots.min(u64::from(u32::MAX)) as u32;
         self.slots += if is_reference { 1 } else { resolved.of.slots() };
         if !is_reference && self.slots <= u64::from(MAXIMUM_SLOTS) {
-            self.image.put(u64::from(slot) * 64, &resolved.of, &resolved.image);
+            self.image
+                .put(u64::from(slot) * 64, &resolved.of, &resolved.image);
         }
         self.fields.push(Field {
             name: name.to_owned(),
@@ -190,7 +191,6 @@ impl<'a> Lowering<'a> {
         let info = StructureInfo {
             fields: fields.collect(),
             unit: Some(unit),
-            image: image.clone(),
         };
         let structure = Structure {
             name: found.name.as_str().to_owned(),
@@ -217,7 +217,10 @@ impl<'a> Lowering<'a> {
             class: declaration.class,
             is_retained: declaration.retained,
             description: declaration.description.clone(),
-            address: declaration.address.as_ref().map(|found| found.as_str().to_owned()),
+            address: declaration
+                .address
+                .as_ref()
+                .map(|found| found.as_str().to_owned()),
             symbol,
         };
         layout.block.members.insert(key.clone(), member);
@@ -241,7 +244,16 @@ impl<'a> Lowering<'a> {
                 return symbol;
             }
         }
-        let is_reference = declaration.class == Class::InOut;
+        // The VAR_IN_OUT of a PROGRAM is given no variable, and is one of its own.
+        let is_reference = declaration.class == Class::InOut && !is_program;
+        if declaration.class == Class::InOut && is_program {
+            let message = format!(
+                "nothing gives the VAR_IN_OUT `{}` of a PROGRAM a variable: it is one of its own",
+                declaration.name
+            );
+            let help = "declare it as VAR, or as VAR_GLOBAL";
+            self.warn("U1055", message, declaration.name.span(), help);
+        }
         let found = if is_reference {
             self.reference_type(&declaration.of)
         } else {
@@ -250,11 +262,6 @@ impl<'a> Lowering<'a> {
         let Some((resolved, is_open)) = found else {
             return Symbol::Faulty;
         };
-        if is_reference && is_program {
-            let message = format!("the PROGRAM has a VAR_IN_OUT `{}`, and nothing gives it a variable", declaration.name);
-            self.error_with("U1040", message, declaration.name.span(), "declare it as VAR");
-            return Symbol::Faulty;
-        }
         if declaration.address.is_some() {
             return self.located(declaration, &resolved);
         }
@@ -282,7 +289,12 @@ impl<'a> Lowering<'a> {
                 is_rising,
             });
         }
-        if matches!(declaration.class, Class::Input | Class::Output | Class::InOut) {
+        let is_parameter = match declaration.class {
+            Class::Input | Class::Output => true,
+            Class::InOut => is_reference,
+            _ => false,
+        };
+        if is_parameter {
             layout.block.parameters.push(Parameter {
                 name: name.to_owned(),
                 class: declaration.class,
@@ -318,10 +330,36 @@ impl<'a> Lowering<'a> {
         }
     }
 
+    /// A VAR_EXTERNAL of a library, whose VAR_GLOBAL stands in the programs that use it.
+    fn assumed(&mut self, declaration: &Declaration) -> Symbol {
+        let name = &declaration.name;
+        let found = self.resolve(&declaration.of);
+        let slot = found
+            .as_ref()
+            .and_then(|found| self.state(found.of.slots(), &name.span()));
+        let symbol = match (found, slot) {
+            (Some(found), Some(slot)) => Symbol::Variable(Rc::new(Variable {
+                name: name.as_str().to_owned(),
+                root: Root::Global(slot),
+                of: found.of,
+                class: Class::Global,
+                is_constant: declaration.constant,
+                is_point: false,
+                span: name.span(),
+            })),
+            _ => Symbol::Faulty,
+        };
+        self.globals.insert(name.key(), symbol.clone());
+        symbol
+    }
+
     /// A VAR_EXTERNAL is the global variable of its name.
     pub(super) fn external(&mut self, declaration: &Declaration) -> Symbol {
         let name = &declaration.name;
         let Some(found) = self.global(&name.key()) else {
+            if self.is_library {
+                return self.assumed(declaration);
+            }
             let message = format!("`{name}` is VAR_EXTERNAL, and no VAR_GLOBAL has that name");
             let help = "declare it with VAR_GLOBAL in the file";
             self.error_with("U1041", message, name.span(), help);

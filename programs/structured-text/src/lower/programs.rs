@@ -3,13 +3,17 @@
 use std::rc::Rc;
 
 use understudy_text::spelling;
-use understudy_typed::{Elementary, Root, Task, Type, Variable as Shown};
+use understudy_typed::{
+    Elementary, Root, Routine as Lowered, RoutineId, RoutineKind, Statement, StatementKind, Task, Type,
+    Variable as Shown,
+};
 
-use crate::syntax::{Class, Declaration, File, Name, Span, Unit, UnitKind};
+use crate::syntax::{Argument, Class, Declaration, File, Name, Span, Unit, UnitKind};
 
-use super::blocks::{Block, Key};
+use super::blocks::{Block, Key, Routine};
 use super::images::initial;
 use super::names::{Owner, Symbol, Variable};
+use super::places::{load, place};
 use super::types::{Resolved, TypeState};
 use super::{DEFAULT_PERIOD, Lowering, Options};
 
@@ -20,6 +24,8 @@ struct Instance<'a> {
     /// Nanoseconds, and how urgent it is.
     interval: Option<i64>,
     priority: i64,
+    /// What its inputs and outputs are connected to.
+    connections: &'a [Argument],
 }
 
 impl<'a> Lowering<'a> {
@@ -228,7 +234,9 @@ impl<'a> Lowering<'a> {
         let is_program = |unit: &&Unit| unit.kind == UnitKind::Program;
         let programs: Vec<&Unit> = file.units.iter().filter(is_program).collect();
         if programs.is_empty() {
-            if options.program.is_some() || file.units.is_empty() {
+            self.is_library = true;
+            let is_empty = file.units.is_empty() && file.types.is_empty() && file.globals.is_empty();
+            if options.program.is_some() || is_empty {
                 let message = "the file has no PROGRAM";
                 self.error_with("U1051", message, 0..0, "add a PROGRAM that calls its blocks");
             }
@@ -272,6 +280,7 @@ impl<'a> Lowering<'a> {
             unit: index,
             interval: None,
             priority: 0,
+            connections: &[],
         };
         if let Some(chosen) = options.program {
             let found = programs.iter().find(|program| program.name.is(chosen));
@@ -317,6 +326,7 @@ impl<'a> Lowering<'a> {
             };
             let mut instance = whole(unit, self.unit_names[&unit.name.key()]);
             instance.name = &declared.name;
+            instance.connections = &declared.connections;
             instance.priority = i64::MAX;
             if let Some(name) = &declared.task {
                 let Some(task) = file.tasks.iter().find(|task| task.name == *name) else {
@@ -378,8 +388,9 @@ impl<'a> Lowering<'a> {
             return;
         };
         self.program.initial.extend(initial(&block.image, own));
+        let connected = self.connected(instance, &routine, &block);
         self.program.tasks.push(Task {
-            routine: routine.id,
+            routine: connected.unwrap_or(routine.id),
             own,
             every,
         });
@@ -387,10 +398,63 @@ impl<'a> Lowering<'a> {
             true => format!("{}.", instance.name),
             false => String::new(),
         };
-        self.program_variables(&block, own, &prefix);
+        self.program_variables(&block, own, &prefix, instance.connections);
     }
 
-    fn program_variables(&mut self, block: &Block, own: u32, prefix: &str) {
+    /// A routine that copies what the program is connected to, before and behind its body.
+    fn connected(
+        &mut self,
+        instance: &Instance<'a>,
+        routine: &Routine,
+        block: &Block,
+    ) -> Option<RoutineId> {
+        if instance.connections.is_empty() {
+            return None;
+        }
+        let id = RoutineId(self.program.routines.len() as u32);
+        self.scope.symbols = Some(Rc::default());
+        self.scope.routine = id.0;
+        let whole = place(Root::Own(0), block.of.clone());
+        let name = instance.name.as_str();
+        let bound = self.bind(name, &routine.parameters, instance.connections, &instance.name.span());
+        let mut body = Vec::new();
+        let line = self.line(&instance.name.span());
+        if let Some(bound) = bound {
+            for (at, value) in &bound.given {
+                let parameter = &routine.parameters[*at];
+                let to = place(Root::Own(parameter.slot), parameter.of.clone());
+                let value = self.expression(value, &parameter.of);
+                let kind = value.map(|value| StatementKind::Assign(to, value));
+                body.extend(kind.map(|kind| Statement { line, kind }));
+            }
+            let kind = StatementKind::Invoke(routine.id, whole);
+            body.push(Statement { line, kind });
+            for (at, path, negated) in &bound.taken {
+                let parameter = &routine.parameters[*at];
+                let value = load(place(Root::Own(parameter.slot), parameter.of.clone()));
+                let kind = self.take_output(value, path, *negated);
+                body.extend(kind.map(|kind| Statement { line, kind }));
+            }
+        }
+        self.scope = super::names::Scope::default();
+        self.calls.push(vec![(routine.id.0, instance.name.span())]);
+        self.program.routines.push(Lowered {
+            name: name.to_owned(),
+            kind: RoutineKind::Block,
+            frame: (self.program.frames, 0),
+            initial: Vec::new(),
+            body,
+        });
+        Some(id)
+    }
+
+    fn program_variables(
+        &mut self,
+        block: &Block,
+        own: u32,
+        prefix: &str,
+        connections: &[Argument],
+    ) {
         for name in &block.order {
             let Some(member) = block.members.get(name) else {
                 continue;
@@ -398,6 +462,10 @@ impl<'a> Lowering<'a> {
             let Symbol::Variable(variable) = &member.symbol else {
                 continue;
             };
+            // Memories that no person declared, as of charts.
+            if variable.name.contains('.') {
+                continue;
+            }
             let parameter = block.parameters.iter().find(|found| found.name == variable.name);
             let slot = match (variable.root, parameter) {
                 (_, Some(parameter)) => own + parameter.slot,
@@ -406,7 +474,12 @@ impl<'a> Lowering<'a> {
                 _ => continue,
             };
             let shown = format!("{prefix}{}", variable.name);
-            if matches!(variable.root, Root::Own(_))
+            let is_connected = connections.iter().any(|connection| match connection {
+                Argument::Given(name, _) | Argument::Taken { from: name, .. } => name.is(&variable.name),
+                Argument::Placed(_) => false,
+            });
+            if !is_connected
+                && matches!(variable.root, Root::Own(_))
                 && let Class::Input | Class::Output = member.class
             {
                 self.point(&shown, variable, slot, member.class == Class::Input);
@@ -439,7 +512,10 @@ impl<'a> Lowering<'a> {
 
     /// Lowers each unit of a file without a PROGRAM by itself.
     fn library(&mut self, file: &'a File) -> Vec<String> {
-        let mut checked = Vec::new();
+        let types = file.types.iter().map(|definition| &definition.name);
+        let globals = file.globals.iter().map(|declaration| &declaration.name);
+        let names = types.chain(globals);
+        let mut checked: Vec<String> = names.map(|name| name.as_str().to_owned()).collect();
         for unit in &file.units {
             let index = self.unit_names[&unit.name.key()];
             let class = (unit.kind == UnitKind::FunctionBlock).then_some(index);

@@ -89,7 +89,7 @@ impl Parser<'_> {
         })
     }
 
-    fn operand(&mut self) -> Expression {
+    pub(super) fn operand(&mut self) -> Expression {
         let start = self.span().start;
         let kind = match self.peek() {
             Lexeme::Sign("+") => {

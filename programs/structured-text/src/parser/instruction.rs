@@ -186,7 +186,8 @@ impl Parser<'_> {
                 let kind = ExpressionKind::Variable(path);
                 Expression { kind, span }
             }
-            _ => self.deeper(Self::expression),
+            // What follows on the next line is no operator of this one.
+            _ => self.deeper(Self::operand),
         }
     }
 }

@@ -56,6 +56,17 @@ pub(super) enum Code {
     And,
     Or,
     Xor,
+    /// a := b AND NOT c
+    AndNot,
+    /// a := d + b · c, where d is operand a of the [`Code::Data`] that follows; each operation is rounded.
+    MultiplyAdd32,
+    MultiplyAddReal,
+    MultiplyAddLreal,
+    /// a := d − b · c
+    MultiplySubtractReal,
+    MultiplySubtractLreal,
+    /// Belongs to the instruction before it.
+    Data,
     /// `extra` is the width.
     ShiftLeft,
     ShiftRight,

@@ -1,0 +1,89 @@
+//! The machine is the interpreter, bit for bit: over random programs, inputs, faults and resets.
+
+mod common;
+
+use common::Random;
+use proptest::prelude::*;
+use understudy_typed::{Fault, Interpreter, Machine, Program, Scratch};
+
+/// What the scans of a program came to.
+#[derive(Debug, Default)]
+struct Account {
+    scans: u64,
+    faults: [u64; 8],
+    resets: u64,
+}
+
+/// Runs both engines side by side.
+fn compare(program: &Program, seed: u64, scans: usize, account: &mut Account) {
+    assert_eq!(program.validate(), Ok(()));
+    let interpreter = Interpreter::new(program);
+    let machine = Machine::new(program);
+    assert_eq!(machine.initial(), interpreter.initial());
+    let mut random = Random(seed);
+    let mut scratch = Scratch::default();
+    let mut expected = interpreter.initial().to_vec();
+    let mut state = expected.clone();
+    let mut inputs = vec![0; machine.input_count().div_ceil(64)];
+    let mut outputs = vec![0; machine.output_count().div_ceil(64)];
+    let mut expected_outputs = outputs.clone();
+    for scan in 0..scans {
+        inputs.fill(0);
+        for point in &program.inputs {
+            let value = match point.slot {
+                0 => u64::from(random.percent(40)),
+                _ => random.value(point.of),
+            };
+            point.set(&mut inputs, value);
+        }
+        let was_faulted = state[0] != 0;
+        let before = state.clone();
+        interpreter.step(&mut expected, &inputs, &mut expected_outputs);
+        machine.step(&mut scratch, &mut state, &inputs, &mut outputs);
+        if expected != state || expected_outputs != outputs {
+            let at = expected.iter().zip(&state).position(|(a, b)| a != b);
+            panic!(
+                "scan {scan}, slot {at:?}: {:?} and {:?}\n{program:#?}",
+                Fault::read(&expected).map(|fault| (fault, fault.describe(program))),
+                Fault::read(&state).map(|fault| (fault, fault.describe(program))),
+            );
+        }
+        account.scans += 1;
+        let fault = Fault::read(&state);
+        if let (Some(fault), false) = (fault, was_faulted) {
+            account.faults[usize::from(fault.cause.code())] += 1;
+            assert!(fault.routine.is_none() || fault.line > 0, "{fault:?}");
+            assert_eq!(before[3..], state[3..], "the state before the scan");
+        }
+        account.resets += u64::from(was_faulted && fault.is_none());
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 300,
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn the_machine_is_the_interpreter(seed in any::<u64>(), statements in 1_usize..12) {
+        let program = common::program(seed, statements);
+        compare(&program, seed, 12, &mut Account::default());
+    }
+}
+
+#[test]
+fn random_programs_fault_in_every_way_and_run_besides() {
+    let mut account = Account::default();
+    for seed in 0..400 {
+        let program = common::program(seed, 8);
+        compare(&program, seed, 10, &mut account);
+    }
+    let faults: u64 = account.faults.iter().sum();
+    assert!(faults < account.scans / 2, "{account:?}");
+    assert!(
+        account.faults[1..].iter().all(|&count| count > 0),
+        "{account:?}"
+    );
+    assert!(account.resets > 20, "{account:?}");
+}
