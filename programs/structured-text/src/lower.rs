@@ -10,6 +10,7 @@ mod calls;
 mod chains;
 mod constants;
 mod convert;
+mod expand;
 mod fold;
 mod images;
 mod initial;
@@ -80,7 +81,10 @@ pub struct Lowered {
 /// Lowers the programs of a file, or checks the units of a library.
 pub fn lower(file: &File, options: &Options<'_>) -> Lowered {
     let library = library::file();
+    let mut found = Vec::new();
+    let file = &*expand::expand(file, &mut found);
     let mut lowering = Lowering::new(file, library, options.text);
+    lowering.diagnostics = found;
     lowering.declare(file, library);
     let checked = lowering.programs(file, options);
     lowering.finish(checked)

@@ -1,7 +1,10 @@
 //! What the tests of several crates share: skipped tests, random numbers, random programs and tables of states.
 
+mod folder;
 pub mod random;
 pub mod states;
+
+pub use folder::Folder;
 
 use std::fmt::Display;
 use std::fs::OpenOptions;

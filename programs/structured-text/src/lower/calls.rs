@@ -561,7 +561,7 @@ impl<'a> Lowering<'a> {
         false
     }
 
-    fn take_output(
+    pub(super) fn take_output(
         &mut self,
         value: Expression,
         path: &Path,

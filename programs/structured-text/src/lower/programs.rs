@@ -3,13 +3,17 @@
 use std::rc::Rc;
 
 use understudy_text::spelling;
-use understudy_typed::{Elementary, Root, Task, Type, Variable as Shown};
+use understudy_typed::{
+    Elementary, Root, Routine as Lowered, RoutineId, RoutineKind, Statement, StatementKind, Task, Type,
+    Variable as Shown,
+};
 
-use crate::syntax::{Class, Declaration, File, Name, Span, Unit, UnitKind};
+use crate::syntax::{Argument, Class, Declaration, File, Name, Span, Unit, UnitKind};
 
-use super::blocks::{Block, Key};
+use super::blocks::{Block, Key, Routine};
 use super::images::initial;
 use super::names::{Owner, Symbol, Variable};
+use super::places::{load, place};
 use super::types::{Resolved, TypeState};
 use super::{DEFAULT_PERIOD, Lowering, Options};
 
@@ -20,6 +24,8 @@ struct Instance<'a> {
     /// Nanoseconds, and how urgent it is.
     interval: Option<i64>,
     priority: i64,
+    /// What its inputs and outputs are connected to.
+    connections: &'a [Argument],
 }
 
 impl<'a> Lowering<'a> {
@@ -97,10 +103,7 @@ impl<'a> Lowering<'a> {
                 name: name.to_owned(),
                 of: variable.of.clone(),
                 slot,
-                address: declaration
-                    .address
-                    .as_ref()
-                    .map(|found| found.as_str().to_owned()),
+                address: declaration.address.as_ref().map(|found| found.as_str().to_owned()),
                 description: declaration.description.clone(),
                 is_retained: declaration.retained,
             });
@@ -143,25 +146,19 @@ impl<'a> Lowering<'a> {
     }
 
     fn at_address(&mut self, name: &Name, address: &Name, resolved: &Resolved) -> Option<Symbol> {
-        let kind = address
-            .as_str()
-            .chars()
-            .nth(1)
-            .map(|kind| kind.to_ascii_uppercase());
+        let kind = address.as_str().chars().nth(1).map(|kind| kind.to_ascii_uppercase());
         let is_input = kind == Some('I');
         let is_point = is_input || kind == Some('Q');
         if !is_point && kind != Some('M') {
             let message = format!("`{address}` is not an address");
-            let help =
-                "write an input such as %IX0.0, an output such as %QW3 or a memory such as %MD8";
+            let help = "write an input such as %IX0.0, an output such as %QW3 or a memory such as %MD8";
             self.error_with("U1083", message, address.span(), help);
             return None;
         }
         let elementary = resolved.of.elementary();
         if is_point && elementary.is_none() {
             let found = self.describe(&resolved.of);
-            let message =
-                format!("`{name}` at {address} is {found}; a point is one number, bit or time");
+            let message = format!("`{name}` at {address} is {found}; a point is one number, bit or time");
             let help = "declare each element as a variable with an address of its own";
             self.error_with("U1083", message, name.span(), help);
             return None;
@@ -177,10 +174,7 @@ impl<'a> Lowering<'a> {
                 false => &mut self.program.outputs,
             };
             let mut shown = name.as_str().to_owned();
-            if points
-                .iter()
-                .any(|point| point.name.eq_ignore_ascii_case(&shown))
-            {
+            if points.iter().any(|point| point.name.eq_ignore_ascii_case(&shown)) {
                 shown = format!("{name} {address}");
             }
             points.push(shown, of, slot);
@@ -241,16 +235,10 @@ impl<'a> Lowering<'a> {
         let programs: Vec<&Unit> = file.units.iter().filter(is_program).collect();
         if programs.is_empty() {
             self.is_library = true;
-            let is_empty =
-                file.units.is_empty() && file.types.is_empty() && file.globals.is_empty();
+            let is_empty = file.units.is_empty() && file.types.is_empty() && file.globals.is_empty();
             if options.program.is_some() || is_empty {
                 let message = "the file has no PROGRAM";
-                self.error_with(
-                    "U1051",
-                    message,
-                    0..0,
-                    "add a PROGRAM that calls its blocks",
-                );
+                self.error_with("U1051", message, 0..0, "add a PROGRAM that calls its blocks");
             }
             return self.library(file);
         }
@@ -258,10 +246,7 @@ impl<'a> Lowering<'a> {
         if instances.is_empty() {
             return Vec::new();
         }
-        let base = instances
-            .iter()
-            .filter_map(|instance| instance.interval)
-            .min();
+        let base = instances.iter().filter_map(|instance| instance.interval).min();
         self.program.period = options.period.or(base).unwrap_or(DEFAULT_PERIOD);
         let name = instances[0].name;
         self.program.name = match instances.len() {
@@ -295,6 +280,7 @@ impl<'a> Lowering<'a> {
             unit: index,
             interval: None,
             priority: 0,
+            connections: &[],
         };
         if let Some(chosen) = options.program {
             let found = programs.iter().find(|program| program.name.is(chosen));
@@ -340,6 +326,7 @@ impl<'a> Lowering<'a> {
             };
             let mut instance = whole(unit, self.unit_names[&unit.name.key()]);
             instance.name = &declared.name;
+            instance.connections = &declared.connections;
             instance.priority = i64::MAX;
             if let Some(name) = &declared.task {
                 let Some(task) = file.tasks.iter().find(|task| task.name == *name) else {
@@ -367,10 +354,7 @@ impl<'a> Lowering<'a> {
     /// In every so many-th scan a task runs.
     fn every(&mut self, name: &Name, interval: i64, base: i64) -> u32 {
         let times = interval.checked_div(base).unwrap_or(0);
-        if base > 0
-            && interval % base == 0
-            && let Ok(times) = u32::try_from(times)
-        {
+        if base > 0 && interval % base == 0 && let Ok(times) = u32::try_from(times) {
             return times.max(1);
         }
         let shown = |nanoseconds: i64| format!("{} ms", nanoseconds as f64 / 1e6);
@@ -404,8 +388,9 @@ impl<'a> Lowering<'a> {
             return;
         };
         self.program.initial.extend(initial(&block.image, own));
+        let connected = self.connected(instance, &routine, &block);
         self.program.tasks.push(Task {
-            routine: routine.id,
+            routine: connected.unwrap_or(routine.id),
             own,
             every,
         });
@@ -413,10 +398,63 @@ impl<'a> Lowering<'a> {
             true => format!("{}.", instance.name),
             false => String::new(),
         };
-        self.program_variables(&block, own, &prefix);
+        self.program_variables(&block, own, &prefix, instance.connections);
     }
 
-    fn program_variables(&mut self, block: &Block, own: u32, prefix: &str) {
+    /// A routine that copies what the program is connected to, before and behind its body.
+    fn connected(
+        &mut self,
+        instance: &Instance<'a>,
+        routine: &Routine,
+        block: &Block,
+    ) -> Option<RoutineId> {
+        if instance.connections.is_empty() {
+            return None;
+        }
+        let id = RoutineId(self.program.routines.len() as u32);
+        self.scope.symbols = Some(Rc::default());
+        self.scope.routine = id.0;
+        let whole = place(Root::Own(0), block.of.clone());
+        let name = instance.name.as_str();
+        let bound = self.bind(name, &routine.parameters, instance.connections, &instance.name.span());
+        let mut body = Vec::new();
+        let line = self.line(&instance.name.span());
+        if let Some(bound) = bound {
+            for (at, value) in &bound.given {
+                let parameter = &routine.parameters[*at];
+                let to = place(Root::Own(parameter.slot), parameter.of.clone());
+                let value = self.expression(value, &parameter.of);
+                let kind = value.map(|value| StatementKind::Assign(to, value));
+                body.extend(kind.map(|kind| Statement { line, kind }));
+            }
+            let kind = StatementKind::Invoke(routine.id, whole);
+            body.push(Statement { line, kind });
+            for (at, path, negated) in &bound.taken {
+                let parameter = &routine.parameters[*at];
+                let value = load(place(Root::Own(parameter.slot), parameter.of.clone()));
+                let kind = self.take_output(value, path, *negated);
+                body.extend(kind.map(|kind| Statement { line, kind }));
+            }
+        }
+        self.scope = super::names::Scope::default();
+        self.calls.push(vec![(routine.id.0, instance.name.span())]);
+        self.program.routines.push(Lowered {
+            name: name.to_owned(),
+            kind: RoutineKind::Block,
+            frame: (self.program.frames, 0),
+            initial: Vec::new(),
+            body,
+        });
+        Some(id)
+    }
+
+    fn program_variables(
+        &mut self,
+        block: &Block,
+        own: u32,
+        prefix: &str,
+        connections: &[Argument],
+    ) {
         for name in &block.order {
             let Some(member) = block.members.get(name) else {
                 continue;
@@ -424,10 +462,11 @@ impl<'a> Lowering<'a> {
             let Symbol::Variable(variable) = &member.symbol else {
                 continue;
             };
-            let parameter = block
-                .parameters
-                .iter()
-                .find(|found| found.name == variable.name);
+            // Memories that no person declared, as of charts.
+            if variable.name.contains('.') {
+                continue;
+            }
+            let parameter = block.parameters.iter().find(|found| found.name == variable.name);
             let slot = match (variable.root, parameter) {
                 (_, Some(parameter)) => own + parameter.slot,
                 (Root::Own(slot), None) => own + slot,
@@ -435,7 +474,12 @@ impl<'a> Lowering<'a> {
                 _ => continue,
             };
             let shown = format!("{prefix}{}", variable.name);
-            if matches!(variable.root, Root::Own(_))
+            let is_connected = connections.iter().any(|connection| match connection {
+                Argument::Given(name, _) | Argument::Taken { from: name, .. } => name.is(&variable.name),
+                Argument::Placed(_) => false,
+            });
+            if !is_connected
+                && matches!(variable.root, Root::Own(_))
                 && let Class::Input | Class::Output = member.class
             {
                 self.point(&shown, variable, slot, member.class == Class::Input);
@@ -454,8 +498,7 @@ impl<'a> Lowering<'a> {
     fn point(&mut self, name: &str, variable: &Variable, slot: u32, is_input: bool) {
         let Some(of) = variable.of.elementary() else {
             let found = self.describe(&variable.of);
-            let message =
-                format!("`{name}` is a point of {found}; a point is one number, bit or time");
+            let message = format!("`{name}` is a point of {found}; a point is one number, bit or time");
             let help = "declare each of its parts as an input or output, or use VAR";
             self.error_with("U1083", message, variable.span.clone(), help);
             return;
@@ -522,11 +565,7 @@ impl<'a> Lowering<'a> {
 /// An address in capitals, with the X that may be left out.
 fn normal(address: &str) -> String {
     let mut key = address.to_ascii_uppercase();
-    if key
-        .chars()
-        .nth(2)
-        .is_some_and(|digit| digit.is_ascii_digit())
-    {
+    if key.chars().nth(2).is_some_and(|digit| digit.is_ascii_digit()) {
         key.insert(2, 'X');
     }
     key

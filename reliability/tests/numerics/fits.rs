@@ -1,38 +1,21 @@
+use rand::RngExt;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
-use understudy_reliability::{
-    BoxKind, Hours, Law, Null, Probability, Rule, System, ThreeState, fit,
-};
+use understudy_reliability::{AfterFailure, Law, Null, Rule, fit};
 
-fn model(mttr: f64) -> ThreeState {
-    ThreeState::new(3, 1e-4, 1.0 / mttr).expect("a model")
-}
+use crate::support::system;
 
-/// The law of the same model, from its chain.
+/// The law of the paper's model with three controllers, MTBF 10,000 h.
 fn law(mttr: f64) -> Law {
-    let kind = |name: &str, count| BoxKind {
-        name: name.into(),
-        count,
-        mtbf: Hours::new("mtbf", 10_000.0).expect("a time"),
-        mttr: Hours::new("mttr", mttr).expect("a time"),
-    };
-    let system = System {
-        controllers: vec![kind("controllers", 3)],
-        understudies: kind("understudy", 1),
-        groups: 1,
-        rule: Rule::Paper,
-        crews: None,
-        coverage: Probability::ONE,
-        detection: None,
-        common_cause: None,
-        shared: Vec::new(),
-    };
+    let system = system(3, 1, Rule::Paper, 10_000.0, mttr);
     Law::of_chain(&system.chain().expect("a chain")).expect("a law")
 }
 
-fn sample(model: &ThreeState, count: usize, seed: u64) -> Vec<f64> {
+fn sample(law: &Law, count: usize, seed: u64) -> Vec<f64> {
     let mut random = Pcg64::seed_from_u64(seed);
-    (0..count).map(|_| model.draw(&mut random)).collect()
+    (0..count)
+        .map(|_| law.quantile(random.random::<f64>()))
+        .collect()
 }
 
 #[test]
@@ -40,7 +23,7 @@ fn critical_values_are_those_of_the_literature_where_there_are_any() {
     // At long odds the law is exponential. Stephens (1974): A² at 5 % is 2.492 where the law is known and 1.321/(1 + 0.6/n) where its
     // mean was fitted; D is 1.358/√n where known (n large), and about 1.094/√n (Lilliefors 1969) where fitted.
     let law = law(0.01);
-    let hours = sample(&model(0.01), 100, 1);
+    let hours = sample(&law, 100, 1);
     let mut random = Pcg64::seed_from_u64(2);
     let known = fit(&hours, &law, Null::Specified, 4_000, &mut random).expect("a fit");
     assert!(
@@ -64,12 +47,12 @@ fn critical_values_are_those_of_the_literature_where_there_are_any() {
 
 #[test]
 fn a_true_law_is_rejected_as_often_as_promised() {
-    let (law, model) = (law(5_000.0), model(5_000.0));
+    let law = law(5_000.0);
     for null in [Null::Specified, Null::ScaleFitted] {
         let rejected = (0..200)
             .filter(|&seed| {
                 let mut random = Pcg64::seed_from_u64(1_000 + seed);
-                let hours = sample(&model, 30, seed);
+                let hours = sample(&law, 30, seed);
                 fit(&hours, &law, null, 200, &mut random)
                     .expect("a fit")
                     .anderson_darling_p
@@ -84,7 +67,7 @@ fn a_true_law_is_rejected_as_often_as_promised() {
 #[test]
 fn an_exponential_law_is_told_from_a_hypoexponential_one() {
     // Strong acceleration: repair is slow, and short times are rarer than in an exponential law of the same mean.
-    let hypoexponential = model(5_000.0);
+    let hypoexponential = law(5_000.0);
     let exponential = law(1e-3);
     let mut random = Pcg64::seed_from_u64(3);
     let found = fit(
@@ -98,16 +81,22 @@ fn an_exponential_law_is_told_from_a_hypoexponential_one() {
 }
 
 #[test]
-fn the_law_of_a_chain_is_that_of_its_closed_form() {
-    let (law, model) = (law(500.0), model(500.0));
-    for step in 1..100 {
-        let hours = model.mttf() * f64::from(step) / 20.0;
-        let found = law.unreliability(hours);
+fn the_table_of_a_law_is_that_of_its_chain() {
+    let law = law(500.0);
+    let chain = system(3, 1, Rule::Paper, 10_000.0, 500.0)
+        .chain()
+        .expect("a chain");
+    let times: Vec<f64> = (1..100)
+        .map(|step| law.mean() * f64::from(step) / 20.0)
+        .collect();
+    let exact = chain.transients(&times, AfterFailure::Final).expect("P(t)");
+    for (hours, exact) in times.into_iter().zip(exact) {
         assert!(
-            (found - model.unreliability(hours)).abs() < 1e-5,
-            "{hours}: {found}"
+            (law.unreliability(hours) - exact.failed).abs() < 1e-5,
+            "{hours}"
         );
-        let share = f64::from(step) / 100.0;
+    }
+    for share in (1..100).map(|step| f64::from(step) / 100.0) {
         assert!((law.unreliability(law.quantile(share)) - share).abs() < 1e-12);
     }
 }

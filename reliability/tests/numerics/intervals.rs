@@ -1,25 +1,8 @@
-use serde_json::Value;
 use understudy_reliability::{
-    BoxKind, Hours, Interval, Probability, Rule, Stopped, System, acceleration_bias, mean_time,
-    proportion, times_to_failure,
+    Hours, Interval, Rule, Stopped, acceleration_bias, mean_time, proportion, times_to_failure,
 };
 
-fn fixture() -> Value {
-    let text = include_str!("../fixtures/high-precision.json");
-    serde_json::from_str(text).expect("the fixture is JSON")
-}
-
-fn check(found: f64, expected: f64, precision: f64, what: &str) {
-    let error = (found / expected - 1.0).abs();
-    assert!(
-        error <= precision,
-        "{what}: {found} instead of {expected}, wrong by {error:e}"
-    );
-}
-
-fn number(value: &Value, key: &str) -> f64 {
-    value[key].as_f64().expect("a number")
-}
+use crate::support::{check_within as check, fixture, number, system};
 
 #[test]
 fn mean_times_have_the_quantiles_of_chi_squared() {
@@ -124,24 +107,7 @@ fn the_exact_interval_is_exact() {
 
 #[test]
 fn acceleration_is_honest_about_detection() {
-    let hours = |value| Hours::new("a time", value).expect("a time");
-    let kind = |name: &str, count| BoxKind {
-        name: name.into(),
-        count,
-        mtbf: hours(10_000.0),
-        mttr: hours(24.0),
-    };
-    let system = System {
-        controllers: vec![kind("controllers", 2)],
-        understudies: kind("understudy", 1),
-        groups: 1,
-        rule: Rule::AsBuilt,
-        crews: None,
-        coverage: Probability::ONE,
-        detection: None,
-        common_cause: None,
-        shared: Vec::new(),
-    };
+    let system = system(2, 1, Rule::AsBuilt, 10_000.0, 24.0);
     let detection: Hours = "50ms".parse().expect("a time");
     let slow = acceleration_bias(&system, detection, 1.0, false).expect("a bias");
     assert_eq!(slow.relative, 0.0);
