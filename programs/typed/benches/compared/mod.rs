@@ -9,8 +9,11 @@ use understudy_typed::{Machine, Program, Scratch};
 
 use crate::programs;
 
-/// Scans of each measurement.
-const SCANS: u32 = 2_000;
+/// Scans of a measurement, few enough that some measurements are not interrupted.
+const SCANS: u32 = 10;
+
+/// Measurements, of which the shortest counts.
+const RUNS: u32 = 5_000;
 
 const C: &str = r#"
 #include <stdint.h>
@@ -55,13 +58,13 @@ static double seconds(void) {
 
 static void measure(void (*scan)(void)) {
     double best = 1e9;
-    for (int run = 0; run < 5; run++) {
+    for (int run = 0; run < RUNS; run++) {
         double start = seconds();
-        for (int k = 0; k < 2000; k++) scan();
+        for (int k = 0; k < SCANS; k++) scan();
         double took = seconds() - start;
         if (took < best) best = took;
     }
-    printf("%.9f\n", best / 2000);
+    printf("%.12f\n", best / SCANS);
 }
 
 int main(void) {
@@ -110,13 +113,13 @@ pub(crate) fn print() {
     }
 }
 
-/// Seconds of a scan, the best of five runs.
+/// Seconds of a scan, the best of all measurements.
 fn machine(program: &Program) -> f64 {
     let machine = Machine::new(program);
     let mut scratch = Scratch::default();
     let mut state = machine.initial().to_vec();
     let mut best = Duration::MAX;
-    for _ in 0..5 {
+    for _ in 0..RUNS {
         #[allow(clippy::disallowed_methods, reason = "a measurement")]
         let start = std::time::Instant::now();
         for _ in 0..SCANS {
@@ -144,7 +147,10 @@ fn c() -> Option<Vec<f64>> {
         .stderr(Stdio::null())
         .spawn()
         .ok()?;
-    let source = C.replace("RUNGS", &rungs);
+    let source = C
+        .replace("RUNGS", &rungs)
+        .replace("RUNS", &RUNS.to_string())
+        .replace("SCANS", &SCANS.to_string());
     gcc.stdin.take()?.write_all(source.as_bytes()).ok()?;
     let is_compiled = gcc.wait().ok()?.success();
     let output = is_compiled.then(|| Command::new(&program).output());

@@ -349,14 +349,13 @@ impl Run<'_> {
                     let element = &tables.elements[c as usize];
                     let offset = element!(element) + u64::from(element.bit);
                     let from = slot!(element.base) + (offset / 64) as usize;
-                    let mask = mask(element.bits as u16);
-                    set!(a, row[from] >> (offset % 64) & mask);
+                    set!(a, row[from] >> (offset % 64) & element.mask);
                 }
                 Code::StorePacked => {
                     let element = &tables.elements[c as usize];
                     let offset = element!(element) + u64::from(element.bit);
                     let to = slot!(element.base) + (offset / 64) as usize;
-                    let mask = mask(element.bits as u16);
+                    let mask = element.mask;
                     let value = get!(a) & mask;
                     let word = &mut row[to];
                     *word = *word & !(mask << (offset % 64)) | value << (offset % 64);

@@ -20,14 +20,22 @@ pub(super) fn extend(value: u64, unused: u32) -> i64 {
 #[inline]
 pub(super) fn offset(element: &Element, index: u64) -> Result<u64, Cause> {
     let index = extend(index, element.extension);
-    if index < element.low || index > element.high {
-        let is_below = index < element.low;
-        return Err(Cause::IndexOutOfRange {
-            index,
-            bound: if is_below { element.low } else { element.high },
-        });
+    let from_first = index.wrapping_sub(element.low) as u64;
+    if from_first > element.span {
+        return Err(outside(element, index));
     }
-    Ok((index.wrapping_sub(element.low) as u64).wrapping_mul(element.stride))
+    Ok(from_first.wrapping_mul(element.stride))
+}
+
+/// The fault of an index outside its array.
+#[cold]
+fn outside(element: &Element, index: i64) -> Cause {
+    let bound = if index < element.low {
+        element.low
+    } else {
+        element.low.wrapping_add(element.span as i64)
+    };
+    Cause::IndexOutOfRange { index, bound }
 }
 
 /// The counter behind a turn; `None` where it would leave its type.
