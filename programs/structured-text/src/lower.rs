@@ -4,13 +4,17 @@
 //! it is called. A name is looked up in the unit, then among the global variables, the values of enumerations and the units. A body is
 //! lowered once for each block that has it, so a method of a base calls the methods of the block it runs on.
 
+mod addresses;
+mod arguments;
 mod blocks;
 mod body;
+mod callees;
 mod calls;
 mod chains;
 mod constants;
 mod convert;
 mod expand;
+mod expressions;
 mod fold;
 mod images;
 mod initial;
@@ -21,6 +25,7 @@ mod programs;
 mod routines;
 mod standard;
 mod statements;
+mod times;
 mod types;
 
 use std::collections::HashMap;
