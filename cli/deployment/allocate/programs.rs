@@ -11,7 +11,6 @@ use understudy_text::Report;
 
 use crate::answer::{Answer, Status};
 use crate::files;
-use crate::kind::Kind;
 
 /// Programs of the command line.
 pub(crate) struct Programs {
