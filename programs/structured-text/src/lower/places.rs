@@ -154,9 +154,7 @@ impl Lowering<'_> {
 
     /// `THIS^.speed`
     fn own_part(&mut self, path: &Path) -> Option<Target> {
-        let Some(own) = self.own_block(&path.root) else {
-            return None;
-        };
+        let own = self.own_block(&path.root)?;
         let steps = match path.steps.as_slice() {
             [Step::Follow, rest @ ..] => rest,
             rest => rest,
