@@ -5,6 +5,7 @@ pub(crate) mod convert;
 mod draw;
 mod init;
 mod parity;
+mod scan;
 pub(crate) mod verify;
 
 use crate::commands::{Group, command};
@@ -20,6 +21,7 @@ pub(crate) fn group() -> Group {
             command("parity", |it, _| parity::run(&it)),
             command("convert", |it, _| convert::run(&it)),
             command("draw", |it, _| draw::run(&it)),
+            command("scan", |it, _| scan::run(&it)),
         ],
     }
 }

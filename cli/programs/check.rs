@@ -10,7 +10,7 @@ use std::time::Duration;
 use clap::Args;
 use serde::Serialize;
 use understudy_cluster::{Cluster, Overrides};
-use understudy_interchange::{parse_program, unknown_form};
+use understudy_interchange::{Source, Wanted, read_source, unknown_form};
 use understudy_journal::Members;
 use understudy_scenarios::read;
 use understudy_supervisor::ladder::read_map;
@@ -18,6 +18,7 @@ use understudy_supervisor::petri::read_net;
 use understudy_supervisor::read_ads;
 use understudy_text::duration;
 use understudy_text::{Diagnostic, Report, Severity, has_errors};
+use understudy_typed::{Cost, Program};
 
 use crate::answer::{Answer, Failure, Status};
 use crate::files::{self, read_cluster};
@@ -41,6 +42,9 @@ pub(crate) struct Arguments {
     /// Ladder programs (.ladder), TCT automata (.ADS), and clusters, scenarios, models, nets, signal maps and projects (.toml)
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
+    /// The program to check in a text with several programs and no configuration
+    #[arg(long, value_name = "NAME")]
+    program: Option<String>,
     /// Time limit for the optional checks of large programs
     #[arg(long, value_name = "TIME", default_value = "1s", value_parser = duration::parse)]
     budget: Duration,
@@ -65,6 +69,48 @@ struct CheckedFile {
     warnings: usize,
     /// Whether the time limit ended the optional checks early.
     cut_short: bool,
+    /// Memory and time of a program with numbers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    size: Option<Size>,
+    /// Function blocks and functions of a text without a program.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    units: Vec<String>,
+}
+
+/// What a program with numbers takes.
+#[derive(Clone, Copy, Serialize)]
+struct Size {
+    /// State that a joining station receives, in bytes.
+    state_bytes: u64,
+    /// Operations of a scan, at most.
+    operations: u64,
+    /// Whether only the budget bounds its loops.
+    bounded_by_budget: bool,
+}
+
+impl Size {
+    fn of(program: &Program) -> Self {
+        let cost = Cost::new(program);
+        Self {
+            state_bytes: cost.state_bytes,
+            operations: cost.worst_case(),
+            bounded_by_budget: cost.is_bounded_by_budget(),
+        }
+    }
+
+    fn text(self) -> String {
+        let Self {
+            state_bytes,
+            operations,
+            bounded_by_budget,
+        } = self;
+        let budget = if bounded_by_budget {
+            ", the limit for its loops"
+        } else {
+            ""
+        };
+        format!("; state {state_bytes} bytes, at most {operations} operations a scan{budget}")
+    }
 }
 
 #[derive(Default)]
@@ -72,6 +118,8 @@ struct Found<'a> {
     /// The named files, in their order.
     given: Vec<(Kind, &'a Path)>,
     cut_short: Vec<String>,
+    sizes: Vec<(String, Size)>,
+    libraries: Vec<(String, Vec<String>)>,
     reports: Vec<(Kind, Report)>,
     failures: Vec<Failure>,
     unreadable: Vec<String>,
@@ -103,12 +151,26 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
             }
             Kind::Model => found.add_model(path),
             Kind::Ladder => {
-                let parsed = parse_program(&path.display().to_string(), &text);
-                let mut diagnostics = parsed.diagnostics;
-                if !has_errors(&diagnostics)
-                    && looking.at_rungs(&parsed.program, PERIOD, &mut diagnostics)
-                {
-                    found.cut_short.push(path.display().to_string());
+                let name = path.display().to_string();
+                let wanted = Wanted {
+                    period: Some(PERIOD),
+                    program: arguments.program.as_deref(),
+                };
+                let file = read_source(&name, &text, wanted);
+                let mut diagnostics = file.diagnostics;
+                match &file.source {
+                    Some(Source::Ladder(program)) => {
+                        if looking.at_rungs(program, PERIOD, &mut diagnostics) {
+                            found.cut_short.push(name);
+                        }
+                    }
+                    Some(Source::Typed(program)) => {
+                        found.sizes.push((name, Size::of(program)));
+                    }
+                    Some(Source::Library(units)) => {
+                        found.libraries.push((name, units.clone()));
+                    }
+                    None => {}
                 }
                 found.add_file(Kind::Ladder, path, text, diagnostics);
             }
@@ -162,6 +224,9 @@ impl Found<'_> {
             };
             let known = seen.contains(&report.name) || has_errors(&report.diagnostics);
             seen.push(report.name.clone());
+            if let Some(program) = controller.code.typed() {
+                self.sizes.push((report.name.clone(), Size::of(program)));
+            }
             if !known
                 && let Some(ladder) = controller.ladder()
                 && looking.at_rungs(ladder, period, &mut report.diagnostics)
@@ -243,6 +308,8 @@ impl Found<'_> {
             errors: count(report, Severity::Error),
             warnings: count(report, Severity::Warning),
             cut_short: self.cut_short.contains(&report.name),
+            size: found_of(&self.sizes, &report.name),
+            units: found_of(&self.libraries, &report.name).unwrap_or_default(),
         });
         let unreadable = self.unreadable.into_iter().map(|name| CheckedFile {
             name,
@@ -250,6 +317,8 @@ impl Found<'_> {
             errors: 1,
             warnings: 0,
             cut_short: false,
+            size: None,
+            units: Vec::new(),
         });
         let files: Vec<CheckedFile> = checked.chain(unreadable).collect();
         let errors = files.iter().map(|file| file.errors).sum();
@@ -274,11 +343,19 @@ impl Found<'_> {
                 }
             };
             let kind = file.kind.unwrap_or("");
-            let more = if file.cut_short {
-                "; optional checks incomplete: increase --budget or use `understudy verify`"
-            } else {
-                ""
-            };
+            let mut more = String::new();
+            if file.cut_short {
+                more +=
+                    "; optional checks incomplete: increase --budget or use `understudy verify`";
+            }
+            if !file.units.is_empty() {
+                let units = match file.units.len() {
+                    1 => "1 unit".to_owned(),
+                    units => format!("{units} units"),
+                };
+                more += &format!("; a library without a program: {units} checked");
+            }
+            more += &file.size.map(Size::text).unwrap_or_default();
             let _ = writeln!(text, "{:width$}  {kind:8}  {verdict}{more}", file.name);
         }
         let status = if errors == 0 {
@@ -297,6 +374,12 @@ impl Found<'_> {
         answer.failures = self.failures;
         answer
     }
+}
+
+/// What was found out about the file of a name.
+fn found_of<T: Clone>(found: &[(String, T)], name: &str) -> Option<T> {
+    let found = found.iter().find(|(known, _)| known == name);
+    found.map(|(_, value)| value.clone())
 }
 
 fn number(count: usize, what: &str) -> String {

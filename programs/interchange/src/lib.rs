@@ -9,7 +9,7 @@ pub mod structured_text;
 mod written;
 
 pub use format::{Format, Reading, parse_program, read, read_all, unknown_form};
-pub use source::{Source, read_source};
+pub use source::{Source, SourceFile, Wanted, no_program, read_source};
 pub use written::{Compared, USUAL_PERIOD, WriteError, Written, write};
 
 /// The examples of the codes of this crate are run with its own.

@@ -4,12 +4,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_ladder::Program as Ladder;
-use understudy_structured_text::lower::{Options, lower};
-use understudy_structured_text::parser;
+use understudy_structured_text::{Lowered, Options, lower, parse};
 use understudy_text::{Diagnostic, has_errors};
 use understudy_typed::Program as Typed;
 
-use crate::format::{Format, parse_program};
+use crate::format::{Format, Reading, read, unknown_form};
 
 /// What a file holds.
 #[derive(Debug, Clone)]
@@ -18,29 +17,84 @@ pub enum Source {
     Ladder(Ladder),
     /// A program with numbers, for one period.
     Typed(Arc<Typed>),
+    /// Function blocks and functions without a program, each checked: their names.
+    Library(Vec<String>),
 }
 
-/// Reads the program of the file `name`, and everything that is wrong with it; nothing is read where there are errors.
-pub fn read_source(name: &str, text: &str, period: Duration) -> (Option<Source>, Vec<Diagnostic>) {
-    let parsed = parse_program(name, text);
-    if !has_errors(&parsed.diagnostics) {
-        return (Some(Source::Ladder(parsed.program)), parsed.diagnostics);
+/// What is read from a file, and how.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Wanted<'a> {
+    /// The program, in a file with several.
+    pub program: Option<&'a str>,
+    /// From one scan to the next, in place of what the file says.
+    pub period: Option<Duration>,
+}
+
+/// A file that was read.
+#[derive(Debug, Clone, Default)]
+pub struct SourceFile {
+    /// What it holds; nothing where there are errors.
+    pub source: Option<Source>,
+    /// From one scan to the next, where the file says so.
+    pub period: Option<Duration>,
+    /// Everything that is wrong or odd, with its place.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// Reads the program of the file `name`, and everything that is wrong with it.
+pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
+    let Some(format) = Format::of(name, text) else {
+        return SourceFile {
+            diagnostics: vec![unknown_form(text)],
+            ..SourceFile::default()
+        };
+    };
+    let Reading {
+        program,
+        period,
+        diagnostics,
+        ..
+    } = read(format, name, text, wanted.program);
+    if program.is_some() || format != Format::StructuredText {
+        return SourceFile {
+            source: program.map(Source::Ladder),
+            period,
+            diagnostics,
+        };
     }
-    if Format::of(name, text) != Some(Format::StructuredText) {
-        return (None, parsed.diagnostics);
-    }
-    // What no ladder can hold may be a program with numbers.
-    let (file, mut diagnostics) = parser::parse(text);
+    // What no ladder can hold may be a program with numbers, or a library.
+    typed(text, wanted, period)
+}
+
+fn typed(text: &str, wanted: Wanted<'_>, in_file: Option<Duration>) -> SourceFile {
+    let (file, mut diagnostics) = parse(text);
+    let nanoseconds = |period: Duration| i64::try_from(period.as_nanos()).unwrap_or(i64::MAX);
     let options = Options {
         text,
-        program: None,
-        period: i64::try_from(period.as_nanos()).ok(),
+        program: wanted.program,
+        period: wanted.period.map(nanoseconds),
     };
-    let lowered = lower(&file, &options);
-    diagnostics.extend(lowered.diagnostics);
-    let program = lowered.program.filter(|_| !has_errors(&diagnostics));
-    (
-        program.map(|program| Source::Typed(Arc::new(program))),
+    let Lowered {
+        program,
+        checked,
+        diagnostics: found,
+    } = lower(&file, &options);
+    diagnostics.extend(found);
+    diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
+    let is_right = !has_errors(&diagnostics);
+    let library = (!checked.is_empty()).then_some(Source::Library(checked));
+    let source = program
+        .map(|program| Source::Typed(Arc::new(program)))
+        .or(library);
+    SourceFile {
+        source: source.filter(|_| is_right),
+        period: in_file,
         diagnostics,
-    )
+    }
+}
+
+/// The error of a file that a program is wanted of, and that has none.
+pub fn no_program() -> Diagnostic {
+    Diagnostic::error("U1051", "the text has no program", 0..0)
+        .with_help("a text needs a PROGRAM … END_PROGRAM")
 }

@@ -21,8 +21,11 @@ mod siemens;
 mod statement;
 mod types;
 mod unit;
+mod words;
 
 use std::collections::HashSet;
+
+pub use words::is_keyword;
 
 use understudy_text::{Diagnostic, MAXIMUM_FINDINGS};
 
@@ -37,89 +40,6 @@ pub const MAXIMUM_TEXT_BYTES: usize = 16 << 20;
 
 /// The deepest nesting of brackets, types and statements.
 pub const MAXIMUM_NESTING: usize = 64;
-
-/// Words of the language that no variable can have for its name.
-const KEYWORDS: [&str; 72] = [
-    "AND",
-    "AND_THEN",
-    "ARRAY",
-    "AT",
-    "BY",
-    "CASE",
-    "CONFIGURATION",
-    "CONSTANT",
-    "CONTINUE",
-    "DO",
-    "ELSE",
-    "ELSIF",
-    "END_ACTION",
-    "END_CASE",
-    "END_CLASS",
-    "END_CONFIGURATION",
-    "END_FOR",
-    "END_FUNCTION",
-    "END_FUNCTION_BLOCK",
-    "END_IF",
-    "END_INTERFACE",
-    "END_METHOD",
-    "END_NAMESPACE",
-    "END_PROGRAM",
-    "END_PROPERTY",
-    "END_REPEAT",
-    "END_RESOURCE",
-    "END_STEP",
-    "END_STRUCT",
-    "END_TRANSITION",
-    "END_TYPE",
-    "END_UNION",
-    "END_VAR",
-    "END_WHILE",
-    "EXIT",
-    "FALSE",
-    "FOR",
-    "FUNCTION",
-    "FUNCTION_BLOCK",
-    "IF",
-    "INITIAL_STEP",
-    "MOD",
-    "NOT",
-    "OF",
-    "OR",
-    "OR_ELSE",
-    "PROGRAM",
-    "REPEAT",
-    "RETURN",
-    "STRUCT",
-    "THEN",
-    "TO",
-    "TRUE",
-    "TYPE",
-    "UNTIL",
-    "VAR",
-    "VAR_ACCESS",
-    "VAR_CONFIG",
-    "VAR_EXTERNAL",
-    "VAR_GLOBAL",
-    "VAR_INPUT",
-    "VAR_INST",
-    "VAR_IN_OUT",
-    "VAR_OUTPUT",
-    "VAR_STAT",
-    "VAR_TEMP",
-    "WHILE",
-    "XOR",
-    "END_ORGANIZATION_BLOCK",
-    "END_DATA_BLOCK",
-    "ORGANIZATION_BLOCK",
-    "DATA_BLOCK",
-];
-
-/// Whether no variable can be called so.
-pub fn is_keyword(word: &str) -> bool {
-    KEYWORDS
-        .iter()
-        .any(|keyword| keyword.eq_ignore_ascii_case(word))
-}
 
 /// A whole text: programs, blocks, functions, types, configurations. With everything that was wrong with it.
 pub fn parse(text: &str) -> (File, Vec<Diagnostic>) {

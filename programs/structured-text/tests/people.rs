@@ -49,7 +49,11 @@ fn files_of_other_people_are_taken_or_refused_with_a_reason() {
                 Some(_) => "program",
                 None => "library",
             };
-            let _ = writeln!(table, "{name}: {what}, {} warnings", warnings.lines().count());
+            let _ = writeln!(
+                table,
+                "{name}: {what}, {} warnings",
+                warnings.lines().count()
+            );
         } else {
             let _ = writeln!(table, "{name}: refused");
             for error in errors.lines().take(4) {

@@ -33,7 +33,12 @@ fn numbers_are_those_of_another_compiler() {
     for (name, vector) in vectors.as_object().expect("an object") {
         let mut running = Running::new(program(&text(folder.join(format!("{name}.st")))));
         let (inputs, outputs) = (running.inputs(), running.outputs());
-        for (scan, line) in vector["scans"].as_array().expect("scans").iter().enumerate() {
+        for (scan, line) in vector["scans"]
+            .as_array()
+            .expect("scans")
+            .iter()
+            .enumerate()
+        {
             let line = line.as_str().expect("a line");
             let (given, expected) = line.split_once(" -> ").expect("inputs -> outputs");
             let given: Vec<&str> = given.split(' ').collect();
@@ -43,13 +48,18 @@ fn numbers_are_those_of_another_compiler() {
             let found = running.scan(&values);
             assert_eq!(running.fault(), None, "{name}");
             for ((point, found), expected) in outputs.iter().zip(found).zip(expected.split(' ')) {
-                let may_differ = name == "trigonometry" && TRANSCENDENTAL.contains(&point.name.as_str());
+                let may_differ =
+                    name == "trigonometry" && TRANSCENDENTAL.contains(&point.name.as_str());
                 let is_equal = match may_differ {
                     true => found.abs_diff(stored(point.of, expected)) <= 2,
                     false => written(point.of, found) == expected,
                 };
                 let shown = written(point.of, found);
-                assert!(is_equal, "{name} scan {scan} {}: {shown} is not {expected}", point.name);
+                assert!(
+                    is_equal,
+                    "{name} scan {scan} {}: {shown} is not {expected}",
+                    point.name
+                );
             }
             scans += 1;
         }

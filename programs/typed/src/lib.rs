@@ -14,6 +14,7 @@ mod form;
 mod image;
 mod interpreter;
 mod machine;
+mod notation;
 mod operation;
 mod scan;
 mod types;

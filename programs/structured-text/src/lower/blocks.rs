@@ -90,7 +90,8 @@ impl Layout {
         let slot = self.slots.min(u64::from(u32::MAX)) as u32;
         self.slots += if is_reference { 1 } else { resolved.of.slots() };
         if !is_reference && self.slots <= u64::from(MAXIMUM_SLOTS) {
-            self.image.put(u64::from(slot) * 64, &resolved.of, &resolved.image);
+            self.image
+                .put(u64::from(slot) * 64, &resolved.of, &resolved.image);
         }
         self.fields.push(Field {
             name: name.to_owned(),
@@ -217,7 +218,10 @@ impl<'a> Lowering<'a> {
             class: declaration.class,
             is_retained: declaration.retained,
             description: declaration.description.clone(),
-            address: declaration.address.as_ref().map(|found| found.as_str().to_owned()),
+            address: declaration
+                .address
+                .as_ref()
+                .map(|found| found.as_str().to_owned()),
             symbol,
         };
         layout.block.members.insert(key.clone(), member);
@@ -331,7 +335,9 @@ impl<'a> Lowering<'a> {
     fn assumed(&mut self, declaration: &Declaration) -> Symbol {
         let name = &declaration.name;
         let found = self.resolve(&declaration.of);
-        let slot = found.as_ref().and_then(|found| self.state(found.of.slots(), &name.span()));
+        let slot = found
+            .as_ref()
+            .and_then(|found| self.state(found.of.slots(), &name.span()));
         let symbol = match (found, slot) {
             (Some(found), Some(slot)) => Symbol::Variable(Rc::new(Variable {
                 name: name.as_str().to_owned(),

@@ -103,8 +103,9 @@ impl<'a> Lowering<'a> {
         let known = units.filter(|entry| entry.unit.kind == UnitKind::Function);
         let known = known.map(|entry| entry.unit.name.as_str());
         let known = known.chain(super::standard::NAMES.iter().copied());
-        let help = understudy_text::spelling::question(name.as_str(), known)
-            .unwrap_or_else(|| "declare it with FUNCTION, or an instance of a block with VAR".into());
+        let help = understudy_text::spelling::question(name.as_str(), known).unwrap_or_else(|| {
+            "declare it with FUNCTION, or an instance of a block with VAR".into()
+        });
         let message = format!("`{name}` is neither a function nor an instance of a block");
         self.error_with("U1041", message, name.span(), help);
         None
@@ -115,7 +116,10 @@ impl<'a> Lowering<'a> {
             UnitKind::Function => Some(Callee::Function(unit)),
             UnitKind::FunctionBlock => {
                 let message = format!("`{name}` is a block, and is called through an instance");
-                let help = format!("declare one, such as `VAR my_{0} : {name}; END_VAR`, and call it", name.as_str().to_lowercase());
+                let help = format!(
+                    "declare one, such as `VAR my_{0} : {name}; END_VAR`, and call it",
+                    name.as_str().to_lowercase()
+                );
                 self.error_with("U1049", message, name.span(), help);
                 None
             }
@@ -135,7 +139,8 @@ impl<'a> Lowering<'a> {
             steps: path.steps[..path.steps.len() - 1].to_vec(),
             span: path.span.clone(),
         };
-        let is_super = prefix.root.is("SUPER") && matches!(prefix.steps.as_slice(), [] | [Step::Follow]);
+        let is_super =
+            prefix.root.is("SUPER") && matches!(prefix.steps.as_slice(), [] | [Step::Follow]);
         if is_super {
             self.own_block(&prefix.root)?;
             let unit = self.scope.unit?;
@@ -146,7 +151,9 @@ impl<'a> Lowering<'a> {
             }
             return self.no_method(base, name);
         }
-        let is_global_list = prefix.steps.is_empty() && !prefix.root.is("THIS") && self.lookup(&prefix.root).is_none();
+        let is_global_list = prefix.steps.is_empty()
+            && !prefix.root.is("THIS")
+            && self.lookup(&prefix.root).is_none();
         if is_global_list {
             if let Some(Symbol::Variable(_)) = self.global(&name.key()) {
                 return self.instance(path);
@@ -224,7 +231,10 @@ impl<'a> Lowering<'a> {
         };
         let inputs = |class: Class| matches!(class, Class::Input | Class::InOut);
         let indices = 0..parameters.len();
-        let mut order: Vec<usize> = indices.clone().filter(|at| inputs(parameters[*at].class)).collect();
+        let mut order: Vec<usize> = indices
+            .clone()
+            .filter(|at| inputs(parameters[*at].class))
+            .collect();
         let places = order.len();
         order.extend(indices.filter(|at| !inputs(parameters[*at].class)));
         let find = |name: &Name| parameters.iter().position(|found| name.is(&found.name));
@@ -241,7 +251,9 @@ impl<'a> Lowering<'a> {
                             bound.taken.push((at, path, false));
                         }
                         _ => {
-                            let message = format!("`{name}` has {places} inputs, and this is the {placed}th value");
+                            let message = format!(
+                                "`{name}` has {places} inputs, and this is the {placed}th value"
+                            );
                             self.wrong_call(message, parameters, &value.span);
                             return None;
                         }
@@ -283,7 +295,10 @@ impl<'a> Lowering<'a> {
         }
         for (at, parameter) in parameters.iter().enumerate() {
             if parameter.class == Class::InOut && !seen[at] && is_whole {
-                let message = format!("`{}` of `{name}` is a VAR_IN_OUT, and is given no variable", parameter.name);
+                let message = format!(
+                    "`{}` of `{name}` is a VAR_IN_OUT, and is given no variable",
+                    parameter.name
+                );
                 let help = format!("write `{} := variable`", parameter.name);
                 self.error_with("U1049", message, span.clone(), help);
                 is_whole = false;
@@ -354,14 +369,20 @@ impl<'a> Lowering<'a> {
         let target = self.target(path)?;
         self.writable(&target, path)?;
         if target.bits.is_some() {
-            let message = format!("`{}` is a VAR_IN_OUT, and a bit of a word is no variable", parameter.name);
+            let message = format!(
+                "`{}` is a VAR_IN_OUT, and a bit of a word is no variable",
+                parameter.name
+            );
             self.error("U1049", message, value.span.clone());
             return None;
         }
         if target.place.of != parameter.of {
             let found = self.describe(&target.place.of);
             let wanted = self.describe(&parameter.of);
-            let message = format!("`{}` is a VAR_IN_OUT of {wanted}, and is given {found}", parameter.name);
+            let message = format!(
+                "`{}` is a VAR_IN_OUT of {wanted}, and is given {found}",
+                parameter.name
+            );
             let help = "give a variable of exactly that type";
             self.error_with("U1043", message, value.span.clone(), help);
             return None;
@@ -391,20 +412,27 @@ impl<'a> Lowering<'a> {
                 let value = self.settle(value, None);
                 if value.is_some() {
                     let message = format!("the result of {key} is not used");
-                    self.warn("U1023", message, span.clone(), "assign it to a variable, or remove the call");
+                    self.warn(
+                        "U1023",
+                        message,
+                        span.clone(),
+                        "assign it to a variable, or remove the call",
+                    );
                 }
                 None
             }
-            callee => self.routine_call(callee, arguments, span).map(|(call, enable, enabled)| {
-                let of = Type::Elementary(Elementary::Bool);
-                let of = call.result.as_ref().map_or(of, |result| result.of.clone());
-                let kind = ExpressionKind::Call(Box::new(call));
-                statements.push(Statement {
-                    line,
-                    kind: StatementKind::Evaluate(Expression { of, kind }),
-                });
-                (enable, enabled)
-            }),
+            callee => self
+                .routine_call(callee, arguments, span)
+                .map(|(call, enable, enabled)| {
+                    let of = Type::Elementary(Elementary::Bool);
+                    let of = call.result.as_ref().map_or(of, |result| result.of.clone());
+                    let kind = ExpressionKind::Call(Box::new(call));
+                    statements.push(Statement {
+                        line,
+                        kind: StatementKind::Evaluate(Expression { of, kind }),
+                    });
+                    (enable, enabled)
+                }),
         };
         match control {
             Some(control) => self.enabled(control, statements, line, body),
@@ -445,7 +473,13 @@ impl<'a> Lowering<'a> {
         });
     }
 
-    fn set_enabled(&mut self, path: &Path, value: Expression, line: u32, body: &mut Vec<Statement>) {
+    fn set_enabled(
+        &mut self,
+        path: &Path,
+        value: Expression,
+        line: u32,
+        body: &mut Vec<Statement>,
+    ) {
         let Some(target) = self.target(path) else {
             return;
         };
@@ -601,10 +635,16 @@ impl<'a> Lowering<'a> {
             let parameter = &routine.parameters[*at];
             let target = self.target(path)?;
             self.writable(&target, path)?;
-            let are_texts = matches!((&target.place.of, &parameter.of), (Type::Text(_), Type::Text(_)));
+            let are_texts = matches!(
+                (&target.place.of, &parameter.of),
+                (Type::Text(_), Type::Text(_))
+            );
             if *negated || target.bits.is_some() || target.place.of != parameter.of && !are_texts {
                 let wanted = self.describe(&parameter.of);
-                let message = format!("the output `{}` of a function goes to a variable of {wanted}", parameter.name);
+                let message = format!(
+                    "the output `{}` of a function goes to a variable of {wanted}",
+                    parameter.name
+                );
                 let help = "take it with a variable of that type, and assign that";
                 self.error_with("U1043", message, path.span.clone(), help);
                 return None;
@@ -639,7 +679,10 @@ impl<'a> Lowering<'a> {
         let parameters = self.deeper(span, |own| {
             let mut parameters = Vec::new();
             for declaration in &unit.declarations {
-                if !matches!(declaration.class, Class::Input | Class::Output | Class::InOut) {
+                if !matches!(
+                    declaration.class,
+                    Class::Input | Class::Output | Class::InOut
+                ) {
                     continue;
                 }
                 let (resolved, _) = own.reference_type(&declaration.of)?;
@@ -678,7 +721,10 @@ impl<'a> Lowering<'a> {
         }
         if let Callee::Block(..) = callee {
             let message = format!("`{}` is a block: it has no value of its own", shown(path));
-            let help = format!("call it as a statement, and read an output, such as `{}.Q`", shown(path));
+            let help = format!(
+                "call it as a statement, and read an output, such as `{}.Q`",
+                shown(path)
+            );
             self.error_with("U1049", message, span.clone(), help);
             return Operand::Faulty;
         }
@@ -719,7 +765,11 @@ impl<'a> Lowering<'a> {
             return Operand::Faulty;
         };
         if value.of.elementary().is_none() {
-            self.error("U1040", "EN is for results without parts", enable.span.clone());
+            self.error(
+                "U1040",
+                "EN is for results without parts",
+                enable.span.clone(),
+            );
             return Operand::Faulty;
         }
         let zero = number(value.of.clone(), 0);
@@ -772,6 +822,11 @@ impl<'a> Lowering<'a> {
         };
         let assigned = self.assign(path, &value);
         let statements = assigned.map(|kind| Statement { line, kind });
-        self.enabled((enable, enabled), statements.into_iter().collect(), line, body);
+        self.enabled(
+            (enable, enabled),
+            statements.into_iter().collect(),
+            line,
+            body,
+        );
     }
 }

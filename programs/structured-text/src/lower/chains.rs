@@ -44,7 +44,11 @@ impl Lowering<'_> {
         self.settle(operand, hint)
     }
 
-    pub(super) fn operand(&mut self, expression: &syntax::Expression, hint: Option<&Type>) -> Operand {
+    pub(super) fn operand(
+        &mut self,
+        expression: &syntax::Expression,
+        hint: Option<&Type>,
+    ) -> Operand {
         let span = &expression.span;
         let found = match &expression.kind {
             ExpressionKind::Literal(literal) => return self.literal(literal, span),
@@ -64,7 +68,9 @@ impl Lowering<'_> {
     fn literal(&mut self, literal: &Literal, span: &Span) -> Operand {
         Operand::Typed(match literal {
             Literal::Boolean(value) => boolean(*value),
-            Literal::Integer { value, of: None } => return Operand::Number(Number::Integer(*value)),
+            Literal::Integer { value, of: None } => {
+                return Operand::Number(Number::Integer(*value));
+            }
             Literal::Integer {
                 value,
                 of: Some(of),
@@ -86,9 +92,7 @@ impl Lowering<'_> {
                     _ => return Operand::Number(value),
                 }
             }
-            Literal::Time { nanoseconds, of } => {
-                number(Type::Elementary(*of), *nanoseconds as u64)
-            }
+            Literal::Time { nanoseconds, of } => number(Type::Elementary(*of), *nanoseconds as u64),
             Literal::Text { bytes, .. } => {
                 let capacity = u16::try_from(bytes.len()).unwrap_or(u16::MAX).max(1);
                 Expression {
@@ -183,7 +187,9 @@ impl Lowering<'_> {
         rest: &[(Operator, syntax::Expression)],
         hint: Option<&Type>,
     ) -> Operand {
-        let compares = rest.iter().any(|(operator, _)| matches!(operator, Operator::Compare(_)));
+        let compares = rest
+            .iter()
+            .any(|(operator, _)| matches!(operator, Operator::Compare(_)));
         let outer = hint.filter(|_| !compares);
         let mut whole = first.span.clone();
         let mut left = self.operand(first, outer);
@@ -291,7 +297,13 @@ impl Lowering<'_> {
         found.map_or(Operand::Faulty, Operand::Typed)
     }
 
-    fn literals(&mut self, operator: Operator, left: Number, right: Number, span: &Span) -> Operand {
+    fn literals(
+        &mut self,
+        operator: Operator,
+        left: Number,
+        right: Number,
+        span: &Span,
+    ) -> Operand {
         if let Operator::Compare(comparison) = operator {
             let ordering = match (left, right) {
                 (Number::Integer(left), Number::Integer(right)) => Some(left.cmp(&right)),
@@ -380,7 +392,11 @@ impl Lowering<'_> {
     ) -> Option<Expression> {
         let of = Type::Elementary(Elementary::Bool);
         if let (Type::Text(_), Type::Text(_)) = (&left.of, &right.of) {
-            return Some(text(TextOperation::Compare(comparison), vec![left, right], of));
+            return Some(text(
+                TextOperation::Compare(comparison),
+                vec![left, right],
+                of,
+            ));
         }
         let are_enumerations = matches!(
             (&left.of, &right.of),
@@ -465,7 +481,9 @@ impl Lowering<'_> {
         {
             return match self.time_arithmetic(operator, left, right) {
                 Ok(value) => Some(value),
-                Err(operands) => self.do_not_fit("calculated with so", &operands.0, &operands.1, span),
+                Err(operands) => {
+                    self.do_not_fit("calculated with so", &operands.0, &operands.1, span)
+                }
             };
         }
         let found = kinds.and_then(|(left, right)| {
@@ -480,7 +498,8 @@ impl Lowering<'_> {
             && matches!(operator, Operator::Divide | Operator::Modulo)
             && !of.is_real()
         {
-            let leaves = |from: Elementary| limits(from).0 < limits(of).0 || limits(from).1 > limits(of).1;
+            let leaves =
+                |from: Elementary| limits(from).0 < limits(of).0 || limits(from).1 > limits(of).1;
             if leaves(left) || leaves(right) {
                 let message = format!("{left} and {right} are divided as {of}");
                 let help = "convert both to a type that has all their numbers";
@@ -494,7 +513,8 @@ impl Lowering<'_> {
             Operator::Divide => Operation::Divide(of),
             _ if of.is_real() => {
                 let message = format!("MOD needs whole numbers, and this is {of}");
-                let help = "convert both, such as with REAL_TO_DINT(…), or write x - y * FLOOR(x / y)";
+                let help =
+                    "convert both, such as with REAL_TO_DINT(…), or write x - y * FLOOR(x / y)";
                 self.error_with("U1043", message, span.clone(), help);
                 return None;
             }
@@ -519,7 +539,8 @@ impl Lowering<'_> {
         span: &Span,
     ) -> Option<Expression> {
         let kinds = left.of.elementary().zip(right.of.elementary());
-        let Some((base, exponent)) = kinds.filter(|(left, right)| is_number(*left) && is_number(*right))
+        let Some((base, exponent)) =
+            kinds.filter(|(left, right)| is_number(*left) && is_number(*right))
         else {
             return self.do_not_fit("raised to a power", &left, &right, span);
         };
@@ -552,9 +573,7 @@ impl Lowering<'_> {
             Operator::Add if to == Time && from.is_time() => {
                 plain(Operation::Add, left, right, from)
             }
-            Operator::Add if from == Time && to.is_time() => {
-                plain(Operation::Add, left, right, to)
-            }
+            Operator::Add if from == Time && to.is_time() => plain(Operation::Add, left, right, to),
             Operator::Subtract if to == Time && from.is_time() => {
                 plain(Operation::Subtract, left, right, from)
             }

@@ -119,8 +119,10 @@ impl Lowering<'_> {
                 }
                 _ => {
                     let wanted = self.describe(of);
-                    let message =
-                        format!("the text has {} characters, and {wanted} is too short", bytes.len());
+                    let message = format!(
+                        "the text has {} characters, and {wanted} is too short",
+                        bytes.len()
+                    );
                     self.error("U1043", message, expression.span.clone());
                     None
                 }
@@ -130,7 +132,11 @@ impl Lowering<'_> {
     }
 
     /// Lowers an expression where no variables are known.
-    fn constant_operand(&mut self, expression: &syntax::Expression, hint: Option<&Type>) -> Operand {
+    fn constant_operand(
+        &mut self,
+        expression: &syntax::Expression,
+        hint: Option<&Type>,
+    ) -> Operand {
         let mut scope = self.scope.clone();
         scope.symbols = None;
         let outside = std::mem::replace(&mut self.scope, scope);

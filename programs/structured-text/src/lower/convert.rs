@@ -108,7 +108,11 @@ pub(super) fn common(left: Elementary, right: Elementary) -> Option<Elementary> 
         });
     }
     if left.is_bit_string() && right.is_bit_string() {
-        return Some(if left.bits() >= right.bits() { left } else { right });
+        return Some(if left.bits() >= right.bits() {
+            left
+        } else {
+            right
+        });
     }
     let (left, right) = (as_integer(left), as_integer(right));
     Some(match left.bits().cmp(&right.bits()) {
@@ -132,7 +136,12 @@ pub(super) fn comparable(left: Elementary, right: Elementary) -> Option<Elementa
 
 impl Lowering<'_> {
     /// The value as one of a type, where the languages convert by themselves.
-    pub(super) fn coerce(&mut self, operand: Operand, to: &Type, span: &Span) -> Option<Expression> {
+    pub(super) fn coerce(
+        &mut self,
+        operand: Operand,
+        to: &Type,
+        span: &Span,
+    ) -> Option<Expression> {
         match operand {
             Operand::Faulty => None,
             Operand::Number(number) => self.coerce_number(number, to, span),
@@ -147,7 +156,11 @@ impl Lowering<'_> {
                 return Some(number(to.clone(), value as u64 & of.mask()));
             }
             let message = format!("{} has no value {value}", self.describe(to));
-            let shown: Vec<&str> = values.iter().map(|(name, _)| name.as_str()).take(20).collect();
+            let shown: Vec<&str> = values
+                .iter()
+                .map(|(name, _)| name.as_str())
+                .take(20)
+                .collect();
             let help = format!("write one of its names: {}", shown.join(", "));
             self.error_with("U1043", message, span.clone(), help);
             return None;
@@ -226,7 +239,8 @@ impl Lowering<'_> {
         match fit {
             Fit::Whole => {}
             Fit::Sign => {
-                let message = format!("{found} becomes {target}: the bits stay, the number may change");
+                let message =
+                    format!("{found} becomes {target}: the bits stay, the number may change");
                 let help = format!("write {from}_TO_{target}(…) if that is meant");
                 self.warn("U1080", message, span.clone(), help);
             }
@@ -247,11 +261,17 @@ impl Lowering<'_> {
         let is_elementary = |name: &str| Elementary::ALL.iter().any(|of| of.name() == name);
         let help = match to {
             Type::Elementary(_) | Type::Text(_) if is_elementary(found) => {
-                let wanted = if matches!(to, Type::Text(_)) { "STRING" } else { &wanted };
+                let wanted = if matches!(to, Type::Text(_)) {
+                    "STRING"
+                } else {
+                    &wanted
+                };
                 format!("write {found}_TO_{wanted}(…)")
             }
             Type::Elementary(of) if of.is_time() => "write a unit, such as T#500ms".to_owned(),
-            Type::Elementary(of) if found.starts_with("STRING") => format!("write STRING_TO_{of}(…)"),
+            Type::Elementary(of) if found.starts_with("STRING") => {
+                format!("write STRING_TO_{of}(…)")
+            }
             _ => format!("use a value of {wanted}"),
         };
         self.error_with("U1043", message, span.clone(), help);

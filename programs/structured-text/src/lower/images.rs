@@ -54,7 +54,11 @@ impl Builder {
             return;
         };
         let end = start.saturating_add(u32::try_from(of.slots()).unwrap_or(u32::MAX));
-        let old: Vec<u32> = self.slots.range(start..end).map(|(slot, _)| *slot).collect();
+        let old: Vec<u32> = self
+            .slots
+            .range(start..end)
+            .map(|(slot, _)| *slot)
+            .collect();
         for slot in old {
             self.slots.remove(&slot);
         }

@@ -106,8 +106,10 @@ impl Lowering<'_> {
                     match u64::try_from(value) {
                         Ok(value) if value <= array.length() => value,
                         _ => {
-                            let message =
-                                format!("{value} repetitions; the array has {} elements", array.length());
+                            let message = format!(
+                                "{value} repetitions; the array has {} elements",
+                                array.length()
+                            );
                             self.error("U1036", message, times.span.clone());
                             return None;
                         }

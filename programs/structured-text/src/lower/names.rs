@@ -9,8 +9,8 @@ use understudy_typed::{EnumerationId, Expression, ExpressionKind, Root, Type};
 
 use crate::syntax::{Class, Declaration, Name, Span, Unit};
 
-use super::constants::ConstantState;
 use super::Lowering;
+use super::constants::ConstantState;
 
 /// Whose declarations are looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -193,7 +193,8 @@ impl<'a> Lowering<'a> {
             return Some(number(Type::Enumeration(id, elementary), stored));
         }
         let values = &self.program.enumerations[id.0 as usize].values;
-        let help = spelling::suggestion(value.as_str(), values.iter().map(|(name, _)| name.as_str()));
+        let help =
+            spelling::suggestion(value.as_str(), values.iter().map(|(name, _)| name.as_str()));
         let message = format!("`{of}` has no value `{value}`");
         self.error_with("U1041", message, value.span(), help);
         None

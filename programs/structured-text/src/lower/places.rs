@@ -56,15 +56,20 @@ pub(super) fn place(root: Root, of: Type) -> Place {
 
 impl Lowering<'_> {
     /// The value of a path: a variable, a constant or a value of an enumeration.
-    pub(super) fn variable(
-        &mut self,
-        path: &Path,
-        hint: Option<&Type>,
-    ) -> Option<Expression> {
+    pub(super) fn variable(&mut self, path: &Path, hint: Option<&Type>) -> Option<Expression> {
         let symbol = self.root_symbol(&path.root);
         match (&symbol, path.steps.as_slice()) {
             (Some(Symbol::Constant(constant)), []) => return Some(constant.expression()),
-            (Some(Symbol::Constant(constant)), [Step::Bits { width, number, span }]) => {
+            (
+                Some(Symbol::Constant(constant)),
+                [
+                    Step::Bits {
+                        width,
+                        number,
+                        span,
+                    },
+                ],
+            ) => {
                 let value = constant.expression();
                 let (part, at) = self.bits(&value.of, *width, *number, span)?;
                 return Some(extract(value, part, at));
@@ -256,14 +261,22 @@ impl Lowering<'_> {
         };
         let count = whole.bits() / part.bits();
         if number >= count || part.bits() == whole.bits() && number > 0 {
-            let message = format!("part {number} of {whole}, which has parts 0 to {}", count.max(1) - 1);
+            let message = format!(
+                "part {number} of {whole}, which has parts 0 to {}",
+                count.max(1) - 1
+            );
             self.error("U1036", message, span.clone());
             return None;
         }
         Some((part, (number * part.bits()) as u8))
     }
 
-    fn index(&mut self, target: &mut Target, indices: &[&syntax::Expression], span: &Span) -> Option<()> {
+    fn index(
+        &mut self,
+        target: &mut Target,
+        indices: &[&syntax::Expression],
+        span: &Span,
+    ) -> Option<()> {
         let mut rest = indices;
         while !rest.is_empty() {
             let Type::Array(array) = &target.place.of else {
@@ -345,7 +358,8 @@ impl Lowering<'_> {
         {
             let message = format!("`{}` is a constant", variable.name);
             let found = understudy_text::Diagnostic::error("U1044", message, path.span.clone());
-            let found = found.with_help("remove CONSTANT from its declaration, or write another variable");
+            let found =
+                found.with_help("remove CONSTANT from its declaration, or write another variable");
             let found = found.with_related(variable.span.clone(), "declared here");
             self.report(found);
             return None;
@@ -357,14 +371,18 @@ impl Lowering<'_> {
                 self.warn("U1081", message, path.span.clone(), help);
             }
             Some(Class::Output) => {
-                let message = format!("`{}` is an output, which the block writes itself", shown(path));
+                let message = format!(
+                    "`{}` is an output, which the block writes itself",
+                    shown(path)
+                );
                 let help = "use a VAR_INPUT of the block";
                 self.warn("U1081", message, path.span.clone(), help);
             }
             Some(_) => {}
             None => {
                 let variable = target.variable.as_ref();
-                let variable = variable.filter(|found| found.class == Class::Input || found.is_point);
+                let variable =
+                    variable.filter(|found| found.class == Class::Input || found.is_point);
                 if let Some(variable) = variable {
                     let message = format!("`{}` is an input, and is written here", variable.name);
                     let help = match variable.is_point {
@@ -399,7 +417,11 @@ pub(super) fn insert(old: Expression, value: Expression, part: Elementary, at: u
         return reinterpret(value, whole);
     }
     let operands = vec![reinterpret(old, of), value];
-    let value = apply(Operation::Insert { of, part, at }, operands, Type::Elementary(of));
+    let value = apply(
+        Operation::Insert { of, part, at },
+        operands,
+        Type::Elementary(of),
+    );
     reinterpret(value, whole)
 }
 

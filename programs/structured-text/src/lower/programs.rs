@@ -97,7 +97,10 @@ impl<'a> Lowering<'a> {
                 name: name.to_owned(),
                 of: variable.of.clone(),
                 slot,
-                address: declaration.address.as_ref().map(|found| found.as_str().to_owned()),
+                address: declaration
+                    .address
+                    .as_ref()
+                    .map(|found| found.as_str().to_owned()),
                 description: declaration.description.clone(),
                 is_retained: declaration.retained,
             });
@@ -140,19 +143,25 @@ impl<'a> Lowering<'a> {
     }
 
     fn at_address(&mut self, name: &Name, address: &Name, resolved: &Resolved) -> Option<Symbol> {
-        let kind = address.as_str().chars().nth(1).map(|kind| kind.to_ascii_uppercase());
+        let kind = address
+            .as_str()
+            .chars()
+            .nth(1)
+            .map(|kind| kind.to_ascii_uppercase());
         let is_input = kind == Some('I');
         let is_point = is_input || kind == Some('Q');
         if !is_point && kind != Some('M') {
             let message = format!("`{address}` is not an address");
-            let help = "write an input such as %IX0.0, an output such as %QW3 or a memory such as %MD8";
+            let help =
+                "write an input such as %IX0.0, an output such as %QW3 or a memory such as %MD8";
             self.error_with("U1083", message, address.span(), help);
             return None;
         }
         let elementary = resolved.of.elementary();
         if is_point && elementary.is_none() {
             let found = self.describe(&resolved.of);
-            let message = format!("`{name}` at {address} is {found}; a point is one number, bit or time");
+            let message =
+                format!("`{name}` at {address} is {found}; a point is one number, bit or time");
             let help = "declare each element as a variable with an address of its own";
             self.error_with("U1083", message, name.span(), help);
             return None;
@@ -168,7 +177,10 @@ impl<'a> Lowering<'a> {
                 false => &mut self.program.outputs,
             };
             let mut shown = name.as_str().to_owned();
-            if points.iter().any(|point| point.name.eq_ignore_ascii_case(&shown)) {
+            if points
+                .iter()
+                .any(|point| point.name.eq_ignore_ascii_case(&shown))
+            {
                 shown = format!("{name} {address}");
             }
             points.push(shown, of, slot);
@@ -229,10 +241,16 @@ impl<'a> Lowering<'a> {
         let programs: Vec<&Unit> = file.units.iter().filter(is_program).collect();
         if programs.is_empty() {
             self.is_library = true;
-            let is_empty = file.units.is_empty() && file.types.is_empty() && file.globals.is_empty();
+            let is_empty =
+                file.units.is_empty() && file.types.is_empty() && file.globals.is_empty();
             if options.program.is_some() || is_empty {
                 let message = "the file has no PROGRAM";
-                self.error_with("U1051", message, 0..0, "add a PROGRAM that calls its blocks");
+                self.error_with(
+                    "U1051",
+                    message,
+                    0..0,
+                    "add a PROGRAM that calls its blocks",
+                );
             }
             return self.library(file);
         }
@@ -240,7 +258,10 @@ impl<'a> Lowering<'a> {
         if instances.is_empty() {
             return Vec::new();
         }
-        let base = instances.iter().filter_map(|instance| instance.interval).min();
+        let base = instances
+            .iter()
+            .filter_map(|instance| instance.interval)
+            .min();
         self.program.period = options.period.or(base).unwrap_or(DEFAULT_PERIOD);
         let name = instances[0].name;
         self.program.name = match instances.len() {
@@ -346,7 +367,10 @@ impl<'a> Lowering<'a> {
     /// In every so many-th scan a task runs.
     fn every(&mut self, name: &Name, interval: i64, base: i64) -> u32 {
         let times = interval.checked_div(base).unwrap_or(0);
-        if base > 0 && interval % base == 0 && let Ok(times) = u32::try_from(times) {
+        if base > 0
+            && interval % base == 0
+            && let Ok(times) = u32::try_from(times)
+        {
             return times.max(1);
         }
         let shown = |nanoseconds: i64| format!("{} ms", nanoseconds as f64 / 1e6);
@@ -400,7 +424,10 @@ impl<'a> Lowering<'a> {
             let Symbol::Variable(variable) = &member.symbol else {
                 continue;
             };
-            let parameter = block.parameters.iter().find(|found| found.name == variable.name);
+            let parameter = block
+                .parameters
+                .iter()
+                .find(|found| found.name == variable.name);
             let slot = match (variable.root, parameter) {
                 (_, Some(parameter)) => own + parameter.slot,
                 (Root::Own(slot), None) => own + slot,
@@ -427,7 +454,8 @@ impl<'a> Lowering<'a> {
     fn point(&mut self, name: &str, variable: &Variable, slot: u32, is_input: bool) {
         let Some(of) = variable.of.elementary() else {
             let found = self.describe(&variable.of);
-            let message = format!("`{name}` is a point of {found}; a point is one number, bit or time");
+            let message =
+                format!("`{name}` is a point of {found}; a point is one number, bit or time");
             let help = "declare each of its parts as an input or output, or use VAR";
             self.error_with("U1083", message, variable.span.clone(), help);
             return;
@@ -494,7 +522,11 @@ impl<'a> Lowering<'a> {
 /// An address in capitals, with the X that may be left out.
 fn normal(address: &str) -> String {
     let mut key = address.to_ascii_uppercase();
-    if key.chars().nth(2).is_some_and(|digit| digit.is_ascii_digit()) {
+    if key
+        .chars()
+        .nth(2)
+        .is_some_and(|digit| digit.is_ascii_digit())
+    {
         key.insert(2, 'X');
     }
     key

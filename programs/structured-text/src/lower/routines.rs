@@ -195,8 +195,10 @@ impl<'a> Lowering<'a> {
         } else {
             Root::Frame(self.take(frame, &resolved, &name.span())?)
         };
-        if let (Class::Input | Class::Output | Class::InOut, Root::Frame(slot) | Root::FrameReference(slot)) =
-            (declaration.class, root)
+        if let (
+            Class::Input | Class::Output | Class::InOut,
+            Root::Frame(slot) | Root::FrameReference(slot),
+        ) = (declaration.class, root)
         {
             frame.parameters.push(Parameter {
                 name: name.as_str().to_owned(),

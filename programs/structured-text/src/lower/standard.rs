@@ -11,23 +11,103 @@ use crate::syntax::{self, Argument, Operator, Span};
 
 use super::Lowering;
 use super::convert::{as_bits, as_integer, common, is_number, is_whole, limits};
-use super::fold::{apply, choose, boolean, convert, reinterpret};
+use super::fold::{apply, boolean, choose, convert, reinterpret};
 use super::names::number;
 use super::numbers::{Number, Operand};
 
 /// The names that are known here, for suggestions; conversions come on top.
 pub(super) const NAMES: [&str; 91] = [
-    "ABS", "SQRT", "LN", "LOG", "EXP", "SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "ATAN2",
-    "ADD", "MUL", "SUB", "DIV", "MOD", "EXPT", "MOVE", "SHL", "SHR", "ROL", "ROR", "AND", "OR",
-    "XOR", "NOT", "SEL", "MAX", "MIN", "LIMIT", "MUX", "GT", "GE", "EQ", "LE", "LT", "NE", "LEN",
-    "LEFT", "RIGHT", "MID", "CONCAT", "INSERT", "DELETE", "REPLACE", "FIND", "UPPER_CASE",
-    "LOWER_CASE", "TRUNC", "FLOOR", "CEIL", "ROUND", "ADD_TIME", "ADD_LTIME", "ADD_TOD_TIME",
-    "ADD_LTOD_LTIME", "ADD_DT_TIME", "ADD_LDT_LTIME", "SUB_TIME", "SUB_LTIME", "SUB_DATE_DATE",
-    "SUB_LDATE_LDATE", "SUB_TOD_TIME", "SUB_LTOD_LTIME", "SUB_TOD_TOD", "SUB_LTOD_LTOD",
-    "SUB_DT_TIME", "SUB_LDT_LTIME", "SUB_DT_DT", "SUB_LDT_LDT", "MULTIME", "MUL_TIME", "MUL_LTIME",
-    "DIVTIME", "DIV_TIME", "DIV_LTIME", "CONCAT_DATE_TOD", "CONCAT_DATE_LTOD", "TIME", "SIZEOF",
-    "UPPER_BOUND", "LOWER_BOUND", "ADR", "FRAC", "BCD_TO_INT", "INT_TO_BCD", "TRUNC_INT", "TO_UPPER",
-    "TO_LOWER", "LTIME",
+    "ABS",
+    "SQRT",
+    "LN",
+    "LOG",
+    "EXP",
+    "SIN",
+    "COS",
+    "TAN",
+    "ASIN",
+    "ACOS",
+    "ATAN",
+    "ATAN2",
+    "ADD",
+    "MUL",
+    "SUB",
+    "DIV",
+    "MOD",
+    "EXPT",
+    "MOVE",
+    "SHL",
+    "SHR",
+    "ROL",
+    "ROR",
+    "AND",
+    "OR",
+    "XOR",
+    "NOT",
+    "SEL",
+    "MAX",
+    "MIN",
+    "LIMIT",
+    "MUX",
+    "GT",
+    "GE",
+    "EQ",
+    "LE",
+    "LT",
+    "NE",
+    "LEN",
+    "LEFT",
+    "RIGHT",
+    "MID",
+    "CONCAT",
+    "INSERT",
+    "DELETE",
+    "REPLACE",
+    "FIND",
+    "UPPER_CASE",
+    "LOWER_CASE",
+    "TRUNC",
+    "FLOOR",
+    "CEIL",
+    "ROUND",
+    "ADD_TIME",
+    "ADD_LTIME",
+    "ADD_TOD_TIME",
+    "ADD_LTOD_LTIME",
+    "ADD_DT_TIME",
+    "ADD_LDT_LTIME",
+    "SUB_TIME",
+    "SUB_LTIME",
+    "SUB_DATE_DATE",
+    "SUB_LDATE_LDATE",
+    "SUB_TOD_TIME",
+    "SUB_LTOD_LTIME",
+    "SUB_TOD_TOD",
+    "SUB_LTOD_LTOD",
+    "SUB_DT_TIME",
+    "SUB_LDT_LTIME",
+    "SUB_DT_DT",
+    "SUB_LDT_LDT",
+    "MULTIME",
+    "MUL_TIME",
+    "MUL_LTIME",
+    "DIVTIME",
+    "DIV_TIME",
+    "DIV_LTIME",
+    "CONCAT_DATE_TOD",
+    "CONCAT_DATE_LTOD",
+    "TIME",
+    "SIZEOF",
+    "UPPER_BOUND",
+    "LOWER_BOUND",
+    "ADR",
+    "FRAC",
+    "BCD_TO_INT",
+    "INT_TO_BCD",
+    "TRUNC_INT",
+    "TO_UPPER",
+    "TO_LOWER",
+    "LTIME",
 ];
 
 /// Whether a name in capitals is that of a standard function.
@@ -254,7 +334,12 @@ impl Lowering<'_> {
             };
             let right = self.operand(pair[1], hint.as_ref());
             let operator = Operator::Compare(comparison);
-            let one = self.binary(operator, (left, &pair[0].span), (right, &pair[1].span), None);
+            let one = self.binary(
+                operator,
+                (left, &pair[0].span),
+                (right, &pair[1].span),
+                None,
+            );
             let one = self.settle(one, None)?;
             all = Some(match all {
                 Some(before) => choose(before, one, boolean(false)),
@@ -317,7 +402,11 @@ impl Lowering<'_> {
     ) -> Option<Expression> {
         let (value, of) = self.real_value(value, hint)?;
         let real = |function, value| {
-            apply(Operation::Real(function, of), vec![value], Type::Elementary(of))
+            apply(
+                Operation::Real(function, of),
+                vec![value],
+                Type::Elementary(of),
+            )
         };
         let rounded = match key {
             "FLOOR" => real(RealFunction::Floor, value),
@@ -330,7 +419,11 @@ impl Lowering<'_> {
                     Type::Elementary(Elementary::Lint),
                 );
                 let operands = vec![value, convert(whole, of)];
-                return Some(apply(Operation::Subtract(of), operands, Type::Elementary(of)));
+                return Some(apply(
+                    Operation::Subtract(of),
+                    operands,
+                    Type::Elementary(of),
+                ));
             }
         };
         match hint.and_then(Type::elementary) {
@@ -380,7 +473,10 @@ impl Lowering<'_> {
         let found = self.typed(values[0], hint);
         let by = self.long(values[1]);
         let (found, by) = (found?, by?);
-        let Some(of) = found.of.elementary().filter(|of| is_whole(*of) || *of == Elementary::Bool)
+        let Some(of) = found
+            .of
+            .elementary()
+            .filter(|of| is_whole(*of) || *of == Elementary::Bool)
         else {
             let shown = self.describe(&found.of);
             let message = format!("{key} needs a bit string, and this is {shown}");
@@ -423,7 +519,8 @@ impl Lowering<'_> {
             {
                 let kind = syntax::TypeKind::Named(path.root.clone());
                 let span = value.span.clone();
-                self.resolve(&syntax::TypeName { kind, span }).map(|found| found.of)
+                self.resolve(&syntax::TypeName { kind, span })
+                    .map(|found| found.of)
             }
             _ => self.typed(value, None).map(|found| found.of),
         };
@@ -551,7 +648,11 @@ impl Lowering<'_> {
                         let (least, most) = limits(hinted);
                         least <= *value && *value <= most
                     };
-                    if fits { hinted } else { Number::Integer(*value).default_type() }
+                    if fits {
+                        hinted
+                    } else {
+                        Number::Integer(*value).default_type()
+                    }
                 }
                 _ => value.default_type(),
             };

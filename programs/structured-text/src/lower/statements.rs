@@ -160,7 +160,8 @@ impl Lowering<'_> {
         let elementary = elementary.filter(|of| is_whole(*of));
         if let (Some(of), None) = (&of, elementary) {
             let found = self.describe(of);
-            let message = format!("CASE needs a whole number or an enumeration, and this is {found}");
+            let message =
+                format!("CASE needs a whole number or an enumeration, and this is {found}");
             let help = "use IF … ELSIF";
             self.error_with("U1043", message, selector.span.clone(), help);
         }
@@ -222,7 +223,8 @@ impl Lowering<'_> {
             },
         };
         if found.is_none() {
-            let message = "a value of CASE is a whole number that is known when the program is read";
+            let message =
+                "a value of CASE is a whole number that is known when the program is read";
             let help = "write a literal, a constant or a value of the enumeration";
             self.error_with("U1082", message, value.span.clone(), help);
         }
@@ -280,12 +282,17 @@ impl Lowering<'_> {
         let Operand::Typed(value) = &operand else {
             return self.coerce(operand, &wanted, &written.span);
         };
-        let from = value.of.elementary().filter(|of| is_whole(*of)).map(as_integer);
+        let from = value
+            .of
+            .elementary()
+            .filter(|of| is_whole(*of))
+            .map(as_integer);
         match (from, operand) {
             (Some(from), Operand::Typed(value)) => {
                 let ((least, most), (low, high)) = (limits(counter), limits(from));
                 let mut value = reinterpret(value, from);
-                let constant = |limit: i128| number(Type::Elementary(from), limit as u64 & from.mask());
+                let constant =
+                    |limit: i128| number(Type::Elementary(from), limit as u64 & from.mask());
                 if high > most {
                     value = apply(
                         Operation::Minimum(from),

@@ -53,7 +53,11 @@ pub(super) fn elementary(key: &str) -> Option<Elementary> {
         "LDATE" | "D" => Elementary::Date,
         "TOD" | "LTOD" | "LTIME_OF_DAY" => Elementary::TimeOfDay,
         "DT" | "LDT" | "LDATE_AND_TIME" => Elementary::DateAndTime,
-        _ => return Elementary::ALL.into_iter().find(|known| known.name() == key),
+        _ => {
+            return Elementary::ALL
+                .into_iter()
+                .find(|known| known.name() == key);
+        }
     })
 }
 
@@ -169,7 +173,9 @@ impl<'a> Lowering<'a> {
 
     fn subrange(&mut self, base: &Name, low: &Expression, high: &Expression) -> Option<Resolved> {
         let of = self.named_type(base)?.of;
-        let elementary = of.elementary().filter(|found| found.is_integer() || found.is_bit_string());
+        let elementary = of
+            .elementary()
+            .filter(|found| found.is_integer() || found.is_bit_string());
         let Some(elementary) = elementary else {
             let message = format!("a subrange is one of an integer type; `{base}` is none");
             self.error("U1043", message, base.span());
@@ -271,7 +277,10 @@ impl<'a> Lowering<'a> {
                 continue;
             };
             if known.insert(declaration.name.key(), fields.len()).is_some() {
-                let message = format!("two parts of the structure are called `{}`", declaration.name);
+                let message = format!(
+                    "two parts of the structure are called `{}`",
+                    declaration.name
+                );
                 self.error("U1042", message, declaration.name.span());
                 continue;
             }
@@ -352,14 +361,18 @@ impl<'a> Lowering<'a> {
             if let Some(value) = value {
                 next = self.constant_integer(value)?;
             }
-            let Some(value) = i64::try_from(next).ok().filter(|_| next >= least && next <= most)
+            let Some(value) = i64::try_from(next)
+                .ok()
+                .filter(|_| next >= least && next <= most)
             else {
                 let message = format!("the value {next} of `{value_name}` leaves {elementary}");
                 self.error("U1036", message, value_name.span());
                 return None;
             };
             let enumeration = &mut self.program.enumerations[id.0 as usize];
-            enumeration.values.push((value_name.as_str().to_owned(), value));
+            enumeration
+                .values
+                .push((value_name.as_str().to_owned(), value));
             let known = self.enumerators.entry(value_name.key()).or_default();
             known.push((id, elementary, value));
             next += 1;

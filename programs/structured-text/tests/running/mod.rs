@@ -22,7 +22,9 @@ pub(crate) fn program(text: &str) -> Program {
     let (lowered, found) = read(text, None);
     let shown = shown(text, &found, Severity::Error);
     assert!(shown.is_empty(), "{shown}");
-    lowered.program.expect("a text without errors has a program")
+    lowered
+        .program
+        .expect("a text without errors has a program")
 }
 
 /// The findings of a severity, a line each.
@@ -32,11 +34,14 @@ pub(crate) fn shown(text: &str, found: &[Diagnostic], severity: Severity) -> Str
         text: text.to_owned(),
         diagnostics: Vec::new(),
     };
-    let lines = found.iter().filter(|found| found.severity == severity).map(|found| {
-        let place = report.line_and_column(found.span.start);
-        let help = found.help.as_deref().unwrap_or("no help");
-        format!("{} {place} {} [{help}]\n", found.code, found.message)
-    });
+    let lines = found
+        .iter()
+        .filter(|found| found.severity == severity)
+        .map(|found| {
+            let place = report.line_and_column(found.span.start);
+            let help = found.help.as_deref().unwrap_or("no help");
+            format!("{} {place} {} [{help}]\n", found.code, found.message)
+        });
     lines.collect()
 }
 
@@ -95,7 +100,10 @@ impl Running {
         assert_eq!(self.outputs, expected, "the engines differ in an output");
         assert_eq!(self.state, self.reference, "the engines differ in a state");
         let points = self.outputs();
-        points.iter().map(|point| point.get(&self.outputs)).collect()
+        points
+            .iter()
+            .map(|point| point.get(&self.outputs))
+            .collect()
     }
 
     /// What stopped the program.

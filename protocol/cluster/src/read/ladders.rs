@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_interchange::{Source, read_source};
+use understudy_interchange::{Source, SourceFile, Wanted, no_program, read_source};
 use understudy_ladder::Program;
 use understudy_logic::Circuit;
 use understudy_text::{Diagnostic, Report};
@@ -62,6 +62,7 @@ impl<'a> Ladders<'a> {
         let program = match read.source.as_ref()? {
             Source::Ladder(program) => program,
             Source::Typed(program) => return Some(Code::Typed(Arc::clone(program))),
+            Source::Library(_) => return None,
         };
         // Several controllers may run one ladder.
         for warning in program.preset_warnings(period) {
@@ -104,7 +105,18 @@ impl<'a> Ladders<'a> {
             return place.clone();
         }
         let place = (self.open)(file).map(|text| {
-            let (source, diagnostics) = read_source(file, &text, period);
+            let wanted = Wanted {
+                period: Some(period),
+                program: None,
+            };
+            let SourceFile {
+                source,
+                mut diagnostics,
+                ..
+            } = read_source(file, &text, wanted);
+            if let Some(Source::Library(_)) = source {
+                diagnostics.push(no_program());
+            }
             self.read.push(File {
                 name: file.to_owned(),
                 text,

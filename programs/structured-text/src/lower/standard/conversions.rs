@@ -58,7 +58,10 @@ impl Conversion {
             return Some(Self::Truncate(None, Some(elementary(to)?)));
         }
         if let Some((from, to)) = key.split_once("_TRUNC_") {
-            return Some(Self::Truncate(Some(elementary(from)?), Some(elementary(to)?)));
+            return Some(Self::Truncate(
+                Some(elementary(from)?),
+                Some(elementary(to)?),
+            ));
         }
         if let Some((from, to)) = key.split_once("_BCD_TO_") {
             return Some(Self::FromBcd(Some(elementary(from)?), elementary(to)?));
@@ -168,7 +171,11 @@ impl Lowering<'_> {
         let from = match (&value.of, to) {
             (Type::Text(_), End::Text) => return Some(value),
             (Type::Text(_), End::Elementary(to, _)) => {
-                return Some(text(TextOperation::To(to), vec![value], Type::Elementary(to)));
+                return Some(text(
+                    TextOperation::To(to),
+                    vec![value],
+                    Type::Elementary(to),
+                ));
             }
             (of, _) => of.elementary()?,
         };
@@ -222,7 +229,11 @@ fn from_time(value: Expression, unit: i64, to: Elementary) -> Expression {
         let double = Type::Elementary(Elementary::Lreal);
         let value = convert(value, Elementary::Lreal);
         let unit = convert(lint(unit), Elementary::Lreal);
-        let value = apply(Operation::Divide(Elementary::Lreal), vec![value, unit], double);
+        let value = apply(
+            Operation::Divide(Elementary::Lreal),
+            vec![value, unit],
+            double,
+        );
         return convert(value, to);
     }
     if to == Elementary::Bool {
@@ -237,7 +248,11 @@ fn to_time(value: Expression, from: Elementary, to: Elementary, unit: i64) -> Ex
         let double = Type::Elementary(Elementary::Lreal);
         let value = convert(value, Elementary::Lreal);
         let unit = convert(lint(unit), Elementary::Lreal);
-        let value = apply(Operation::Multiply(Elementary::Lreal), vec![value, unit], double);
+        let value = apply(
+            Operation::Multiply(Elementary::Lreal),
+            vec![value, unit],
+            double,
+        );
         return convert(value, to);
     }
     let value = convert(value, Elementary::Lint);

@@ -56,7 +56,11 @@ impl Lowering<'_> {
                     vec![least, value],
                     of.clone(),
                 );
-                Some(apply(Operation::Minimum(elementary), vec![most, raised], of))
+                Some(apply(
+                    Operation::Minimum(elementary),
+                    vec![most, raised],
+                    of,
+                ))
             }
             _ => {
                 let (values, of) = self.alike(values, hint)?;
@@ -127,10 +131,14 @@ impl Lowering<'_> {
         };
         let routine = self.routine(key, span)?;
         let double = Type::Elementary(Elementary::Lreal);
-        let given = routine.parameters.iter().zip([y, x]).map(|(parameter, value)| {
-            let to = place(Root::Frame(parameter.slot), double.clone());
-            Argument::Value(to, convert(value, Elementary::Lreal))
-        });
+        let given = routine
+            .parameters
+            .iter()
+            .zip([y, x])
+            .map(|(parameter, value)| {
+                let to = place(Root::Frame(parameter.slot), double.clone());
+                Argument::Value(to, convert(value, Elementary::Lreal))
+            });
         let call = Call {
             routine: routine.id,
             own: None,

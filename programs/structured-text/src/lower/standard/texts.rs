@@ -78,7 +78,11 @@ impl Lowering<'_> {
             Type::Text(capacity) => Some((found, capacity)),
             _ => {
                 let found = self.describe(&found.of);
-                self.mismatch(&found, &Type::Text(super::super::types::DEFAULT_CAPACITY), &value.span)
+                self.mismatch(
+                    &found,
+                    &Type::Text(super::super::types::DEFAULT_CAPACITY),
+                    &value.span,
+                )
             }
         }
     }

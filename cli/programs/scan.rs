@@ -1,0 +1,314 @@
+//! `understudy scan`: the outputs of a program, scan by scan, for inputs from a file.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::Args;
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+use understudy_executable::{Executable, Interface, Scratch};
+use understudy_interchange::{Source, Wanted, no_program, read_source};
+use understudy_ladder::Program as Ladder;
+use understudy_text::{Diagnostic, Report, duration, has_errors};
+use understudy_typed::{Elementary, Fault, Point, Points, Program};
+
+use crate::answer::{Answer, Status};
+use crate::files;
+
+/// Execute a program on inputs from a file, one scan for each line
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy scan pid.st --inputs steps.txt --period 10ms
+  understudy scan --json robot.ladder --inputs part-arrives.txt
+
+A line of the file holds the values of all inputs in the order of their declaration, with blanks between: BOOL as 0 or 1, integers and bit
+strings in decimal, REAL and LREAL as their hexadecimal bit patterns of 8 and 16 digits or as numbers with a point, times in nanoseconds.
+Empty lines and lines that begin with # are skipped. Each scan is printed as `inputs -> outputs` in the same notation.")]
+pub(crate) struct Arguments {
+    /// Program
+    #[arg(value_name = "PROGRAM")]
+    program_file: PathBuf,
+    /// File with the inputs, one scan a line
+    #[arg(long, value_name = "FILE")]
+    inputs: PathBuf,
+    /// Time from one scan to the next; by default that of the file, else 10ms
+    #[arg(long, value_name = "TIME", value_parser = duration::parse_positive)]
+    period: Option<Duration>,
+    /// The program to execute in a text with several programs and no configuration
+    #[arg(long, value_name = "NAME")]
+    program: Option<String>,
+}
+
+/// Period of a program whose file has none.
+const PERIOD: Duration = Duration::from_millis(10);
+
+/// The longest file of inputs, in scans.
+const MAXIMUM_SCANS: usize = 1_000_000;
+
+/// Faulty lines that are reported one by one.
+const MAXIMUM_REPORTED: usize = 20;
+
+#[derive(Serialize)]
+struct Result {
+    program: String,
+    period_ns: u64,
+    inputs: Vec<Signal>,
+    outputs: Vec<Signal>,
+    scans: Vec<Scanned>,
+}
+
+#[derive(Serialize)]
+struct Signal {
+    name: String,
+    #[serde(rename = "type")]
+    of: &'static str,
+}
+
+#[derive(Serialize)]
+struct Scanned {
+    inputs: Map<String, Value>,
+    outputs: Map<String, Value>,
+    /// The program fault that stops the program in this scan and in all after it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fault: Option<String>,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Answer {
+    match scan(arguments) {
+        Ok(answer) | Err(answer) => answer,
+    }
+}
+
+fn scan(arguments: &Arguments) -> std::result::Result<Answer, Answer> {
+    let (subject, report) = subject(arguments)?;
+    let text = files::text(&arguments.inputs)?;
+    let lines = lines(&text, &subject.interface.inputs).map_err(|diagnostics| {
+        Answer::bad_files(vec![Report {
+            name: arguments.inputs.display().to_string(),
+            text: text.clone(),
+            diagnostics,
+        }])
+    })?;
+    Ok(subject.executed(&lines).with_used(vec![report]))
+}
+
+/// A program that is executed.
+struct Subject {
+    name: String,
+    executable: Executable,
+    interface: Interface,
+    period: Duration,
+    typed: Option<std::sync::Arc<Program>>,
+}
+
+fn subject(arguments: &Arguments) -> std::result::Result<(Subject, Report), Answer> {
+    let text = files::text(&arguments.program_file)?;
+    let name = arguments.program_file.display().to_string();
+    let wanted = |period| Wanted {
+        period: Some(period),
+        program: arguments.program.as_deref(),
+    };
+    let mut read = read_source(&name, &text, wanted(arguments.period.unwrap_or(PERIOD)));
+    // A period in the file is known only after it was read.
+    let period = arguments.period.or(read.period).unwrap_or(PERIOD);
+    if arguments.period.is_none() && period != PERIOD {
+        read = read_source(&name, &text, wanted(period));
+    }
+    if let Some(Source::Library(_)) = read.source {
+        read.diagnostics.push(no_program());
+    }
+    let report = Report {
+        name,
+        text,
+        diagnostics: read.diagnostics,
+    };
+    let (name, executable, interface, typed) = match read.source {
+        Some(Source::Ladder(program)) => {
+            let circuit = lowered(&program, period)?;
+            let name = program.name.to_string();
+            (name, (&circuit).into(), (&circuit).into(), None)
+        }
+        Some(Source::Typed(program)) => {
+            let executable = program.as_ref().into();
+            let name = program.name.clone();
+            (name, executable, program.as_ref().into(), Some(program))
+        }
+        Some(Source::Library(_)) | None => return Err(Answer::bad_files(vec![report])),
+    };
+    let subject = Subject {
+        name,
+        executable,
+        interface,
+        period,
+        typed,
+    };
+    Ok((subject, report))
+}
+
+fn lowered(
+    program: &Ladder,
+    period: Duration,
+) -> std::result::Result<understudy_logic::Circuit, Answer> {
+    program
+        .lower(period)
+        .map_err(|error| Answer::failed(Status::BadInput, "U0436", error.to_string()))
+}
+
+/// The points that a program declares: the reset and the fault of a program with numbers are not among them.
+fn declared(points: &Points) -> impl Iterator<Item = &Point> {
+    let implied = [Program::RESET, Program::FAULT];
+    points
+        .iter()
+        .filter(move |point| !implied.contains(&point.name.as_str()))
+}
+
+/// The stored values of each scan.
+fn lines(text: &str, inputs: &Points) -> std::result::Result<Vec<Vec<u64>>, Vec<Diagnostic>> {
+    let points: Vec<&Point> = declared(inputs).collect();
+    let mut scans = Vec::new();
+    let mut diagnostics = Vec::new();
+    let mut place = 0;
+    for line in text.split_inclusive('\n') {
+        let start = place;
+        place += line.len();
+        let line = line.trim_end();
+        if line.trim_start().starts_with('#') || line.trim().is_empty() && !points.is_empty() {
+            continue;
+        }
+        if scans.len() >= MAXIMUM_SCANS || diagnostics.len() >= MAXIMUM_REPORTED {
+            diagnostics.push(Diagnostic::too_many(start));
+            break;
+        }
+        match values(line, start, &points) {
+            Ok(values) => scans.push(values),
+            Err(diagnostic) => diagnostics.push(diagnostic),
+        }
+    }
+    if has_errors(&diagnostics) {
+        return Err(diagnostics);
+    }
+    Ok(scans)
+}
+
+fn values(
+    line: &str,
+    start: usize,
+    points: &[&Point],
+) -> std::result::Result<Vec<u64>, Diagnostic> {
+    // The lines of another tool may have the outputs behind an arrow.
+    let inputs = line.split("->").next().unwrap_or_default();
+    let words: Vec<&str> = inputs.split_whitespace().collect();
+    if words.len() != points.len() {
+        let message = format!(
+            "a scan has {} inputs, and this line {}",
+            points.len(),
+            words.len()
+        );
+        let named: Vec<String> = points
+            .iter()
+            .take(MAXIMUM_REPORTED)
+            .map(|point| format!("{} : {}", point.name, point.of))
+            .collect();
+        let help = format!("in this order: {}", named.join(", "));
+        return Err(Diagnostic::error("U0439", message, start..start + line.len()).with_help(help));
+    }
+    let read = words.iter().zip(points).map(|(word, point)| {
+        point.of.read(word).ok_or_else(|| {
+            let at = start + (word.as_ptr() as usize - line.as_ptr() as usize);
+            let message = format!("`{word}` is no {} for `{}`", point.of, point.name);
+            Diagnostic::error("U0439", message, at..at + word.len()).with_help(expected(point.of))
+        })
+    });
+    read.collect()
+}
+
+fn expected(of: Elementary) -> String {
+    match of {
+        Elementary::Bool => "write 0 or 1".to_owned(),
+        Elementary::Real => "write 8 hexadecimal digits, or a number with a point".to_owned(),
+        Elementary::Lreal => "write 16 hexadecimal digits, or a number with a point".to_owned(),
+        _ if of.is_time() => "write nanoseconds".to_owned(),
+        _ => "write a decimal number in the range of the type".to_owned(),
+    }
+}
+
+impl Subject {
+    fn executed(&self, lines: &[Vec<u64>]) -> Answer {
+        let Interface { inputs, outputs } = &self.interface;
+        let mut scratch = Scratch::default();
+        let mut state = self.executable.initial().to_vec();
+        let mut read = vec![0; inputs.width().div_ceil(64)];
+        let mut driven = vec![0; outputs.width().div_ceil(64)];
+        let mut text = String::new();
+        let mut scans = Vec::new();
+        let mut fault = None;
+        for values in lines {
+            for (point, value) in declared(inputs).zip(values) {
+                point.set(&mut read, *value);
+            }
+            self.executable
+                .step(&mut scratch, &mut state, &read, &mut driven);
+            let _ = writeln!(
+                text,
+                "{} -> {}",
+                written(inputs, &read),
+                written(outputs, &driven)
+            );
+            let found = self
+                .typed
+                .as_ref()
+                .and_then(|program| Some(Fault::read(&state)?.describe(program)));
+            if fault.is_none() && found.is_some() {
+                fault = found.clone().map(|found| (scans.len() + 1, found));
+            }
+            scans.push(Scanned {
+                inputs: named(inputs, &read),
+                outputs: named(outputs, &driven),
+                fault: found,
+            });
+        }
+        let signals = |points: &Points| {
+            let signals = declared(points).map(|point| Signal {
+                name: point.name.clone(),
+                of: point.of.name(),
+            });
+            signals.collect()
+        };
+        let result = Result {
+            program: self.name.clone(),
+            period_ns: u64::try_from(self.period.as_nanos()).unwrap_or(u64::MAX),
+            inputs: signals(inputs),
+            outputs: signals(outputs),
+            scans,
+        };
+        let answer = Answer::done(text.trim_end().to_owned(), result);
+        match fault {
+            None => answer,
+            Some((scan, fault)) => {
+                let message = format!("program fault in scan {scan}: {fault}");
+                answer.and_failure(Status::Failed, "U0440", message)
+            }
+        }
+    }
+}
+
+/// The values of an image in the notation of the file.
+fn written(points: &Points, image: &[u64]) -> String {
+    let values: Vec<String> = declared(points)
+        .map(|point| point.of.write(point.get(image)))
+        .collect();
+    values.join(" ")
+}
+
+fn named(points: &Points, image: &[u64]) -> Map<String, Value> {
+    let values = declared(points).map(|point| {
+        let value = match point.of {
+            Elementary::Bool => json!(point.get(image) == 1),
+            _ => understudy_view::number_of(point, image),
+        };
+        (point.name.clone(), value)
+    });
+    values.collect()
+}
