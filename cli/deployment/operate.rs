@@ -93,13 +93,10 @@ enum What {
 /// Timeout; a member sends in every cycle.
 const SILENCE: Duration = Duration::from_secs(60);
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
-    let answer = match &arguments.keys {
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
+    match &arguments.keys {
         Some(keys) => elsewhere(arguments, keys),
         None => in_laboratory(arguments),
-    };
-    match answer {
-        Ok(answer) | Err(answer) => answer,
     }
 }
 
@@ -139,8 +136,7 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
 fn written(arguments: &Arguments) -> Result<Run, Answer> {
     let target = &arguments.target;
     if target.is_dir() {
-        return Run::open(target)
-            .map_err(|error| Answer::failed(Status::BadInput, error.code(), error.to_string()));
+        return Ok(Run::open(target)?);
     }
     let (cluster, _) = files::cluster(target, Overrides::default())?;
     find_running_of(&arguments.out, &cluster).ok_or_else(|| {
@@ -184,11 +180,8 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
         let message = format!("no address for {}", arguments.name);
         Answer::failed(Status::BadInput, "U0608", message)
     })?;
-    let failed = |error: understudy_bus::BusError| {
-        Answer::failed(Status::Failed, error.code(), error.to_string())
-    };
     let hash = cluster.agreement().cluster;
-    let call = Call::to(address, hash, &arguments.name, &tls_keys(&keys.tls)).map_err(failed)?;
+    let call = Call::to(address, hash, &arguments.name, &tls_keys(&keys.tls))?;
     let Some(request) = request else {
         let mut left = arguments.lines;
         let take = |line: &str| {
@@ -196,10 +189,10 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
             // The reader closed the pipe.
             writeln!(std::io::stdout(), "{line}").is_ok() && left > 0
         };
-        call.follow(SILENCE, take).map_err(failed)?;
+        call.follow(SILENCE, take)?;
         return Ok(Answer::done("", json!(null)));
     };
-    let text = call.ask(&request).map_err(failed)?;
+    let text = call.ask(&request)?;
     let result = serde_json::from_str(&text).unwrap_or_else(|_| json!({ "text": text }));
     Ok(Answer::done(text, result))
 }

@@ -126,7 +126,7 @@ fn ladder(path: &Path, period: Duration) -> Result<(Member, Report), Answer> {
     let circuit = parsed
         .program
         .lower(period)
-        .map_err(|error| Answer::failed(Status::BadInput, "U0436", error.to_string()))?;
+        .map_err(|error| Answer::failed(Status::BadInput, "U0436", error))?;
     let member = Member {
         name: parsed.program.name.to_string(),
         ladder: parsed.program,

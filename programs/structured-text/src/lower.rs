@@ -4,12 +4,17 @@
 //! it is called. A name is looked up in the unit, then among the global variables, the values of enumerations and the units. A body is
 //! lowered once for each block that has it, so a method of a base calls the methods of the block it runs on.
 
+mod addresses;
+mod arguments;
 mod blocks;
 mod body;
+mod callees;
 mod calls;
 mod chains;
 mod constants;
 mod convert;
+mod expand;
+mod expressions;
 mod fold;
 mod images;
 mod initial;
@@ -20,6 +25,7 @@ mod programs;
 mod routines;
 mod standard;
 mod statements;
+mod times;
 mod types;
 
 use std::collections::HashMap;
@@ -80,7 +86,10 @@ pub struct Lowered {
 /// Lowers the programs of a file, or checks the units of a library.
 pub fn lower(file: &File, options: &Options<'_>) -> Lowered {
     let library = library::file();
+    let mut found = Vec::new();
+    let file = &*expand::expand(file, &mut found);
     let mut lowering = Lowering::new(file, library, options.text);
+    lowering.diagnostics = found;
     lowering.declare(file, library);
     let checked = lowering.programs(file, options);
     lowering.finish(checked)

@@ -100,7 +100,7 @@ impl Interpreter {
             memory,
         };
         for task in self.frame.tasks() {
-            if scans % u64::from(task.every.max(1)) == 0 {
+            if scans.is_multiple_of(u64::from(task.every.max(1))) {
                 let context = Context {
                     routine: task.routine,
                     own: u64::from(task.own),

@@ -191,7 +191,6 @@ impl<'a> Lowering<'a> {
         let info = StructureInfo {
             fields: fields.collect(),
             unit: Some(unit),
-            image: image.clone(),
         };
         let structure = Structure {
             name: found.name.as_str().to_owned(),

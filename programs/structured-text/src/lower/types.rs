@@ -43,7 +43,6 @@ pub(super) struct StructureInfo {
     pub(super) fields: HashMap<String, usize>,
     /// The unit whose memory it is.
     pub(super) unit: Option<usize>,
-    pub(super) image: Image,
 }
 
 /// The elementary type of a name in capitals.
@@ -310,7 +309,6 @@ impl<'a> Lowering<'a> {
             StructureInfo {
                 fields: known,
                 unit: None,
-                image: image.clone(),
             },
         );
         Some(Resolved {

@@ -59,6 +59,8 @@ pub(crate) struct Running {
 
 impl Running {
     pub(crate) fn new(program: Program) -> Self {
+        let violations = program.validate();
+        assert!(violations.is_ok(), "{violations:?}");
         let interpreter = Interpreter::new(&program);
         let machine = Machine::new(&program);
         Self {
