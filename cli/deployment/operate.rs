@@ -160,17 +160,27 @@ fn place<'a>(
     let bad = |message: String| Answer::failed(Status::BadInput, "U0556", message);
     let member = crate::member::find(cluster, &arguments.name)?;
     let Member::RemoteIo(program) = member else {
-        let message = format!("`{}` is not a remote I/O: signals are forced there", arguments.name);
+        let message = format!(
+            "`{}` is not a remote I/O: signals are forced there",
+            arguments.name
+        );
         return Err(bad(message));
     };
     let Interface { inputs, outputs } = &cluster.controllers()[program.index()].interface;
     let name = name.trim();
-    let input = inputs.find(name).map(|point| (SignalPlace::Input(point.bit as u16), point.of));
-    let output = outputs.find(name).map(|point| (SignalPlace::Output(point.bit as u16), point.of));
+    let input = inputs
+        .find(name)
+        .map(|point| (SignalPlace::Input(point.bit as u16), point.of));
+    let output = outputs
+        .find(name)
+        .map(|point| (SignalPlace::Output(point.bit as u16), point.of));
     let (place, of) = input.or(output).ok_or_else(|| {
         let names: Vec<&str> = inputs.names().chain(outputs.names()).collect();
         let names = names.join(", ");
-        bad(format!("the program of `{}` has no signal `{name}`; its signals are {names}", arguments.name))
+        bad(format!(
+            "the program of `{}` has no signal `{name}`; its signals are {names}",
+            arguments.name
+        ))
     })?;
     Ok((place, of, value.trim()))
 }
@@ -196,7 +206,9 @@ fn force(arguments: &Arguments, cluster: &Cluster) -> Result<Force, Answer> {
         owner: crate::inspect::top::owner(),
         reason: arguments.reason.clone(),
     };
-    force.check().map_err(|error| Answer::failed(Status::BadInput, "U0556", error.to_string()))?;
+    force
+        .check()
+        .map_err(|error| Answer::failed(Status::BadInput, "U0556", error.to_string()))?;
     Ok(force)
 }
 

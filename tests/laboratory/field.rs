@@ -52,7 +52,10 @@ impl Device {
     fn start_of(example: &str, argument: &str, module: &str, wanted: &str) -> Option<Self> {
         let python = std::env::var("UNDERSTUDY_PYTHON").unwrap_or_else(|_| "python3".into());
         let version = Command::new(&python)
-            .args(["-c", &format!("import {module}; print({module}.__version__)")])
+            .args([
+                "-c",
+                &format!("import {module}; print({module}.__version__)"),
+            ])
             .output();
         let version = version.map_or_else(
             |error| error.to_string(),
@@ -280,7 +283,13 @@ fn a_real_in_registers_is_driven_while_its_controller_is_dead() {
                 && (missing.is_empty() || record["missing"] == missing)
         }
     };
-    let at = wait_for_member(&journal, 0, "left-io", "driven", own("applied", "direct", ""));
+    let at = wait_for_member(
+        &journal,
+        0,
+        "left-io",
+        "driven",
+        own("applied", "direct", ""),
+    );
     device.mood("nan");
     let lost = |record: &Value| {
         let said = record["reason"].as_str().unwrap_or_default();
@@ -291,7 +300,13 @@ fn a_real_in_registers_is_driven_while_its_controller_is_dead() {
     let bad = own("applied", "fail-safe", "bad-quality");
     let at = wait_for_member(&journal, at, "left-io", "fail-safe", bad);
     device.mood("well");
-    wait_for_member(&journal, at, "left-io", "driven again", own("applied", "direct", ""));
+    wait_for_member(
+        &journal,
+        at,
+        "left-io",
+        "driven again",
+        own("applied", "direct", ""),
+    );
     signal(child.id(), nix::sys::signal::Signal::SIGINT);
     child.wait().expect("it ends");
     no_orphan(&out);

@@ -135,10 +135,7 @@ impl RegisterMap {
     pub fn new(cluster: &Cluster) -> Result<Self, GatewayError> {
         let programs = cluster.controllers();
         let mut places = Vec::new();
-        for (area, meaning) in [
-            (Area::DiscreteInput, INPUT),
-            (Area::Coil, OUTPUT),
-        ] {
+        for (area, meaning) in [(Area::DiscreteInput, INPUT), (Area::Coil, OUTPUT)] {
             let signals = programs.iter().flat_map(|program| {
                 let Interface { inputs, outputs } = &program.interface;
                 let points = match area {
@@ -195,8 +192,7 @@ impl RegisterMap {
                 places.push(register(address, width, name, meaning));
             }
         }
-        let interfaces: Vec<Interface> =
-            programs.iter().map(|it| it.interface.clone()).collect();
+        let interfaces: Vec<Interface> = programs.iter().map(|it| it.interface.clone()).collect();
         let mut address = NUMBERS;
         for (program, interface) in programs.iter().zip(&interfaces) {
             for (points, meaning) in [(&interface.inputs, INPUT), (&interface.outputs, OUTPUT)] {
@@ -265,7 +261,12 @@ impl RegisterMap {
         for (rank, station) in snapshot.stations.iter().enumerate().take(self.stations) {
             registers[STATIONS + rank] = state_number(station.state);
         }
-        for (index, program) in snapshot.programs.iter().enumerate().take(self.interfaces.len()) {
+        for (index, program) in snapshot
+            .programs
+            .iter()
+            .enumerate()
+            .take(self.interfaces.len())
+        {
             let base = PROGRAMS + index * OF_PROGRAM;
             registers[base] = match program.source {
                 None => 0,
@@ -298,8 +299,18 @@ impl RegisterMap {
         }
         for (interface, program) in self.interfaces.iter().zip(&snapshot.programs) {
             let (inputs, outputs) = (program.inputs.as_deref(), program.outputs.as_deref());
-            add_points(&interface.inputs, inputs, &mut image.inputs, &mut image.registers);
-            add_points(&interface.outputs, outputs, &mut image.coils, &mut image.registers);
+            add_points(
+                &interface.inputs,
+                inputs,
+                &mut image.inputs,
+                &mut image.registers,
+            );
+            add_points(
+                &interface.outputs,
+                outputs,
+                &mut image.coils,
+                &mut image.registers,
+            );
         }
         image
     }
@@ -308,7 +319,9 @@ impl RegisterMap {
 /// The points of an image that is written as bits, such as `0110`: BOOLs as bits, numbers as registers; 0 where nothing is known.
 fn add_points(points: &Points, text: Option<&str>, bits: &mut Vec<bool>, registers: &mut Vec<u16>) {
     for point in points {
-        let stored = text.and_then(|text| stored(point, text)).unwrap_or_default();
+        let stored = text
+            .and_then(|text| stored(point, text))
+            .unwrap_or_default();
         if point.of == Elementary::Bool {
             bits.push(stored != 0);
             continue;

@@ -37,9 +37,7 @@ pub fn forced_point<'a>(controller: &'a Controller, force: &Force) -> Option<&'a
         SignalPlace::Output(_) => &controller.interface.outputs,
     };
     let (bit, width) = (force.signal.first_bit(), force.value.width());
-    let is_it = |point: &&Point| {
-        (point.bit, point.of.bits()) == (u32::from(bit), u32::from(width))
-    };
+    let is_it = |point: &&Point| (point.bit, point.of.bits()) == (u32::from(bit), u32::from(width));
     points.iter().find(is_it)
 }
 

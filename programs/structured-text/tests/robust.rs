@@ -7,15 +7,66 @@ use proptest::prelude::*;
 use understudy_structured_text::{Options, lower, parse};
 
 const WORDS: [&str; 60] = [
-    "PROGRAM p ", "END_PROGRAM ", "FUNCTION f : INT ", "END_FUNCTION ", "FUNCTION_BLOCK b ",
-    "END_FUNCTION_BLOCK ", "EXTENDS b ", "METHOD m : INT ", "END_METHOD ", "VAR ", "VAR_INPUT ",
-    "VAR_OUTPUT ", "VAR_IN_OUT ", "VAR_GLOBAL ", "CONSTANT ", "END_VAR ", "TYPE t : ", "END_TYPE ",
-    "STRUCT ", "END_STRUCT; ", "a : INT; ", "c : t; ", "d : b; ", "e : ARRAY [0..3] OF INT; ",
-    "s : STRING[5]; ", "x : REAL := 1.5; ", "w : WORD; ", "a := ", "e[a] := ", "c := ", "w.3 := ",
-    "d(a := 1); ", "f(a) ", "m() ", "THIS^.m() ", "SUPER^(); ", "1 ", "2.5 ", "TRUE ", "'text' ",
-    "T#5s ", "+ ", "* ", "/ 0 ", "AND ", "= ", "NOT ", "( ", ") ", "; ", "IF a > 1 THEN ", "END_IF; ",
-    "FOR a := 0 TO 9 DO ", "END_FOR; ", "CASE a OF 1: ", "END_CASE; ", "INITIAL_STEP s1: END_STEP ",
-    "TRANSITION FROM s1 TO s1 := a = 1; END_TRANSITION ", "LD a\n", "ST a\n",
+    "PROGRAM p ",
+    "END_PROGRAM ",
+    "FUNCTION f : INT ",
+    "END_FUNCTION ",
+    "FUNCTION_BLOCK b ",
+    "END_FUNCTION_BLOCK ",
+    "EXTENDS b ",
+    "METHOD m : INT ",
+    "END_METHOD ",
+    "VAR ",
+    "VAR_INPUT ",
+    "VAR_OUTPUT ",
+    "VAR_IN_OUT ",
+    "VAR_GLOBAL ",
+    "CONSTANT ",
+    "END_VAR ",
+    "TYPE t : ",
+    "END_TYPE ",
+    "STRUCT ",
+    "END_STRUCT; ",
+    "a : INT; ",
+    "c : t; ",
+    "d : b; ",
+    "e : ARRAY [0..3] OF INT; ",
+    "s : STRING[5]; ",
+    "x : REAL := 1.5; ",
+    "w : WORD; ",
+    "a := ",
+    "e[a] := ",
+    "c := ",
+    "w.3 := ",
+    "d(a := 1); ",
+    "f(a) ",
+    "m() ",
+    "THIS^.m() ",
+    "SUPER^(); ",
+    "1 ",
+    "2.5 ",
+    "TRUE ",
+    "'text' ",
+    "T#5s ",
+    "+ ",
+    "* ",
+    "/ 0 ",
+    "AND ",
+    "= ",
+    "NOT ",
+    "( ",
+    ") ",
+    "; ",
+    "IF a > 1 THEN ",
+    "END_IF; ",
+    "FOR a := 0 TO 9 DO ",
+    "END_FOR; ",
+    "CASE a OF 1: ",
+    "END_CASE; ",
+    "INITIAL_STEP s1: END_STEP ",
+    "TRANSITION FROM s1 TO s1 := a = 1; END_TRANSITION ",
+    "LD a\n",
+    "ST a\n",
 ];
 
 proptest! {
@@ -64,7 +115,9 @@ fn large_and_deep_texts_are_bounded() {
     let functions: String = (0..3_000)
         .map(|at| format!("FUNCTION f{at} : INT f{at} := f{}(); END_FUNCTION ", at + 1))
         .collect();
-    let text = format!("{functions} FUNCTION f3000 : INT f3000 := 1; END_FUNCTION PROGRAM p VAR a : INT; END_VAR a := f0(); END_PROGRAM");
+    let text = format!(
+        "{functions} FUNCTION f3000 : INT f3000 := 1; END_FUNCTION PROGRAM p VAR a : INT; END_VAR a := f0(); END_PROGRAM"
+    );
     assert_eq!(taken(&text), "");
     let text = "FUNCTION f : INT f := g(); END_FUNCTION FUNCTION g : INT g := f(); END_FUNCTION PROGRAM p VAR a : INT; END_VAR a := f(); END_PROGRAM";
     assert!(taken(text).starts_with("U1047"));

@@ -196,10 +196,10 @@ impl<'a, 't> Fields<'a, 't> {
             Some(path) if path.starts_with('/') => Some(ConnectionText::Rtu(path.to_owned())),
             Some(path) => {
                 let message = format!("{path:?} is not a path from the root");
-                diagnostics.push(
-                    Diagnostic::error("U0210", message, text.span)
-                        .with_help("the terminal device of the line, such as \"rtu:/dev/ttyUSB0\""),
-                );
+                diagnostics
+                    .push(Diagnostic::error("U0210", message, text.span).with_help(
+                        "the terminal device of the line, such as \"rtu:/dev/ttyUSB0\"",
+                    ));
                 None
             }
             None => self

@@ -264,11 +264,9 @@ fn connection(fields: &Fields<'_, '_>, diagnostics: &mut Vec<Diagnostic>) -> Opt
             for name in ["baud", "parity", "stop_bits"] {
                 if let Some(span) = fields.place_of(name) {
                     let message = format!("`{name}` of a device that is reached by TCP");
-                    diagnostics.push(
-                        Diagnostic::error("U0202", message, span).with_help(
-                            "only a serial line has it, such as modbus = \"rtu:/dev/ttyUSB0\"",
-                        ),
-                    );
+                    diagnostics.push(Diagnostic::error("U0202", message, span).with_help(
+                        "only a serial line has it, such as modbus = \"rtu:/dev/ttyUSB0\"",
+                    ));
                 }
             }
             Connection::Tcp(address)
@@ -280,14 +278,14 @@ fn connection(fields: &Fields<'_, '_>, diagnostics: &mut Vec<Diagnostic>) -> Opt
                 let rates = BAUD_RATES.map(|rate| rate.to_string()).join(", ");
                 let message = format!("no serial line has {} bits per second", line.baud);
                 diagnostics.push(
-                    Diagnostic::error("U0205", message, span)
-                        .with_help(format!("one of {rates}")),
+                    Diagnostic::error("U0205", message, span).with_help(format!("one of {rates}")),
                 );
             }
             if unit == 0
                 && let Some(span) = fields.place_of("unit")
             {
-                let message = "unit 0 of a serial line is all of its devices, and none of them answers";
+                let message =
+                    "unit 0 of a serial line is all of its devices, and none of them answers";
                 diagnostics.push(
                     Diagnostic::error("U0205", message, span)
                         .with_help("the number of the device, 1 to 247"),

@@ -6,7 +6,8 @@ use understudy_text::duration;
 
 use crate::fields::MAXIMUM_NAME_LENGTH;
 use crate::format::{
-    CLUSTER, CONTROLLER, FIELD, Key, Kind, POINT, PRESS_PARAMETERS, ROBOT_PARAMETERS, SECTIONS, Section,
+    CLUSTER, CONTROLLER, FIELD, Key, Kind, POINT, PRESS_PARAMETERS, ROBOT_PARAMETERS, SECTIONS,
+    Section,
 };
 use crate::place::{ByteOrder, Registers};
 

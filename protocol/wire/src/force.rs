@@ -126,7 +126,8 @@ pub enum ForceError {
 impl Force {
     /// Whether both are forces of one bit.
     pub fn overlaps(&self, other: &Self) -> bool {
-        let same_side = std::mem::discriminant(&self.signal) == std::mem::discriminant(&other.signal);
+        let same_side =
+            std::mem::discriminant(&self.signal) == std::mem::discriminant(&other.signal);
         let bits = |force: &Self| {
             let first = u32::from(force.signal.first_bit());
             first..first + u32::from(force.value.width())
@@ -213,7 +214,11 @@ mod tests {
         check(3, "true", Ok(()));
         check(64, r#"{"width":32,"stored":4294967295}"#, Ok(()));
         check(64, r#"{"width":64,"stored":18446744073709551615}"#, Ok(()));
-        check(64, r#"{"width":32,"stored":4294967296}"#, Err(ForceError::Value));
+        check(
+            64,
+            r#"{"width":32,"stored":4294967296}"#,
+            Err(ForceError::Value),
+        );
         check(16, r#"{"width":32,"stored":0}"#, Err(ForceError::Value));
         check(0, r#"{"width":1,"stored":0}"#, Err(ForceError::Value));
         check(0, r#"{"width":0,"stored":0}"#, Err(ForceError::Value));
@@ -228,7 +233,10 @@ mod tests {
             owner: "anna".to_owned(),
             reason: "why".to_owned(),
         };
-        let number = ForcedValue::Number { width: 32, stored: 0 };
+        let number = ForcedValue::Number {
+            width: 32,
+            stored: 0,
+        };
         let wide = force(SignalPlace::Input(32), number);
         for (signal, expected) in [
             (SignalPlace::Input(31), false),
@@ -238,7 +246,10 @@ mod tests {
             (SignalPlace::Output(32), false),
         ] {
             let bit = force(signal, true.into());
-            assert_eq!((wide.overlaps(&bit), bit.overlaps(&wide)), (expected, expected));
+            assert_eq!(
+                (wide.overlaps(&bit), bit.overlaps(&wide)),
+                (expected, expected)
+            );
         }
         assert!(wide.fits(64) && !wide.fits(63));
     }

@@ -19,7 +19,10 @@ pub(crate) fn value(
 ) -> Result<u64, NotFinite> {
     let raw = joined(registers, words);
     let stored = if registers.is_scaled() {
-        store(of, number(registers.of, raw) * registers.scale + registers.offset)
+        store(
+            of,
+            number(registers.of, raw) * registers.scale + registers.offset,
+        )
     } else {
         convert(registers.of, of, raw)
     };
@@ -171,7 +174,15 @@ mod tests {
         let (int, uint) = ("holding:0 int", "holding:0 uint");
         // 4 to 20 mA in 1/100 mA above -20 °C.
         check(int, 0.01, -20.0, Elementary::Real, 2000, real(0.0), 2000);
-        check(int, 0.01, -20.0, Elementary::Real, 0xFFFF, real(-20.01), 0xFFFF);
+        check(
+            int,
+            0.01,
+            -20.0,
+            Elementary::Real,
+            0xFFFF,
+            real(-20.01),
+            0xFFFF,
+        );
         check(int, 1.0, 0.0, Elementary::Lreal, 7, 7.0_f64.to_bits(), 7);
         check(int, 1.0, 0.0, Elementary::Int, 0xFFFE, 0xFFFE, 0xFFFE);
         check(int, 1.0, 0.0, Elementary::Sint, 300, 127, 127);
@@ -199,10 +210,15 @@ mod tests {
             assert_eq!(value(&registers, Elementary::Real, &words), Err(NotFinite));
             assert_eq!(value(&registers, Elementary::Lreal, &words), Err(NotFinite));
         }
-        let words: Vec<u16> = (0..4).map(|at| (1e300_f64.to_bits() >> (48 - 16 * at)) as u16).collect();
+        let words: Vec<u16> = (0..4)
+            .map(|at| (1e300_f64.to_bits() >> (48 - 16 * at)) as u16)
+            .collect();
         let registers = registers("input:0 lreal", 1.0, 0.0);
         assert_eq!(value(&registers, Elementary::Real, &words), Err(NotFinite));
-        assert_eq!(value(&registers, Elementary::Lreal, &words), Ok(1e300_f64.to_bits()));
+        assert_eq!(
+            value(&registers, Elementary::Lreal, &words),
+            Ok(1e300_f64.to_bits())
+        );
     }
 
     proptest! {

@@ -280,7 +280,13 @@ mod tests {
             [(Table::Coil, 65534, 2)]
         );
         assert_eq!(
-            runs(&["input:8 real", "input:4 lreal", "input:10.3", "input:12 int", "input:9 int"]),
+            runs(&[
+                "input:8 real",
+                "input:4 lreal",
+                "input:10.3",
+                "input:12 int",
+                "input:9 int"
+            ]),
             [(Table::Input, 4, 7), (Table::Input, 12, 1)]
         );
         let many: Vec<String> = (0..200).map(|number| format!("input:{number}.0")).collect();
@@ -290,7 +296,9 @@ mod tests {
             [(Table::Input, 0, 123), (Table::Input, 123, 77)]
         );
         // 123 registers would end in the middle of a REAL.
-        let many: Vec<String> = (0..80).map(|number| format!("input:{} real", 2 * number)).collect();
+        let many: Vec<String> = (0..80)
+            .map(|number| format!("input:{} real", 2 * number))
+            .collect();
         let many: Vec<&str> = many.iter().map(String::as_str).collect();
         assert_eq!(
             runs(&many),
@@ -315,7 +323,13 @@ mod tests {
     /// A signal of each width, with gaps in the image between them.
     #[test]
     fn numbers_have_their_bits_of_the_image() {
-        let plan = plan(&["coil:0", "holding:0 int", "coil:1", "holding:1 real", "holding:3 lint"]);
+        let plan = plan(&[
+            "coil:0",
+            "holding:0 int",
+            "coil:1",
+            "holding:1 real",
+            "holding:3 lint",
+        ]);
         let answers = [vec![1, 1], vec![0xFFFE, 0x4148, 0, 0, 0, 0, 7]];
         let image = plan.image(&answers).expect("whole");
         assert_eq!(image.words(), [0x0000_0001_FFFE_0001, 0x4148_0000, 7]);

@@ -4,7 +4,9 @@ use understudy_journal::Members;
 use understudy_node::Event as StationEvent;
 use understudy_plant::Event as PlantEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason, ValueFault};
-use understudy_wire::{ForcedValue, Member, Moment, ProgramSet, SignalPlace, StationId, StationSet, Word};
+use understudy_wire::{
+    ForcedValue, Member, Moment, ProgramSet, SignalPlace, StationId, StationSet, Word,
+};
 
 use super::{Words, list, program_name, programs, source_text, stations};
 

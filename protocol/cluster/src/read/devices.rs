@@ -21,13 +21,37 @@ pub(super) fn device(
 ) -> Option<FieldDevice> {
     let (_, interface) = member.code.as_ref()?;
     let before = diagnostics.len();
-    let inputs = side(&section.inputs, &interface.inputs, "input", member, diagnostics);
-    let outputs = side(&section.outputs, &interface.outputs, "output", member, diagnostics);
+    let inputs = side(
+        &section.inputs,
+        &interface.inputs,
+        "input",
+        member,
+        diagnostics,
+    );
+    let outputs = side(
+        &section.outputs,
+        &interface.outputs,
+        "output",
+        member,
+        diagnostics,
+    );
     check_driven(&section.outputs, diagnostics);
     let mut warned = false;
     for (points, entries, side, code, effect) in [
-        (&interface.inputs, &section.inputs, "input", "U0251", "it stays 0"),
-        (&interface.outputs, &section.outputs, "output", "U0252", "it moves nothing"),
+        (
+            &interface.inputs,
+            &section.inputs,
+            "input",
+            "U0251",
+            "it stays 0",
+        ),
+        (
+            &interface.outputs,
+            &section.outputs,
+            "output",
+            "U0252",
+            "it moves nothing",
+        ),
     ] {
         // The points of a program fault are for the operator and need no wire.
         let optional = [TypedProgram::RESET, TypedProgram::FAULT];
@@ -156,8 +180,7 @@ fn side(
             continue;
         };
         if let Err((message, help)) = fit(point, place, side == "input") {
-            diagnostics
-                .push(Diagnostic::error("U0222", message, span.clone()).with_help(help));
+            diagnostics.push(Diagnostic::error("U0222", message, span.clone()).with_help(help));
         }
         bindings.push(Binding {
             name: point.name.clone(),
@@ -178,7 +201,12 @@ fn side(
 /// Message and help.
 fn fit(point: &Point, place: &Place, is_input: bool) -> Result<(), (String, String)> {
     let Point { name, of, .. } = point;
-    let misfit = |help: String| Err((format!("`{name}` is {of}, and its place is `{place}`"), help));
+    let misfit = |help: String| {
+        Err((
+            format!("`{name}` is {of}, and its place is `{place}`"),
+            help,
+        ))
+    };
     let registers = match place {
         Place::Bit(_) if *of == Elementary::Bool => return Ok(()),
         Place::Bit(_) => {
@@ -211,7 +239,9 @@ fn fit(point: &Point, place: &Place, is_input: bool) -> Result<(), (String, Stri
     }
     if registers.is_scaled() {
         return match of.is_bit_string() {
-            true => misfit(format!("{of} is a bit string: leave `scale` and `offset` out")),
+            true => misfit(format!(
+                "{of} is a bit string: leave `scale` and `offset` out"
+            )),
             false => Ok(()),
         };
     }

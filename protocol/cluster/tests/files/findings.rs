@@ -403,7 +403,9 @@ outputs = { flow = "holding:5 real", step = "holding:6 uint", open = "holding:5.
 "#
     ));
     insta::assert_snapshot!(field("modbus = \"rtu:ttyUSB0\"\nbaud = 300\n"));
-    insta::assert_snapshot!(field("modbus = \"rtu:/dev/ttyUSB0\"\nbaud = 14400\nunit = 0\n"));
+    insta::assert_snapshot!(field(
+        "modbus = \"rtu:/dev/ttyUSB0\"\nbaud = 14400\nunit = 0\n"
+    ));
 }
 
 /// Each would be called, and nothing answers there.
