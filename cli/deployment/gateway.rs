@@ -132,7 +132,7 @@ fn table(map: &RegisterMap) -> String {
             Area::Coil => "coil",
             Area::Register => "register",
         };
-        let last = place.address + place.width - 1;
+        let last = place.address + (place.width - 1);
         let addresses = match place.width {
             1 => place.address.to_string(),
             _ => format!("{}-{last}", place.address),

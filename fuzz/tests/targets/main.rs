@@ -66,6 +66,7 @@ fn cluster() {
         "examples/press-cell/cluster.toml",
         "examples/boiler/cluster.toml",
         "examples/modbus-cell/cluster.toml",
+        "examples/modbus-level/cluster.toml",
     ];
     let ladder = include_str!("../../../examples/press-cell/press.ladder");
     attack("cluster", &seeds, |bytes| {

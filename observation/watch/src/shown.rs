@@ -5,9 +5,10 @@ mod members;
 use std::time::Instant;
 
 use serde::Serialize;
+use understudy_cluster::Controller;
 use understudy_view::{
     Alarm, LostState, MarginSnapshot, Model as RunModel, OutcomeSnapshot, ProgramSnapshot,
-    Protection, Snapshot,
+    Protection, Snapshot, forced_point, forced_value,
 };
 use understudy_wire::{Force, Member, ProgramId, SignalPlace, StationId};
 
@@ -81,7 +82,7 @@ struct ShownLost {
 struct ShownForce {
     kind: &'static str,
     index: u16,
-    value: bool,
+    value: serde_json::Value,
     seconds: u32,
     owner: String,
     reason: String,
@@ -167,7 +168,7 @@ pub(crate) fn state(run: &RunModel, cycle: i64, finished: bool) -> Option<State>
         finished,
         members: members(&snapshot),
         programs: programs
-            .map(|(index, program)| shown_program(&snapshot, index, program))
+            .map(|(index, program)| shown_program(run, &snapshot, index, program))
             .collect(),
         timing: timing(run, &snapshot),
         redundancy: redundancy(&snapshot),
@@ -185,7 +186,14 @@ pub(crate) fn program_name(run: &RunModel, program: ProgramId) -> String {
     run.members().name(controller).to_owned()
 }
 
-fn shown_program(snapshot: &Snapshot, index: usize, program: &ProgramSnapshot) -> ShownProgram {
+fn shown_program(
+    run: &RunModel,
+    snapshot: &Snapshot,
+    index: usize,
+    program: &ProgramSnapshot,
+) -> ShownProgram {
+    let controllers = run.cluster().controllers();
+    let controller_of = controllers.get(index);
     let controller = snapshot.stations.get(index);
     let published = controller.and_then(|controller| controller.words.first());
     ShownProgram {
@@ -198,7 +206,11 @@ fn shown_program(snapshot: &Snapshot, index: usize, program: &ProgramSnapshot) -
         outputs: program.outputs.clone(),
         published: published.map(|word| word.sum.clone()),
         awaits_release: program.awaits_release,
-        forced: program.forces.iter().map(shown_force).collect(),
+        forced: program
+            .forces
+            .iter()
+            .map(|force| shown_force(controller_of, force))
+            .collect(),
         protection: program
             .protection
             .clone()
@@ -219,7 +231,8 @@ fn shown_program(snapshot: &Snapshot, index: usize, program: &ProgramSnapshot) -
     }
 }
 
-fn shown_force(force: &Force) -> ShownForce {
+fn shown_force(controller: Option<&Controller>, force: &Force) -> ShownForce {
+    let point = controller.and_then(|controller| forced_point(controller, force));
     let (kind, index) = match force.signal {
         SignalPlace::Input(index) => ("input", index),
         SignalPlace::Output(index) => ("output", index),
@@ -227,7 +240,10 @@ fn shown_force(force: &Force) -> ShownForce {
     ShownForce {
         kind,
         index,
-        value: force.value,
+        value: match point {
+            Some(point) => forced_value(point, force),
+            None => force.value.stored().into(),
+        },
         seconds: force.seconds,
         owner: force.owner.clone(),
         reason: force.reason.clone(),

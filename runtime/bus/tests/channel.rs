@@ -143,7 +143,7 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
     assert_eq!(hash_there.ok(), Some(expected));
     let force = Request::Force(Force {
         signal: SignalPlace::Output(0),
-        value: true,
+        value: true.into(),
         seconds: 0,
         owner: "anna".to_owned(),
         reason: "to see it".to_owned(),
