@@ -60,6 +60,8 @@ pub struct Trace {
     pub done: Vec<Done>,
     /// Whether later statements were left out.
     pub is_cut: bool,
+    /// What the statement of a program fault read before it failed.
+    pub failed: Vec<Read>,
     /// Memory at its end: x(t+1) and behind it the frames. After a fault as the fault found it.
     pub memory: Vec<u64>,
     /// The program fault that ended it.
@@ -124,6 +126,7 @@ impl Interpreter {
         let recorder = run.trace.take().unwrap_or_default();
         Trace {
             fault,
+            failed: recorder.reads,
             memory: run.memory.slots().to_vec(),
             ..recorder.trace
         }
