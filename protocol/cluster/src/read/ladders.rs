@@ -61,7 +61,10 @@ impl<'a> Ladders<'a> {
         let read = &mut self.read[place];
         let program = match read.source.as_ref()? {
             Source::Ladder(program) => program,
-            Source::Typed(program) => return Some(Code::Typed(Arc::clone(program))),
+            Source::Typed(program) => {
+                let text = Arc::from(read.text.as_str());
+                return Some(Code::Typed(Arc::clone(program), text));
+            }
             Source::Library(_) => return None,
         };
         // Several controllers may run one ladder.
@@ -92,7 +95,7 @@ impl<'a> Ladders<'a> {
     ) -> Option<(Program, Circuit)> {
         match self.code(file, name, period, diagnostics)? {
             Code::Ladder(program, circuit) => Some((*program, circuit)),
-            Code::Typed(_) => {
+            Code::Typed(..) => {
                 let message = format!("`{}` has numbers, and a ladder is wanted", file.value);
                 diagnostics.push(Diagnostic::error("U0212", message, file.span.clone()));
                 None
