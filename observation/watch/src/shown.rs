@@ -5,9 +5,12 @@ mod members;
 use std::time::Instant;
 
 use serde::Serialize;
+use serde_json::Value;
+use understudy_cluster::Controller;
+use understudy_typed::Points;
 use understudy_view::{
     Alarm, LostState, MarginSnapshot, Model as RunModel, OutcomeSnapshot, ProgramSnapshot,
-    Protection, Snapshot,
+    Protection, Snapshot, forced_point, forced_value, value_of,
 };
 use understudy_wire::{Force, Member, ProgramId, SignalPlace, StationId};
 
@@ -51,10 +54,16 @@ struct ShownProgram {
     word_of: Option<String>,
     /// Why there was no provable output, in a missed cycle.
     missing: Option<&'static str>,
+    /// The program fault that has stopped it.
+    fault: Option<String>,
     inputs: Option<String>,
     outputs: Option<String>,
     /// The outputs that its own controller published.
     published: Option<String>,
+    /// Values in the order of the run's facts; nothing where they are not known. So are the following.
+    input_values: Option<Vec<Value>>,
+    output_values: Option<Vec<Value>>,
+    published_values: Option<Vec<Value>>,
     awaits_release: bool,
     forced: Vec<ShownForce>,
     /// Nothing while the remote I/O has not reported it.
@@ -81,7 +90,7 @@ struct ShownLost {
 struct ShownForce {
     kind: &'static str,
     index: u16,
-    value: bool,
+    value: serde_json::Value,
     seconds: u32,
     owner: String,
     reason: String,
@@ -167,7 +176,7 @@ pub(crate) fn state(run: &RunModel, cycle: i64, finished: bool) -> Option<State>
         finished,
         members: members(&snapshot),
         programs: programs
-            .map(|(index, program)| shown_program(&snapshot, index, program))
+            .map(|(index, program)| shown_program(run, &snapshot, index, program))
             .collect(),
         timing: timing(run, &snapshot),
         redundancy: redundancy(&snapshot),
@@ -185,7 +194,24 @@ pub(crate) fn program_name(run: &RunModel, program: ProgramId) -> String {
     run.members().name(controller).to_owned()
 }
 
-fn shown_program(snapshot: &Snapshot, index: usize, program: &ProgramSnapshot) -> ShownProgram {
+fn shown_program(
+    run: &RunModel,
+    snapshot: &Snapshot,
+    index: usize,
+    program: &ProgramSnapshot,
+) -> ShownProgram {
+    let controllers = run.cluster().controllers();
+    let controller_of = controllers.get(index);
+    let interface = &run.cluster().controllers()[index].interface;
+    let values = |points: &Points, bits: Option<&str>| {
+        let bits = bits?;
+        let values = points.iter();
+        Some(
+            values
+                .map(|point| value_of(point, bits).unwrap_or_default())
+                .collect(),
+        )
+    };
     let controller = snapshot.stations.get(index);
     let published = controller.and_then(|controller| controller.words.first());
     ShownProgram {
@@ -194,11 +220,19 @@ fn shown_program(snapshot: &Snapshot, index: usize, program: &ProgramSnapshot) -
         source: program.source.unwrap_or("unknown"),
         word_of: program.word_of.clone(),
         missing: program.missing,
+        fault: program.fault.clone(),
         inputs: program.inputs.clone(),
         outputs: program.outputs.clone(),
         published: published.map(|word| word.sum.clone()),
+        input_values: values(&interface.inputs, program.inputs.as_deref()),
+        output_values: values(&interface.outputs, program.outputs.as_deref()),
+        published_values: values(&interface.outputs, published.map(|word| word.sum.as_str())),
         awaits_release: program.awaits_release,
-        forced: program.forces.iter().map(shown_force).collect(),
+        forced: program
+            .forces
+            .iter()
+            .map(|force| shown_force(controller_of, force))
+            .collect(),
         protection: program
             .protection
             .clone()
@@ -219,7 +253,8 @@ fn shown_program(snapshot: &Snapshot, index: usize, program: &ProgramSnapshot) -
     }
 }
 
-fn shown_force(force: &Force) -> ShownForce {
+fn shown_force(controller: Option<&Controller>, force: &Force) -> ShownForce {
+    let point = controller.and_then(|controller| forced_point(controller, force));
     let (kind, index) = match force.signal {
         SignalPlace::Input(index) => ("input", index),
         SignalPlace::Output(index) => ("output", index),
@@ -227,7 +262,10 @@ fn shown_force(force: &Force) -> ShownForce {
     ShownForce {
         kind,
         index,
-        value: force.value,
+        value: match point {
+            Some(point) => forced_value(point, force),
+            None => force.value.stored().into(),
+        },
         seconds: force.seconds,
         owner: force.owner.clone(),
         reason: force.reason.clone(),

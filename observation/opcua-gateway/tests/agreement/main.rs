@@ -17,7 +17,8 @@ use opcua::types::Variant;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use serde_json::{Value, json};
-use understudy_cluster::{Cluster, press_cell, read};
+use understudy_cluster::Cluster;
+use understudy_cycle::Mode;
 use understudy_gateway::{BOUNDS, Metrics, Observation, RegisterMap};
 use understudy_opcua_gateway::variables;
 use understudy_view::{Bounds, Model, Snapshot, StationState};
@@ -32,13 +33,7 @@ const JOURNALS: u64 = 60;
 const CYCLES: usize = 70;
 
 fn cell() -> Arc<Cluster> {
-    let files = press_cell();
-    let loaded = read("cluster.toml", files[0].text, &mut |name| {
-        let file = files.iter().find(|file| file.name == name);
-        file.map(|file| file.text.to_owned())
-            .ok_or_else(|| "no such file".to_owned())
-    });
-    Arc::new(loaded.cluster.expect("it comes with the program"))
+    Arc::new(understudy_testing::press_cell(Mode::Full))
 }
 
 fn model(cluster: &Arc<Cluster>, bounds: Bounds, entries: &[Entry]) -> Model {

@@ -1,9 +1,13 @@
 //! How a snapshot is taken from the model of a run.
 
+use std::collections::BTreeMap;
+
+use serde_json::Value;
 use understudy_cycle::Mode;
 use understudy_journal::{Process, SourceCounts, source_word};
 use understudy_remote_io::Missing;
-use understudy_wire::{Member, ProgramId, ProgramSet, SignalPlace, StationId};
+use understudy_typed::Elementary;
+use understudy_wire::{Member, ProgramId, ProgramSet, StationId};
 
 use super::{
     LinkSnapshot, MarginSnapshot, OutcomeSnapshot, PlantSnapshot, PlantState, ProgramSnapshot,
@@ -11,11 +15,12 @@ use super::{
     WordSnapshot,
 };
 use crate::alarm::Alarm;
-use crate::describe::missing_text;
+use crate::describe::{missing_text, program_fault_text};
 use crate::history::Driven;
 use crate::margin::{Margin, Outcome};
 use crate::model::{Model, Standing};
 use crate::station::StationState;
+use crate::value::{forced_point, forced_value, named};
 
 impl Model {
     /// The present: the newest cycle of which every living remote I/O has reported, with every change that was read since.
@@ -208,10 +213,12 @@ impl Picture<'_> {
                 .and_then(|driven| driven.word_of)
                 .map(|station| self.name(Member::Station(station))),
             missing: driven.and_then(|driven| driven.missing).map(missing_text),
+            fault: self.fault(program),
             inputs: driven
                 .and_then(|driven| driven.inputs.as_ref())
                 .map(ToString::to_string),
             outputs: driven.map(|driven| driven.outputs.to_string()),
+            values: self.values(program, driven),
             direct,
             reconstructed,
             held,
@@ -226,25 +233,39 @@ impl Picture<'_> {
         }
     }
 
+    fn fault(&self, program: ProgramId) -> Option<String> {
+        let step = self.model.deadline(program, self.cycle?)?;
+        let fault = step.sampled.as_ref()?.fault?;
+        let cluster = self.model.cluster();
+        Some(program_fault_text(cluster, program, Some(&fault)))
+    }
+
+    fn values(&self, program: ProgramId, driven: Option<&Driven>) -> BTreeMap<String, Value> {
+        let interface = &self.model.cluster().controllers()[program.index()].interface;
+        let mut values = BTreeMap::new();
+        let inputs = driven.and_then(|driven| driven.inputs.as_ref());
+        let outputs = driven.map(|driven| &driven.outputs);
+        for (points, image) in [(&interface.inputs, inputs), (&interface.outputs, outputs)] {
+            values.extend(image.into_iter().flat_map(|image| named(points, image)));
+        }
+        values
+    }
+
     fn forced(&self, program: ProgramId) -> Vec<String> {
         let own = self.standing.program(program);
         let forced = own.into_iter().flat_map(|own| &own.forced);
         let texts = forced.map(|force| {
-            let name = self.signal_name(program, force.signal);
-            let value = u8::from(force.value);
+            let controller = &self.model.cluster().controllers()[program.index()];
+            let (name, value) = match forced_point(controller, force) {
+                Some(point) if point.of == Elementary::Bool => {
+                    (point.name.as_str(), force.value.stored().to_string())
+                }
+                Some(point) => (point.name.as_str(), forced_value(point, force).to_string()),
+                None => ("an unknown signal", force.value.stored().to_string()),
+            };
             format!("{name} = {value} by {}: {}", force.owner, force.reason)
         });
         texts.collect()
-    }
-
-    fn signal_name(&self, program: ProgramId, signal: SignalPlace) -> String {
-        let interface = &self.model.cluster().controllers()[program.index()].interface;
-        let (points, place) = match signal {
-            SignalPlace::Input(place) => (&interface.inputs, place),
-            SignalPlace::Output(place) => (&interface.outputs, place),
-        };
-        let name = points.bit_names().into_iter().nth(usize::from(place));
-        name.unwrap_or_else(|| "an unknown signal".to_owned())
     }
 
     fn remote_io(&self, program: ProgramId) -> RemoteIoSnapshot {
