@@ -7,6 +7,7 @@ mod configuration;
 mod interface;
 mod make;
 mod network;
+mod surroundings;
 mod values;
 
 use std::collections::HashMap;
@@ -116,6 +117,7 @@ impl Typed {
         for instances in elements(root).filter(|part| part.tag_name().name() == "instances") {
             self.instances(instances);
         }
+        self.surroundings();
         for (at, pou) in project.pous.iter().enumerate() {
             self.body(at, pou, project.lacks_instances);
         }

@@ -271,7 +271,7 @@ fn quoted(written: &str, of: &TypeName) -> String {
 /// What the types of variables are that Beremiz shows on a panel.
 fn panel(name: &str) -> Option<&'static str> {
     Some(match name {
-        "HMI_BOOL" => "BOOL",
+        "HMI_BOOL" | "HMI_NODE" => "BOOL",
         "HMI_INT" => "INT",
         "HMI_REAL" => "REAL",
         "HMI_STRING" => "STRING",
