@@ -6,6 +6,7 @@ pub mod ldmicro;
 pub mod plcopen;
 mod source;
 pub mod structured_text;
+mod twincat;
 mod written;
 
 pub use format::{Format, Reading, parse_program, read, read_all, unknown_form};

@@ -8,9 +8,10 @@ use understudy_structured_text::{Lowered, Options, lower, parse};
 use understudy_text::{Diagnostic, has_errors};
 use understudy_typed::Program as Typed;
 
-use understudy_structured_text::syntax::File;
-use crate::plcopen;
 use crate::format::{Format, Reading, read, unknown_form};
+use crate::plcopen;
+use crate::twincat;
+use understudy_structured_text::syntax::File;
 
 /// What a file holds.
 #[derive(Debug, Clone)]
@@ -45,6 +46,9 @@ pub struct SourceFile {
 
 /// Reads the program of the file `name`, and everything that is wrong with it.
 pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
+    if let Some(parsed) = twincat::read(text) {
+        return typed(text, parsed, wanted, None);
+    }
     let Some(format) = Format::of(name, text) else {
         return SourceFile {
             diagnostics: vec![unknown_form(text)],

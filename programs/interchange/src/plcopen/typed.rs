@@ -48,7 +48,10 @@ pub fn read_typed(text: &str) -> (File, Vec<Diagnostic>) {
             root.tag_name().name()
         );
         let error = Diagnostic::error("U1001", message, xml::start_tag(root));
-        let help = format!("it should be `project` in the namespace {:?}", NAMESPACES[0]);
+        let help = format!(
+            "it should be `project` in the namespace {:?}",
+            NAMESPACES[0]
+        );
         return (File::default(), vec![error.with_help(help)]);
     }
     let mut typed = Typed {
@@ -71,7 +74,8 @@ pub fn read_typed(text: &str) -> (File, Vec<Diagnostic>) {
 
 impl Typed {
     fn error(&mut self, code: &'static str, message: String, span: Range<usize>) {
-        self.diagnostics.push(Diagnostic::error(code, message, span));
+        self.diagnostics
+            .push(Diagnostic::error(code, message, span));
     }
 
     fn error_with(&mut self, code: &'static str, message: String, span: Range<usize>, help: &str) {
@@ -104,7 +108,10 @@ impl Typed {
             }
         }
         let mut nodes: HashMap<String, Node<'_, '_>> = HashMap::new();
-        for node in root.descendants().filter(|node| node.tag_name().name() == "pou") {
+        for node in root
+            .descendants()
+            .filter(|node| node.tag_name().name() == "pou")
+        {
             if let Some(name) = attribute(node, "name") {
                 nodes.entry(name.to_uppercase()).or_insert(node);
             }
@@ -126,7 +133,8 @@ impl Typed {
     /// A unit without its body.
     fn unit(&mut self, pou: &Pou, node: Option<Node<'_, '_>>) {
         let interface = node.and_then(|node| child(node, "interface"));
-        let (declarations, result) = interface.map_or((Vec::new(), None), |node| self.interface(node));
+        let (declarations, result) =
+            interface.map_or((Vec::new(), None), |node| self.interface(node));
         let kind = match pou.kind {
             PouKind::Program => UnitKind::Program,
             PouKind::FunctionBlock => UnitKind::FunctionBlock,
@@ -172,8 +180,7 @@ impl Typed {
                 Body::Statements(statements)
             }
             Some(Drawn::InstructionList(text)) => {
-                let (list, errors) =
-                    parse_instructions_at(text.as_str(), &|span| text.place(span));
+                let (list, errors) = parse_instructions_at(text.as_str(), &|span| text.place(span));
                 network.diagnostics.extend(errors);
                 Body::Instructions(list)
             }

@@ -5,6 +5,7 @@ mod bad_input;
 mod instruction_lists;
 mod jumps;
 mod meaning;
+mod numbers;
 mod public_ladders;
 #[path = "../shared/reading.rs"]
 mod reading;

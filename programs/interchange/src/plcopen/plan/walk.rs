@@ -7,8 +7,8 @@ use std::collections::{HashMap, HashSet};
 use understudy_ladder::Name;
 use understudy_text::Diagnostic;
 
-use super::{Plan, Rules};
 use super::links::{Links, Source};
+use super::{Plan, Rules};
 use finish::read;
 
 use crate::plcopen::document::{Condition, Graph, Kind, Language, Object};
@@ -351,4 +351,3 @@ impl<'a> Walk<'a> {
         (power != Power::Constant(true)).then_some(power)
     }
 }
-

@@ -6,7 +6,7 @@ use understudy_text::{Diagnostic, MAXIMUM_FINDINGS};
 use crate::plcopen::xml::start_tag;
 
 /// Elements with the attributes that they may have. Those in front of `|` are understood; behind it, they change nothing.
-const KNOWN: [(&str, &str); 96] = [
+const KNOWN: [(&str, &str); 97] = [
     ("project", "|xmlns schemaLocation"),
     ("types", ""),
     ("dataTypes", ""),
@@ -48,7 +48,10 @@ const KNOWN: [(&str, &str); 96] = [
     ),
     ("type", ""),
     ("actions", ""),
-    ("action", "name qualifier duration indicator|localId width height globalId executionOrderId"),
+    (
+        "action",
+        "name qualifier duration indicator|localId width height globalId executionOrderId",
+    ),
     ("transitions", ""),
     (
         "transition",
@@ -68,8 +71,14 @@ const KNOWN: [(&str, &str); 96] = [
     ("pouInstance", "name typeName|globalId"),
     ("leftPowerRail", PLACED),
     ("rightPowerRail", PLACED),
-    ("contact", "localId negated edge storage executionOrderId variable|height width globalId lineNumber"),
-    ("coil", "localId negated edge storage kind executionOrderId variable|height width globalId lineNumber"),
+    (
+        "contact",
+        "localId negated edge storage executionOrderId variable|height width globalId lineNumber",
+    ),
+    (
+        "coil",
+        "localId negated edge storage kind executionOrderId variable|height width globalId lineNumber",
+    ),
     (
         "block",
         "localId typeName instanceName executionOrderId|height width globalId lineNumber",
@@ -87,26 +96,57 @@ const KNOWN: [(&str, &str); 96] = [
     ("connectionPointIn", "|globalId"),
     ("connectionPointOut", "formalParameter|globalId"),
     ("connection", "refLocalId formalParameter|globalId"),
-    ("connector", "name localId|executionOrderId height width globalId"),
-    ("continuation", "name localId|executionOrderId height width globalId"),
+    (
+        "connector",
+        "name localId|executionOrderId height width globalId",
+    ),
+    (
+        "continuation",
+        "name localId|executionOrderId height width globalId",
+    ),
     ("comment", "|localId height width globalId executionOrderId"),
-    ("step", "localId name initialStep negated|height width globalId executionOrderId"),
+    (
+        "step",
+        "localId name initialStep negated|height width globalId executionOrderId",
+    ),
     ("condition", "negated"),
     ("reference", "name"),
     ("inline", "|name"),
+    ("connectionPointOutAction", "|formalParameter globalId"),
     ("selectionDivergence", PLACED),
     ("selectionConvergence", PLACED),
-    ("simultaneousDivergence", "localId|name height width globalId executionOrderId"),
+    (
+        "simultaneousDivergence",
+        "localId|name height width globalId executionOrderId",
+    ),
     ("simultaneousConvergence", PLACED),
-    ("jumpStep", "localId targetName|height width globalId executionOrderId"),
-    ("actionBlock", "localId negated|height width globalId executionOrderId"),
-    ("jump", "localId label executionOrderId|height width globalId"),
-    ("label", "localId label executionOrderId|height width globalId"),
+    (
+        "jumpStep",
+        "localId targetName|height width globalId executionOrderId",
+    ),
+    (
+        "actionBlock",
+        "localId negated|height width globalId executionOrderId",
+    ),
+    (
+        "jump",
+        "localId label executionOrderId|height width globalId",
+    ),
+    (
+        "label",
+        "localId label executionOrderId|height width globalId",
+    ),
     ("return", "localId executionOrderId|height width globalId"),
     ("rung", "localId|lineNumber"),
     // Refused where objects are read.
-    ("macroStep", "localId name|height width globalId executionOrderId"),
-    ("vendorElement", "localId|height width globalId executionOrderId"),
+    (
+        "macroStep",
+        "localId name|height width globalId executionOrderId",
+    ),
+    (
+        "vendorElement",
+        "localId|height width globalId executionOrderId",
+    ),
     ("error", "localId|height width globalId executionOrderId"),
     ("qualifier", ""),
     // Places on the sheet.
@@ -125,9 +165,33 @@ const SIGNED: &str = "localId executionOrderId negated edge storage|height width
 
 /// Elementary types stand as elements of their names.
 const ELEMENTARY: [&str; 27] = [
-    "BOOL", "BYTE", "WORD", "DWORD", "LWORD", "SINT", "INT", "DINT", "LINT", "USINT", "UINT",
-    "UDINT", "ULINT", "REAL", "LREAL", "TIME", "DATE", "DT", "TOD", "LTIME", "LDATE", "LDT",
-    "LTOD", "DATE_AND_TIME", "TIME_OF_DAY", "CHAR", "WCHAR",
+    "BOOL",
+    "BYTE",
+    "WORD",
+    "DWORD",
+    "LWORD",
+    "SINT",
+    "INT",
+    "DINT",
+    "LINT",
+    "USINT",
+    "UINT",
+    "UDINT",
+    "ULINT",
+    "REAL",
+    "LREAL",
+    "TIME",
+    "DATE",
+    "DT",
+    "TOD",
+    "LTIME",
+    "LDATE",
+    "LDT",
+    "LTOD",
+    "DATE_AND_TIME",
+    "TIME_OF_DAY",
+    "CHAR",
+    "WCHAR",
 ];
 
 /// Elements whose contents are texts, headers or pictures: what stands in them is read as a whole, or changes nothing.
@@ -207,9 +271,11 @@ fn data(node: Node<'_, '_>, diagnostics: &mut Vec<Diagnostic>) {
             .iter()
             .any(|word| last.eq_ignore_ascii_case(word))
         {
-            let message = format!("the additional data `{last}` of a tool holds a part of the program");
+            let message =
+                format!("the additional data `{last}` of a tool holds a part of the program");
             let found = Diagnostic::error("U1010", message, start_tag(data));
-            diagnostics.push(found.with_help("export the project without additional data of the tool"));
+            diagnostics
+                .push(found.with_help("export the project without additional data of the tool"));
         }
     }
 }

@@ -98,7 +98,9 @@ impl Reader<'_, '_> {
         for object in &self.graph.objects {
             if matches!(object.kind, Kind::Transition(_)) {
                 let target = wired(object).to_uppercase();
-                let name = self.network.declare("condition", make::named("BOOL", &span));
+                let name = self
+                    .network
+                    .declare("condition", make::named("BOOL", &span));
                 conditions.insert(target.clone(), make::variable(&name, &object.span));
                 self.network.renamed.insert(target, name);
             }
@@ -161,9 +163,14 @@ impl Reader<'_, '_> {
             let span = object.span.clone();
             let mut condition = match &transition.condition {
                 Condition::Wired => {
-                    let has = object.inputs.iter().any(|pin| pin.name.as_str() == CONDITION);
+                    let has = object
+                        .inputs
+                        .iter()
+                        .any(|pin| pin.name.as_str() == CONDITION);
                     let value = wired_values.get(&wired(object).to_uppercase()).cloned();
-                    value.filter(|_| has).unwrap_or_else(|| make::boolean(false, &span))
+                    value
+                        .filter(|_| has)
+                        .unwrap_or_else(|| make::boolean(false, &span))
                 }
                 Condition::Inline(body) => self.condition(place, None, body),
                 Condition::Reference(name) => {
@@ -211,17 +218,20 @@ impl Reader<'_, '_> {
         match body {
             Drawn::StructuredText(text) => self.written(text),
             Drawn::InstructionList(text) => {
-                let (list, found) =
-                    parse_instructions_at(text.as_str(), &|span| text.place(span));
+                let (list, found) = parse_instructions_at(text.as_str(), &|span| text.place(span));
                 self.network.diagnostics.extend(found);
                 let bool = Some(make::named("BOOL", &span));
                 self.method("condition", bool, Body::Instructions(list), &span)
             }
             Drawn::Graph(graph) => {
-                let written = graph.objects.iter().rev().find_map(|object| match &object.kind {
-                    Kind::Coil(variable, _) | Kind::OutVariable(variable, _) => Some(variable),
-                    _ => None,
-                });
+                let written = graph
+                    .objects
+                    .iter()
+                    .rev()
+                    .find_map(|object| match &object.kind {
+                        Kind::Coil(variable, _) | Kind::OutVariable(variable, _) => Some(variable),
+                        _ => None,
+                    });
                 let named = |name: &&Written| {
                     graph.objects.iter().any(|object| match &object.kind {
                         Kind::Coil(variable, _) | Kind::OutVariable(variable, _) => {
@@ -235,8 +245,12 @@ impl Reader<'_, '_> {
                     self.error("U1015", message, span.clone());
                     return make::boolean(false, &span);
                 };
-                let value = self.network.declare("condition", make::named("BOOL", &span));
-                self.network.renamed.insert(answer.to_uppercase(), value.clone());
+                let value = self
+                    .network
+                    .declare("condition", make::named("BOOL", &span));
+                self.network
+                    .renamed
+                    .insert(answer.to_uppercase(), value.clone());
                 let mut statements = self.network.statements(graph);
                 self.network.renamed.clear();
                 let method = self.method_name("condition");
@@ -362,7 +376,10 @@ impl Reader<'_, '_> {
             true => Name::new("N", action.span.clone()),
             false => make::name(&action.qualifier),
         };
-        let duration = action.duration.as_ref().filter(|duration| !duration.is_empty());
+        let duration = action
+            .duration
+            .as_ref()
+            .filter(|duration| !duration.is_empty());
         Some(Association {
             action: name,
             qualifier,
@@ -381,8 +398,7 @@ impl Reader<'_, '_> {
                 statements
             }
             Drawn::InstructionList(text) => {
-                let (list, found) =
-                    parse_instructions_at(text.as_str(), &|span| text.place(span));
+                let (list, found) = parse_instructions_at(text.as_str(), &|span| text.place(span));
                 self.network.diagnostics.extend(found);
                 let name = self.method_name("action");
                 self.add(&name, None, Body::Instructions(list), span);

@@ -2,9 +2,7 @@
 
 use roxmltree::Node;
 use understudy_structured_text::parser::{Places, parse_expression_at};
-use understudy_structured_text::syntax::{
-    Class, ExpressionKind, Literal, ProgramInstance, Task,
-};
+use understudy_structured_text::syntax::{Class, ExpressionKind, Literal, ProgramInstance, Task};
 
 use super::Typed;
 use super::make::name;
@@ -97,7 +95,10 @@ impl Typed {
 
 /// `T#20ms`, or as 2.01 has it, `PT0.02S`; also plain seconds.
 fn nanoseconds(text: &str) -> Option<i64> {
-    if let Some(seconds) = text.strip_prefix("PT").and_then(|rest| rest.strip_suffix('S')) {
+    if let Some(seconds) = text
+        .strip_prefix("PT")
+        .and_then(|rest| rest.strip_suffix('S'))
+    {
         return seconds_of(seconds);
     }
     let (value, found) = parse_expression_at(text, &|span| span);

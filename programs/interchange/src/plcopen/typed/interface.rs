@@ -90,6 +90,10 @@ impl Typed {
             "derived" => {
                 let written = self.needed(kind, "name")?;
                 match panel(&written) {
+                    Some("STRING") => TypeKind::Text {
+                        wide: false,
+                        length: None,
+                    },
                     Some(usual) => TypeKind::Named(Name::new(usual, written.span())),
                     None => TypeKind::Named(name(&written)),
                 }
@@ -214,7 +218,9 @@ impl Typed {
                 let mut values = Vec::new();
                 for value in children(kind, "value") {
                     let times = match attribute(value, "repetitionValue") {
-                        Some(times) if times.as_str() != "1" => self.value(value, "repetitionValue"),
+                        Some(times) if times.as_str() != "1" => {
+                            self.value(value, "repetitionValue")
+                        }
                         _ => None,
                     };
                     let inner = self.initial(value, of, depth + 1)?;

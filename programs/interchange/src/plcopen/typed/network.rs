@@ -104,7 +104,8 @@ impl<'a> Network<'a> {
     }
 
     fn error(&mut self, code: &'static str, message: String, span: Range<usize>) {
-        self.diagnostics.push(Diagnostic::error(code, message, span));
+        self.diagnostics
+            .push(Diagnostic::error(code, message, span));
     }
 
     fn push(&mut self, statement: Statement) {
@@ -121,7 +122,8 @@ impl<'a> Network<'a> {
     ) -> String {
         let name = format!("{what}.{}", self.made.len());
         let span = of.span.clone();
-        self.made.push(make::declare(&name, Class::Local, of, &span));
+        self.made
+            .push(make::declare(&name, Class::Local, of, &span));
         name
     }
 
@@ -137,7 +139,10 @@ impl<'a> Network<'a> {
         let cases = parts.into_iter().enumerate().map(|(at, mut body)| {
             let at = at as i128;
             let behind = make::integer(at + 1, &span);
-            body.insert(0, make::assign(make::path(&next, None, &span), behind, &span));
+            body.insert(
+                0,
+                make::assign(make::path(&next, None, &span), behind, &span),
+            );
             let first = make::integer(at, &span);
             (vec![Label { first, last: None }], body)
         });
@@ -159,7 +164,8 @@ impl<'a> Network<'a> {
         // One for each network that has jumps.
         let made = self.made.iter().rev();
         let mut made = made.filter(|made| made.name.as_str().starts_with(NEXT));
-        made.next().map_or(NEXT.to_owned(), |made| made.name.as_str().to_owned())
+        made.next()
+            .map_or(NEXT.to_owned(), |made| made.name.as_str().to_owned())
     }
 
     /// An expression as it is written in an object.
@@ -237,7 +243,9 @@ impl<'a> Network<'a> {
         }
         let mut path = self.instance(instance);
         path.steps
-            .push(understudy_structured_text::syntax::Step::Field(make::name(pin)));
+            .push(understudy_structured_text::syntax::Step::Field(make::name(
+                pin,
+            )));
         make::read(path)
     }
 
@@ -267,8 +275,16 @@ impl<'a> Network<'a> {
             let values = inputs.into_iter().map(|(_, value)| value).collect();
             return make::chain(values, operator, span);
         }
-        if !own && inputs.len() == 1 && ["MOVE", "ADD", "MUL", "XOR"].iter().any(|word| name.eq_ignore_ascii_case(word)) {
-            return inputs.into_iter().next().map_or(make::boolean(false, span), |(_, value)| value);
+        if !own
+            && inputs.len() == 1
+            && ["MOVE", "ADD", "MUL", "XOR"]
+                .iter()
+                .any(|word| name.eq_ignore_ascii_case(word))
+        {
+            return inputs
+                .into_iter()
+                .next()
+                .map_or(make::boolean(false, span), |(_, value)| value);
         }
         make::call(make::name(name), arguments(inputs, own), span)
     }

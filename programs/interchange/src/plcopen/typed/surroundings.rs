@@ -55,9 +55,8 @@ impl Typed {
     /// Where a variable of that type is declared first.
     fn first_use(&self, word: &str) -> Option<Span> {
         let mut variables = self.variables_of_units();
-        let found = variables.find(
-            |variable| matches!(&variable.of.kind, TypeKind::Named(name) if name.is(word)),
-        );
+        let found = variables
+            .find(|variable| matches!(&variable.of.kind, TypeKind::Named(name) if name.is(word)));
         found.map(|variable| variable.name.span())
     }
 }

@@ -72,8 +72,12 @@ impl<'a> Values<'a> {
 
     /// The type of operands together: the widest.
     fn joined(&self, values: &[&Expression], operator: Operator) -> Option<TypeName> {
-        let types: Vec<TypeName> = values.iter().filter_map(|value| self.strong(value)).collect();
-        let is = |of: &TypeName, word: &str| matches!(&of.kind, TypeKind::Named(name) if name.is(word));
+        let types: Vec<TypeName> = values
+            .iter()
+            .filter_map(|value| self.strong(value))
+            .collect();
+        let is =
+            |of: &TypeName, word: &str| matches!(&of.kind, TypeKind::Named(name) if name.is(word));
         let moments = ["TIME_OF_DAY", "TOD", "DATE_AND_TIME", "DT", "DATE"];
         let is_moment = |of: &TypeName| moments.iter().any(|word| is(of, word));
         if operator == Operator::Subtract && types.len() == 2 && types.iter().all(is_moment) {
@@ -243,7 +247,11 @@ fn text(wide: bool, span: &Span) -> TypeName {
 }
 
 fn address(written: &str) -> &'static str {
-    match written.chars().nth(2).map(|letter| letter.to_ascii_uppercase()) {
+    match written
+        .chars()
+        .nth(2)
+        .map(|letter| letter.to_ascii_uppercase())
+    {
         Some('B') => "BYTE",
         Some('W') => "WORD",
         Some('D') => "DWORD",

@@ -31,7 +31,8 @@ impl Network<'_> {
                 if let Some(first) = places.insert(key, step.span.clone()) {
                     let message = format!("two labels are called `{name}`");
                     let error = Diagnostic::error("U1016", message, step.span.clone());
-                    self.diagnostics.push(error.with_related(first, "the first"));
+                    self.diagnostics
+                        .push(error.with_related(first, "the first"));
                 }
             }
         }
@@ -101,9 +102,9 @@ impl Network<'_> {
             }
             Action::Jump { label, power } => {
                 let condition = self.prepared(power, span);
-                let target = label.as_ref().and_then(|label| {
-                    labels.and_then(|labels| labels.get(&label.to_uppercase()))
-                });
+                let target = label
+                    .as_ref()
+                    .and_then(|label| labels.and_then(|labels| labels.get(&label.to_uppercase())));
                 let body = match (label, target) {
                     (Some(_), Some(part)) => {
                         let next = make::path(&self.next(), None, span);

@@ -1,0 +1,220 @@
+//! The files of TwinCAT, `.TcPOU`, `.TcGVL`, `.TcDUT` and `.TcIO`: XML around Structured Text.
+//!
+//! Declarations and bodies are texts; a body in another language is refused by its name, as are properties and transitions.
+
+use roxmltree::Node;
+use understudy_structured_text::parser::{
+    parse_body_at, parse_declarations_at, parse_statements_at,
+};
+use understudy_structured_text::syntax::{Body, File, Name, Unit, UnitKind};
+use understudy_text::Diagnostic;
+
+use crate::plcopen::xml::{attribute, child, children, elements, parse, start_tag, text};
+
+/// What every file of TwinCAT has as its root.
+const ROOT: &str = "TcPlcObject";
+
+/// Elements that change nothing: folders, and where lines are.
+const READ_PAST: [&str; 4] = ["Folder", "LineIds", "ObjectProperties", "Data"];
+
+/// Reads a file of TwinCAT with everything that is wrong with it; none where the text is none.
+pub(crate) fn read(text: &str) -> Option<(File, Vec<Diagnostic>)> {
+    let start = text.trim_start_matches('\u{feff}').trim_start();
+    if !start.starts_with('<') || !start.contains(ROOT) {
+        return None;
+    }
+    let document = match parse(text) {
+        Ok(document) => document,
+        Err(error) => return Some((File::default(), vec![error])),
+    };
+    let root = document.root_element();
+    if root.tag_name().name() != ROOT {
+        return None;
+    }
+    let mut reader = Reader::default();
+    for object in elements(root) {
+        match object.tag_name().name() {
+            "POU" => reader.unit(object),
+            "GVL" | "DUT" => reader.declarations(object),
+            name => reader.foreign(name, object),
+        }
+    }
+    reader.diagnostics.sort_by_key(|found| found.span.start);
+    Some((reader.file, reader.diagnostics))
+}
+
+#[derive(Default)]
+struct Reader {
+    file: File,
+    diagnostics: Vec<Diagnostic>,
+}
+
+impl Reader {
+    fn foreign(&mut self, name: &str, node: Node<'_, '_>) {
+        let message = format!("the element `{name}` of TwinCAT is not supported");
+        let error = Diagnostic::error("U1010", message, start_tag(node));
+        self.diagnostics.push(error);
+    }
+
+    /// The text of the declaration of an object.
+    fn declared(&mut self, object: Node<'_, '_>) -> File {
+        let Some(node) = child(object, "Declaration") else {
+            let message = format!("`{}` lacks its `Declaration`", object.tag_name().name());
+            let error = Diagnostic::error("U1002", message, start_tag(object));
+            self.diagnostics.push(error);
+            return File::default();
+        };
+        let passage = text(node);
+        let (file, found) = parse_declarations_at(passage.as_str(), &|span| passage.place(span));
+        self.diagnostics.extend(found);
+        file
+    }
+
+    fn declarations(&mut self, object: Node<'_, '_>) {
+        let file = self.declared(object);
+        self.file.units.extend(file.units);
+        self.file.globals.extend(file.globals);
+        self.file.types.extend(file.types);
+        let known = ["Declaration"];
+        for part in elements(object) {
+            let name = part.tag_name().name();
+            if !known.contains(&name) && !READ_PAST.contains(&name) {
+                self.foreign(name, part);
+            }
+        }
+    }
+
+    fn unit(&mut self, object: Node<'_, '_>) {
+        let file = self.declared(object);
+        self.file.globals.extend(file.globals);
+        self.file.types.extend(file.types);
+        let mut units = file.units.into_iter();
+        let Some(mut unit) = units.next() else {
+            return;
+        };
+        for part in elements(object) {
+            match part.tag_name().name() {
+                "Declaration" => {}
+                "Implementation" => unit.body = self.body(part),
+                "Method" => unit.methods.extend(self.method(part)),
+                "Action" => unit.methods.extend(self.action(part)),
+                name if READ_PAST.contains(&name) => {}
+                name => self.foreign(name, part),
+            }
+        }
+        self.file.units.push(unit);
+        self.file.units.extend(units);
+    }
+
+    fn body(&mut self, implementation: Node<'_, '_>) -> Body {
+        let mut body = Body::default();
+        for language in elements(implementation) {
+            if language.tag_name().name() == "ST" {
+                let passage = text(language);
+                let (found, errors) = parse_body_at(passage.as_str(), &|span| passage.place(span));
+                self.diagnostics.extend(errors);
+                body = found;
+            } else {
+                let name = language.tag_name().name();
+                let message = format!("a body in {name} of TwinCAT is not supported");
+                let error = Diagnostic::error("U1010", message, start_tag(language));
+                self.diagnostics.push(
+                    error.with_help("export it as PLCopen XML, or write it in Structured Text"),
+                );
+            }
+        }
+        body
+    }
+
+    fn method(&mut self, node: Node<'_, '_>) -> Option<Unit> {
+        let file = self.declared(node);
+        let mut unit = file.units.into_iter().next()?;
+        // The header of a method alone may be read as one of a unit without a name.
+        if unit.kind != UnitKind::Method
+            && let Some(method) = unit.methods.pop()
+        {
+            unit = method;
+        }
+        unit.kind = UnitKind::Method;
+        for implementation in children(node, "Implementation") {
+            unit.body = self.body(implementation);
+        }
+        Some(unit)
+    }
+
+    /// An action is a method without variables.
+    fn action(&mut self, node: Node<'_, '_>) -> Option<Unit> {
+        let name = attribute(node, "Name")?;
+        let mut statements = Vec::new();
+        for implementation in children(node, "Implementation") {
+            for language in elements(implementation) {
+                if language.tag_name().name() != "ST" {
+                    self.body(implementation);
+                    continue;
+                }
+                let passage = text(language);
+                let (found, errors) =
+                    parse_statements_at(passage.as_str(), &|span| passage.place(span));
+                self.diagnostics.extend(errors);
+                statements.extend(found);
+            }
+        }
+        Some(Unit {
+            kind: UnitKind::Method,
+            name: Name::new(name.as_str(), name.span()),
+            comments: Vec::new(),
+            result: None,
+            declarations: Vec::new(),
+            body: Body::Statements(statements),
+            methods: Vec::new(),
+            extends: None,
+            implements: Vec::new(),
+            span: name.span(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use understudy_structured_text::{Options, lower};
+    use understudy_text::has_errors;
+
+    use super::read;
+
+    const UNIT: &str = r#"<?xml version="1.0" encoding="utf-8"?>
+<TcPlcObject Version="1.1.0.1"><POU Name="Main" Id="{0}" SpecialFunc="None">
+<Declaration><![CDATA[PROGRAM Main
+VAR in AT %IW0 : INT; out AT %QW0 : INT; END_VAR
+]]></Declaration><Implementation><ST><![CDATA[IF in < 10 THEN Double(); END_IF]]></ST></Implementation>
+<Action Name="Double" Id="{1}"><Implementation><ST><![CDATA[out := in * 2;]]></ST></Implementation></Action>
+</POU></TcPlcObject>"#;
+
+    #[test]
+    fn a_unit_with_an_action_is_a_program() {
+        let (file, mut found) = read(UNIT).expect("a file of TwinCAT");
+        let lowered = lower(
+            &file,
+            &Options {
+                text: UNIT,
+                ..Options::default()
+            },
+        );
+        found.extend(lowered.diagnostics);
+        assert!(!has_errors(&found), "{found:?}");
+        assert!(lowered.program.is_some());
+    }
+
+    #[test]
+    fn a_body_in_another_language_is_refused_by_its_name() {
+        let text = UNIT.replace("<ST>", "<NWL>").replace("</ST>", "</NWL>");
+        let (_, found) = read(&text).expect("a file of TwinCAT");
+        assert!(found.iter().all(|found| found.message.contains("NWL")));
+        assert_eq!(found.len(), 2, "{found:?}");
+    }
+
+    #[test]
+    fn other_documents_are_none() {
+        assert!(read("<project/>").is_none());
+        assert!(read("PROGRAM p END_PROGRAM").is_none());
+    }
+}

@@ -1,0 +1,299 @@
+//! Documents as typed programs: what each construct does, and that both readers agree where both take a document.
+
+use std::time::Duration;
+
+use understudy_interchange::USUAL_PERIOD;
+use understudy_interchange::plcopen::{read, read_typed};
+use understudy_logic::Running;
+use understudy_structured_text::{Options, lower};
+use understudy_testing::random::Dice;
+use understudy_text::{Diagnostic, Severity};
+use understudy_typed::{Elementary, Machine, Program, Scratch};
+
+use crate::support::{PERIOD, data};
+
+/// The program of a document, or its errors.
+fn typed(text: &str, period: Duration) -> Result<Program, Vec<Diagnostic>> {
+    let (file, mut found) = read_typed(text);
+    let options = Options {
+        text,
+        program: None,
+        period: i64::try_from(period.as_nanos()).ok(),
+    };
+    let lowered = lower(&file, &options);
+    found.extend(lowered.diagnostics);
+    found.retain(|found| found.severity == Severity::Error);
+    match lowered.program {
+        Some(program) if found.is_empty() => Ok(program),
+        _ => Err(found),
+    }
+}
+
+struct Scans {
+    program: Program,
+    machine: Machine,
+    state: Vec<u64>,
+    scratch: Scratch,
+}
+
+impl Scans {
+    fn new(program: Program) -> Self {
+        program.validate().expect("a sound program");
+        let machine = Machine::new(&program);
+        Self {
+            state: machine.initial().to_vec(),
+            scratch: Scratch::default(),
+            machine,
+            program,
+        }
+    }
+
+    fn scan(&mut self, values: &[u64]) -> Vec<u64> {
+        let mut inputs = vec![0; self.machine.input_count().div_ceil(64)];
+        let mut outputs = vec![0; self.machine.output_count().div_ceil(64)];
+        let points = self.program.inputs.iter().filter(|point| point.slot != 0);
+        for (point, value) in points.zip(values) {
+            point.set(&mut inputs, *value);
+        }
+        self.machine
+            .step(&mut self.scratch, &mut self.state, &inputs, &mut outputs);
+        let points = self.program.outputs.iter().filter(|point| point.slot != 0);
+        points.map(|point| point.get(&outputs)).collect()
+    }
+}
+
+/// A document with one program.
+fn document(variables: &str, body: &str) -> String {
+    format!(
+        r#"<project xmlns="http://www.plcopen.org/xml/tc6_0201"><types><dataTypes/><pous>
+<pou name="main" pouType="program"><interface><localVars>{variables}</localVars></interface><body>{body}</body></pou>
+</pous></types><instances><configurations/></instances></project>"#
+    )
+}
+
+fn variable(name: &str, address: &str, of: &str) -> String {
+    format!(r#"<variable name="{name}" address="{address}"><type><{of}/></type></variable>"#)
+}
+
+fn from(id: u32) -> String {
+    format!(r#"<connectionPointIn><connection refLocalId="{id}"/></connectionPointIn>"#)
+}
+
+fn given(id: u32, expression: &str) -> String {
+    format!(
+        r#"<inVariable localId="{id}"><connectionPointOut/><expression>{expression}</expression></inVariable>"#
+    )
+}
+
+fn taken(id: u32, source: u32, expression: &str) -> String {
+    let source = from(source);
+    format!(
+        r#"<outVariable localId="{id}">{source}<expression>{expression}</expression></outVariable>"#
+    )
+}
+
+fn function(id: u32, of: &str, sources: &[u32]) -> String {
+    let inputs = sources.iter().enumerate().map(|(at, source)| {
+        let source = from(*source);
+        format!(
+            r#"<variable formalParameter="IN{}">{source}</variable>"#,
+            at + 1
+        )
+    });
+    let inputs: String = inputs.collect();
+    format!(
+        r#"<block localId="{id}" typeName="{of}"><inputVariables>{inputs}</inputVariables><inOutVariables/><outputVariables><variable formalParameter="OUT"><connectionPointOut/></variable></outputVariables></block>"#
+    )
+}
+
+fn run(text: &str, inputs: &[&[u64]]) -> Vec<Vec<u64>> {
+    let program = typed(text, PERIOD).unwrap_or_else(|found| panic!("{found:#?}"));
+    let mut scans = Scans::new(program);
+    inputs.iter().map(|values| scans.scan(values)).collect()
+}
+
+#[test]
+fn a_sum_that_feeds_itself_is_what_it_was_in_the_last_scan() {
+    let variables = variable("a", "%IW0", "INT") + &variable("y", "%QW0", "INT");
+    let body = given(1, "a") + &function(2, "ADD", &[1, 2]) + &taken(3, 2, "y");
+    let text = document(&variables, &format!("<FBD>{body}</FBD>"));
+    let shown = run(&text, &[&[1], &[2], &[3]]);
+    assert_eq!(shown, [vec![1], vec![3], vec![6]]);
+}
+
+#[test]
+fn a_jump_back_repeats_and_a_jump_on_skips() {
+    let variables = variable("n", "%IW0", "INT") + &variable("y", "%QW0", "INT");
+    let order = |text: String, order: u32| {
+        text.replacen(
+            " localId",
+            &format!(" executionOrderId=\"{order}\" localId"),
+            1,
+        )
+    };
+    let label = r#"<label localId="1" executionOrderId="1" label="again"/>"#;
+    let jump = r#"<jump localId="9" executionOrderId="5" label="again">"#;
+    let body = [
+        label.to_owned(),
+        given(2, "y"),
+        given(3, "1"),
+        order(function(4, "ADD", &[2, 3]), 2),
+        order(taken(5, 4, "y"), 3),
+        given(6, "y"),
+        given(7, "n"),
+        order(function(8, "LT", &[6, 7]), 4),
+        format!("{jump}{}</jump>", from(8)),
+    ];
+    let text = document(&variables, &format!("<FBD>{}</FBD>", body.concat()));
+    assert_eq!(run(&text, &[&[5], &[5], &[9]]), [vec![5], vec![6], vec![9]]);
+}
+
+#[test]
+fn a_chart_goes_from_step_to_step() {
+    let variables = variable("go", "%IX0.0", "BOOL")
+        + &variable("n", "%QW0", "INT")
+        + &variable("y", "%QX0.0", "BOOL");
+    let body = format!(
+        r#"<step localId="1" name="Idle" initialStep="true">{}<connectionPointOut formalParameter="sfc"/></step>
+<transition localId="2">{}<connectionPointOut/><condition><inline name="c"><ST><xhtml:p xmlns:xhtml="http://www.w3.org/1999/xhtml">go AND n &lt; 3</xhtml:p></ST></inline></condition></transition>
+<step localId="3" name="Run">{}<connectionPointOut formalParameter="sfc"/><connectionPointOutAction formalParameter="a"/></step>
+<actionBlock localId="4">{}<action qualifier="N"><reference name="y"/></action><action qualifier="P1"><inline><ST>n := n + 1;</ST></inline></action></actionBlock>
+<transition localId="5">{}<connectionPointOut/><condition><inline name="d"><ST>NOT go</ST></inline></condition></transition>
+<jumpStep localId="6" targetName="Idle">{}</jumpStep>"#,
+        "",
+        from(1),
+        from(2),
+        from(3),
+        from(3),
+        from(5)
+    );
+    let text = document(&variables, &format!("<SFC>{body}</SFC>"));
+    let shown = run(&text, &[&[0], &[1], &[1], &[0], &[1], &[0]]);
+    let expected: [&[u64]; 6] = [&[0, 0], &[1, 1], &[1, 1], &[1, 0], &[2, 1], &[2, 0]];
+    assert_eq!(shown, expected.map(<[u64]>::to_vec));
+}
+
+#[test]
+fn what_is_not_understood_is_refused_by_its_name() {
+    let variables = variable("a", "%IX0.0", "BOOL");
+    for (body, word) in [
+        (r#"<ST>a := a;</ST><Extra/>"#, "Extra"),
+        (r#"<FBD><comment localId="1" magic="yes"/></FBD>"#, "magic"),
+        (
+            r#"<SFC><macroStep localId="1" name="m"/></SFC>"#,
+            "macro step",
+        ),
+    ] {
+        let found = typed(&document(&variables, body), PERIOD).expect_err("a refusal");
+        assert!(
+            found.iter().any(|found| found.message.contains(word)),
+            "{word}: {found:#?}"
+        );
+    }
+}
+
+#[test]
+fn dancing_lights_as_a_typed_program_do_what_another_compiler_s_code_does() {
+    let (Some(file), Some(vectors)) = (
+        data("ladder/dancinglights/plc.xml"),
+        data("ladder/vectors/dancinglights.json"),
+    ) else {
+        return;
+    };
+    let text = std::fs::read_to_string(file).expect("a file that exists");
+    let vectors = std::fs::read_to_string(vectors).expect("a file that exists");
+    let vectors: serde_json::Value = serde_json::from_str(&vectors).expect("vectors");
+    let mut scans = Scans::new(typed(&text, PERIOD).expect("a sound program"));
+    let lines = vectors["scans"].as_array().expect("scans");
+    for (number, line) in lines.iter().enumerate() {
+        let line = line.as_str().and_then(|line| line.split_once(' '));
+        let (inputs, outputs) = line.expect("two words");
+        let inputs: Vec<u64> = inputs.bytes().map(|bit| u64::from(bit == b'1')).collect();
+        let shown = scans.scan(&inputs);
+        let shown: String = shown.iter().map(u64::to_string).collect();
+        assert_eq!(shown, outputs, "scan {number}");
+    }
+    assert!(lines.len() >= 600);
+}
+
+/// Files of this project and of other people.
+fn documents() -> Vec<std::path::PathBuf> {
+    let examples = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
+    let mut folders = vec![examples];
+    folders.extend(
+        ["ladder", "programs"]
+            .iter()
+            .filter_map(|folder| data(folder)),
+    );
+    let mut found = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|end| end == "xml") {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn both_readers_agree_scan_by_scan() {
+    let mut compared = 0;
+    for path in documents() {
+        let text = std::fs::read_to_string(&path).expect("a text");
+        let reading = read(&text, None);
+        let period = reading.period.unwrap_or(USUAL_PERIOD);
+        let Some(program) = reading.program else {
+            continue;
+        };
+        let Ok(circuit) = program.lower(period) else {
+            continue;
+        };
+        let other = match typed(&text, period) {
+            Ok(other) => other,
+            Err(found) => {
+                // The Boolean reader looks only at units that the program uses.
+                let is_elsewhere = found.iter().all(|found| found.code == "U1041");
+                assert!(is_elsewhere, "{}: {found:#?}", path.display());
+                continue;
+            }
+        };
+        let named = |points: &understudy_typed::Points| -> Option<Vec<String>> {
+            let mut points = points.iter().filter(|point| point.slot != 0);
+            let is_bit = points.clone().all(|point| point.of == Elementary::Bool);
+            is_bit.then(|| {
+                points
+                    .by_ref()
+                    .map(|point| point.name.to_uppercase())
+                    .collect()
+            })
+        };
+        let same = |names: Option<Vec<String>>, bits: usize| {
+            names.is_some_and(|names| names.len() == bits)
+        };
+        let (inputs, outputs) = (circuit.inputs().len(), circuit.outputs().len());
+        if !same(named(&other.inputs), inputs) || !same(named(&other.outputs), outputs) {
+            continue;
+        }
+        compared += 1;
+        let mut scans = Scans::new(other);
+        let mut running = Running::new(&circuit);
+        let mut dice = Dice::new(7);
+        let mut given = vec![false; inputs];
+        for scan in 0..2_000 {
+            for input in &mut given {
+                *input ^= dice.rarely(3);
+            }
+            let expected = running.step(&given);
+            let values: Vec<u64> = given.iter().map(|bit| u64::from(*bit)).collect();
+            let shown: Vec<bool> = scans.scan(&values).iter().map(|bit| *bit != 0).collect();
+            assert_eq!(shown, expected, "{} scan {scan}", path.display());
+        }
+    }
+    println!("{compared} documents compared");
+    assert!(compared >= 1, "{compared} documents compared");
+}
