@@ -57,7 +57,7 @@ struct Signal {
 }
 
 /// Why answers make no process image.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub(crate) enum Unread {
     /// An answer has fewer words than its run.
     #[error("it answered a reading too shortly")]

@@ -52,7 +52,7 @@ pub(crate) fn open(line: &SerialLine) -> io::Result<SerialPort> {
     tcsetattr(&file, SetArg::TCSANOW, &settings)?;
     tcflush(&file, FlushArg::TCIOFLUSH)?;
     let interest = Interest::READABLE | Interest::WRITABLE;
-    Ok(SerialPort(AsyncFd::with_interest(file, interest)?))
+    Ok(SerialPort(AsyncFd::register_with_interest(file, interest)?))
 }
 
 /// The silence between two frames: 3.5 characters of 11 bits, and 1.75 ms above 19,200 bits per second.
