@@ -7,7 +7,7 @@ use std::time::SystemTime;
 
 use serde_json::{Value, json};
 use understudy_cluster::{Cluster, Loaded, Overrides, TemplateFile};
-use understudy_interchange::parse_program;
+use understudy_interchange::{Source, Wanted, parse_program, read_source};
 use understudy_journal::{Members, RunDirectory, RunDirectoryError, named_file};
 use understudy_ladder::Program;
 use understudy_parity::ParityController;
@@ -105,7 +105,15 @@ pub fn ladder(path: &Path) -> Result<(Program, Report), Answer> {
         diagnostics: parsed.diagnostics,
     };
     if report.has_errors() {
-        return Err(Answer::bad_files(vec![report]));
+        let typed = read_source(&report.name, &report.text, Wanted::default()).source;
+        let answer = Answer::bad_files(vec![report]);
+        return Err(match typed {
+            Some(Source::Typed(_)) => {
+                let message = "this command works on Boolean programs, and the program has numbers";
+                answer.and_failure(Status::BadInput, "U0438", message)
+            }
+            _ => answer,
+        });
     }
     Ok((parsed.program, report))
 }

@@ -5,6 +5,7 @@
 
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
+use understudy_typed::{Elementary, Point, Points};
 use understudy_wire::Image;
 
 use crate::account::{Account, Interval, Presence, Service, TRACED_CYCLES, Trace};
@@ -13,10 +14,14 @@ use crate::summary::Summary;
 /// Names of a program's signals, and of what moves in its plant.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Signals {
-    /// u, in order.
+    /// u, bit by bit.
     pub inputs: Vec<String>,
-    /// y, in order.
+    /// y, bit by bit.
     pub outputs: Vec<String>,
+    /// u, point by point.
+    pub input_points: Points,
+    /// y, point by point.
+    pub output_points: Points,
     /// Moving parts of its simulated plant, in order.
     pub positions: Vec<String>,
 }
@@ -208,7 +213,7 @@ fn panels(account: &Account, summary: &Summary) -> Vec<Panel> {
                 shown = "positions and sensors";
             }
             lanes.extend(position_lanes(&trace.positions, &signals.positions));
-            lanes.extend(bit_lanes(&trace.sensors, &signals.inputs));
+            lanes.extend(point_lanes(&trace.sensors, &signals.input_points));
         }
         let summary = summary.plants.iter().find(|plant| plant.name == plant_name);
         panels.push(Panel {
@@ -221,17 +226,13 @@ fn panels(account: &Account, summary: &Summary) -> Vec<Panel> {
         let trace = &account.traces.stations[station.index()];
         let understudy = terms.agreement.schedule.is_understudy(station);
         let width = trace.spans().map(|(_, _, image)| image.width()).max();
-        let parity: Vec<String>;
-        let names = if understudy {
-            parity = (1..=width.unwrap_or(0))
-                .map(|bit| format!("parity {bit}"))
-                .collect();
-            &parity[..]
+        let lanes = if understudy {
+            let bits = 1..=width.unwrap_or(0);
+            let names: Vec<String> = bits.map(|bit| format!("parity {bit}")).collect();
+            bit_lanes(trace, &names)
         } else {
-            terms
-                .signals
-                .get(station.index())
-                .map_or(&[][..], |signals| &signals.outputs)
+            let signals = terms.signals.get(station.index());
+            signals.map_or_else(Vec::new, |own| point_lanes(trace, &own.output_points))
         };
         let kind = if understudy {
             "understudy"
@@ -249,7 +250,7 @@ fn panels(account: &Account, summary: &Summary) -> Vec<Panel> {
             } else {
                 format!("({}) {kind} {name}: {what}", letter())
             },
-            lanes: bounded(bit_lanes(trace, names)),
+            lanes: bounded(lanes),
             shades: summary
                 .stations
                 .get(station.index())
@@ -287,6 +288,61 @@ fn bit_lanes(trace: &Trace<Image>, names: &[String]) -> Vec<Lane> {
             ),
         })
         .collect()
+}
+
+/// A lane for each point: high and low for a BOOL; a number lies between its least and its greatest value, which stand behind its name.
+fn point_lanes(trace: &Trace<Image>, points: &Points) -> Vec<Lane> {
+    let lanes = points.iter().map(|point| {
+        let spans = trace
+            .spans()
+            .filter(|(.., image)| image.width() >= points.width());
+        let values: Vec<Step> = spans
+            .map(|(from, to, image)| (from, to, drawn(point, image)))
+            .collect();
+        let finite = values.iter().map(|(.., value)| *value);
+        let (low, high) = finite
+            .filter(|value| value.is_finite())
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+                (low.min(value), high.max(value))
+            });
+        let (name, share): (String, Box<dyn Fn(f64) -> f64>) = match point.of {
+            Elementary::Bool => (point.name.clone(), Box::new(|value| value)),
+            _ if low < high => (
+                format!("{} {} … {}", point.name, short(low), short(high)),
+                Box::new(move |value| (value - low) / (high - low)),
+            ),
+            _ if low == high => (format!("{} {}", point.name, short(low)), Box::new(|_| 0.5)),
+            _ => (point.name.clone(), Box::new(|_| 0.5)),
+        };
+        let known = values.into_iter().filter(|(.., value)| value.is_finite());
+        Lane {
+            name,
+            colour: SIGNAL,
+            steps: joined(known.map(|(from, to, value)| (from, to, share(value)))),
+        }
+    });
+    lanes.collect()
+}
+
+/// A value as a height; a time in seconds.
+fn drawn(point: &Point, image: &Image) -> f64 {
+    let stored = point.get(image.words());
+    match point.of {
+        Elementary::Real => f64::from(f32::from_bits(stored as u32)),
+        Elementary::Lreal => f64::from_bits(stored),
+        of if of.is_time() => of.signed(stored) as f64 / 1e9,
+        of => of.signed(stored) as f64,
+    }
+}
+
+/// At most four significant digits.
+fn short(value: f64) -> String {
+    let whole = value.abs().log10().floor().max(0.0) as usize;
+    let text = format!("{value:.*}", 3_usize.saturating_sub(whole));
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    }
 }
 
 fn position_lanes(trace: &Trace<Vec<u16>>, names: &[String]) -> Vec<Lane> {

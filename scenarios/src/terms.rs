@@ -26,6 +26,8 @@ impl Terms {
                 .unwrap_or_default(),
             inputs: controller.interface.inputs.bit_names(),
             outputs: controller.interface.outputs.bit_names(),
+            input_points: controller.interface.inputs.clone(),
+            output_points: controller.interface.outputs.clone(),
         });
         let mut plants = ProgramSet::default();
         for (program, plant) in cluster.plants().iter().enumerate() {

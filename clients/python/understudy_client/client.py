@@ -10,6 +10,9 @@ from typing import Any
 
 import zenoh
 
+#: A value of an input or output.
+Value = bool | int | float | None
+
 
 @dataclass(frozen=True)
 class Program:
@@ -18,10 +21,13 @@ class Program:
     name: str
     #: Source of the applied outputs: `direct`, `reconstructed`, `held` or `fail-safe`; None before the first deadline.
     source: str | None
-    inputs: dict[str, bool] | None
-    outputs: dict[str, bool] | None
+    #: By name: a BOOL as `bool`, an integer, bit string or time (in nanoseconds) as `int`, a REAL or LREAL as `float`, or None where it is not finite.
+    inputs: dict[str, Value] | None
+    outputs: dict[str, Value] | None
     #: Number of deadlines by source.
     deadlines: dict[str, int]
+    #: The program fault that has stopped it, in words.
+    fault: str | None = None
 
 
 @dataclass(frozen=True)
@@ -141,4 +147,5 @@ def _program(key: str, document: dict[str, Any]) -> Program:
         inputs=document["inputs"],
         outputs=document["outputs"],
         deadlines=document["deadlines"],
+        fault=document.get("fault"),
     )

@@ -114,6 +114,7 @@ fn values(program: &ProgramSnapshot, interface: &Interface) -> Value {
         "outputs": named(&interface.outputs, program.outputs.as_deref()),
         "word_of": program.word_of,
         "missing": program.missing,
+        "fault": program.fault,
         "awaits_release": program.awaits_release,
         "forced": program.forced,
         "protection": program.protection,

@@ -2,8 +2,10 @@
 
 use std::collections::BTreeSet;
 
+use understudy_cluster::Cluster;
 use understudy_journal::{Happening, Members, Record, source_word};
 use understudy_remote_io::Missing;
+use understudy_typed::Fault;
 use understudy_wire::{Element, Member, ProgramId, ProgramSet, Set, Source, StationId, StationSet};
 
 use crate::event::Level;
@@ -54,9 +56,10 @@ pub(crate) fn event_names() -> BTreeSet<&'static str> {
         processes::host::NAMES,
         processes::run::NAMES,
     ];
-    // A listing shows a deadline whose source changed as an event of its own.
+    // A listing shows a deadline whose source changed, or at which a program was found stopped, as an event of its own.
     let names = all.into_iter().flatten().copied();
-    names.chain(["source"]).collect()
+    let names = names.chain(["source", PROGRAM_FAULT]);
+    names.collect()
 }
 
 /// Describes a record with the names of its cluster.
@@ -80,6 +83,24 @@ pub fn describe(record: &Record, names: &Members) -> Description {
 }
 
 type Words = (&'static str, Level, String);
+
+/// The event of a program fault.
+pub(crate) const PROGRAM_FAULT: &str = "program-fault";
+
+/// A program fault in words: the program, and where it stopped and why, as far as that is known.
+pub(crate) fn program_fault_text(
+    cluster: &Cluster,
+    program: ProgramId,
+    fault: Option<&Fault>,
+) -> String {
+    let controller = cluster.controllers().get(program.index());
+    let name = controller.map_or("an unknown program", |controller| controller.name.as_str());
+    let typed = controller.and_then(|controller| controller.code.typed());
+    match typed.zip(fault) {
+        Some((typed, fault)) => format!("program fault in {name}: {}", fault.describe(typed)),
+        None => format!("program fault in {name}"),
+    }
+}
 
 /// Why there was no provable output.
 pub(crate) fn missing_text(missing: Missing) -> &'static str {

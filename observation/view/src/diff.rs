@@ -3,10 +3,12 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_journal::source_word;
+use understudy_typed::{Elementary, Point, Points};
 use understudy_wire::{Image, ProgramId};
 
 use crate::model::Model;
 use crate::timeline::Timeline;
+use crate::value::{value_in, value_text};
 
 /// What differs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
@@ -112,14 +114,30 @@ pub fn diff(left: &Model, right: &Model) -> RunDiff {
         };
         let (ours, theirs) = (ProgramId(place as u8), ProgramId(other as u8));
         let (one, two) = (left.series(), right.series());
-        let image = |image: Option<&Image>| image.map_or("nothing".to_owned(), Image::to_string);
+        let interface = &controller.interface;
+        let (inputs, outputs) = (&interface.inputs, &interface.outputs);
         let pairs = [
-            (Differing::Inputs, one.inputs(ours), two.inputs(theirs)),
-            (Differing::Outputs, one.outputs(ours), two.outputs(theirs)),
+            (
+                Differing::Inputs,
+                inputs,
+                one.inputs(ours),
+                two.inputs(theirs),
+            ),
+            (
+                Differing::Outputs,
+                outputs,
+                one.outputs(ours),
+                two.outputs(theirs),
+            ),
         ];
-        for (what, one, two) in pairs {
+        for (what, points, one, two) in pairs {
             if let (Some(one), Some(two)) = (one, two) {
-                differences.extend(first(name, what, one, two, end, image));
+                let mut found = first(name, what, one, two, end, image_text);
+                if let Some(found) = &mut found {
+                    let images = [one.at(found.cycle), two.at(found.cycle)];
+                    differing_values(found, points, images);
+                }
+                differences.extend(found);
             }
         }
         if let (Some(one), Some(two)) = (one.sources(ours), two.sources(theirs)) {
@@ -141,6 +159,33 @@ pub fn diff(left: &Model, right: &Model) -> RunDiff {
         cycles,
         differences,
     }
+}
+
+fn image_text(image: Option<&Image>) -> String {
+    image.map_or("nothing".to_owned(), Image::to_string)
+}
+
+/// Shows images with numbers by the points that differ, as values; images of bits stay as they are.
+fn differing_values(found: &mut Difference, points: &Points, images: [Option<&Image>; 2]) {
+    let [Some(left), Some(right)] = images else {
+        return;
+    };
+    let are_bits = points.iter().all(|point| point.of == Elementary::Bool);
+    if are_bits || [left, right].iter().any(|it| it.width() != points.width()) {
+        return;
+    }
+    let points = points.iter();
+    let differing: Vec<&Point> = points
+        .filter(|point| point.get(left.words()) != point.get(right.words()))
+        .collect();
+    let text = |image: &Image| {
+        let values = differing.iter();
+        let texts: Vec<String> = values
+            .map(|point| format!("{} = {}", point.name, value_text(&value_in(point, image))))
+            .collect();
+        texts.join(", ")
+    };
+    (found.left, found.right) = (text(left), text(right));
 }
 
 /// The first cycle from 0 to below `end` in which two timelines differ, and how many there are.

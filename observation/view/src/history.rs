@@ -8,6 +8,7 @@ use std::collections::VecDeque;
 use understudy_cluster::Cluster;
 use understudy_remote_io::{Event, Missing};
 use understudy_simulator::{Referee, Violation};
+use understudy_typed::{Fault, Program as TypedProgram};
 use understudy_wire::{Image, Lineage, Moment, ProgramId, Source, StationId, StationSet};
 
 /// A sample and its effect on the program.
@@ -23,6 +24,10 @@ pub struct Sampled {
     pub after: Lineage,
     /// h(x(t), u(t)).
     pub outputs: Image,
+    /// The program fault in x(t+1), of a program with numbers.
+    pub fault: Option<Fault>,
+    /// Whether it occurred in this scan.
+    pub fault_is_new: bool,
 }
 
 /// The outputs at a deadline.
@@ -64,6 +69,8 @@ pub struct History {
     referee: Referee,
     steps: VecDeque<Step>,
     most: usize,
+    /// Bit of u(i) that resets a stopped program; nothing of a Boolean program, which never stops.
+    reset: Option<usize>,
     /// Whether steps have gone, or were never seen.
     cut: bool,
     /// The newest samples, while it is not known which state they belong to.
@@ -77,11 +84,16 @@ impl History {
     pub(crate) fn new(cluster: &Cluster, program: ProgramId, most: usize) -> Option<Self> {
         let settings = cluster.remote_io_settings(program)?;
         let executable = cluster.programs().get(program.index())?.executable.clone();
+        let controller = cluster.controllers().get(program.index())?;
+        let inputs = &controller.interface.inputs;
+        let reset = inputs.find(TypedProgram::RESET);
+        let reset = reset.filter(|_| controller.code.typed().is_some());
         Some(Self {
             program,
             referee: Referee::new(&settings, executable),
             steps: VecDeque::new(),
             most: most.max(2),
+            reset: reset.map(|reset| reset.bit as usize),
             cut: false,
             unplaced: VecDeque::new(),
             awaited: None,
@@ -188,15 +200,33 @@ impl History {
         };
         let truth = self.referee.truth().filter(|(of, _)| of == moment);
         let sampled = truth.and_then(|(_, outputs)| {
+            let state = self.referee.state_of(*before)?;
+            let after = before.after(inputs);
+            let fault = self.fault_after(after);
+            let was_stopped = self.fault_in(state).is_some();
+            let is_reset = self.reset.is_some_and(|reset| inputs.get(reset));
             Some(Sampled {
                 inputs: inputs.clone(),
                 before: *before,
-                state: self.referee.state_of(*before)?.clone(),
-                after: before.after(inputs),
+                state: state.clone(),
+                after,
                 outputs: outputs.clone(),
+                fault,
+                fault_is_new: fault.is_some() && (is_reset || !was_stopped),
             })
         });
         (sampled, violation)
+    }
+
+    /// The program fault that a state holds.
+    fn fault_in(&self, state: &Image) -> Option<Fault> {
+        let has_header = state.words().len() >= TypedProgram::HEADER as usize;
+        self.reset.filter(|_| has_header)?;
+        Fault::read(state.words())
+    }
+
+    fn fault_after(&self, after: Lineage) -> Option<Fault> {
+        self.fault_in(self.referee.state_of(after)?)
     }
 
     /// Keeps a sample until it is known which state it belongs to.

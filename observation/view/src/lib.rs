@@ -25,9 +25,12 @@ mod model;
 mod protection;
 mod run;
 mod series;
+mod shown_text;
 mod snapshot;
 mod source;
+mod source_text;
 mod station;
+mod stop;
 mod terminal;
 mod timeline;
 mod timing;
@@ -47,6 +50,7 @@ pub use model::{Bounds, Counters, MemberCounters, Model, ProgramCounters, SentTu
 pub use protection::{LackingStation, LostState, Protection};
 pub use run::{Run, find_run, find_run_of, find_running, find_running_of};
 pub use series::Series;
+pub use shown_text::{ShownLine, Uses};
 pub use snapshot::{
     LinkSnapshot, MarginSnapshot, OutcomeSnapshot, PlantSnapshot, PlantState, ProgramSnapshot,
     RemoteIoSnapshot, RemoteIoState, RunState, Snapshot, StationSnapshot, TimingSnapshot,

@@ -11,9 +11,10 @@ use understudy_text::spelling::suggestion;
 use understudy_wire::{Member, Moment, ProgramId, Source};
 
 use crate::cycles::Cycles;
-use crate::describe::{describe, event_names};
+use crate::describe::{PROGRAM_FAULT, describe, event_names};
 use crate::error::ViewError;
 use crate::event::Level;
+use crate::stop::Stops;
 
 /// Which records are wanted; an empty list is all.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -57,6 +58,7 @@ pub struct Listing {
     wanted: Vec<Member>,
     cycles: Cycles,
     sources: BTreeMap<ProgramId, Source>,
+    stops: Stops,
 }
 
 impl Listing {
@@ -107,6 +109,7 @@ impl Listing {
             members,
             cycles: Cycles::default(),
             sources: BTreeMap::new(),
+            stops: Stops::new(cluster),
         })
     }
 
@@ -124,6 +127,7 @@ impl Listing {
         Self {
             cycles: self.cycles.again(),
             sources: BTreeMap::new(),
+            stops: self.stops.again(),
             ..self.clone()
         }
     }
@@ -134,6 +138,7 @@ impl Listing {
         let _ = self.cycles.take_shift();
         let cycle = self.cycles.has_origin().then_some(cycle);
         let changed = self.source_changed(record);
+        let fault = self.stops.take(record);
         if !self.is_wanted(record, cycle) {
             return None;
         }
@@ -141,6 +146,14 @@ impl Listing {
         let wants_source = self.filter.events.is_empty() || self.wants("source");
         if changed && wants_source && !self.filter.ordinary && !self.wants("applied") {
             description.event = "source";
+            description.is_ordinary = false;
+        }
+        if let Some(fault) = fault
+            && (self.filter.events.is_empty() || self.wants(PROGRAM_FAULT))
+        {
+            description.event = PROGRAM_FAULT;
+            description.level = Level::Alarm;
+            description.text = fault;
             description.is_ordinary = false;
         }
         let named = self.wants(description.event);

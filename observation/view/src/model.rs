@@ -17,6 +17,7 @@ use std::sync::{Arc, OnceLock};
 use understudy_cluster::Cluster;
 use understudy_journal::{Happening, Members, Record};
 use understudy_ladder::Observer;
+use understudy_typed::Interpreter;
 use understudy_wire::{Member, Moment, ProgramId};
 
 use crate::alarm::Alarms;
@@ -78,6 +79,7 @@ pub struct Model {
     alarms: Alarms,
     timings: Timings,
     observers: Vec<OnceLock<Option<Observer>>>,
+    interpreters: Vec<OnceLock<Option<Interpreter>>>,
     /// The newest cycle of which the states of the stations are in the series.
     closed: Option<i64>,
     at_ns: u64,
@@ -109,6 +111,7 @@ impl Model {
             alarms: Alarms::default(),
             timings: Timings::new(schedule, bounds.timings),
             observers: vec![OnceLock::new(); programs],
+            interpreters: vec![OnceLock::new(); programs],
             closed: None,
             at_ns: 0,
             records: 0,

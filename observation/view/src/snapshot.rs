@@ -3,8 +3,11 @@
 
 mod taken;
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::Serialize;
+use serde_json::Value;
 use understudy_wire::Force;
 
 use crate::alarm::Alarm;
@@ -228,10 +231,15 @@ pub struct ProgramSnapshot {
     pub word_of: Option<String>,
     /// Why there was no provable output, in a missed cycle.
     pub missing: Option<&'static str>,
+    /// The program fault that has stopped it, with its line and its values; of a program with numbers.
+    pub fault: Option<String>,
     /// u(i) as last sampled, element 1 first.
     pub inputs: Option<String>,
     /// y(i) as driven, element 1 first.
     pub outputs: Option<String>,
+    /// Inputs as last sampled and outputs as driven, by name: a BOOL as true or false, a number as a number, null where it is not finite, a
+    /// time in nanoseconds.
+    pub values: BTreeMap<String, Value>,
     /// Deadlines with direct outputs, from the origin of the run on; so are the following.
     pub direct: u64,
     /// Deadlines with reconstructed outputs.

@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 use understudy_cluster::Controller;
-use understudy_typed::{Elementary, Point};
-use understudy_wire::{Force, SignalPlace};
+use understudy_typed::{Elementary, Point, Points};
+use understudy_wire::{Force, Image, SignalPlace};
 
 /// The bits of a point as they are stored; nothing where the text ends before them.
 pub fn stored(point: &Point, bits: &str) -> Option<u64> {
@@ -19,10 +19,36 @@ pub fn stored(point: &Point, bits: &str) -> Option<u64> {
 /// it is none, as null; a time as a number of nanoseconds.
 pub fn value_of(point: &Point, bits: &str) -> Option<Value> {
     let value = stored(point, bits)?;
-    Some(match point.of {
-        Elementary::Bool => Value::Bool(value != 0),
-        of => number(of, value),
-    })
+    Some(elementary(point.of, value))
+}
+
+/// The value of a point in an image, as [`value_of`] has it.
+pub(crate) fn value_in(point: &Point, image: &Image) -> Value {
+    elementary(point.of, point.get(image.words()))
+}
+
+/// The values of all points of an image, by name.
+pub(crate) fn named(points: &Points, image: &Image) -> impl Iterator<Item = (String, Value)> {
+    let points = points.iter();
+    points.map(|point| (point.name.clone(), value_in(point, image)))
+}
+
+/// An elementary value as it is stored, as [`value_of`] has it.
+pub(crate) fn elementary(of: Elementary, stored: u64) -> Value {
+    match of {
+        Elementary::Bool => Value::Bool(stored != 0),
+        of => number(of, stored),
+    }
+}
+
+/// A value as people read it: a BOOL as 0 or 1.
+pub(crate) fn value_text(value: &Value) -> String {
+    match value {
+        Value::Bool(value) => u8::from(*value).to_string(),
+        Value::Null => "not a finite number".to_owned(),
+        Value::String(text) => text.clone(),
+        other => other.to_string(),
+    }
 }
 
 /// The value of a point in a packed image, for drawing: a BOOL as 0 or 1, all else as [`value_of`] has it.
@@ -68,8 +94,6 @@ fn number(of: Elementary, value: u64) -> Value {
 
 #[cfg(test)]
 mod tests {
-    use understudy_typed::Points;
-
     use super::*;
 
     #[test]

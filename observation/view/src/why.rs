@@ -1,25 +1,32 @@
-//! Why an output has its value: the chain of contacts that caused it, through memory bits and earlier cycles; for a reconstructed output
+//! Why an output has its value: the chain of contacts or statements that caused it, through memory and earlier cycles; for a reconstructed output
 //! the parity word, its mask and the lineage that proves it.
 
 mod explain;
 mod power;
+mod statements;
 mod text;
+
+use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use serde_json::Value;
+use understudy_cluster::Code;
 use understudy_journal::source_word;
 use understudy_ladder::Program;
 use understudy_parity::reconstruct;
+use understudy_remote_io::Missing;
 use understudy_text::spelling::suggestion;
-use understudy_wire::{Member, ProgramId, Source, StationId};
+use understudy_wire::{Image, Member, ProgramId, Source, StationId};
 
 use crate::describe::missing_text;
 use crate::error::ViewError;
 use crate::history::{Driven, History, Step};
 use crate::model::Model;
+use crate::value::{named, value_in};
 use explain::Explainer;
 
-/// Why an output or a memory bit of a program has its value.
+/// Why an output or a variable of a program has its value.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Why {
     /// Its name.
@@ -30,17 +37,23 @@ pub struct Why {
     pub remote_io: String,
     /// From the origin of the run.
     pub cycle: i64,
-    /// Its value as driven; of a memory bit after the scan.
-    pub value: bool,
+    /// Its value as driven, of a variable after the scan: a BOOL as true or false, a number as a number, null where it is not finite, a time in
+    /// nanoseconds.
+    pub value: Value,
     /// `direct`, `reconstructed`, `held` or `fail-safe`; nothing for a cycle whose deadline is not in the journal.
     pub source: Option<&'static str>,
     /// Why there was no provable output, in a missed cycle.
     pub missing: Option<&'static str>,
     /// The value of the program's own scan, where it was not driven.
-    pub scanned: Option<bool>,
+    pub scanned: Option<Value>,
+    /// The inputs that were sampled in this cycle, by name.
+    pub inputs: BTreeMap<String, Value>,
+    /// Whether it is a program with numbers.
+    #[serde(skip)]
+    pub has_numbers: bool,
     /// How it was reconstructed.
     pub reconstructed: Option<Reconstructed>,
-    /// The chain of contacts; nothing for a fail-safe value.
+    /// The chain of contacts or statements; nothing for a fail-safe value, unless a program fault led to it.
     pub because: Option<Reason>,
 }
 
@@ -57,6 +70,8 @@ pub struct Reconstructed {
     pub others: Vec<Addend>,
     /// The sum of them all.
     pub sum: String,
+    /// The sum as outputs of the program, by name.
+    pub values: BTreeMap<String, Value>,
     /// L(t+1) of the program: a station at this lineage has the same inputs since the same start.
     pub lineage: String,
     /// Whether the sum equals the outputs that the samples yield.
@@ -72,6 +87,8 @@ pub struct Addend {
     pub published_by: String,
     /// Element 1 first.
     pub outputs: String,
+    /// The same by name.
+    pub values: BTreeMap<String, Value>,
 }
 
 /// A signal in a cycle, and the reason for its value.
@@ -80,13 +97,17 @@ pub struct Reason {
     /// A signal, a pin of a block, or a comparison.
     pub signal: String,
     /// Its value at that place of the scan.
-    pub value: bool,
+    pub value: Value,
     /// From the origin of the run.
     pub cycle: i64,
     /// The rung that determined it, counted from 1.
     pub rung: Option<usize>,
     /// The title of that rung.
     pub title: Option<String>,
+    /// The line of the statement that determined it, of a program with numbers, counted from 1.
+    pub line: Option<u32>,
+    /// That line of its text.
+    pub statement: Option<String>,
     /// The reason in words.
     pub text: String,
     /// The reasons behind it.
@@ -123,48 +144,56 @@ impl Model {
         let step = &history.steps()[place];
         let controller = &self.cluster.controllers()[program.index()];
         let output = controller.interface.outputs.find(name);
-        let output = output.map(|output| output.bit as usize);
         let source = step.driven.as_ref().map(|driven| driven.source);
+        let missing = step.driven.as_ref().and_then(|driven| driven.missing);
         // What is held was true in an earlier cycle; the fail-safe values were never computed.
         let explained = match source {
             Some(Source::Held) if output.is_some() => last_true(history, place),
             Some(Source::FailSafe) if output.is_some() => None,
             _ => Some(place),
         };
-        let ladder = controller.ladder().ok_or_else(|| ViewError::NoState {
-            cycle: step.cycle,
-            program: controller.name.clone(),
-            reason: "only a ladder can be evaluated".to_owned(),
-        })?;
-        let mut explainer = Explainer::new(self, history, ladder);
-        let because = match explained {
-            None => None,
-            Some(explained) => Some(explainer.root(name, explained)?),
-        };
         let scanned = match (output, &step.sampled) {
-            (Some(output), Some(sampled)) => Some(sampled.outputs.get(output)),
+            (Some(output), Some(sampled)) => Some(value_in(output, &sampled.outputs)),
             _ => None,
         };
         let driven = step
             .driven
             .as_ref()
-            .and_then(|driven| Some(driven.outputs.get(output?)));
+            .and_then(|driven| Some(value_in(output?, &driven.outputs)));
+        let because = match &controller.code {
+            Code::Ladder(ladder, _) => explained
+                .map(|explained| Explainer::new(self, history, ladder).root(name, explained))
+                .transpose()?,
+            Code::Typed(typed, text) => {
+                let mut explainer = statements::Explainer::new(self, history, typed, text);
+                let stopped = missing == Some(Missing::ProgramFault) && output.is_some();
+                let value = driven.clone().unwrap_or_default();
+                let fault = stopped
+                    .then(|| explainer.fault(name, value, place))
+                    .flatten();
+                match (fault, explained, typed.part(name)) {
+                    (Some(fault), ..) => Some(fault),
+                    (None, Some(explained), Some(part)) => Some(explainer.root(&part, explained)?),
+                    _ => None,
+                }
+            }
+        };
         let value = driven
-            .or(because.as_ref().map(|reason| reason.value))
+            .or(because.as_ref().map(|reason| reason.value.clone()))
             .unwrap_or_default();
+        let sampled = step.sampled.as_ref().into_iter();
+        let inputs = sampled.flat_map(|it| named(&controller.interface.inputs, &it.inputs));
         Ok(Why {
             signal: name.to_owned(),
             program: controller.name.clone(),
             remote_io: self.members.name(Member::RemoteIo(program)).to_owned(),
             cycle: step.cycle,
-            value,
             source: source.map(source_word),
-            missing: step
-                .driven
-                .as_ref()
-                .and_then(|driven| driven.missing)
-                .map(missing_text),
+            missing: missing.map(missing_text),
             scanned: scanned.filter(|scanned| *scanned != value),
+            inputs: inputs.collect(),
+            has_numbers: controller.code.typed().is_some(),
+            value,
             reconstructed: step
                 .driven
                 .as_ref()
@@ -188,6 +217,19 @@ impl Model {
                     let program = ProgramId(place as u8);
                     found.push((program, signal.name.to_string(), name != asked));
                 }
+            }
+        }
+        for (place, controller) in controllers.iter().enumerate() {
+            let Some(typed) = controller.code.typed() else {
+                continue;
+            };
+            let prefix = format!("{}.", controller.name);
+            let name = asked.strip_prefix(&prefix).unwrap_or(asked);
+            known.extend(typed.variables.iter().map(|it| it.name.clone()));
+            let part = typed.part(name).filter(|it| it.of.elementary().is_some());
+            let point = typed.outputs.find(name).map(|point| point.name.clone());
+            if let Some(name) = point.or(part.map(|part| part.name)) {
+                found.push((ProgramId(place as u8), name, asked.starts_with(&prefix)));
             }
         }
         if found.iter().any(|(_, _, named)| *named) {
@@ -230,10 +272,20 @@ impl Model {
         };
         let sum = reconstruct(word, program, driven.outputs.width(), published).ok()?;
         let others = word.mask.iter().filter(|other| *other != program);
+        let values = |program: ProgramId, image: &Image| {
+            let interface = &self.cluster.controllers()[program.index()].interface;
+            let is_whole = image.width() >= interface.outputs.width();
+            let image = is_whole.then_some(image).into_iter();
+            image
+                .flat_map(|image| named(&interface.outputs, image))
+                .collect()
+        };
         let others = others.filter_map(|other| {
+            let outputs = published(other)?;
             Some(Addend {
                 published_by: self.program_name(other).to_owned(),
-                outputs: published(other)?.to_string(),
+                outputs: outputs.to_string(),
+                values: values(other, outputs),
             })
         });
         let not_received = (0..self.cluster.agreement().schedule.stations() as u8)
@@ -252,6 +304,7 @@ impl Model {
             others: others.collect(),
             lineage: sampled.map_or_else(String::new, |sampled| sampled.after.to_string()),
             proved: sampled.is_some_and(|sampled| sampled.outputs == sum),
+            values: values(program, &sum),
             sum: sum.to_string(),
             not_received: not_received.collect(),
         })

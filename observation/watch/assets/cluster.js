@@ -1,6 +1,6 @@
 // The cluster: states of the members, source of the outputs of each plant, and remaining redundancy.
 
-import { el, keyed, setText, setAttribute } from "/element.js";
+import { el, keyed, setText, setAttribute, valueText } from "/element.js";
 import { signalLegend, sourceLegend, stateLegend } from "/legend.js";
 import { STATES, makePicture } from "/picture.js";
 import { continueWords, openChoice, openMember } from "/commands.js";
@@ -148,12 +148,12 @@ function signals(state) {
     },
     (details, program) => {
       const source = SOURCES[program.source] ?? SOURCES.unknown;
-      setText(details.querySelector(".source-words"), `${source.sign} ${source.words}${program.word_of ? ` from a parity word of ${program.word_of}` : ""}`);
+      setText(details.querySelector(".source-words"), `${source.sign} ${source.words}${program.word_of ? ` from a parity word of ${program.word_of}` : ""}${program.fault ? `: ${program.fault}` : ""}`);
       for (const button of details.querySelectorAll(".signal")) {
         const { kind, index } = button.dataset;
-        const values = kind === "input" ? program.inputs : program.outputs;
+        const values = kind === "input" ? program.input_values : program.output_values;
         const forced = program.forced.find((force) => force.kind === kind && String(force.index) === index);
-        const value = forced && kind === "output" ? String(Number(forced.value)) : (values?.[index] ?? "?");
+        const value = forced && kind === "output" ? valueText(forced.value) : valueText(values?.[index]);
         setText(button.querySelector(".signal-value"), value);
         setText(button.querySelector(".signal-forced"), forced ? `forced by ${forced.owner}` : "");
         setAttribute(button, "data-value", value);

@@ -69,4 +69,13 @@ export function keyed(parent, items, keyOf, make, show) {
   }
 }
 
-export const bit = (on) => (on ? "1" : "0");
+// A value as people read it: a BOOL as 0 or 1, a number with at most seven digits.
+export function valueText(value) {
+  if (typeof value === "boolean") {
+    return value ? "1" : "0";
+  }
+  if (typeof value === "number") {
+    return Number.isInteger(value) ? String(value) : String(Number(value.toPrecision(7)));
+  }
+  return value === null || value === undefined ? "?" : String(value);
+}

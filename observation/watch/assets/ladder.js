@@ -1,7 +1,7 @@
-// A program as a ladder with the power flow of the shown cycle; for an understudy its parity words, with the outputs of their masks.
+// A program as a ladder with the power flow of the shown cycle, or as text with the values after its scan; for an understudy its parity words, with the outputs of their masks.
 
 import { act, ask } from "/ask.js";
-import { el, setText } from "/element.js";
+import { el, keyed, setAttribute, setText, valueText } from "/element.js";
 import { cycleParameter, isLive, state } from "/time.js";
 import { ladderLegend } from "/legend.js";
 import { openWhy } from "/why.js";
@@ -35,7 +35,7 @@ export function prepare(facts) {
         el("option", { value: "understudy" }, "Understudy"), el("option", { value: "codesys" }, "CODESYS"), el("option", { value: "tia" }, "TIA"))),
     ),
     el("p", { id: "ladder-stamp", class: "stamp", role: "status" }),
-    ladderLegend(),
+    el("div", { id: "ladder-legend" }, ladderLegend()),
     el("div", { class: "ladder-columns" },
       el("div", { id: "ladder-picture", class: "wide", tabindex: "0", role: "region", "aria-label": "Ladder" }),
       el("section", { id: "ladder-cross", class: "card", "aria-label": "Cross-reference" })),
@@ -98,11 +98,45 @@ async function picture() {
     return;
   }
   setText(id("ladder-stamp"), answer.words);
-  if (answer.svg !== shown) {
+  id("ladder-legend").hidden = Boolean(answer.lines);
+  if (answer.lines) {
+    showText(answer.lines);
+  } else if (answer.svg !== shown) {
     shown = answer.svg;
     // The server draws it from the program, and escapes every name.
     id("ladder-picture").innerHTML = answer.svg;
   }
+}
+
+// A line for each line of the text; what was not executed is pale, and values stand beside the text.
+function showText(lines) {
+  if (shown !== "text" || !id("ladder-picture").querySelector("table.program-text")) {
+    shown = "text";
+    const head = el("tr", {}, ["line", "statement", "values after the scan"].map((text) => el("th", { scope: "col" }, text)));
+    id("ladder-picture").replaceChildren(el("table", { class: "program-text" }, el("thead", {}, head), el("tbody")));
+  }
+  keyed(
+    id("ladder-picture").querySelector("tbody"),
+    lines,
+    (line) => `${program}:${line.line}`,
+    (line) => el("tr", {}, el("th", { scope: "row" }, String(line.line)), el("td", {}, el("code")), el("td", { class: "values" })),
+    (row, line) => {
+      setAttribute(row, "data-executed", line.failed ? "failed" : String(line.executed));
+      setText(row.querySelector("code"), line.text);
+      keyed(
+        row.querySelector(".values"),
+        line.values,
+        ([name]) => name,
+        ([name]) => el("button", { type: "button", class: "link", click: () => askWhy(name) }),
+        (button, [name, value]) => setText(button, `${name} = ${typeof value === "boolean" ? String(value).toUpperCase() : valueText(value)}`),
+      );
+    },
+  );
+}
+
+function askWhy(name) {
+  const index = run.programs[program].outputs.findIndex((output) => output.name.toLowerCase() === name.toLowerCase());
+  openWhy(program, index >= 0 ? index : name);
 }
 
 // A click on the name of an output asks why.
@@ -136,7 +170,7 @@ async function cross() {
     el("tr", {},
       el("th", { scope: "row" }, el("button", { class: "link", type: "button", click: () => { find = signal.name; id("ladder-find").value = find; refresh(true); } }, signal.name)),
       el("td", {}, signal.address ?? ""), el("td", {}, rungs(signal.written)), el("td", {}, rungs(signal.read)), el("td", { class: "soft" }, signal.comment ?? ""));
-  const head = ["signal", "address", "written in rung", "read in rung", "meaning"];
+  const head = ["signal", "address", `written in ${answer.place}`, `read in ${answer.place}`, "meaning"];
   place.replaceChildren(el("h2", {}, "Cross-reference"),
     el("div", { class: "wide", tabindex: "0", role: "region", "aria-label": "Cross-reference table" },
       el("table", {}, el("thead", {}, el("tr", {}, head.map((text) => el("th", { scope: "col" }, text)))), el("tbody", {}, answer.signals.map(row)))));
@@ -151,13 +185,18 @@ function sum() {
   const station = now.members.find((member) => member.name === program);
   const width = Math.max(...members.map((item) => item.outputs.length));
   const words = station?.parity_words ?? [];
+  const areBits = members.every((item) => item.outputs.every((output) => output.type === "BOOL"));
   const column = (item, place) => {
     const output = item.outputs[place];
-    const value = now.programs[item.index].published?.[place];
-    return el("td", {}, output ? `${output.name} = ${value ?? "?"}` : "");
+    const value = now.programs[item.index].published_values?.[place];
+    return el("td", {}, output ? `${output.name} = ${valueText(value)}` : "");
   };
   const rows = [...Array(width).keys()].map((place) =>
-    el("tr", {}, el("th", { scope: "row" }, `y${place + 1}`), members.map((item) => column(item, place)), words.map((word) => el("td", { class: "sum" }, word.sum[place] ?? ""))));
+    el("tr", {}, el("th", { scope: "row" }, `y${place + 1}`), members.map((item) => column(item, place)), words.map((word) => el("td", { class: "sum" }, areBits ? (word.sum[place] ?? "") : ""))));
+  // A sum of numbers has no value of its own: its bits stand in one line.
+  if (!areBits) {
+    rows.push(el("tr", {}, el("th", { scope: "row" }, "bits"), members.map(() => el("td")), words.map((word) => el("td", { class: "sum" }, el("code", {}, word.sum)))));
+  }
   const published = words.length === 0 ? "published no parity word" : `published ${words.map((word) => `the sum of ${sumOf(word)}`).join(" and ")}`;
   setText(id("ladder-stamp"), `cycle ${now.cycle}: ${program} ${published}`);
   shown = "";

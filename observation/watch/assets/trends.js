@@ -1,7 +1,7 @@
 // Trends of chosen signals over the cycles, with sources and faults as bands behind them.
 
 import { act, ask } from "/ask.js";
-import { el, setText, shorten } from "/element.js";
+import { el, setText, shorten, valueText } from "/element.js";
 import { goTo, state } from "/time.js";
 import { bandPlugin } from "/bands.js";
 import { bandLegend } from "/legend.js";
@@ -82,9 +82,50 @@ async function refresh() {
   }
 }
 
-// Each signal has a lane of its own; in it, it is at the bottom where it is 0 and above where it is 1.
+// Lanes of a signal with numbers are as high as so many of a BOOL.
+const HIGH = 4;
+
+// Each signal has a lane of its own, the first on top. A BOOL is at the bottom of it where it is 0 and above where it is 1; a number lies between its
+// least and its greatest value, which the axis shows.
+function lanesOf(signals) {
+  const types = new Map(run.programs.flatMap((program) => ["input", "output"].flatMap((kind) => program[`${kind}s`].map((signal, index) => [`${program.index}.${kind}.${index}`, signal.type]))));
+  let base = 0;
+  const lanes = signals.map((signal, index) => {
+    const isNumber = (types.get(chosen[index]) ?? "BOOL") !== "BOOL";
+    const known = signal.runs.map(([, value]) => value).filter((value) => value !== null);
+    const low = known.reduce((least, value) => Math.min(least, value), Infinity);
+    const high = known.reduce((most, value) => Math.max(most, value), -Infinity);
+    return { name: signal.name, isNumber, height: isNumber ? HIGH : 1, low: Number.isFinite(low) ? low : 0, high: Number.isFinite(high) ? high : 0 };
+  });
+  for (const lane of [...lanes].reverse()) {
+    lane.base = base;
+    base += lane.height;
+  }
+  return lanes;
+}
+
+// Where a value lies: a number that does not change in the middle of its lane.
+function heightOf(lane, value) {
+  if (!lane.isNumber) {
+    return lane.base + 0.7 * value;
+  }
+  const share = lane.high > lane.low ? (value - lane.low) / (lane.high - lane.low) : 0.5;
+  return lane.base + 0.2 + share * (lane.height - 0.7);
+}
+
+// What stands beside a lane: the name, and the least and the greatest value.
+function labelsOf(lane) {
+  if (!lane.isNumber) {
+    return [[lane.base + 0.35, shorten(lane.name, 18)]];
+  }
+  const name = [lane.base + lane.height / 2 - 0.15, shorten(lane.name, 18)];
+  return lane.high > lane.low ? [[heightOf(lane, lane.low), valueText(lane.low)], name, [heightOf(lane, lane.high), valueText(lane.high)]] : [name];
+}
+
 function draw(answer) {
-  const lanes = answer.signals.length;
+  const lanes = lanesOf(answer.signals);
+  const height = lanes.reduce((sum, lane) => sum + lane.height, 0);
+  const labels = lanes.flatMap(labelsOf).sort(([one], [other]) => one - other);
   const marks = new Set([answer.from, answer.to]);
   for (const signal of answer.signals) {
     for (const [cycle] of signal.runs) {
@@ -92,7 +133,8 @@ function draw(answer) {
     }
   }
   const cycles = [...marks].sort((a, b) => a - b);
-  const rows = answer.signals.map((signal, index) => sampled(signal.runs, cycles).map((value) => (value === null ? null : lanes - 1 - index + 0.7 * value)));
+  const values = answer.signals.map((signal) => sampled(signal.runs, cycles));
+  const rows = values.map((row, index) => row.map((value) => (value === null ? null : heightOf(lanes[index], value))));
   const place = id("trend-plot");
   const dark = getComputedStyle(document.documentElement);
   const color = (name) => dark.getPropertyValue(name).trim();
@@ -102,17 +144,17 @@ function draw(answer) {
     width: 2,
     paths: uPlot.paths.stepped({ align: 1 }),
     points: { show: false },
-    value: (_, value, __, at) => (at === null ? "" : value === null ? "?" : value - (lanes - 1 - index) > 0.5 ? "1" : "0"),
+    value: (_, __, ___, at) => (at === null ? "" : valueText(values[index][at])),
   }));
   const bandRows = answer.sources.length;
   const axis = { stroke: color("--ink"), grid: { stroke: color("--line"), width: 1 }, ticks: { stroke: color("--line") } };
   const options = {
     width: place.clientWidth,
-    height: Math.max(220, 26 * lanes + 18 * bandRows + 110),
-    scales: { x: { time: false }, y: { range: [-0.3 - bandRows * 0.7, Math.max(lanes, 1)] } },
+    height: Math.max(220, 26 * height + 18 * bandRows + 110),
+    scales: { x: { time: false }, y: { range: [-0.3 - bandRows * 0.7, Math.max(height, 1)] } },
     axes: [
       { ...axis, label: "cycle", labelSize: 20, values: (_, values) => values.map((value) => (Number.isInteger(value) ? String(value) : "")) },
-      { ...axis, size: 130, splits: () => answer.signals.map((_, index) => lanes - 1 - index + 0.35), values: () => answer.signals.map((signal) => shorten(signal.name, 18)), grid: { show: false } },
+      { ...axis, size: 130, splits: () => labels.map(([at]) => at), values: () => labels.map(([, text]) => text), grid: { show: false } },
     ],
     series: [{ label: "cycle", value: (_, value) => (value === null ? "" : String(value)) }, ...series],
     plugins: [bandPlugin(answer, color)],

@@ -1,7 +1,7 @@
-// Why an output has its value: the chain of contacts that caused it; for a reconstructed output also its proof.
+// Why an output has its value: the chain of contacts or statements that caused it; for a reconstructed output also its proof.
 
 import { act, ask } from "/ask.js";
-import { bit, el } from "/element.js";
+import { el, valueText } from "/element.js";
 import { SOURCES } from "/sources.js";
 import { cycleParameter, goTo } from "/time.js";
 
@@ -14,7 +14,7 @@ export function prepare() {
 }
 
 export async function openWhy(program, output) {
-  const answer = await act(() => ask(`/api/why/${program}/${output}?${cycleParameter()}`));
+  const answer = await act(() => ask(`/api/why/${program}/${encodeURIComponent(output)}?${cycleParameter()}`));
   if (!answer) {
     return;
   }
@@ -26,11 +26,11 @@ export async function openWhy(program, output) {
   };
   const close = el("button", { type: "button", click: hide }, "Close");
   drawer.replaceChildren(
-    el("div", { class: "drawer-head" }, el("h2", {}, `Why is ${answer.signal} ${bit(answer.value)}?`), close),
+    el("div", { class: "drawer-head" }, el("h2", {}, `Why is ${answer.signal} ${valueText(answer.value)}?`), close),
     el("p", { class: "soft" }, `${answer.program}, cycle ${answer.cycle}; remote I/O ${answer.remote_io}`),
     ...source(answer).map((line) => el("p", {}, line)),
-    answer.because ? el("ul", { class: "cause" }, tree(answer.because)) : el("p", {}, "No rung caused this value."),
-    el("p", {}, el("a", { href: `#ladder/${program}/${encodeURIComponent(answer.signal)}`, click: () => (drawer.hidden = true) }, "Show the rung")),
+    answer.because ? el("ul", { class: "cause" }, tree(answer.because)) : el("p", {}, "It is the configured fail-safe value: the program did not cause it."),
+    el("p", {}, el("a", { href: `#ladder/${program}/${encodeURIComponent(answer.signal)}`, click: () => (drawer.hidden = true) }, "Show it in the program")),
   );
   drawer.hidden = false;
   close.focus();
@@ -40,7 +40,7 @@ export async function openWhy(program, output) {
 function source(answer) {
   const lines = [`It is ${SOURCES[answer.source]?.words ?? "not known yet"}${answer.missing ? `: ${answer.missing}` : ""}.`];
   if (answer.scanned !== null && answer.scanned !== answer.value) {
-    lines.push(`The scan of the program yields ${bit(answer.scanned)}.`);
+    lines.push(`The scan of the program yields ${valueText(answer.scanned)}.`);
   }
   const { reconstructed } = answer;
   if (reconstructed) {
@@ -57,8 +57,9 @@ function source(answer) {
 function tree(reason) {
   const line = [
     el("button", { class: "link", type: "button", click: () => goTo(reason.cycle) }, `cycle ${reason.cycle}`),
-    ` ${reason.signal} = ${bit(reason.value)}`,
+    ` ${reason.signal} = ${valueText(reason.value)}`,
     reason.rung ? `, rung ${reason.rung}${reason.title ? ` “${reason.title}”` : ""}` : "",
+    reason.line ? [`, line ${reason.line} `, el("code", {}, reason.statement)] : null,
     `: ${reason.text}`];
   const deeper = reason.because?.length ? el("ul", { class: "cause" }, reason.because.map(tree)) : null;
   return el("li", {}, line, deeper);

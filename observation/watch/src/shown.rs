@@ -5,10 +5,12 @@ mod members;
 use std::time::Instant;
 
 use serde::Serialize;
+use serde_json::Value;
 use understudy_cluster::Controller;
+use understudy_typed::Points;
 use understudy_view::{
     Alarm, LostState, MarginSnapshot, Model as RunModel, OutcomeSnapshot, ProgramSnapshot,
-    Protection, Snapshot, forced_point, forced_value,
+    Protection, Snapshot, forced_point, forced_value, value_of,
 };
 use understudy_wire::{Force, Member, ProgramId, SignalPlace, StationId};
 
@@ -52,10 +54,16 @@ struct ShownProgram {
     word_of: Option<String>,
     /// Why there was no provable output, in a missed cycle.
     missing: Option<&'static str>,
+    /// The program fault that has stopped it.
+    fault: Option<String>,
     inputs: Option<String>,
     outputs: Option<String>,
     /// The outputs that its own controller published.
     published: Option<String>,
+    /// Values in the order of the run's facts; nothing where they are not known. So are the following.
+    input_values: Option<Vec<Value>>,
+    output_values: Option<Vec<Value>>,
+    published_values: Option<Vec<Value>>,
     awaits_release: bool,
     forced: Vec<ShownForce>,
     /// Nothing while the remote I/O has not reported it.
@@ -194,6 +202,16 @@ fn shown_program(
 ) -> ShownProgram {
     let controllers = run.cluster().controllers();
     let controller_of = controllers.get(index);
+    let interface = &run.cluster().controllers()[index].interface;
+    let values = |points: &Points, bits: Option<&str>| {
+        let bits = bits?;
+        let values = points.iter();
+        Some(
+            values
+                .map(|point| value_of(point, bits).unwrap_or_default())
+                .collect(),
+        )
+    };
     let controller = snapshot.stations.get(index);
     let published = controller.and_then(|controller| controller.words.first());
     ShownProgram {
@@ -202,9 +220,13 @@ fn shown_program(
         source: program.source.unwrap_or("unknown"),
         word_of: program.word_of.clone(),
         missing: program.missing,
+        fault: program.fault.clone(),
         inputs: program.inputs.clone(),
         outputs: program.outputs.clone(),
         published: published.map(|word| word.sum.clone()),
+        input_values: values(&interface.inputs, program.inputs.as_deref()),
+        output_values: values(&interface.outputs, program.outputs.as_deref()),
+        published_values: values(&interface.outputs, published.map(|word| word.sum.as_str())),
         awaits_release: program.awaits_release,
         forced: program
             .forces

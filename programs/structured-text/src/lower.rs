@@ -133,6 +133,8 @@ struct Lowering<'a> {
     /// Which routines each routine calls, and where it first does.
     calls: Vec<Vec<(u32, Range<usize>)>>,
     scope: Scope,
+    /// How often something was reported, or found that was reported before.
+    blamed: usize,
     /// The file has no PROGRAM.
     is_library: bool,
     nesting: u32,
@@ -184,6 +186,7 @@ impl<'a> Lowering<'a> {
             queue: Vec::new(),
             calls: Vec::new(),
             scope: Scope::default(),
+            blamed: 0,
             is_library: false,
             nesting: 0,
             length: 0,
@@ -216,6 +219,7 @@ impl<'a> Lowering<'a> {
     }
 
     fn report(&mut self, found: Diagnostic) {
+        self.blamed += 1;
         if self.silent == 0 && self.diagnostics.len() <= MAXIMUM_FINDINGS {
             self.diagnostics.push(found);
         }
@@ -245,6 +249,15 @@ impl<'a> Lowering<'a> {
         if !self.in_library() {
             self.report(Diagnostic::warning(code, message, span).with_help(help));
         }
+    }
+
+    /// What fails is reported: where nothing says why, that it is not supported.
+    fn accounted<T>(&mut self, before: usize, found: Option<T>, span: &Range<usize>) -> Option<T> {
+        if found.is_none() && self.blamed == before {
+            let help = "write it with other operators or functions";
+            self.error_with("U1040", "this is not supported here", span.clone(), help);
+        }
+        found
     }
 
     /// The line of a place, from 1.

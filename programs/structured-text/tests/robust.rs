@@ -70,7 +70,7 @@ const WORDS: [&str; 60] = [
 ];
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(400))]
+    #![proptest_config(ProptestConfig::with_cases(1_000))]
     #[test]
     fn any_row_of_words_is_answered(row in prop::collection::vec(0..WORDS.len(), 0..60), whole in any::<bool>()) {
         let mut text: String = row.iter().map(|word| WORDS[*word]).collect();

@@ -2,6 +2,7 @@
 
 mod evaluate;
 mod memory;
+mod trace;
 
 use crate::cost::Costs;
 use crate::fault::{Cause, Fault};
@@ -9,6 +10,8 @@ use crate::form::{For, Program, RoutineId, Statement, StatementKind};
 use crate::interpreter::memory::{Address, Memory};
 use crate::scan::Frame;
 use crate::types::Elementary;
+
+pub use self::trace::{Done, Effect, Read, Trace};
 
 /// The reference engine. It gives a program its meaning; [`crate::Machine`] is proved equal to it and is the one to use.
 #[derive(Debug, Clone)]
@@ -34,6 +37,8 @@ struct Run<'a> {
     memory: Memory,
     budget: u64,
     elapsed: u64,
+    /// What is recorded of the scan; nothing unless it is asked for.
+    trace: Option<trace::Recorder>,
 }
 
 /// The routine that runs and the slot of its instance.
@@ -89,16 +94,27 @@ impl Interpreter {
     }
 
     fn scan(&self, state: &[u64], inputs: &[u64]) -> Result<Memory, Fault> {
+        let mut run = self.prepared(state, inputs);
+        self.execute(&mut run)?;
+        Ok(run.memory)
+    }
+
+    /// A scan with its inputs, before its first statement.
+    fn prepared(&self, state: &[u64], inputs: &[u64]) -> Run<'_> {
         let mut memory = Memory::new(state, self.program.frames);
         self.frame.unpack(inputs, memory.slots_mut());
-        let scans = memory.slots()[crate::scan::SCANS];
-        let mut run = Run {
+        Run {
             program: &self.program,
             costs: &self.costs,
             budget: self.program.budget,
             elapsed: self.frame.elapsed(memory.slots()),
             memory,
-        };
+            trace: None,
+        }
+    }
+
+    fn execute(&self, run: &mut Run<'_>) -> Result<(), Fault> {
+        let scans = run.memory.slots()[crate::scan::SCANS];
         for task in self.frame.tasks() {
             if scans.is_multiple_of(u64::from(task.every.max(1))) {
                 let context = Context {
@@ -109,8 +125,7 @@ impl Interpreter {
                 run.body(context)?;
             }
         }
-        self.frame.end(run.memory.slots_mut())?;
-        Ok(run.memory)
+        self.frame.end(run.memory.slots_mut())
     }
 }
 
@@ -124,6 +139,7 @@ impl Run<'_> {
         for initial in &routine.initial {
             self.memory.slots_mut()[frames + initial.slot as usize] = initial.value;
         }
+        self.forget(frames + first, count);
     }
 
     fn body(&mut self, context: Context) -> Result<(), Fault> {
@@ -151,10 +167,12 @@ impl Run<'_> {
         };
         match &statement.kind {
             StatementKind::Assign(place, value) => {
+                let reads = self.mark();
                 let value = self.value(context, line, value)?;
                 let address = self.address(context, line, place)?;
                 let stored = self.memory.store(address, &place.of, value);
                 stored.map_err(fault)?;
+                self.assigned(context, line, address, &place.of, reads);
             }
             StatementKind::Bind(slot, place) => {
                 let Address(address) = self.address(context, line, place)?;
@@ -173,22 +191,27 @@ impl Run<'_> {
                 self.value(context, line, expression)?;
             }
             StatementKind::If(branches, otherwise) => {
+                let mut chosen = otherwise;
+                let reads = self.mark();
                 for branch in branches {
                     if self.number(context, line, &branch.condition)? != 0 {
-                        return self.statements(context, &branch.body);
+                        chosen = &branch.body;
+                        break;
                     }
                 }
-                return self.statements(context, otherwise);
+                return self.guarded(context, line, reads, chosen);
             }
             StatementKind::Case(selector, cases, otherwise) => {
                 let of = selector.of.elementary().unwrap_or(Elementary::Lint);
+                let reads = self.mark();
                 let value = of.signed(self.number(context, line, selector)?);
                 let has = |case: &&crate::form::Case| {
                     let mut ranges = case.ranges.iter();
                     ranges.any(|&(low, high)| i128::from(low) <= value && value <= i128::from(high))
                 };
                 let case = cases.iter().find(has);
-                return self.statements(context, case.map_or(otherwise, |case| &case.body));
+                let chosen = case.map_or(otherwise, |case| &case.body);
+                return self.guarded(context, line, reads, chosen);
             }
             StatementKind::For(each) => return self.repeat_for(context, statement, each),
             StatementKind::While(condition, body) => {
@@ -228,8 +251,10 @@ impl Run<'_> {
         let line = statement.line;
         let of = each.counter.of.elementary().unwrap_or(Elementary::Lint);
         let counter = self.address(context, line, &each.counter)?;
+        let reads = self.mark();
         let from = self.number(context, line, &each.from)?;
         self.memory.set(counter, of, from);
+        self.assigned(context, line, counter, &each.counter.of, reads);
         let to = of.signed(self.number(context, line, &each.to)?);
         let by = of.signed(self.number(context, line, &each.by)?);
         loop {
@@ -253,6 +278,8 @@ impl Run<'_> {
                 return Ok(Flow::Next);
             }
             self.memory.set(counter, of, stored);
+            let none = self.mark();
+            self.assigned(context, line, counter, &each.counter.of, none);
         }
     }
 

@@ -14,6 +14,7 @@ mod form;
 mod image;
 mod interpreter;
 mod machine;
+mod naming;
 mod notation;
 mod operation;
 mod scan;
@@ -28,8 +29,9 @@ pub use self::form::{
     Root, Routine, RoutineId, RoutineKind, Statement, StatementKind, Task, Variable,
 };
 pub use self::image::{Point, Points};
-pub use self::interpreter::Interpreter;
+pub use self::interpreter::{Done, Effect, Interpreter, Read, Trace};
 pub use self::machine::{Machine, Scratch};
+pub use self::naming::Part;
 pub use self::operation::{
     Comparison, Operand, Operation, RealFunction, Signature, TextOperand, TextOperation,
 };

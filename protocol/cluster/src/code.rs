@@ -14,17 +14,17 @@ use crate::canonical::{circuit_text, typed_text};
 #[derive(Debug, Clone)]
 pub enum Code {
     /// All Boolean: a ladder and its circuit for the period of the cluster. What is proved is proved of the circuit.
-    Ladder(LadderProgram, Circuit),
-    /// With numbers.
-    Typed(Arc<TypedProgram>),
+    Ladder(Box<LadderProgram>, Circuit),
+    /// With numbers, and the text of its file, whose lines a program fault names.
+    Typed(Arc<TypedProgram>, Arc<str>),
 }
 
 impl Code {
     /// The ladder, of one that is Boolean.
     pub fn ladder(&self) -> Option<&LadderProgram> {
         match self {
-            Self::Ladder(program, _) => Some(program),
-            Self::Typed(_) => None,
+            Self::Ladder(program, _) => Some(program.as_ref()),
+            Self::Typed(..) => None,
         }
     }
 
@@ -32,7 +32,7 @@ impl Code {
     pub fn circuit(&self) -> Option<&Circuit> {
         match self {
             Self::Ladder(_, circuit) => Some(circuit),
-            Self::Typed(_) => None,
+            Self::Typed(..) => None,
         }
     }
 
@@ -40,7 +40,15 @@ impl Code {
     pub fn typed(&self) -> Option<&Arc<TypedProgram>> {
         match self {
             Self::Ladder(..) => None,
-            Self::Typed(program) => Some(program),
+            Self::Typed(program, _) => Some(program),
+        }
+    }
+
+    /// The text of its file, of one with numbers.
+    pub fn source_text(&self) -> Option<&str> {
+        match self {
+            Self::Ladder(..) => None,
+            Self::Typed(_, text) => Some(text),
         }
     }
 
@@ -48,7 +56,7 @@ impl Code {
     pub fn interface(&self) -> Interface {
         match self {
             Self::Ladder(_, circuit) => circuit.into(),
-            Self::Typed(program) => program.as_ref().into(),
+            Self::Typed(program, _) => program.as_ref().into(),
         }
     }
 
@@ -56,7 +64,7 @@ impl Code {
     pub fn state_bits(&self) -> usize {
         match self {
             Self::Ladder(_, circuit) => circuit.registers().len(),
-            Self::Typed(program) => program.state as usize * 64,
+            Self::Typed(program, _) => program.state as usize * 64,
         }
     }
 
@@ -64,7 +72,7 @@ impl Code {
     pub fn executable(&self) -> Executable {
         match self {
             Self::Ladder(_, circuit) => circuit.into(),
-            Self::Typed(program) => program.as_ref().into(),
+            Self::Typed(program, _) => program.as_ref().into(),
         }
     }
 
@@ -72,7 +80,7 @@ impl Code {
     pub(crate) fn text(&self) -> String {
         match self {
             Self::Ladder(_, circuit) => circuit_text(circuit),
-            Self::Typed(program) => typed_text(program),
+            Self::Typed(program, _) => typed_text(program),
         }
     }
 

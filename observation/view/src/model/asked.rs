@@ -6,13 +6,14 @@ use understudy_cluster::Cluster;
 use understudy_journal::{Members, SourceCounts};
 use understudy_ladder::{Evaluation, Observer};
 use understudy_logic::Scratch;
+use understudy_typed::{Interpreter, Trace};
 use understudy_wire::{Moment, ProgramId, StationId};
 
 use super::{Counters, Model, SentTurn};
 use crate::alarm::Alarm;
 use crate::error::ViewError;
 use crate::event::Event;
-use crate::history::History;
+use crate::history::{History, Sampled};
 use crate::series::Series;
 use crate::station::StationState;
 use crate::timing::CycleTiming;
@@ -126,29 +127,62 @@ impl Model {
         place: usize,
     ) -> Result<Evaluation, ViewError> {
         let program = history.program();
-        let step = &history.steps()[place];
-        let no_state = |reason: &str| ViewError::NoState {
-            cycle: step.cycle,
-            program: self.program_name(program).to_owned(),
-            reason: reason.to_owned(),
-        };
-        let sampled = step.sampled.as_ref().ok_or_else(|| {
-            no_state(
-                match step.driven.as_ref().and_then(|driven| driven.missing) {
-                    Some(missing) => crate::describe::missing_text(missing),
-                    None => "the journal does not contain the start of its history",
-                },
-            )
-        })?;
+        let sampled = self.sampled_at(history, place)?;
         let controller = &self.cluster.controllers()[program.index()];
         let period = self.cluster.agreement().schedule.period();
         let observer = self.observers[program.index()]
             .get_or_init(|| Observer::new(controller.ladder()?, period).ok());
-        let observer = observer
-            .as_ref()
-            .ok_or_else(|| no_state("only a ladder can be evaluated"))?;
+        let observer = observer.as_ref().ok_or_else(|| ViewError::NoState {
+            cycle: history.steps()[place].cycle,
+            program: self.program_name(program).to_owned(),
+            reason: "only a ladder has a power flow".to_owned(),
+        })?;
         let mut scratch = Scratch::default();
         Ok(observer.evaluate(&mut scratch, sampled.state.words(), sampled.inputs.words()))
+    }
+
+    /// The scan of a program with numbers in a cycle, statement by statement.
+    ///
+    /// # Errors
+    /// Where the cycle or the state is not known, or the program is Boolean.
+    pub fn trace(&self, program: ProgramId, cycle: i64) -> Result<Trace, ViewError> {
+        let history = self.history_of(program)?;
+        let place = history
+            .place_of(cycle)
+            .ok_or_else(|| self.no_cycle(program, cycle))?;
+        self.trace_at(history, place)
+    }
+
+    pub(crate) fn trace_at(&self, history: &History, place: usize) -> Result<Trace, ViewError> {
+        let sampled = self.sampled_at(history, place)?;
+        let program = history.program();
+        let interpreter = self.interpreters[program.index()].get_or_init(|| {
+            let typed = self.cluster.controllers()[program.index()].code.typed()?;
+            Some(Interpreter::new(typed))
+        });
+        let interpreter = interpreter.as_ref().ok_or_else(|| ViewError::NoState {
+            cycle: history.steps()[place].cycle,
+            program: self.program_name(program).to_owned(),
+            reason: "only a program with numbers has statements".to_owned(),
+        })?;
+        Ok(interpreter.trace(sampled.state.words(), sampled.inputs.words()))
+    }
+
+    /// The sample of a step, where the state before it is known.
+    fn sampled_at<'h>(&self, history: &'h History, place: usize) -> Result<&'h Sampled, ViewError> {
+        let step = &history.steps()[place];
+        step.sampled.as_ref().ok_or_else(|| {
+            let missing = step.driven.as_ref().and_then(|driven| driven.missing);
+            let reason = match missing {
+                Some(missing) => crate::describe::missing_text(missing),
+                None => "the journal does not contain the start of its history",
+            };
+            ViewError::NoState {
+                cycle: step.cycle,
+                program: self.program_name(history.program()).to_owned(),
+                reason: reason.to_owned(),
+            }
+        })
     }
 
     pub(crate) fn history_of(&self, program: ProgramId) -> Result<&History, ViewError> {

@@ -8,8 +8,9 @@ use understudy_wire::{Image, Member, Moment, ProgramId, Source, StationId, Stati
 use super::Model;
 use super::standing::{Change, ProgramChange, StationChange};
 use super::tally::Tally;
-use crate::describe::{describe, source_text};
+use crate::describe::{PROGRAM_FAULT, describe, program_fault_text, source_text};
 use crate::event::{Event, Level};
+use crate::stop::{self, Stop};
 
 /// Cycles that are closed at once, at most.
 const MOST_CLOSED: i64 = 64;
@@ -27,6 +28,7 @@ pub(super) struct ProgramTrack {
     pub(super) reported: Option<i64>,
     /// Whether its outputs were provable in any cycle.
     served: bool,
+    stop: Stop,
 }
 
 impl ProgramTrack {
@@ -38,6 +40,7 @@ impl ProgramTrack {
             heard: [StationSet::EMPTY; 2],
             reported: None,
             served: false,
+            stop: Stop::default(),
         }
     }
 
@@ -54,7 +57,7 @@ impl ProgramTrack {
 impl Model {
     pub(super) fn remote_io(&mut self, record: &Record, program: ProgramId, event: &RemoteIoEvent) {
         let place = program.index();
-        if place >= self.programs.len() || !self.fits(place, event) {
+        if place >= self.programs.len() || !stop::fits(&self.cluster, program, event) {
             self.left_out += 1;
             return;
         }
@@ -105,23 +108,6 @@ impl Model {
         self.happened(record, cycle, cause);
     }
 
-    /// Whether the images of a report are as wide as those of the program: a journal of other programs does not belong to this cluster.
-    fn fits(&self, place: usize, event: &RemoteIoEvent) -> bool {
-        let interface = &self.cluster.controllers()[place].interface;
-        let inputs = |image: &Image| image.width() == interface.inputs.width();
-        match event {
-            RemoteIoEvent::Sampled {
-                inputs: sampled, ..
-            } => inputs(sampled),
-            RemoteIoEvent::Applied {
-                sampled, outputs, ..
-            } => {
-                sampled.as_ref().is_none_or(inputs) && outputs.width() == interface.outputs.width()
-            }
-            _ => true,
-        }
-    }
-
     /// What changes the standing of a program, with the alarms that it raises and ends.
     fn changed(&mut self, record: &Record, program: ProgramId, cycle: i64, event: &RemoteIoEvent) {
         let subject = |alarm| (record.name.clone(), alarm);
@@ -132,8 +118,9 @@ impl Model {
                 awaits_release: *awaits_release,
             }),
             RemoteIoEvent::Released { .. } => {
-                let over = ["value-fault", "disputed"];
+                let over = ["value-fault", "disputed", PROGRAM_FAULT];
                 self.alarms.all_over(&record.name, &over, cycle);
+                self.programs[program.index()].stop.released();
                 own(ProgramChange::Released)
             }
             RemoteIoEvent::ValueFault {
@@ -219,6 +206,8 @@ impl Model {
             track.inputs = Some(inputs.clone());
         }
         self.histories[program.index()].sampled_last(track.inputs.as_ref());
+        self.stopped(record, program, cycle, *missing);
+        let track = &mut self.programs[program.index()];
         let before = track.source.replace(*source);
         let was_served = track.served;
         track.served |= missing.is_none();
@@ -226,6 +215,30 @@ impl Model {
             self.source_changed(record, program, cycle, event);
         }
         self.close();
+    }
+
+    /// A program fault is an event where it occurs, and an alarm until the operator releases the outputs.
+    fn stopped(
+        &mut self,
+        record: &Record,
+        program: ProgramId,
+        cycle: i64,
+        missing: Option<Missing>,
+    ) {
+        let history = &self.histories[program.index()];
+        let newest = history.steps().back();
+        let newest = newest.and_then(|step| step.sampled.as_ref());
+        let track = &mut self.programs[program.index()];
+        let Some(change) = track.stop.decided(missing, newest) else {
+            return;
+        };
+        // A second fault, after a reset, is a second alarm.
+        let subject = (record.name.clone(), PROGRAM_FAULT);
+        self.alarms.over(&subject, cycle);
+        if let stop::Change::Stopped(fault) = change {
+            let text = program_fault_text(&self.cluster, program, fault.as_ref());
+            self.alarmed(record, cycle, PROGRAM_FAULT, text);
+        }
     }
 
     fn source_changed(

@@ -1,5 +1,8 @@
 //! How a snapshot is taken from the model of a run.
 
+use std::collections::BTreeMap;
+
+use serde_json::Value;
 use understudy_cycle::Mode;
 use understudy_journal::{Process, SourceCounts, source_word};
 use understudy_remote_io::Missing;
@@ -12,12 +15,12 @@ use super::{
     WordSnapshot,
 };
 use crate::alarm::Alarm;
-use crate::describe::missing_text;
+use crate::describe::{missing_text, program_fault_text};
 use crate::history::Driven;
 use crate::margin::{Margin, Outcome};
 use crate::model::{Model, Standing};
 use crate::station::StationState;
-use crate::value::{forced_point, forced_value};
+use crate::value::{forced_point, forced_value, named};
 
 impl Model {
     /// The present: the newest cycle of which every living remote I/O has reported, with every change that was read since.
@@ -210,10 +213,12 @@ impl Picture<'_> {
                 .and_then(|driven| driven.word_of)
                 .map(|station| self.name(Member::Station(station))),
             missing: driven.and_then(|driven| driven.missing).map(missing_text),
+            fault: self.fault(program),
             inputs: driven
                 .and_then(|driven| driven.inputs.as_ref())
                 .map(ToString::to_string),
             outputs: driven.map(|driven| driven.outputs.to_string()),
+            values: self.values(program, driven),
             direct,
             reconstructed,
             held,
@@ -226,6 +231,24 @@ impl Picture<'_> {
             finished: own.plant.map(|(finished, _)| finished),
             plant_faults: own.plant.map(|(_, plant_faults)| plant_faults),
         }
+    }
+
+    fn fault(&self, program: ProgramId) -> Option<String> {
+        let step = self.model.deadline(program, self.cycle?)?;
+        let fault = step.sampled.as_ref()?.fault?;
+        let cluster = self.model.cluster();
+        Some(program_fault_text(cluster, program, Some(&fault)))
+    }
+
+    fn values(&self, program: ProgramId, driven: Option<&Driven>) -> BTreeMap<String, Value> {
+        let interface = &self.model.cluster().controllers()[program.index()].interface;
+        let mut values = BTreeMap::new();
+        let inputs = driven.and_then(|driven| driven.inputs.as_ref());
+        let outputs = driven.map(|driven| &driven.outputs);
+        for (points, image) in [(&interface.inputs, inputs), (&interface.outputs, outputs)] {
+            values.extend(image.into_iter().flat_map(|image| named(points, image)));
+        }
+        values
     }
 
     fn forced(&self, program: ProgramId) -> Vec<String> {

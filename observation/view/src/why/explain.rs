@@ -84,10 +84,12 @@ impl<'m> Explainer<'m> {
     fn leaf(&self, signal: &str, value: bool, place: usize, text: impl Into<String>) -> Reason {
         Reason {
             signal: signal.to_owned(),
-            value,
+            value: value.into(),
             cycle: self.cycle(place),
             rung: None,
             title: None,
+            line: None,
+            statement: None,
             text: text.into(),
             because: Vec::new(),
         }
@@ -242,10 +244,12 @@ impl<'m> Explainer<'m> {
         let rung = &self.program.rungs[decision.rung];
         Reason {
             signal: name.to_owned(),
-            value,
+            value: value.into(),
             cycle: self.cycle(place),
             rung: Some(decision.rung + 1),
             title: rung.title.clone().filter(|title| !title.is_empty()),
+            line: None,
+            statement: None,
             text: format!("{how}{when}"),
             because: self.power_of(decision.rung, evaluation, at, depth + 1),
         }
@@ -353,7 +357,7 @@ impl<'m> Explainer<'m> {
         match explained {
             Some(reason) => Reason {
                 signal: operand.to_owned(),
-                value,
+                value: value.into(),
                 ..reason
             },
             None => self.signal(operand, value, place, rung, depth + 1),

@@ -1,14 +1,18 @@
 //! A chain of reasons as a tree in text.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use serde_json::Value;
+
 use super::{Reason, Why};
+use crate::value::value_text;
 
 impl Why {
     /// For a terminal; lines end in a newline.
     pub fn to_text(&self) -> String {
         let mut text = String::new();
-        let value = u8::from(self.value);
+        let value = value_text(&self.value);
         let _ = writeln!(
             text,
             "{}.{} is {value} in cycle {}",
@@ -20,12 +24,12 @@ impl Why {
                 .map_or(String::new(), |missing| format!(": {missing}"));
             let _ = writeln!(text, "  {} drives it, {source}{why}", self.remote_io);
         }
-        if let Some(scanned) = self.scanned {
-            let _ = writeln!(
-                text,
-                "  the scan of this cycle yields {}",
-                u8::from(scanned)
-            );
+        if let Some(scanned) = &self.scanned {
+            let scanned = value_text(scanned);
+            let _ = writeln!(text, "  the scan of this cycle yields {scanned}");
+        }
+        if self.has_numbers && !self.inputs.is_empty() {
+            let _ = writeln!(text, "  inputs: {}", list(&self.inputs));
         }
         if let Some(restored) = &self.reconstructed {
             let not_received = if restored.not_received.is_empty() {
@@ -42,6 +46,9 @@ impl Why {
             );
             for other in &restored.others {
                 let _ = writeln!(text, "  + {} of {}", other.outputs, other.published_by);
+                if self.has_numbers {
+                    let _ = writeln!(text, "    {}", list(&other.values));
+                }
             }
             let proof = if restored.proved {
                 "the outputs that the samples yield"
@@ -53,18 +60,31 @@ impl Why {
                 "  = {}, {proof}; lineage {}",
                 restored.sum, restored.lineage
             );
+            if self.has_numbers {
+                let _ = writeln!(text, "    {}", list(&restored.values));
+            }
         }
-        match &self.because {
-            None => {
-                let _ = writeln!(text, "  it is the configured fail-safe value");
-            }
-            Some(reason) => {
-                line(&mut text, reason, self.cycle, "");
-                children(&mut text, reason, "");
-            }
+        if self.because.is_none() || self.source == Some(FAIL_SAFE) {
+            let _ = writeln!(text, "  it is the configured fail-safe value");
+        }
+        if let Some(reason) = &self.because {
+            line(&mut text, reason, self.cycle, "");
+            children(&mut text, reason, "");
         }
         text
     }
+}
+
+/// The source of values that no program computed.
+const FAIL_SAFE: &str = "fail-safe";
+
+/// `level = 2.5, run = 1`.
+fn list(values: &BTreeMap<String, Value>) -> String {
+    let values = values.iter();
+    let texts: Vec<String> = values
+        .map(|(name, value)| format!("{name} = {}", value_text(value)))
+        .collect();
+    texts.join(", ")
 }
 
 fn children(text: &mut String, reason: &Reason, indent: &str) {
@@ -82,7 +102,7 @@ fn children(text: &mut String, reason: &Reason, indent: &str) {
 }
 
 fn line(text: &mut String, reason: &Reason, parent: i64, indent: &str) {
-    let value = u8::from(reason.value);
+    let value = value_text(&reason.value);
     let when = if reason.cycle == parent {
         String::new()
     } else {
@@ -93,9 +113,13 @@ fn line(text: &mut String, reason: &Reason, parent: i64, indent: &str) {
         let title = title.map_or(String::new(), |title| format!(" \"{title}\""));
         format!(" [rung {rung}{title}]")
     });
+    let written = match (reason.line, &reason.statement) {
+        (Some(line), Some(statement)) => format!(" [line {line} \"{statement}\"]"),
+        _ => String::new(),
+    };
     let _ = writeln!(
         text,
-        "{indent}{} = {value}{when}: {}{rung}",
+        "{indent}{} = {value}{when}: {}{rung}{written}",
         reason.signal, reason.text
     );
 }

@@ -10,6 +10,7 @@ mod directory;
 mod fold;
 mod hostile;
 mod margin;
+mod numbers;
 mod protection;
 mod replay;
 mod screen;

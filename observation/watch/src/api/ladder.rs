@@ -7,7 +7,9 @@ use axum::Json;
 use axum::extract::rejection::{PathRejection, QueryRejection};
 use axum::extract::{Path, Query, State};
 use serde::{Deserialize, Serialize};
+use understudy_cluster::Controller;
 use understudy_ladder::{Element, Program, Rung, draw_svg_rungs, visit};
+use understudy_view::ShownLine;
 use understudy_wire::ProgramId;
 
 use super::Answered;
@@ -43,7 +45,10 @@ pub(super) struct Picture {
     cycle: i64,
     /// Cycle and lineage of the picture, and the share of the program that it shows.
     words: String,
+    /// Empty for a program with numbers.
     svg: String,
+    /// The text of a program with numbers, in place of a drawing.
+    lines: Option<Vec<ShownLine>>,
 }
 
 pub(super) async fn picture(
@@ -59,26 +64,23 @@ pub(super) async fn picture(
     .map(Json)
 }
 
-fn ladder_of(known: &Known, program: ProgramId) -> Answered<&Program> {
+fn controller_of(known: &Known, program: ProgramId) -> Answered<&Controller> {
     let controllers = known.run.cluster().controllers();
     let controller = controllers.get(program.index());
-    let controller = controller.ok_or_else(|| {
+    controller.ok_or_else(|| {
         Problem::unknown(format!(
             "the cluster has {} programs, not program {}",
             controllers.len(),
             program.0
         ))
-    })?;
-    controller.ladder().ok_or_else(|| {
-        Problem::unknown(format!(
-            "`{}` is a program with numbers, not a ladder",
-            controller.name
-        ))
     })
 }
 
 fn draw(known: &Known, program: ProgramId, cycle: i64, wanted: &Wanted) -> Answered<Picture> {
-    let ladder = ladder_of(known, program)?;
+    let controller = controller_of(known, program)?;
+    let Some(ladder) = controller.ladder() else {
+        return Ok(text(known, program, cycle, wanted.find.trim()));
+    };
     let evaluation = known.run.evaluation(program, cycle);
     let rungs: Vec<usize> = found(ladder, wanted.find.trim()).collect();
     let shown = &rungs[..rungs.len().min(MAXIMUM_RUNGS)];
@@ -106,7 +108,33 @@ fn draw(known: &Known, program: ProgramId, cycle: i64, wanted: &Wanted) -> Answe
         cycle,
         words,
         svg: without_style(&svg),
+        lines: None,
     })
+}
+
+/// A program with numbers as its text, with the values after the scan of a cycle; of a search the lines that have the words.
+fn text(known: &Known, program: ProgramId, cycle: i64, find: &str) -> Picture {
+    let name = shown::program_name(&known.run, program);
+    let mut words = format!("{name}, cycle {cycle}");
+    let (mut lines, error) = known.run.text_at(program, cycle).unwrap_or_default();
+    let step = known.run.history(program).and_then(|steps| steps.at(cycle));
+    match (error, step.and_then(|step| step.sampled.as_ref())) {
+        (Some(error), _) => words += &format!(": without values: {}", error.words()),
+        (None, Some(sampled)) => words += &format!(": as executed, lineage {}", sampled.before),
+        (None, None) => {}
+    }
+    let find = find.to_lowercase();
+    let count = lines.len();
+    lines.retain(|line| line.text.to_lowercase().contains(&find));
+    if lines.len() < count {
+        words += &format!("; {} of {count} lines", lines.len());
+    }
+    Picture {
+        cycle,
+        words,
+        svg: String::new(),
+        lines: Some(lines),
+    }
 }
 
 /// The page has the styles of its own theme and palette.
@@ -163,6 +191,8 @@ fn names_in(rung: &Rung) -> NamesIn {
 
 #[derive(Debug, Serialize)]
 pub(super) struct CrossReference {
+    /// `rung` or `line`: what the numbers are of.
+    place: &'static str,
     signals: Vec<Line>,
 }
 
@@ -171,7 +201,7 @@ struct Line {
     name: String,
     address: Option<String>,
     comment: Option<String>,
-    /// Rungs, counted from 0.
+    /// Rungs or lines, counted from 0.
     written: Vec<usize>,
     read: Vec<usize>,
 }
@@ -182,7 +212,11 @@ pub(super) async fn cross_reference(
 ) -> Answered<Json<CrossReference>> {
     let Path(program) = program?;
     let model = app.model();
-    let ladder = ladder_of(known(&model)?, ProgramId(program))?;
+    let known = known(&model)?;
+    let program = ProgramId(program);
+    let Some(ladder) = controller_of(known, program)?.ladder() else {
+        return Ok(Json(uses(known, program)));
+    };
     let (mut read, mut written) = (BTreeMap::new(), BTreeMap::new());
     for (place, rung) in ladder.rungs.iter().enumerate() {
         let names = names_in(rung);
@@ -201,8 +235,26 @@ pub(super) async fn cross_reference(
         }
     });
     Ok(Json(CrossReference {
+        place: "rung",
         signals: lines.collect(),
     }))
+}
+
+/// The variables of a program with numbers, by lines of its text.
+fn uses(known: &Known, program: ProgramId) -> CrossReference {
+    let uses = known.run.uses(program).unwrap_or_default();
+    let places = |lines: Vec<u32>| lines.into_iter().map(|line| line as usize - 1).collect();
+    let signals = uses.into_iter().map(|own| Line {
+        name: own.name,
+        address: own.address,
+        comment: own.description,
+        written: places(own.written),
+        read: places(own.read),
+    });
+    CrossReference {
+        place: "line",
+        signals: signals.collect(),
+    }
 }
 
 fn note(rungs: &mut BTreeMap<String, Vec<usize>>, names: Vec<String>, place: usize) {

@@ -55,7 +55,10 @@ impl Lowering<'_> {
         });
         if let (Some(symbol), false) = (&symbol, is_result) {
             return match symbol {
-                Symbol::Faulty => None,
+                Symbol::Faulty => {
+                    self.blamed += 1;
+                    None
+                }
                 _ => self.instance(&Path {
                     root: name.clone(),
                     steps: Vec::new(),

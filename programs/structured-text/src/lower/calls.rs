@@ -207,7 +207,6 @@ impl Lowering<'_> {
     }
 
     /// A call of a function or method, with its EN and ENO.
-    #[expect(clippy::type_complexity, reason = "EN and ENO of the call")]
     fn routine_call<'s>(
         &mut self,
         callee: Callee,

@@ -43,6 +43,16 @@ impl Lowering<'_> {
         expression: &syntax::Expression,
         hint: Option<&Type>,
     ) -> Operand {
+        let before = self.blamed;
+        let found = match self.operand_kind(expression, hint) {
+            Operand::Faulty => None,
+            found => Some(found),
+        };
+        let found = self.accounted(before, found, &expression.span);
+        found.unwrap_or(Operand::Faulty)
+    }
+
+    fn operand_kind(&mut self, expression: &syntax::Expression, hint: Option<&Type>) -> Operand {
         let span = &expression.span;
         let found = match &expression.kind {
             ExpressionKind::Literal(literal) => return self.literal(literal, span),
@@ -54,7 +64,10 @@ impl Lowering<'_> {
             ExpressionKind::Call(path, arguments) => {
                 return self.call(path, arguments, hint, span);
             }
-            ExpressionKind::Faulty => None,
+            ExpressionKind::Faulty => {
+                self.blamed += 1;
+                None
+            }
         };
         found.map_or(Operand::Faulty, Operand::Typed)
     }

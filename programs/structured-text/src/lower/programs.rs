@@ -423,8 +423,8 @@ impl<'a> Lowering<'a> {
         let globals = file.globals.iter().map(|declaration| &declaration.name);
         let names = types.chain(globals);
         let mut checked: Vec<String> = names.map(|name| name.as_str().to_owned()).collect();
-        for unit in &file.units {
-            let index = self.unit_names[&unit.name.key()];
+        // The file's units come first among all.
+        for (index, unit) in file.units.iter().enumerate() {
             let class = (unit.kind == UnitKind::FunctionBlock).then_some(index);
             self.check(index, None, class, unit);
             for method in 0..unit.methods.len() {

@@ -84,6 +84,7 @@ impl Run<'_> {
             ExpressionKind::Text(text) => Ok(Value::Text(text.to_vec())),
             ExpressionKind::Load(place) => {
                 let address = self.address(context, line, place)?;
+                self.loaded(address, &place.of);
                 Ok(self.memory.load(address, &place.of))
             }
             ExpressionKind::Apply(operation, operands) => {
@@ -171,10 +172,14 @@ impl Run<'_> {
             let value = self.memory.load(source, &from.of);
             let stored = self.memory.store(address, &to.of, value);
             stored.map_err(fault)?;
+            let reads = self.mark();
+            self.loaded(source, &from.of);
+            self.assigned(context, line, address, &to.of, reads);
         }
         match &call.result {
             Some(place) => {
                 let address = self.address(inner, line, place)?;
+                self.loaded(address, &place.of);
                 Ok(self.memory.load(address, &place.of))
             }
             None => Ok(Value::Number(0)),

@@ -61,7 +61,10 @@ impl<'a> Ladders<'a> {
         let read = &mut self.read[place];
         let program = match read.source.as_ref()? {
             Source::Ladder(program) => program,
-            Source::Typed(program) => return Some(Code::Typed(Arc::clone(program))),
+            Source::Typed(program) => {
+                let text = Arc::from(read.text.as_str());
+                return Some(Code::Typed(Arc::clone(program), text));
+            }
             Source::Library(_) => return None,
         };
         // Several controllers may run one ladder.
@@ -73,7 +76,7 @@ impl<'a> Ladders<'a> {
         let mut program = program.clone();
         program.name = name.into();
         match program.lower(period) {
-            Ok(circuit) => Some(Code::Ladder(program, circuit)),
+            Ok(circuit) => Some(Code::Ladder(Box::new(program), circuit)),
             Err(error) => {
                 let message = format!("`{}`: {error}", file.value);
                 diagnostics.push(Diagnostic::error("U0212", message, file.span.clone()));
@@ -91,8 +94,8 @@ impl<'a> Ladders<'a> {
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Option<(Program, Circuit)> {
         match self.code(file, name, period, diagnostics)? {
-            Code::Ladder(program, circuit) => Some((program, circuit)),
-            Code::Typed(_) => {
+            Code::Ladder(program, circuit) => Some((*program, circuit)),
+            Code::Typed(..) => {
                 let message = format!("`{}` has numbers, and a ladder is wanted", file.value);
                 diagnostics.push(Diagnostic::error("U0212", message, file.span.clone()));
                 None

@@ -75,9 +75,9 @@ impl Lowering<'_> {
     /// The type of operands among which there are literals.
     fn with_literals(&self, of: Option<Type>, operands: &[Operand], hint: Option<&Type>) -> Type {
         let hinted = hint.and_then(Type::elementary).filter(|of| is_number(*of));
-        let mut of = of.and_then(|of| match of.elementary() {
-            Some(found) if is_number(found) && matches!(of, Type::Elementary(_)) => Some(Ok(found)),
-            _ => Some(Err(of)),
+        let mut of = of.map(|of| match of.elementary() {
+            Some(found) if is_number(found) && matches!(of, Type::Elementary(_)) => Ok(found),
+            _ => Err(of),
         });
         for operand in operands {
             let Operand::Number(value) = operand else {

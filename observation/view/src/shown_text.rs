@@ -1,0 +1,159 @@
+//! The text of a program with numbers as a scan executed it: which lines, and the values in each line.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::Serialize;
+use serde_json::Value;
+use understudy_typed::{Effect, Program, Trace};
+use understudy_wire::ProgramId;
+
+use crate::error::ViewError;
+use crate::model::Model;
+use crate::source_text::{Line, SourceText};
+use crate::value::elementary;
+
+/// A line of a program's text, in one scan.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ShownLine {
+    /// From 1.
+    pub line: u32,
+    /// As it is written.
+    pub text: String,
+    /// Whether a statement in it was executed.
+    pub executed: bool,
+    /// Whether the program fault of this scan occurred in it.
+    pub failed: bool,
+    /// The variables that it names, with their values after the scan; in the order of the text.
+    pub values: Vec<(String, Value)>,
+}
+
+/// Where a variable is assigned and read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Uses {
+    /// Its name.
+    pub name: String,
+    /// Its address, such as `%QW4`.
+    pub address: Option<String>,
+    /// Its description.
+    pub description: Option<String>,
+    /// Lines that assign it, from 1.
+    pub written: Vec<u32>,
+    /// Lines that read it, from 1.
+    pub read: Vec<u32>,
+}
+
+impl Model {
+    /// The text of a program with numbers and the values of a cycle; without values where the state is not known, which the second part says.
+    /// Nothing for a Boolean program.
+    pub fn text_at(
+        &self,
+        program: ProgramId,
+        cycle: i64,
+    ) -> Option<(Vec<ShownLine>, Option<ViewError>)> {
+        let code = &self.cluster.controllers().get(program.index())?.code;
+        let (typed, text) = (code.typed()?, code.source_text()?);
+        let source = SourceText::new(text);
+        Some(match self.trace(program, cycle) {
+            Ok(trace) => (lines(typed, &source, Some(&trace)), None),
+            Err(error) => (lines(typed, &source, None), Some(error)),
+        })
+    }
+
+    /// The variables of a program with numbers, and the lines that use them.
+    pub fn uses(&self, program: ProgramId) -> Option<Vec<Uses>> {
+        let code = &self.cluster.controllers().get(program.index())?.code;
+        let (typed, text) = (code.typed()?, code.source_text()?);
+        let source = SourceText::new(text);
+        let uses = typed.variables.iter().map(|variable| {
+            let (mut written, mut read) = (BTreeSet::new(), BTreeSet::new());
+            for (number, line) in (1..).zip(source.lines()) {
+                for (name, behind) in line.names.iter().filter(|_| line.is_program) {
+                    let behind = behind.trim_start();
+                    // What follows a colon is a declaration.
+                    let is_declaration =
+                        behind.starts_with([':', ',']) && !behind.starts_with(":=");
+                    let is_own = name_of(line, name, |it| {
+                        let same = it.eq_ignore_ascii_case(&variable.name);
+                        let head = it.get(..variable.name.len());
+                        let begins = head.is_some_and(|it| it.eq_ignore_ascii_case(&variable.name));
+                        same || begins && it[variable.name.len()..].starts_with('.')
+                    });
+                    match (is_own, is_declaration, behind.starts_with(":=")) {
+                        (true, false, true) => drop(written.insert(number)),
+                        (true, false, false) => drop(read.insert(number)),
+                        _ => {}
+                    }
+                }
+            }
+            Uses {
+                name: variable.name.clone(),
+                address: variable.address.clone(),
+                description: variable.description.clone(),
+                written: written.into_iter().collect(),
+                read: read.into_iter().collect(),
+            }
+        });
+        Some(uses.collect())
+    }
+}
+
+/// Whether a name in a line is one that is looked for: as written, or behind the name of its program.
+fn name_of(line: &Line<'_>, name: &str, is: impl Fn(&str) -> bool) -> bool {
+    is(name) || line.unit.is_some_and(|unit| is(&format!("{unit}.{name}")))
+}
+
+fn lines(typed: &Program, source: &SourceText<'_>, trace: Option<&Trace>) -> Vec<ShownLine> {
+    let mut executed = BTreeSet::new();
+    let mut temporary = BTreeMap::new();
+    for done in trace.iter().flat_map(|trace| &trace.done) {
+        let routine = &typed.routine(done.routine).name;
+        if !source.declares(routine) {
+            continue;
+        }
+        executed.insert(done.line);
+        // A variable of a frame has no name but in the text.
+        if let Effect::Assigned {
+            address,
+            value: Some((of, stored)),
+        } = done.effect
+            && address / 64 >= u64::from(typed.state)
+            && let Some((target, _)) = source.line(done.line).and_then(|it| it.split_once(":="))
+        {
+            let key = (routine.to_lowercase(), target.trim().to_lowercase());
+            temporary.insert(key, elementary(of, stored));
+        }
+    }
+    let failed = trace.and_then(|trace| trace.fault);
+    let failed = failed.filter(|fault| {
+        let routine = fault.routine.map(|routine| &typed.routine(routine).name);
+        routine.is_some_and(|routine| source.declares(routine))
+    });
+    let value = |line: &Line<'_>, name: &str| {
+        let memory = &trace?.memory;
+        let unit = line.unit.filter(|_| line.is_program)?;
+        let behind_program = format!("{unit}.{name}");
+        let part = typed.part(&behind_program).or_else(|| typed.part(name));
+        let stored = part.and_then(|part| part.stored(memory));
+        let key = (unit.to_lowercase(), name.to_lowercase());
+        stored
+            .map(|(of, stored)| elementary(of, stored))
+            .or_else(|| temporary.get(&key).cloned())
+    };
+    let shown = (1..).zip(source.lines()).map(|(number, line)| {
+        let mut values: Vec<(String, Value)> = Vec::new();
+        for (name, _) in &line.names {
+            let known = values.iter().any(|(known, _)| known == name);
+            if let Some(value) = value(line, name).filter(|_| !known) {
+                values.push(((*name).to_owned(), value));
+            }
+        }
+        ShownLine {
+            line: number,
+            text: line.text.to_owned(),
+            executed: executed.contains(&number),
+            failed: failed.is_some_and(|fault| fault.line == number),
+            values,
+        }
+    });
+    shown.collect()
+}

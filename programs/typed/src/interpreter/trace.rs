@@ -1,0 +1,216 @@
+//! What the statements of one scan did: each assignment with the values that it read, and the conditions that led to it.
+
+use std::collections::BTreeMap;
+
+use crate::fault::Fault;
+use crate::form::{RoutineId, Statement};
+use crate::interpreter::memory::Address;
+use crate::interpreter::{Context, Flow, Interpreter, Run};
+use crate::types::{Elementary, Type};
+
+/// Statements that are recorded of one scan.
+const MOST: usize = 50_000;
+
+/// A value that a statement read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Read {
+    /// Its place in memory: 64 · slot + bit.
+    pub address: u64,
+    /// Its type.
+    pub of: Elementary,
+    /// The value, as it is stored.
+    pub value: u64,
+    /// The statement of this scan that assigned it before, as a place in [`Trace::done`].
+    pub by: Option<usize>,
+}
+
+/// What a statement did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Effect {
+    /// It assigned a variable; the value, as it is stored, where it has no parts.
+    Assigned {
+        /// Its place in memory: 64 · slot + bit.
+        address: u64,
+        /// Type and value, of a variable without parts.
+        value: Option<(Elementary, u64)>,
+    },
+    /// It chose what is executed, by a condition or a selector.
+    Chose,
+}
+
+/// A statement that was executed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Done {
+    /// Its routine.
+    pub routine: RoutineId,
+    /// Its line in the text of its routine; 0 where it has none.
+    pub line: u32,
+    /// What it did.
+    pub effect: Effect,
+    /// What it read, in order.
+    pub reads: Vec<Read>,
+    /// The choice that led to it, as a place in [`Trace::done`].
+    pub under: Option<usize>,
+}
+
+/// One scan.
+#[derive(Debug, Clone, Default)]
+pub struct Trace {
+    /// Its statements, in the order of execution.
+    pub done: Vec<Done>,
+    /// Whether later statements were left out.
+    pub is_cut: bool,
+    /// What the statement of a program fault read before it failed.
+    pub failed: Vec<Read>,
+    /// Memory at its end: x(t+1) and behind it the frames. After a fault as the fault found it.
+    pub memory: Vec<u64>,
+    /// The program fault that ended it.
+    pub fault: Option<Fault>,
+}
+
+impl Trace {
+    /// The last statement that assigned the variable at an address.
+    pub fn last_write(&self, address: u64) -> Option<usize> {
+        self.done.iter().rposition(
+            |done| matches!(done.effect, Effect::Assigned { address: of, .. } if of == address),
+        )
+    }
+}
+
+/// What is recorded while a scan runs.
+#[derive(Debug, Default)]
+pub(super) struct Recorder {
+    trace: Trace,
+    reads: Vec<Read>,
+    /// The newest assignment of each address.
+    writers: BTreeMap<u64, usize>,
+    under: Option<usize>,
+}
+
+impl Recorder {
+    fn push(&mut self, context: Context, line: u32, effect: Effect, reads: usize) -> Option<usize> {
+        let reads = self.reads.split_off(reads.min(self.reads.len()));
+        if self.trace.done.len() == MOST {
+            self.trace.is_cut = true;
+            return None;
+        }
+        self.trace.done.push(Done {
+            routine: context.routine,
+            line,
+            effect,
+            reads,
+            under: self.under,
+        });
+        Some(self.trace.done.len() - 1)
+    }
+}
+
+impl Interpreter {
+    /// One scan as [`Interpreter::step`] executes it, statement by statement; empty where a fault keeps the program from it.
+    ///
+    /// # Panics
+    /// As [`Interpreter::step`].
+    pub fn trace(&self, state: &[u64], inputs: &[u64]) -> Trace {
+        let words = self.state_words();
+        let mut state = state[..words].to_vec();
+        if !self.frame.begin(&mut state, inputs) {
+            return Trace {
+                fault: Fault::read(&state),
+                memory: state,
+                ..Trace::default()
+            };
+        }
+        let mut run = self.prepared(&state, inputs);
+        run.trace = Some(Recorder::default());
+        let fault = self.execute(&mut run).err();
+        let recorder = run.trace.take().unwrap_or_default();
+        Trace {
+            fault,
+            failed: recorder.reads,
+            memory: run.memory.slots().to_vec(),
+            ..recorder.trace
+        }
+    }
+}
+
+impl Run<'_> {
+    /// The place behind the reads so far, where those of a statement begin.
+    pub(super) fn mark(&self) -> usize {
+        self.trace
+            .as_ref()
+            .map_or(0, |recorder| recorder.reads.len())
+    }
+
+    /// A value is read.
+    pub(super) fn loaded(&mut self, Address(address): Address, of: &Type) {
+        if let (Some(recorder), Some(of)) = (&mut self.trace, of.elementary()) {
+            let value = self.memory.get(Address(address), of);
+            let by = recorder.writers.get(&address).copied();
+            recorder.reads.push(Read {
+                address,
+                of,
+                value,
+                by,
+            });
+        }
+    }
+
+    /// A variable has its value from what was read since `reads`.
+    pub(super) fn assigned(
+        &mut self,
+        context: Context,
+        line: u32,
+        Address(address): Address,
+        of: &Type,
+        reads: usize,
+    ) {
+        let Some(recorder) = &mut self.trace else {
+            return;
+        };
+        let value = of
+            .elementary()
+            .map(|of| (of, self.memory.get(Address(address), of)));
+        let effect = Effect::Assigned { address, value };
+        let Some(place) = recorder.push(context, line, effect, reads) else {
+            return;
+        };
+        recorder.writers.insert(address, place);
+        if value.is_none() {
+            // The parts of an array or a structure that were assigned before have their values from here.
+            let behind = address + 64 * of.slots();
+            let parts = recorder.writers.range_mut(address..behind);
+            parts.for_each(|(_, by)| *by = place);
+        }
+    }
+
+    /// Executes the statements that a condition, read since `reads`, has chosen.
+    pub(super) fn guarded(
+        &mut self,
+        context: Context,
+        line: u32,
+        reads: usize,
+        chosen: &[Statement],
+    ) -> Result<Flow, Fault> {
+        let mut before = None;
+        if let Some(recorder) = &mut self.trace {
+            before = recorder.under;
+            let place = recorder.push(context, line, Effect::Chose, reads);
+            recorder.under = place.or(before);
+        }
+        let flow = self.statements(context, chosen);
+        if let Some(recorder) = &mut self.trace {
+            recorder.under = before;
+        }
+        flow
+    }
+
+    /// Slots are set to their initial content, which no statement assigned.
+    pub(super) fn forget(&mut self, first: usize, count: usize) {
+        if let Some(recorder) = &mut self.trace {
+            let (from, to) = (64 * first as u64, 64 * (first + count) as u64);
+            while let Some((&address, _)) = recorder.writers.range(from..to).next() {
+                recorder.writers.remove(&address);
+            }
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! Variables by name and by address: `pid.integral`, `table[3]`.
+
+use crate::form::Program;
+use crate::operation::number_text;
+use crate::types::{Array, Elementary, Type};
+
+/// A variable without parts, or such a part of one.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Part {
+    /// Its name, such as `pid.integral` or `table[3]`.
+    pub name: String,
+    /// Its type.
+    pub of: Type,
+    /// Its place in memory: 64 · slot + bit.
+    pub address: u64,
+}
+
+impl Part {
+    /// The value in a state, as it is stored; nothing where it has parts, or where the state ends before it.
+    pub fn stored(&self, state: &[u64]) -> Option<(Elementary, u64)> {
+        let of = self.of.elementary()?;
+        let slot = usize::try_from(self.address / 64).ok()?;
+        Some((of, state.get(slot)? >> (self.address % 64) & of.mask()))
+    }
+}
+
+impl Elementary {
+    /// A stored value in the notation of IEC 61131-3, such as `2.5`, `TRUE`, `T#1s`.
+    pub fn text(self, stored: u64) -> String {
+        number_text::write(self, stored)
+    }
+}
+
+impl Program {
+    /// The variable, or the part of one, that lies at an address of the state. Of an address within a text, the text.
+    pub fn part_at(&self, address: u64) -> Option<Part> {
+        let slot = address / 64;
+        let holds = |first: u32, of: &Type| {
+            let first = u64::from(first);
+            (first..first.saturating_add(of.slots())).contains(&slot)
+        };
+        let mut variables = self.variables.iter();
+        let variable = variables.find(|variable| holds(variable.slot, &variable.of))?;
+        let mut part = Part {
+            name: variable.name.clone(),
+            of: variable.of.clone(),
+            address: 64 * u64::from(variable.slot),
+        };
+        loop {
+            let within = address - part.address;
+            match part.of.clone() {
+                Type::Structure(id, _) => {
+                    let fields = &self.structures.get(id.0 as usize)?.fields;
+                    let field = fields.iter().find(|field| {
+                        let first = u64::from(field.slot);
+                        let slots = if field.is_reference {
+                            1
+                        } else {
+                            field.of.slots()
+                        };
+                        (first..first.saturating_add(slots)).contains(&(within / 64))
+                    })?;
+                    // What lies there is an address, and the variable elsewhere.
+                    if field.is_reference {
+                        return None;
+                    }
+                    part.name = format!("{}.{}", part.name, field.name);
+                    part.of = field.of.clone();
+                    part.address += 64 * u64::from(field.slot);
+                }
+                Type::Array(array) => {
+                    let element = within / array.stride().max(1);
+                    part.name += &indices(&array, element)?;
+                    part.address += element * array.stride();
+                    part.of = array.element.clone();
+                }
+                _ => return Some(part),
+            }
+        }
+    }
+
+    /// The variable or the part of a name, in any case of letters: `level`, `pid.integral`, `table[3]`, or an address such as `%QW4`.
+    pub fn part(&self, name: &str) -> Option<Part> {
+        let is = |known: &str| known.eq_ignore_ascii_case(name);
+        let begins = |known: &str| {
+            let head = name.get(..known.len());
+            head.is_some_and(|head| head.eq_ignore_ascii_case(known))
+                && name[known.len()..].starts_with(['.', '['])
+        };
+        let addressed = |address: &Option<String>| address.as_deref().is_some_and(is);
+        let mut variables = self.variables.iter();
+        let whole = variables.find(|variable| is(&variable.name) || addressed(&variable.address));
+        let within = || {
+            let found = self.variables.iter().filter(|known| begins(&known.name));
+            found.max_by_key(|known| known.name.len())
+        };
+        let variable = whole.or_else(within)?;
+        let mut part = Part {
+            name: variable.name.clone(),
+            of: variable.of.clone(),
+            address: 64 * u64::from(variable.slot),
+        };
+        let mut rest = match whole {
+            Some(_) => "",
+            None => &name[variable.name.len()..],
+        };
+        while !rest.is_empty() {
+            match part.of.clone() {
+                Type::Structure(id, _) => {
+                    let after = rest.strip_prefix('.')?;
+                    let end = after.find(['.', '[']).unwrap_or(after.len());
+                    let fields = &self.structures.get(id.0 as usize)?.fields;
+                    let mut fields = fields.iter();
+                    let field = fields.find(|field| {
+                        !field.is_reference && field.name.eq_ignore_ascii_case(&after[..end])
+                    })?;
+                    part.name = format!("{}.{}", part.name, field.name);
+                    part.of = field.of.clone();
+                    part.address += 64 * u64::from(field.slot);
+                    rest = &after[end..];
+                }
+                Type::Array(array) => {
+                    let (inside, after) = rest.strip_prefix('[')?.split_once(']')?;
+                    let element = element(&array, inside)?;
+                    part.name += &indices(&array, element)?;
+                    part.address += element * array.stride();
+                    part.of = array.element.clone();
+                    rest = after;
+                }
+                _ => return None,
+            }
+        }
+        Some(part)
+    }
+}
+
+/// The indices of an element, `[3]` or `[1,2]`.
+fn indices(array: &Array, element: u64) -> Option<String> {
+    if element >= array.length() {
+        return None;
+    }
+    let mut rest = element;
+    let mut texts = Vec::new();
+    for &(low, high) in array.ranges.iter().rev() {
+        let length = high.abs_diff(low).saturating_add(1);
+        texts.push(low.saturating_add_unsigned(rest % length).to_string());
+        rest /= length;
+    }
+    texts.reverse();
+    Some(format!("[{}]", texts.join(",")))
+}
+
+/// The element of indices such as `3` or `1, 2`.
+fn element(array: &Array, indices: &str) -> Option<u64> {
+    let indices: Vec<i64> = indices
+        .split(',')
+        .map(|index| index.trim().parse().ok())
+        .collect::<Option<_>>()?;
+    if indices.len() != array.ranges.len() {
+        return None;
+    }
+    let mut element = 0u64;
+    for (&index, &(low, high)) in indices.iter().zip(&array.ranges) {
+        let is_inside = (low..=high).contains(&index);
+        let length = high.abs_diff(low).saturating_add(1);
+        element = element
+            .checked_mul(length)?
+            .checked_add(index.abs_diff(low))?;
+        if !is_inside {
+            return None;
+        }
+    }
+    Some(element)
+}
