@@ -293,7 +293,9 @@ fn bit_lanes(trace: &Trace<Image>, names: &[String]) -> Vec<Lane> {
 /// A lane for each point: high and low for a BOOL; a number lies between its least and its greatest value, which stand behind its name.
 fn point_lanes(trace: &Trace<Image>, points: &Points) -> Vec<Lane> {
     let lanes = points.iter().map(|point| {
-        let spans = trace.spans().filter(|(.., image)| image.width() >= points.width());
+        let spans = trace
+            .spans()
+            .filter(|(.., image)| image.width() >= points.width());
         let values: Vec<Step> = spans
             .map(|(from, to, image)| (from, to, drawn(point, image)))
             .collect();

@@ -117,8 +117,18 @@ pub fn diff(left: &Model, right: &Model) -> RunDiff {
         let interface = &controller.interface;
         let (inputs, outputs) = (&interface.inputs, &interface.outputs);
         let pairs = [
-            (Differing::Inputs, inputs, one.inputs(ours), two.inputs(theirs)),
-            (Differing::Outputs, outputs, one.outputs(ours), two.outputs(theirs)),
+            (
+                Differing::Inputs,
+                inputs,
+                one.inputs(ours),
+                two.inputs(theirs),
+            ),
+            (
+                Differing::Outputs,
+                outputs,
+                one.outputs(ours),
+                two.outputs(theirs),
+            ),
         ];
         for (what, points, one, two) in pairs {
             if let (Some(one), Some(two)) = (one, two) {

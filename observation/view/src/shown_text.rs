@@ -70,7 +70,8 @@ impl Model {
                 for (name, behind) in line.names.iter().filter(|_| line.is_program) {
                     let behind = behind.trim_start();
                     // What follows a colon is a declaration.
-                    let is_declaration = behind.starts_with([':', ',']) && !behind.starts_with(":=");
+                    let is_declaration =
+                        behind.starts_with([':', ',']) && !behind.starts_with(":=");
                     let is_own = name_of(line, name, |it| {
                         let same = it.eq_ignore_ascii_case(&variable.name);
                         let head = it.get(..variable.name.len());

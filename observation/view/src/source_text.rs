@@ -49,8 +49,12 @@ impl<'t> SourceText<'t> {
                     unit = behind.find(|word| !is_modifier(word));
                     is_program = is("PROGRAM");
                 }
-                ends |= name.get(..4).is_some_and(|head| head.eq_ignore_ascii_case("END_"))
-                    && UNITS.into_iter().any(|word| name[4..].eq_ignore_ascii_case(word));
+                ends |= name
+                    .get(..4)
+                    .is_some_and(|head| head.eq_ignore_ascii_case("END_"))
+                    && UNITS
+                        .into_iter()
+                        .any(|word| name[4..].eq_ignore_ascii_case(word));
             }
             lines.push(Line {
                 text,

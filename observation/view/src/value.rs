@@ -27,10 +27,7 @@ pub(crate) fn value_in(point: &Point, image: &Image) -> Value {
 }
 
 /// The values of all points of an image, by name.
-pub(crate) fn named(
-    points: &Points,
-    image: &Image,
-) -> impl Iterator<Item = (String, Value)> {
+pub(crate) fn named(points: &Points, image: &Image) -> impl Iterator<Item = (String, Value)> {
     let points = points.iter();
     points.map(|point| (point.name.clone(), value_in(point, image)))
 }

@@ -168,7 +168,9 @@ impl Model {
                 let mut explainer = statements::Explainer::new(self, history, typed, text);
                 let stopped = missing == Some(Missing::ProgramFault) && output.is_some();
                 let value = driven.clone().unwrap_or_default();
-                let fault = stopped.then(|| explainer.fault(name, value, place)).flatten();
+                let fault = stopped
+                    .then(|| explainer.fault(name, value, place))
+                    .flatten();
                 match (fault, explained, typed.part(name)) {
                     (Some(fault), ..) => Some(fault),
                     (None, Some(explained), Some(part)) => Some(explainer.root(&part, explained)?),

@@ -203,7 +203,11 @@ fn shown_program(
     let values = |points: &Points, bits: Option<&str>| {
         let bits = bits?;
         let values = points.iter();
-        Some(values.map(|point| value_of(point, bits).unwrap_or_default()).collect())
+        Some(
+            values
+                .map(|point| value_of(point, bits).unwrap_or_default())
+                .collect(),
+        )
     };
     let controller = snapshot.stations.get(index);
     let published = controller.and_then(|controller| controller.words.first());

@@ -53,7 +53,11 @@ impl Program {
                     let fields = &self.structures.get(id.0 as usize)?.fields;
                     let field = fields.iter().find(|field| {
                         let first = u64::from(field.slot);
-                        let slots = if field.is_reference { 1 } else { field.of.slots() };
+                        let slots = if field.is_reference {
+                            1
+                        } else {
+                            field.of.slots()
+                        };
                         (first..first.saturating_add(slots)).contains(&(within / 64))
                     })?;
                     // What lies there is an address, and the variable elsewhere.

@@ -132,13 +132,11 @@ impl Model {
         let period = self.cluster.agreement().schedule.period();
         let observer = self.observers[program.index()]
             .get_or_init(|| Observer::new(controller.ladder()?, period).ok());
-        let observer = observer
-            .as_ref()
-            .ok_or_else(|| ViewError::NoState {
-                cycle: history.steps()[place].cycle,
-                program: self.program_name(program).to_owned(),
-                reason: "only a ladder has a power flow".to_owned(),
-            })?;
+        let observer = observer.as_ref().ok_or_else(|| ViewError::NoState {
+            cycle: history.steps()[place].cycle,
+            program: self.program_name(program).to_owned(),
+            reason: "only a ladder has a power flow".to_owned(),
+        })?;
         let mut scratch = Scratch::default();
         Ok(observer.evaluate(&mut scratch, sampled.state.words(), sampled.inputs.words()))
     }

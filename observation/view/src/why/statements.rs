@@ -76,7 +76,12 @@ impl<'m> Explainer<'m> {
         let at = (0..=place).rev().take(FARTHEST).find(is_new)?;
         let fault = steps[at].sampled.as_ref()?.fault?;
         let trace = self.trace(at)?;
-        let mut reason = self.leaf(name, value, at, format!("program fault: {}", self.told(&fault)));
+        let mut reason = self.leaf(
+            name,
+            value,
+            at,
+            format!("program fault: {}", self.told(&fault)),
+        );
         if let Some(routine) = fault.routine {
             self.locate(&mut reason, routine, fault.line);
         }
@@ -209,9 +214,8 @@ impl<'m> Explainer<'m> {
     /// The input at an address, as it was sampled.
     fn input(&self, address: u64, place: usize) -> Option<Reason> {
         let mut points = self.program.inputs.iter();
-        let point = points.find(|point| {
-            point.slot != 0 && u64::from(point.slot) == address / 64
-        })?;
+        let point =
+            points.find(|point| point.slot != 0 && u64::from(point.slot) == address / 64)?;
         let at = |place: usize| {
             let sampled = self.history.steps()[place].sampled.as_ref()?;
             Some(point.get(sampled.inputs.words()))

@@ -71,9 +71,9 @@ pub struct Trace {
 impl Trace {
     /// The last statement that assigned the variable at an address.
     pub fn last_write(&self, address: u64) -> Option<usize> {
-        self.done.iter().rposition(|done| {
-            matches!(done.effect, Effect::Assigned { address: of, .. } if of == address)
-        })
+        self.done.iter().rposition(
+            |done| matches!(done.effect, Effect::Assigned { address: of, .. } if of == address),
+        )
     }
 }
 
