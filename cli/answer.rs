@@ -2,10 +2,12 @@
 
 use std::borrow::Cow;
 use std::ffi::OsStr;
+use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Map, Value};
+use understudy_bus::BusError;
 use understudy_text::{
     Diagnostic, Lines, MAXIMUM_MESSAGE, Position, Report, Severity, shell, shortened,
 };
@@ -18,7 +20,7 @@ const MAXIMUM_FAILURES: usize = 100;
 
 /// Exit status of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Status {
+pub enum Status {
     /// Exit status 0: success.
     Done,
     /// Exit status 1: a run or a check failed.
@@ -42,16 +44,16 @@ impl Status {
 
 /// A failure without a position in a file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
-pub(crate) struct Failure {
+pub struct Failure {
     /// Stable code, such as `U0501`.
-    pub(crate) code: String,
+    pub code: String,
     /// What failed, with the names and numbers concerned.
-    pub(crate) message: String,
+    pub message: String,
 }
 
 /// Answer of a command.
 #[derive(Debug)]
-pub(crate) struct Answer {
+pub struct Answer {
     pub(crate) status: Status,
     /// Text for standard output.
     pub(crate) text: String,
@@ -75,7 +77,8 @@ pub(crate) struct About {
 }
 
 impl Answer {
-    pub(crate) fn done(text: impl Into<String>, result: impl Serialize) -> Self {
+    /// Success, with its text and its JSON.
+    pub fn done(text: impl Into<String>, result: impl Serialize) -> Self {
         Self {
             status: Status::Done,
             text: text.into(),
@@ -87,11 +90,13 @@ impl Answer {
         }
     }
 
-    pub(crate) fn failed(status: Status, code: &str, message: impl Into<String>) -> Self {
+    /// A failure with its stable code, such as `U0501`.
+    pub fn failed(status: Status, code: &str, message: impl ToString) -> Self {
         Self::done("", Value::Null).and_failure(status, code, message)
     }
 
-    pub(crate) fn bad_files(reports: Vec<Report>) -> Self {
+    /// Files with errors.
+    pub fn bad_files(reports: Vec<Report>) -> Self {
         Self {
             status: Status::BadInput,
             ..Self::done("", Value::Null).with_reports(reports)
@@ -116,17 +121,29 @@ impl Answer {
         self
     }
 
+    /// Adds the name of a file that was written, as a line and as `file` of the result.
+    pub(crate) fn and_written(mut self, path: &Path) -> Self {
+        let name = path.display().to_string();
+        if !self.text.is_empty() {
+            self.text.push('\n');
+        }
+        self.text.push_str(&format!("written to {name}"));
+        self.result["file"] = Value::String(name);
+        self
+    }
+
     /// Adds a next step, given by its arguments.
     pub(crate) fn and_next(mut self, arguments: &[&dyn AsRef<OsStr>]) -> Self {
         let words = arguments.iter();
         let words: Vec<_> = words.map(|word| word.as_ref().to_string_lossy()).collect();
-        self.about
-            .next
-            .push(shell_line(words.iter().map(Cow::as_ref)));
+        let line = std::iter::once("understudy").chain(words.iter().map(Cow::as_ref));
+        self.about.next.push(shell::line(line));
         self
     }
 
-    pub(crate) fn with_status(mut self, status: Status) -> Self {
+    /// The same with another exit status.
+    #[must_use]
+    pub fn with_status(mut self, status: Status) -> Self {
         self.status = status;
         self
     }
@@ -135,14 +152,21 @@ impl Answer {
         mut self,
         status: Status,
         code: &str,
-        message: impl Into<String>,
+        message: impl ToString,
     ) -> Self {
         self.status = status;
         self.failures.push(Failure {
             code: code.to_owned(),
-            message: message.into(),
+            message: message.to_string(),
         });
         self
+    }
+
+    /// Message of the first failure.
+    pub fn first_failure(&self) -> Option<&str> {
+        self.failures
+            .first()
+            .map(|failure| failure.message.as_str())
     }
 
     /// Limits the number and the length of failures.
@@ -163,9 +187,17 @@ impl Answer {
     }
 }
 
-/// Command line of this program, quoted for a shell.
-pub(crate) fn shell_line<'a>(arguments: impl IntoIterator<Item = &'a str>) -> String {
-    shell::line(std::iter::once("understudy").chain(arguments))
+/// What ends a command early is an answer too.
+impl From<Result<Answer, Answer>> for Answer {
+    fn from(answer: Result<Answer, Answer>) -> Self {
+        answer.unwrap_or_else(|failed| failed)
+    }
+}
+
+impl From<BusError> for Answer {
+    fn from(error: BusError) -> Self {
+        Self::failed(Status::Failed, error.code(), error)
+    }
 }
 
 /// Findings of each file, up to the maximum.

@@ -50,17 +50,17 @@ impl Group {
     }
 }
 
-/// A command with arguments of type `A`, which carry its description and examples.
-pub(crate) fn command<A: Args + 'static>(
+/// A command with arguments of type `A`, which carry its description and examples. `run` returns an [`Answer`], or a result of two.
+pub(crate) fn command<A: Args + 'static, R: Into<Answer>>(
     name: &'static str,
-    run: impl Fn(A, &mut Console) -> Answer + Copy + 'static,
+    run: impl Fn(A, &mut Console) -> R + Copy + 'static,
 ) -> Entry {
     Entry {
         name,
         parser: A::augment_args(Command::new(name)),
         bind: Box::new(move |matches| {
             let arguments = A::from_arg_matches(matches)?;
-            Ok(Box::new(move |console| run(arguments, console)))
+            Ok(Box::new(move |console| run(arguments, console).into()))
         }),
     }
 }

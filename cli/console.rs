@@ -15,7 +15,7 @@ use crate::answer::{Answer, Envelope, Status, shown};
 use crate::excerpt::Shown;
 
 /// Output of a command.
-pub(crate) struct Console {
+pub struct Console {
     json: bool,
     progress: Option<ProgressBar>,
     /// Whether the cycles of the scenario have begun.
@@ -24,7 +24,8 @@ pub(crate) struct Console {
 }
 
 impl Console {
-    pub(crate) fn new(json: bool) -> Self {
+    /// Prints text and progress, or one JSON document at the end.
+    pub fn new(json: bool) -> Self {
         Self {
             json,
             progress: None,
@@ -39,7 +40,7 @@ impl Console {
     }
 
     /// Prints the answer and returns the exit status.
-    pub(crate) fn finish(self, command: &str, mut answer: Answer) -> ExitCode {
+    pub fn finish(self, command: &str, mut answer: Answer) -> ExitCode {
         answer.bound();
         // The reader may have closed the pipe.
         let _ = if self.json {
@@ -98,7 +99,7 @@ impl Console {
     }
 
     /// Prints a line while the command runs; nothing with `--json`.
-    pub(crate) fn note(&mut self, line: &str) {
+    pub fn note(&mut self, line: &str) {
         if !self.json {
             self.say(line);
         }

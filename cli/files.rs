@@ -3,9 +3,13 @@
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
+use serde_json::{Value, json};
 use understudy_cluster::{Cluster, Loaded, Overrides, TemplateFile};
-use understudy_journal::{Members, named_file};
+use understudy_interchange::{Source, Wanted, parse_program, read_source};
+use understudy_journal::{Members, RunDirectory, RunDirectoryError, named_file};
+use understudy_ladder::Program;
 use understudy_parity::ParityController;
 use understudy_scenarios::{Scenario, read as read_scenario};
 use understudy_text::spelling::nearest;
@@ -87,9 +91,64 @@ fn nearest_file(path: &Path) -> Option<PathBuf> {
     Some(folder.join(nearest))
 }
 
+/// A ladder without errors, and its file with the warnings.
+///
+/// # Errors
+/// If the file cannot be read, is not a ladder or has errors.
+pub fn ladder(path: &Path) -> Result<(Program, Report), Answer> {
+    let text = text_of(Kind::Ladder, path)?;
+    let name = path.display().to_string();
+    let parsed = parse_program(&name, &text);
+    let report = Report {
+        name,
+        text,
+        diagnostics: parsed.diagnostics,
+    };
+    if report.has_errors() {
+        let typed = read_source(&report.name, &report.text, Wanted::default()).source;
+        let answer = Answer::bad_files(vec![report]);
+        return Err(match typed {
+            Some(Source::Typed(_)) => {
+                let message = "this command works on Boolean programs, and the program has numbers";
+                answer.and_failure(Status::BadInput, "U0438", message)
+            }
+            _ => answer,
+        });
+    }
+    Ok((parsed.program, report))
+}
+
 /// Writes a file.
-pub(crate) fn write(path: &Path, text: &str) -> Result<(), Answer> {
+///
+/// # Errors
+/// U0602 if it cannot be written.
+pub fn write(path: &Path, text: &str) -> Result<(), Answer> {
     fs::write(path, text).map_err(|error| unwritable(path, &error))
+}
+
+/// Makes a folder and its parents.
+pub(crate) fn make_folder(path: &Path) -> Result<(), Answer> {
+    fs::create_dir_all(path).map_err(|error| unwritable(path, &error))
+}
+
+/// Answers with a text and its JSON, or writes the text to the output file if one is given.
+pub(crate) fn deliver(output: Option<&Path>, text: &str, result: Value) -> Result<Answer, Answer> {
+    let Some(path) = output else {
+        return Ok(Answer::done(text, result));
+    };
+    write(path, text)?;
+    Ok(Answer::done("", json!({})).and_written(path))
+}
+
+/// A new directory for a run below `runs`.
+pub(crate) fn run_directory(runs: &Path) -> Result<RunDirectory, Answer> {
+    RunDirectory::create(runs, SystemTime::now()).map_err(unwritable_run)
+}
+
+/// The failure of a directory for runs that cannot be written.
+pub(crate) fn unwritable_run(error: RunDirectoryError) -> Answer {
+    let message = format!("{error}; choose another directory with --out");
+    Answer::failed(Status::Failed, "U0602", message)
 }
 
 /// Replaces a file atomically.
@@ -176,7 +235,7 @@ pub(crate) fn write_new(folder: &Path, files: &[NewFile]) -> Result<Vec<PathBuf>
         return Err(Answer::failed(Status::BadInput, "U0603", message));
     }
     let is_new = !folder.exists();
-    fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))?;
+    make_folder(folder)?;
     for (count, (file, path)) in files.iter().zip(&paths).enumerate() {
         if let Err(error) = fs::write(path, &file.bytes) {
             for written in &paths[..=count] {
@@ -191,7 +250,7 @@ pub(crate) fn write_new(folder: &Path, files: &[NewFile]) -> Result<Vec<PathBuf>
     Ok(paths)
 }
 
-fn unwritable(path: &Path, error: &io::Error) -> Answer {
+pub(crate) fn unwritable(path: &Path, error: &io::Error) -> Answer {
     let message = format!("{} cannot be written: {error}", path.display());
     Answer::failed(Status::Failed, "U0602", message)
 }

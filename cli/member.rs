@@ -16,44 +16,44 @@ use crate::answer::{Answer, Status};
 use crate::files;
 use crate::overrides::{OverrideArguments, parse_size};
 
-/// Run one station, a controller or an understudy, as this process
+/// Run one station, a controller or an understudy
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy node cluster.toml --name robot
 
-Reports are JSON lines on standard output (docs/reference/run-directory.md). Every member needs an address in the cluster file, or in
-the file of --endpoints. SIGINT and SIGTERM end it in order; the lines `stop` and `release` on standard input are commands.")]
-pub(crate) struct Arguments {
-    /// The cluster file
+The journal records are JSON lines on standard output (docs/reference/run-directory.md). All members must have an address, in the cluster
+file or in the file of --endpoints. SIGINT and SIGTERM shut the member down; the lines `stop` and `release` on standard input are commands.")]
+pub struct Arguments {
+    /// Cluster file
     #[arg(value_name = "CLUSTER.toml")]
     cluster: PathBuf,
-    /// Which member of the cluster, by its name
+    /// Name of the member in the cluster file
     #[arg(long, value_name = "NAME")]
     name: String,
-    /// A JSON list of members, names and addresses, in place of the addresses of the cluster file
+    /// JSON list of members with names and addresses, overrides the addresses of the cluster file
     #[arg(long, value_name = "FILE")]
     endpoints: Option<PathBuf>,
-    /// The folder of this member's keys; needed unless the cluster file says `security = "off"`
+    /// Folder of the keys of this member; required unless the cluster file has `security = "off"`
     #[arg(long, value_name = "DIR")]
     keys: Option<PathBuf>,
-    /// End with standard input and with the process that started this one
+    /// Exit when standard input is closed or the parent process ends
     #[arg(long)]
     in_laboratory: bool,
-    /// Do not ask for real-time rights
+    /// Do not request real-time scheduling and locked memory
     #[arg(long)]
     no_real_time: bool,
-    /// Write the reports to this file in place of standard output; older ones to segments beside it
+    /// Journal file; older records are moved to segments next to it. Default: standard output
     #[arg(long, value_name = "FILE")]
     journal: Option<PathBuf>,
-    /// What that file and its segments may take of the disk, such as 200MB; the oldest reports go when they are full
+    /// Size limit of the journal, such as 200MB; the oldest records are removed first
     #[arg(long, value_name = "SIZE", default_value = "1GB", value_parser = parse_size)]
     journal_limit: u64,
     #[command(flatten)]
     overrides: OverrideArguments,
 }
 
-/// Run one remote I/O as this process
+/// Run one remote I/O
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -63,7 +63,7 @@ pub(crate) struct RemoteIoArguments {
     pub(crate) common: Arguments,
 }
 
-/// Run one simulated plant as this process
+/// Run one simulated plant
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -73,13 +73,15 @@ pub(crate) struct PlantArguments {
     pub(crate) common: Arguments,
 }
 
-pub(crate) fn run_station(arguments: &Arguments) -> Answer {
+/// Runs one station as this process.
+pub fn run_station(arguments: &Arguments) -> Result<Answer, Answer> {
     let station = |member: Member| matches!(member, Member::Station(_));
     let wanted = (station as fn(Member) -> bool, "station", "understudy node");
     run(arguments, wanted, understudy_member::run_station)
 }
 
-pub(crate) fn run_remote_io(arguments: &Arguments) -> Answer {
+/// Runs one remote I/O as this process.
+pub fn run_remote_io(arguments: &Arguments) -> Result<Answer, Answer> {
     let remote_io = |member: Member| matches!(member, Member::RemoteIo(_));
     let wanted = (
         remote_io as fn(Member) -> bool,
@@ -89,7 +91,8 @@ pub(crate) fn run_remote_io(arguments: &Arguments) -> Answer {
     run(arguments, wanted, understudy_member::run_remote_io)
 }
 
-pub(crate) fn run_plant(arguments: &Arguments) -> Answer {
+/// Runs one simulated plant as this process.
+pub fn run_plant(arguments: &Arguments) -> Result<Answer, Answer> {
     let plant = |member: Member| matches!(member, Member::Plant(_));
     let wanted = (plant as fn(Member) -> bool, "plant", "understudy plant");
     run(arguments, wanted, understudy_member::run_plant)
@@ -102,28 +105,19 @@ fn run(
     arguments: &Arguments,
     (is_wanted, wanted, command): Wanted,
     member: fn(&Cluster, &MemberOptions) -> Result<(), MemberError>,
-) -> Answer {
-    let (cluster, _) = match files::cluster(&arguments.cluster, arguments.overrides.overrides()) {
-        Ok(read) => read,
-        Err(answer) => return answer,
-    };
+) -> Result<Answer, Answer> {
+    let (cluster, _) = files::cluster(&arguments.cluster, arguments.overrides.overrides())?;
     restart_for_zenoh(link_kind(&cluster));
-    let done = find(&cluster, &arguments.name)
-        .and_then(|member| {
-            let name = arguments.name.clone();
-            let wrong = MemberError::WrongKind {
-                name,
-                wanted,
-                command,
-            };
-            is_wanted(member).then_some(()).ok_or(failed(&wrong))
-        })
-        .and_then(|()| arguments.options(&cluster))
-        .and_then(|options| member(&cluster, &options).map_err(|error| failed(&error)));
-    match done {
-        Ok(()) => Answer::done("", json!(null)),
-        Err(answer) => answer,
+    if !is_wanted(find(&cluster, &arguments.name)?) {
+        return Err(failed(&MemberError::WrongKind {
+            name: arguments.name.clone(),
+            wanted,
+            command,
+        }));
     }
+    let options = arguments.options(&cluster)?;
+    member(&cluster, &options).map_err(|error| failed(&error))?;
+    Ok(Answer::done("", json!(null)))
 }
 
 impl Arguments {
@@ -149,7 +143,7 @@ fn failed(error: &MemberError) -> Answer {
     } else {
         Status::Failed
     };
-    Answer::failed(status, error.code(), error.to_string())
+    Answer::failed(status, error.code(), error)
 }
 
 /// The member of a name.

@@ -9,8 +9,9 @@ use understudy_cluster::{Link, Overrides, Security};
 use understudy_cycle::Mode;
 use understudy_text::duration::parse_positive;
 
+/// Overrides of the cluster file.
 #[derive(Debug, Clone, Default, Args)]
-pub(crate) struct OverrideArguments {
+pub struct OverrideArguments {
     /// Cycle period, such as 10ms, overrides the cluster file
     #[arg(long, value_name = "TIME", value_parser = parse_positive)]
     period: Option<Duration>,
@@ -82,7 +83,7 @@ impl OverrideArguments {
     }
 
     /// The overrides for the given link, or for each link.
-    pub(crate) fn each_link(&self) -> Vec<(LinkKind, Self)> {
+    pub fn each_link(&self) -> Vec<(LinkKind, Self)> {
         let links = [
             (LinkKind::Udp, LinkArgument::Udp),
             (LinkKind::Zenoh, LinkArgument::Zenoh),

@@ -8,7 +8,33 @@ mod reduction;
 mod supervisor_to_ladder;
 mod synth;
 
+use understudy_supervisor::petri::ExplorationError;
+use understudy_supervisor::proof::ProofError;
+use understudy_supervisor::{AdsError, AutomatonError, TooComplex, TooLarge, TooLargeToDraw};
+
+use crate::answer::{Answer, Status};
 use crate::commands::{Group, command};
+
+/// Errors with a code that end a command with exit status 1.
+macro_rules! failures {
+    ($($error:ty),+ $(,)?) => {
+        $(impl From<$error> for Answer {
+            fn from(error: $error) -> Self {
+                Self::failed(Status::Failed, error.code(), error)
+            }
+        })+
+    };
+}
+
+failures!(
+    AdsError,
+    AutomatonError,
+    ExplorationError,
+    ProofError,
+    TooComplex,
+    TooLarge,
+    TooLargeToDraw,
+);
 
 pub(crate) fn group() -> Group {
     Group {

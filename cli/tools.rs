@@ -5,7 +5,6 @@ pub(crate) mod proxy;
 mod schema;
 mod shell;
 
-use crate::bench;
 use crate::commands::{Group, command};
 
 pub(crate) fn group() -> Group {
@@ -16,7 +15,6 @@ pub(crate) fn group() -> Group {
             command("explain", |it, _| explain::run(&it)),
             command("schema", |it, _| schema::run(&it)),
             command("proxy", |it, console| proxy::run(&it, console)),
-            command("bench", bench::run),
             command("completions", |it, _| shell::completions(&it)),
             command("man", |it, _| shell::man(&it)),
         ],

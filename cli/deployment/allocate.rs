@@ -153,13 +153,7 @@ fn properties(text: &str) -> Result<(String, PathBuf), String> {
     Ok((name.trim().to_owned(), PathBuf::from(file.trim())))
 }
 
-pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
-    match plan(arguments, console) {
-        Ok(answer) | Err(answer) => answer,
-    }
-}
-
-fn plan(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let options = options(arguments)?;
     let programs = Programs::read(&arguments.programs, arguments.period)?;
     let (catalogue, about) = catalogue::read(arguments.catalogue.as_deref())?;
@@ -269,10 +263,7 @@ fn write_report(
     };
     let page = html(found, terms, &about);
     let page = page.map_err(|error| Answer::failed(Status::Failed, "U1141", message(&error)))?;
-    std::fs::create_dir_all(folder).map_err(|error| {
-        let message = format!("{} cannot be written: {error}", folder.display());
-        Answer::failed(Status::Failed, "U0602", message)
-    })?;
+    files::make_folder(folder)?;
     let place = folder.join("allocation.html");
     files::write(&folder.join("allocation.csv"), &csv(found))?;
     files::write(&place, &page)?;

@@ -132,8 +132,8 @@ fn kind(text: &str) -> Result<Kind, String> {
     Kind::of(text).ok_or_else(|| "expected plc or embedded".to_owned())
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
-    let answer = match &arguments.what {
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
+    match &arguments.what {
         What::List {
             vendor,
             family,
@@ -148,8 +148,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
             file,
         } => import(file, from, *update, *empty),
         What::Export { output, file } => export(file, output.as_deref()),
-    };
-    answer.unwrap_or_else(|answer| answer)
+    }
 }
 
 fn refused(errors: &[AdditionError]) -> Answer {

@@ -74,13 +74,7 @@ struct Examined<'a> {
     fixed: Option<&'a Fixed>,
 }
 
-pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
-    match examined(arguments, console) {
-        Ok(answer) | Err(answer) => answer,
-    }
-}
-
-fn examined(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let (cluster, _) = files::cluster(&arguments.cluster, arguments.overrides.overrides())?;
     let agreement = cluster.agreement();
     let mut findings = examine_machine(agreement.schedule.period());
@@ -145,8 +139,8 @@ fn of_member(
     let members = crate::member::peers(cluster, arguments.endpoints.as_deref())?;
     let agreement = cluster.agreement();
     let endpoints = Endpoints::new(agreement.cluster, member, members, cluster.neighbours());
-    let endpoints = endpoints
-        .map_err(|error| Answer::failed(Status::BadInput, error.code(), error.to_string()))?;
+    let endpoints =
+        endpoints.map_err(|error| Answer::failed(Status::BadInput, error.code(), error))?;
     let mut findings = examine_ports(&endpoints, link_kind(cluster));
     let (mut guard, of_keys) = keys(arguments, cluster, member);
     findings.extend(of_keys);

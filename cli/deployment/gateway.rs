@@ -78,20 +78,13 @@ struct RunArgument {
 
 impl RunArgument {
     fn open(&self) -> Result<Run, Answer> {
-        Run::open(&self.run)
-            .map_err(|error| Answer::failed(Status::BadInput, error.code(), error.to_string()))
+        Ok(Run::open(&self.run)?)
     }
 }
 
-pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
-    match act(&arguments.what, console) {
-        Ok(answer) | Err(answer) => answer,
-    }
-}
-
-fn act(what: &What, console: &mut Console) -> Result<Answer, Answer> {
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let mut ready = |address| console.note(&format!("listening on {address}"));
-    match what {
+    match &arguments.what {
         What::Metrics { run, once, .. } if *once => {
             let metrics = understudy_gateway::exposition_of(&run.open()?).map_err(failed)?;
             Ok(Answer::done(metrics.as_str(), json!({ "text": metrics })))
@@ -122,7 +115,7 @@ fn act(what: &What, console: &mut Console) -> Result<Answer, Answer> {
 }
 
 fn failed(error: GatewayError) -> Answer {
-    Answer::failed(Status::Failed, error.code(), error.to_string())
+    Answer::failed(Status::Failed, error.code(), error)
 }
 
 fn ended() -> Answer {
@@ -139,7 +132,7 @@ fn table(map: &RegisterMap) -> String {
             Area::Coil => "coil",
             Area::Register => "register",
         };
-        let last = place.address + place.width - 1;
+        let last = place.address + (place.width - 1);
         let addresses = match place.width {
             1 => place.address.to_string(),
             _ => format!("{}-{last}", place.address),

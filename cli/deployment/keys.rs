@@ -91,14 +91,15 @@ struct DaysArgument {
     days: u32,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let now = Date::of(SystemTime::now());
-    let done = match &arguments.what {
+    let (issued, without_address) = match &arguments.what {
         What::Init {
             cluster,
             folder,
             days,
-        } => read(cluster).and_then(|cluster| {
+        } => {
+            let cluster = read(cluster)?;
             let members = cluster.members();
             let names = members.filter_map(|member| cluster.member_name(member));
             let names: Vec<String> = names.map(str::to_owned).collect();
@@ -107,8 +108,8 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
             let operators = [DEFAULT_OPERATOR.to_owned()];
             let issued = authority.issue(&cluster, &names, operators[..].into(), days.days, now);
             let issued = issued.map_err(|errors| failed(&errors))?;
-            Ok((issued, without_address(&cluster, &names)))
-        }),
+            (issued, without_address(&cluster, &names))
+        }
         What::Issue {
             cluster,
             names,
@@ -116,7 +117,8 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
             address,
             folder,
             days,
-        } => read(cluster).and_then(|cluster| {
+        } => {
+            let cluster = read(cluster)?;
             let mut authority = open(folder)?;
             let operators = Operators {
                 names: operator,
@@ -124,34 +126,25 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
             };
             let issued = authority.issue(&cluster, names, operators, days.days, now);
             let issued = issued.map_err(|errors| failed(&errors))?;
-            Ok((issued, without_address(&cluster, names)))
-        }),
+            (issued, without_address(&cluster, names))
+        }
         What::List { folder } => {
-            return match open(folder) {
-                Ok(authority) => listed(&authority.register().holders, now),
-                Err(answer) => answer,
-            };
+            return Ok(listed(&open(folder)?.register().holders, now));
         }
-        What::Revoke { names, folder } => open(folder).and_then(|mut authority| {
-            let revoked = authority.revoke(names, now);
-            let revoked = revoked.map_err(|errors| failed(&errors))?;
-            Ok((revoked, Vec::new()))
-        }),
+        What::Revoke { names, folder } => {
+            let revoked = open(folder)?.revoke(names, now);
+            (revoked.map_err(|errors| failed(&errors))?, Vec::new())
+        }
     };
-    match done {
-        Ok((issued, without_address)) => {
-            let has_addresses = without_address.is_empty();
-            let answer = changed(&issued, without_address, now);
-            match &arguments.what {
-                What::Init {
-                    cluster, folder, ..
-                } if has_addresses => with_doctor(answer, cluster, &folder.folder, &issued),
-                What::Init { cluster, .. } => answer.and_next(&[&"lab", cluster]),
-                _ => answer,
-            }
-        }
-        Err(answer) => answer,
-    }
+    let has_addresses = without_address.is_empty();
+    let answer = changed(&issued, without_address, now);
+    Ok(match &arguments.what {
+        What::Init {
+            cluster, folder, ..
+        } if has_addresses => with_doctor(answer, cluster, &folder.folder, &issued),
+        What::Init { cluster, .. } => answer.and_next(&[&"lab", cluster]),
+        _ => answer,
+    })
 }
 
 /// Command for the machine of the first member.
@@ -193,7 +186,7 @@ pub(crate) fn failed(errors: &[KeysError]) -> Answer {
     };
     let answer = Answer::done("", serde_json::Value::Null).with_status(status);
     errors.iter().fold(answer, |answer, error| {
-        answer.and_failure(status, error.code(), error.to_string())
+        answer.and_failure(status, error.code(), error)
     })
 }
 

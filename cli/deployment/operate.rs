@@ -7,12 +7,14 @@ use std::time::{Duration, SystemTime};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use understudy_bus::{Call, Request};
-use understudy_cluster::Overrides;
+use understudy_cluster::{Cluster, Overrides, typed_value};
+use understudy_executable::Interface;
 use understudy_journal::{Command, OperatorAction, Refusal};
 use understudy_keys::{Date, OperatorKeys};
 use understudy_member::tls_keys;
+use understudy_typed::Elementary;
 use understudy_view::{Run, find_running_of};
-use understudy_wire::{Cycle, StateChoice};
+use understudy_wire::{Cycle, Force, ForcedValue, Member, SignalPlace, StateChoice};
 
 use crate::answer::{Answer, Status};
 use crate::files;
@@ -27,6 +29,8 @@ Example:
   understudy operate cell/cluster.toml --keys keys/members/operator --name robot-io release
   understudy operate cell/cluster.toml --keys keys/members/operator --name robot-io accept-state --cycle 4711
   understudy operate cell/cluster.toml --keys keys/members/operator --name robot journal --lines 100
+  understudy operate runs/latest --name tank-io force inflow=12.5 --seconds 60 --reason \"valve test\"
+  understudy operate runs/latest --name tank-io unforce inflow
 
 Without --keys the member belongs to a laboratory on this machine: that of the given run, or the running one of the cluster below --out.")]
 pub(crate) struct Arguments {
@@ -42,6 +46,12 @@ pub(crate) struct Arguments {
     /// Command or query
     #[arg(value_enum)]
     what: What,
+    /// For force: signal and value, such as inflow=12.5 or lamp=true; for unforce: signal
+    #[arg(value_name = "SIGNAL[=VALUE]", required_if_eq_any([("what", "force"), ("what", "unforce")]))]
+    signal: Option<String>,
+    /// For force: duration
+    #[arg(long, value_name = "N", default_value_t = 60)]
+    seconds: u32,
     /// For accept-state: cycle of the state as in the event `state-lost`; the command is refused if the newest state is of another cycle
     #[arg(long, value_name = "CYCLE", required_if_eq("what", "accept-state"))]
     cycle: Option<u64>,
@@ -80,6 +90,10 @@ enum What {
     ColdStart,
     /// Continue a program with lost state from the newest available state, of cycle --cycle
     AcceptState,
+    /// Replace a signal of the program by a value, for a limited time
+    Force,
+    /// End a force
+    Unforce,
     /// Stop the member
     Stop,
     /// Print new journal records
@@ -93,13 +107,10 @@ enum What {
 /// Timeout; a member sends in every cycle.
 const SILENCE: Duration = Duration::from_secs(60);
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
-    let answer = match &arguments.keys {
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
+    match &arguments.keys {
         Some(keys) => elsewhere(arguments, keys),
         None => in_laboratory(arguments),
-    };
-    match answer {
-        Ok(answer) | Err(answer) => answer,
     }
 }
 
@@ -108,6 +119,10 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
     let word = arguments.what.to_possible_value();
     let word = word.as_ref().map_or("", |value| value.get_name());
     let command = match arguments.what {
+        What::Force => Command::Force(force(arguments, written(arguments)?.cluster())?),
+        What::Unforce => Command::Unforce {
+            signal: place(arguments, written(arguments)?.cluster())?.0,
+        },
         What::Kill => Command::Kill,
         What::Restart => Command::Restart,
         What::Release => Command::Release,
@@ -116,7 +131,7 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
         },
         What::Status | What::Configuration | What::Stop | What::Journal => {
             let message = format!(
-                "`{word}` requires a remote member: give the folder of the operator's keys by --keys; a laboratory accepts kill, restart, release, cold-start and accept-state"
+                "`{word}` requires a remote member: give the folder of the operator's keys by --keys; a laboratory accepts kill, restart, release, cold-start, accept-state, force and unforce"
             );
             return Err(Answer::failed(Status::BadInput, "U0621", message));
         }
@@ -135,12 +150,73 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
     Ok(Answer::done(text, result).and_next(&[&"top", &run.path()]))
 }
 
+/// The forced signal: its place, its type, and the text of its value.
+fn place<'a>(
+    arguments: &'a Arguments,
+    cluster: &Cluster,
+) -> Result<(SignalPlace, Elementary, &'a str), Answer> {
+    let text = arguments.signal.as_deref().unwrap_or_default();
+    let (name, value) = text.split_once('=').unwrap_or((text, ""));
+    let bad = |message: String| Answer::failed(Status::BadInput, "U0556", message);
+    let member = crate::member::find(cluster, &arguments.name)?;
+    let Member::RemoteIo(program) = member else {
+        let message = format!(
+            "`{}` is not a remote I/O: signals are forced there",
+            arguments.name
+        );
+        return Err(bad(message));
+    };
+    let Interface { inputs, outputs } = &cluster.controllers()[program.index()].interface;
+    let name = name.trim();
+    let input = inputs
+        .find(name)
+        .map(|point| (SignalPlace::Input(point.bit as u16), point.of));
+    let output = outputs
+        .find(name)
+        .map(|point| (SignalPlace::Output(point.bit as u16), point.of));
+    let (place, of) = input.or(output).ok_or_else(|| {
+        let names: Vec<&str> = inputs.names().chain(outputs.names()).collect();
+        let names = names.join(", ");
+        bad(format!(
+            "the program of `{}` has no signal `{name}`; its signals are {names}",
+            arguments.name
+        ))
+    })?;
+    Ok((place, of, value.trim()))
+}
+
+/// A force of a signal as a whole.
+fn force(arguments: &Arguments, cluster: &Cluster) -> Result<Force, Answer> {
+    let (signal, of, text) = place(arguments, cluster)?;
+    let stored = typed_value(text, of).map_err(|help| {
+        let message = format!("invalid value `{text}` of a {of}: {help}");
+        Answer::failed(Status::BadInput, "U0556", message)
+    })?;
+    let value = match of {
+        Elementary::Bool => ForcedValue::Bit(stored != 0),
+        _ => ForcedValue::Number {
+            width: of.bits() as u8,
+            stored,
+        },
+    };
+    let force = Force {
+        signal,
+        value,
+        seconds: arguments.seconds,
+        owner: crate::inspect::top::owner(),
+        reason: arguments.reason.clone(),
+    };
+    force
+        .check()
+        .map_err(|error| Answer::failed(Status::BadInput, "U0556", error.to_string()))?;
+    Ok(force)
+}
+
 /// The named run, or the newest running one of the cluster.
 fn written(arguments: &Arguments) -> Result<Run, Answer> {
     let target = &arguments.target;
     if target.is_dir() {
-        return Run::open(target)
-            .map_err(|error| Answer::failed(Status::BadInput, error.code(), error.to_string()));
+        return Ok(Run::open(target)?);
     }
     let (cluster, _) = files::cluster(target, Overrides::default())?;
     find_running_of(&arguments.out, &cluster).ok_or_else(|| {
@@ -171,6 +247,8 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
         What::Configuration => Some(Request::Configuration),
         What::Release => Some(Request::Release),
         What::ColdStart | What::AcceptState => Some(Request::Choose(arguments.choice())),
+        What::Force => Some(Request::Force(force(arguments, &cluster)?)),
+        What::Unforce => Some(Request::Unforce(place(arguments, &cluster)?.0)),
         What::Stop => Some(Request::Stop),
         What::Journal => None,
         What::Kill | What::Restart => {
@@ -184,11 +262,8 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
         let message = format!("no address for {}", arguments.name);
         Answer::failed(Status::BadInput, "U0608", message)
     })?;
-    let failed = |error: understudy_bus::BusError| {
-        Answer::failed(Status::Failed, error.code(), error.to_string())
-    };
     let hash = cluster.agreement().cluster;
-    let call = Call::to(address, hash, &arguments.name, &tls_keys(&keys.tls)).map_err(failed)?;
+    let call = Call::to(address, hash, &arguments.name, &tls_keys(&keys.tls))?;
     let Some(request) = request else {
         let mut left = arguments.lines;
         let take = |line: &str| {
@@ -196,10 +271,10 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
             // The reader closed the pipe.
             writeln!(std::io::stdout(), "{line}").is_ok() && left > 0
         };
-        call.follow(SILENCE, take).map_err(failed)?;
+        call.follow(SILENCE, take)?;
         return Ok(Answer::done("", json!(null)));
     };
-    let text = call.ask(&request).map_err(failed)?;
+    let text = call.ask(&request)?;
     let result = serde_json::from_str(&text).unwrap_or_else(|_| json!({ "text": text }));
     Ok(Answer::done(text, result))
 }

@@ -33,16 +33,12 @@ pub(crate) struct Arguments {
     period: Duration,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
-    match Programs::read(&arguments.programs, arguments.period) {
-        Ok(programs) => {
-            let answer = counted(&programs, arguments.instructions);
-            let mut next: Vec<&dyn AsRef<OsStr>> = vec![&"allocate"];
-            next.extend(arguments.programs.iter().map(|it| it as &dyn AsRef<OsStr>));
-            answer.and_next(&next)
-        }
-        Err(answer) => answer,
-    }
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
+    let programs = Programs::read(&arguments.programs, arguments.period)?;
+    let answer = counted(&programs, arguments.instructions);
+    let mut next: Vec<&dyn AsRef<OsStr>> = vec![&"allocate"];
+    next.extend(arguments.programs.iter().map(|it| it as &dyn AsRef<OsStr>));
+    Ok(answer.and_next(&next))
 }
 
 fn counted(programs: &Programs, with_instructions: bool) -> Answer {

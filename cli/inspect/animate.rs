@@ -8,7 +8,7 @@ use understudy_view::{Bounds, Run, Scene};
 
 use crate::answer::Answer;
 use crate::files;
-use crate::inspect::view::{RUN, refused};
+use crate::inspect::view::RUN;
 
 /// Draw part of a run as an animated SVG picture
 #[derive(Debug, Args)]
@@ -38,28 +38,20 @@ pub(crate) struct Arguments {
     output: PathBuf,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let scene = Scene {
         program: arguments.program.as_deref(),
         from: arguments.from,
         to: arguments.to,
     };
-    let film = Run::open(&arguments.run).and_then(|run| {
-        let until = arguments.to.unwrap_or(i64::MAX);
-        run.read_until(Bounds::default(), until)?.film(scene)
-    });
-    let film = match film {
-        Ok(film) => film,
-        Err(error) => return refused(&error),
-    };
-    if let Err(answer) = files::write(&arguments.output, &film.to_svg()) {
-        return answer;
-    }
+    let until = arguments.to.unwrap_or(i64::MAX);
+    let model = Run::open(&arguments.run)?.read_until(Bounds::default(), until)?;
+    let film = model.film(scene)?;
+    files::write(&arguments.output, &film.to_svg())?;
     let file = arguments.output.display().to_string();
     let (from, to) = film.cycles();
     let program = film.program();
-    Answer::done(
-        format!("{file}: outputs of {program}, cycles {from} to {to}"),
-        json!({ "file": file, "program": program, "from": from, "to": to }),
-    )
+    let text = format!("{file}: outputs of {program}, cycles {from} to {to}");
+    let result = json!({ "file": file, "program": program, "from": from, "to": to });
+    Ok(Answer::done(text, result))
 }

@@ -13,6 +13,7 @@ use understudy_member::tls_keys;
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
+use crate::files;
 use crate::member::peers;
 
 /// Access to a running cluster.
@@ -49,32 +50,25 @@ impl AttachArguments {
     ) -> Result<(RunDirectory, Attached), Answer> {
         if cluster.security() == Security::Off {
             let error = AttachError::NoKeys;
-            return Err(Answer::failed(
-                Status::BadInput,
-                error.code(),
-                error.to_string(),
-            ));
+            return Err(Answer::failed(Status::BadInput, error.code(), error));
         }
         let folder = self.keys.as_deref().unwrap_or(Path::new(""));
         let keys = OperatorKeys::load(folder, cluster, Date::of(SystemTime::now()));
         let keys = keys.map_err(|errors| crate::deployment::keys::failed(&errors))?;
         let peers = peers(cluster, self.endpoints.as_deref())?;
         let found = find(cluster, tls_keys(&keys.tls), peers)
-            .map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))?;
+            .map_err(|error| Answer::failed(Status::Failed, error.code(), error))?;
         let (heard, unheard) = found.names();
         console.note(&format!("attached to {}", heard.join(", ")));
         if !unheard.is_empty() {
             let unheard = unheard.join(", ");
             console.note(&format!("not received, retrying: {unheard}"));
         }
-        let written = |error: understudy_journal::RunDirectoryError| {
-            Answer::failed(Status::Failed, "U0602", error.to_string())
-        };
-        let directory = RunDirectory::create(out, SystemTime::now()).map_err(written)?;
-        keep_cluster(directory.path(), cluster_file, cluster).map_err(written)?;
+        let directory = files::run_directory(out)?;
+        keep_cluster(directory.path(), cluster_file, cluster).map_err(files::unwritable_run)?;
         let attached = found
             .record(&directory, journal_limit)
-            .map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))?;
+            .map_err(|error| Answer::failed(Status::Failed, error.code(), error))?;
         Ok((directory, attached))
     }
 }

@@ -10,7 +10,7 @@ use understudy_text::MAXIMUM_SHOWN;
 use understudy_view::{Filter, JournalLine, Listing, Run, Trouble};
 
 use crate::answer::{Answer, Status};
-use crate::inspect::view::{RUN, refused, several};
+use crate::inspect::view::{RUN, several};
 
 /// Print or follow the journal of a run
 #[derive(Debug, Args)]
@@ -52,12 +52,8 @@ pub(crate) struct Arguments {
 /// Polling interval of a growing journal.
 const LOOK: Duration = Duration::from_millis(100);
 
-pub(crate) fn run(arguments: &Arguments, json: bool) -> Answer {
-    answered(arguments, json).unwrap_or_else(|answer| answer)
-}
-
-fn answered(arguments: &Arguments, json: bool) -> Result<Answer, Answer> {
-    let run = Run::open(&arguments.run).map_err(|error| refused(&error))?;
+pub(crate) fn run(arguments: &Arguments, json: bool) -> Result<Answer, Answer> {
+    let run = Run::open(&arguments.run)?;
     let filter = Filter {
         members: arguments.member.clone(),
         events: arguments.event.clone(),

@@ -1,7 +1,7 @@
 //! `understudy top`: a live view of a run on the terminal.
 
 use std::io::{self, IsTerminal};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use clap::Args;
@@ -16,7 +16,7 @@ use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
 use crate::inspect::attach::AttachArguments;
-use crate::inspect::view::{RUN, refused};
+use crate::inspect::view::RUN;
 
 /// Show a live view of a run on the terminal
 #[derive(Debug, Args)]
@@ -56,19 +56,13 @@ const HEARD_FOR: Duration = Duration::from_secs(20);
 /// Time in which all members of a remote cluster have reported.
 const ALL_SAY: Duration = Duration::from_secs(1);
 
-pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
-    answered(arguments, console).unwrap_or_else(|answer| answer)
-}
-
-fn answered(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let (run, attached) = open(arguments, console)?;
     if console.is_json() || arguments.once {
         if attached.is_some() {
             wait_for_a_cycle(&run);
         }
-        let model = run
-            .read(Bounds::default())
-            .map_err(|error| refused(&error))?;
+        let model = run.read(Bounds::default())?;
         let mut screen = Screen::default();
         let snapshot = model.snapshot();
         return Ok(Answer::done(printed(&mut screen, &model)?, &snapshot));
@@ -111,9 +105,8 @@ fn open(arguments: &Arguments, console: &mut Console) -> Result<Opened, Answer> 
     let is_cluster = path
         .extension()
         .is_some_and(|extension| extension == "toml");
-    let open = |path: &Path| Run::open(path).map_err(|error| refused(&error));
     if !is_cluster && !arguments.elsewhere.is_wanted() {
-        return Ok((open(path)?, None));
+        return Ok((Run::open(path)?, None));
     }
     let (cluster, _) = files::cluster(path, Default::default())?;
     if arguments.elsewhere.is_wanted() {
@@ -121,9 +114,9 @@ fn open(arguments: &Arguments, console: &mut Console) -> Result<Opened, Answer> 
         let attached = arguments
             .elsewhere
             .attach(path, &cluster, out, limit, console)?;
-        return Ok((open(attached.0.path())?, Some(attached)));
+        return Ok((Run::open(attached.0.path())?, Some(attached)));
     }
-    let run = find_run_of(&arguments.out, &cluster).map_err(|error| refused(&error))?;
+    let run = find_run_of(&arguments.out, &cluster)?;
     Ok((run, None))
 }
 
@@ -150,11 +143,11 @@ fn failed(error: io::Error) -> Answer {
 }
 
 fn printed(screen: &mut Screen, model: &Model) -> Result<String, Answer> {
-    let mut terminal =
-        Terminal::new(TestBackend::new(WIDTH, HEIGHT)).map_err(|never| match never {})?;
+    let mut terminal = Terminal::new(TestBackend::new(WIDTH, HEIGHT))
+        .map_err(|never| -> Answer { match never {} })?;
     terminal
         .draw(|frame| screen.draw(frame, model))
-        .map_err(|never| match never {})?;
+        .map_err(|never| -> Answer { match never {} })?;
     let buffer = terminal.backend().buffer();
     let rows = buffer.content.chunks(usize::from(WIDTH));
     let lines = rows.map(|row| {

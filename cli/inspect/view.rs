@@ -7,9 +7,10 @@ use crate::answer::{Answer, Status};
 /// The newest run, the default.
 pub(crate) const RUN: &str = "runs/latest";
 
-/// Failure of an inspection.
-pub(crate) fn refused(error: &ViewError) -> Answer {
-    several(std::slice::from_ref(error))
+impl From<ViewError> for Answer {
+    fn from(error: ViewError) -> Self {
+        several(&[error])
+    }
 }
 
 /// Failure with several errors.
@@ -19,7 +20,7 @@ pub(crate) fn several(errors: &[ViewError]) -> Answer {
         if let ViewError::Kept(understudy_journal::KeptError::Files { reports }) = error {
             answer.reports.extend(reports.iter().cloned());
         }
-        answer = answer.and_failure(Status::BadInput, error.code(), error.to_string());
+        answer = answer.and_failure(Status::BadInput, error.code(), error);
     }
     answer
 }

@@ -2,13 +2,11 @@
 
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
 
 use clap::Args;
 use serde::Serialize;
 use understudy_cluster::Cluster;
-use understudy_journal::{Commander, Commands, RunDirectory, commands};
-use understudy_processes::LaboratoryError;
+use understudy_journal::{Commander, Commands, commands};
 use understudy_scenarios::{MAXIMUM_CYCLES, Scenario};
 use understudy_view::{Run, find_running};
 use understudy_watch::{Certificate, Commanding, Logins, Served, Settings, WatchError, serve};
@@ -187,7 +185,7 @@ fn failed(error: &WatchError) -> Answer {
         }
         WatchError::Listen { .. } | WatchError::System { .. } => Status::Failed,
     };
-    Answer::failed(status, error.code(), error.to_string())
+    Answer::failed(status, error.code(), error)
 }
 
 #[derive(Serialize)]
@@ -196,7 +194,7 @@ struct Watched {
     run: String,
 }
 
-pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let page = Page {
         address: arguments.address,
         arguments: arguments.page.clone(),
@@ -210,20 +208,22 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
 }
 
 /// Shows a cluster: on other machines, in a running laboratory, or in a new one.
-fn watch_cluster(arguments: &Arguments, page: &Page, console: &mut Console) -> Answer {
+fn watch_cluster(
+    arguments: &Arguments,
+    page: &Page,
+    console: &mut Console,
+) -> Result<Answer, Answer> {
     let (target, run) = (&arguments.target, &arguments.run);
-    let (cluster, reports) = match files::cluster(target, run.overrides.overrides()) {
-        Ok(read) => read,
-        Err(answer) => return answer,
-    };
+    let (cluster, reports) = files::cluster(target, run.overrides.overrides())?;
     if arguments.elsewhere.is_wanted() {
-        return watch_elsewhere(arguments, &cluster, page, console).with_used(reports);
+        let answer = watch_elsewhere(arguments, &cluster, page, console)?;
+        return Ok(answer.with_used(reports));
     }
     let running = (!arguments.start).then(|| find_running(&run.out, &cluster));
     if let Some(running) = running.flatten() {
         let path = running.path().to_owned();
         console.note(&format!("already running, showing {}", path.display()));
-        return watch_run(&path, page, console).with_used(reports);
+        return Ok(watch_run(&path, page, console)?.with_used(reports));
     }
     if arguments.attach {
         let out = run.out.display();
@@ -231,15 +231,15 @@ fn watch_cluster(arguments: &Arguments, page: &Page, console: &mut Console) -> A
             "no laboratory of `{}` runs below {out}; remote members require the keys of an operator (--keys DIR)",
             cluster.name()
         );
-        return Answer::failed(Status::BadInput, "U0614", message);
+        return Err(Answer::failed(Status::BadInput, "U0614", message));
     }
     if let Some(who) = who_runs_already(&cluster).filter(|_| !arguments.start) {
         let message = format!(
             "the cluster is already running: {who} accepts connections; attach to it with the keys of an operator (--keys DIR)"
         );
-        return Answer::failed(Status::BadInput, "U0615", message);
+        return Err(Answer::failed(Status::BadInput, "U0615", message));
     }
-    run_and_watch(&cluster, arguments, page, console).with_used(reports)
+    Ok(run_and_watch(&cluster, arguments, page, console)?.with_used(reports))
 }
 
 fn watch_elsewhere(
@@ -247,26 +247,19 @@ fn watch_elsewhere(
     cluster: &Cluster,
     page: &Page,
     console: &mut Console,
-) -> Answer {
+) -> Result<Answer, Answer> {
     let (target, run) = (&arguments.target, &arguments.run);
-    let attached =
+    let (directory, attached) =
         arguments
             .elsewhere
-            .attach(target, cluster, &run.out, run.journal_limit, console);
-    let (directory, attached) = match attached {
-        Ok(attached) => attached,
-        Err(answer) => return answer,
-    };
+            .attach(target, cluster, &run.out, run.journal_limit, console)?;
     let commanding = page.commanding(attached.commander(), understudy_attach::impossible());
     serve_until_asked_to_end(directory.path(), page, commanding, console)
 }
 
-fn watch_run(target: &Path, page: &Page, console: &mut Console) -> Answer {
+fn watch_run(target: &Path, page: &Page, console: &mut Console) -> Result<Answer, Answer> {
     // Errors are reported here, before a page is served.
-    let run = match Run::open(target) {
-        Ok(run) => run,
-        Err(error) => return Answer::failed(Status::BadInput, error.code(), error.to_string()),
-    };
+    let run = Run::open(target)?;
     let (path, commander) = (run.path().to_owned(), run.commander());
     let mut commanding = page.commanding(commander, Vec::new());
     if !run.is_written() {
@@ -280,15 +273,11 @@ fn serve_until_asked_to_end(
     page: &Page,
     commanding: Commanding,
     console: &mut Console,
-) -> Answer {
-    let served = match page.serve(run, commanding, console) {
-        Ok(served) => served,
-        Err(answer) => return answer,
-    };
-    match served.until_asked_to_end() {
-        Ok(()) => watched(run),
-        Err(error) => failed(&error),
-    }
+) -> Result<Answer, Answer> {
+    let served = page.serve(run, commanding, console)?;
+    let ended = served.until_asked_to_end();
+    ended.map_err(|error| failed(&error))?;
+    Ok(watched(run))
 }
 
 fn watched(run: &Path) -> Answer {
@@ -303,7 +292,7 @@ fn run_and_watch(
     arguments: &Arguments,
     page: &Page,
     console: &mut Console,
-) -> Answer {
+) -> Result<Answer, Answer> {
     let (target, arguments) = (&arguments.target, &arguments.run);
     let scenario = Scenario {
         title: cluster.name().to_owned(),
@@ -312,26 +301,15 @@ fn run_and_watch(
     };
     let scenario = scenario.shortened(arguments.cycles);
     wakefulness::warn(cluster, console);
-    let directory = match RunDirectory::create(&arguments.out, SystemTime::now()) {
-        Ok(directory) => directory,
-        Err(error) => return Answer::failed(Status::Failed, "U0602", error.to_string()),
-    };
+    let directory = files::run_directory(&arguments.out)?;
     let file = target.clone();
     let page = Some(page);
-    match judged(
+    let (_, run) = judged(
         cluster, &scenario, file, arguments, &directory, page, console,
-    ) {
-        Err(answer) => answer,
-        Ok((_, run)) => {
-            let answer = watched(directory.path());
-            match run.failure {
-                Some(failure) => answer.and_failure(
-                    Status::Failed,
-                    LaboratoryError::code(&failure),
-                    failure.to_string(),
-                ),
-                None => answer,
-            }
-        }
-    }
+    )?;
+    let answer = watched(directory.path());
+    Ok(match run.failure {
+        Some(failure) => answer.and_failure(Status::Failed, failure.code(), &failure),
+        None => answer,
+    })
 }

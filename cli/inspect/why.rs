@@ -6,7 +6,7 @@ use clap::Args;
 use understudy_view::{Bounds, Run};
 
 use crate::answer::Answer;
-use crate::inspect::view::{RUN, refused};
+use crate::inspect::view::RUN;
 
 /// Explain the value of an output in a cycle of a run
 #[derive(Debug, Args)]
@@ -31,14 +31,9 @@ pub(crate) struct Arguments {
     run: PathBuf,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
-    let found = Run::open(&arguments.run).and_then(|run| {
-        let until = arguments.at.unwrap_or(i64::MAX);
-        let model = run.read_until(Bounds::default(), until)?;
-        model.why(&arguments.output, arguments.at)
-    });
-    match found {
-        Ok(why) => Answer::done(why.to_text(), &why).and_next(&[&"watch", &arguments.run]),
-        Err(error) => refused(&error),
-    }
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
+    let until = arguments.at.unwrap_or(i64::MAX);
+    let model = Run::open(&arguments.run)?.read_until(Bounds::default(), until)?;
+    let why = model.why(&arguments.output, arguments.at)?;
+    Ok(Answer::done(why.to_text(), &why).and_next(&[&"watch", &arguments.run]))
 }

@@ -76,14 +76,10 @@ impl Form {
     }
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
-    let read_file = match arguments.from {
-        Some(_) => files::text(&arguments.from_file),
-        None => files::text_of(Kind::Ladder, &arguments.from_file),
-    };
-    let source = match read_file {
-        Ok(source) => source,
-        Err(answer) => return answer,
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
+    let source = match arguments.from {
+        Some(_) => files::text(&arguments.from_file)?,
+        None => files::text_of(Kind::Ladder, &arguments.from_file)?,
     };
     let name = arguments.from_file.display().to_string();
     let form = arguments.from.map(Form::format);
@@ -109,7 +105,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         let mut answer = Answer::bad_files(vec![report]);
         answer.text = kept;
         answer.result = json!({ "file": null, "text": null, "fidelity": fidelity });
-        return answer;
+        return Err(answer);
     };
     let period = arguments.period.or(reading.period);
     let written = form_of_output(arguments).and_then(|form| {
@@ -118,7 +114,8 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     let written = match written {
         Ok(written) => written,
         Err((code, message)) => {
-            return Answer::failed(Status::BadInput, code, message).with_reports(vec![report]);
+            let answer = Answer::failed(Status::BadInput, code, message);
+            return Err(answer.with_reports(vec![report]));
         }
     };
     if arguments.fidelity {
@@ -132,17 +129,14 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
             let result = json!({ "file": null, "text": text, "fidelity": fidelity });
             Answer::done(format!("{text}{kept}"), result)
         }
-        Some(path) => match files::write(path, &text) {
-            Ok(()) => {
-                let name = path.display().to_string();
-                let result = json!({ "file": name, "text": null, "fidelity": fidelity });
-                Answer::done(format!("written to {name}\n{kept}"), result)
-                    .and_next(&[&"check", path])
-            }
-            Err(answer) => answer,
-        },
+        Some(path) => {
+            files::write(path, &text)?;
+            let name = path.display().to_string();
+            let result = json!({ "file": name, "text": null, "fidelity": fidelity });
+            Answer::done(format!("written to {name}\n{kept}"), result).and_next(&[&"check", path])
+        }
     };
-    answer.with_reports(vec![report])
+    Ok(answer.with_reports(vec![report]))
 }
 
 /// Code of the error that prevented the conversion.

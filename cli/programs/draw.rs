@@ -4,13 +4,11 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use understudy_interchange::{digraph, parse_program};
+use understudy_interchange::digraph;
 use understudy_ladder::{draw_svg, draw_text};
-use understudy_text::Report;
 
 use crate::answer::Answer;
 use crate::files;
-use crate::kind::Kind;
 
 /// Draw a ladder diagram as text or SVG
 #[derive(Debug, Args)]
@@ -41,38 +39,18 @@ enum Form {
     Digraph,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
-    let source = match files::text_of(Kind::Ladder, &arguments.ladder) {
-        Ok(source) => source,
-        Err(answer) => return answer,
-    };
-    let parsed = parse_program(&arguments.ladder.display().to_string(), &source);
-    let report = Report {
-        name: arguments.ladder.display().to_string(),
-        text: source,
-        diagnostics: parsed.diagnostics,
-    };
-    if report.has_errors() {
-        return Answer::bad_files(vec![report]);
-    }
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
+    let (program, report) = files::ladder(&arguments.ladder)?;
     let text = match arguments.form {
-        Form::Text => draw_text(&parsed.program),
-        Form::Svg => draw_svg(&parsed.program),
-        Form::Digraph => digraph::draw_svg(&parsed.program),
+        Form::Text => draw_text(&program),
+        Form::Svg => draw_svg(&program),
+        Form::Digraph => digraph::draw_svg(&program),
     };
-    let answer = match &arguments.output {
-        None => {
-            let result = json!({ "text": text });
-            Answer::done(text, result)
-        }
-        Some(path) => match files::write(path, &text) {
-            Ok(()) => {
-                let name = path.display().to_string();
-                Answer::done(format!("written to {name}"), json!({ "file": name }))
-                    .and_next(&[&"verify", &arguments.ladder])
-            }
-            Err(answer) => answer,
-        },
+    let output = arguments.output.as_deref();
+    let answer = files::deliver(output, &text, json!({ "text": text }))?;
+    let answer = match output {
+        Some(_) => answer.and_next(&[&"verify", &arguments.ladder]),
+        None => answer,
     };
-    answer.with_reports(vec![report])
+    Ok(answer.with_reports(vec![report]))
 }

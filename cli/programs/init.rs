@@ -55,22 +55,17 @@ impl Template {
     }
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let folder = &arguments.folder;
     if !arguments.from.is_empty() {
         return from::run(folder, &arguments.from);
     }
-    match files::write_template(folder, arguments.template.files()) {
-        Err(answer) => answer,
-        Ok(paths) => {
-            let answer = written(folder, &paths, "");
-            if arguments.template == Template::Modbus {
-                let device = folder.join("device.py");
-                return with_device(answer, &device);
-            }
-            answer
-        }
-    }
+    let paths = files::write_template(folder, arguments.template.files())?;
+    let answer = written(folder, &paths, "");
+    Ok(match arguments.template {
+        Template::Modbus => with_device(answer, &folder.join("device.py")),
+        Template::Minimal | Template::Cell => answer,
+    })
 }
 
 /// Answer that lists the files and the next steps.

@@ -41,27 +41,16 @@ enum Form {
     Json,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
-    let (cluster, reports) = match files::cluster(&arguments.cluster, Overrides::default()) {
-        Ok(read) => read,
-        Err(answer) => return answer,
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
+    let (cluster, reports) = files::cluster(&arguments.cluster, Overrides::default())?;
+    let (text, result) = made(&cluster, arguments.form)?;
+    let output = arguments.output.as_deref();
+    let answer = files::deliver(output, &text, result)?;
+    let answer = match output {
+        Some(_) => answer.and_next(&[&"verify", &arguments.cluster]),
+        None => answer,
     };
-    let (text, result) = match made(&cluster, arguments.form) {
-        Ok(made) => made,
-        Err(answer) => return answer,
-    };
-    let answer = match &arguments.output {
-        None => Answer::done(text, result),
-        Some(path) => match files::write(path, &text) {
-            Ok(()) => {
-                let name = path.display().to_string();
-                Answer::done(format!("written to {name}"), json!({ "file": name }))
-                    .and_next(&[&"verify", &arguments.cluster])
-            }
-            Err(answer) => answer,
-        },
-    };
-    answer.with_used(reports)
+    Ok(answer.with_used(reports))
 }
 
 /// Text and JSON of the controller.

@@ -3,13 +3,13 @@
 mod answer;
 pub(crate) mod patience;
 
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use understudy_cluster::{Cluster, Overrides};
-use understudy_interchange::parse_program;
 use understudy_ladder::Program;
 use understudy_logic::Circuit;
 use understudy_parity::ParityController;
@@ -23,7 +23,6 @@ use understudy_verification::{GoOn, draw_runs, prove_parity, smv};
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
-use crate::kind::Kind;
 use answer::{Finding, ProgramAnswer};
 use patience::Patience;
 
@@ -88,7 +87,7 @@ enum Smv {
     Rungs,
 }
 
-pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let is_cluster = arguments
         .file
         .extension()
@@ -97,54 +96,43 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
     if is_cluster {
         return cluster(arguments, &patience);
     }
-    let source = match files::text_of(Kind::Ladder, &arguments.file) {
-        Ok(source) => source,
-        Err(answer) => return answer,
-    };
-    let parsed = parse_program(&arguments.file.display().to_string(), &source);
-    let program = parsed.program;
-    let mut report = Report {
-        name: arguments.file.display().to_string(),
-        text: source,
-        diagnostics: parsed.diagnostics,
-    };
-    if report.has_errors() {
-        return Answer::bad_files(vec![report]);
-    }
-    let subject = match Subject::new(&program, arguments.period) {
-        Ok(subject) => subject,
-        Err(error) => return Answer::failed(Status::BadInput, "U0436", error.to_string()),
-    };
+    let (program, mut report) = files::ladder(&arguments.file)?;
+    let subject = Subject::new(&program, arguments.period).map_err(not_lowered)?;
     let asked = match asked(arguments, &subject) {
         Ok(asked) => asked,
         Err(mut answer) => {
             answer.reports.insert(0, report);
-            return answer;
+            return Err(answer);
         }
     };
     let answer = match arguments.smv {
-        Some(form) => text_for_nusmv(arguments, form, &program, &subject, &asked),
+        Some(form) => {
+            let text = text_for_nusmv(form, &program, &subject, &asked);
+            files::deliver(arguments.output.as_deref(), &text, json!({ "text": text }))?
+        }
         None => {
             let go_on = |work| patience.goes_on(work);
             let bounds = bounds(arguments, &go_on);
             patience.turn_to("the order and the effect of the rungs".to_owned());
-            let remarks = match subject.remarks(&program, arguments.period, bounds) {
-                Ok(remarks) => remarks,
-                Err(error) => {
-                    return Answer::failed(Status::BadInput, "U0436", error.to_string());
-                }
-            };
+            let remarks = subject
+                .remarks(&program, arguments.period, bounds)
+                .map_err(not_lowered)?;
             let found = remarks.found.iter();
             report
                 .diagnostics
                 .extend(found.map(|remark| remark.diagnostic.clone()));
             proved(
                 arguments, &program, &subject, &remarks, &asked, &patience, bounds,
-            )
+            )?
             .and_next(&[&"init", &"cell", &"--from", &arguments.file])
         }
     };
-    answer.with_used(vec![report])
+    Ok(answer.with_used(vec![report]))
+}
+
+/// The failure of a program that does not become a circuit.
+fn not_lowered(error: impl Display) -> Answer {
+    Answer::failed(Status::BadInput, "U0436", error)
 }
 
 fn bounds<'a>(arguments: &Arguments, go_on: GoOn<'a>) -> Bounds<'a> {
@@ -218,31 +206,15 @@ fn asked(arguments: &Arguments, subject: &Subject) -> Result<Asked, Answer> {
     }
 }
 
-fn text_for_nusmv(
-    arguments: &Arguments,
-    form: Smv,
-    program: &Program,
-    subject: &Subject,
-    asked: &Asked,
-) -> Answer {
+fn text_for_nusmv(form: Smv, program: &Program, subject: &Subject, asked: &Asked) -> String {
     let formulas: Vec<Resolved> = asked
         .properties
         .iter()
         .map(|(_, formula)| formula.clone())
         .collect();
-    let text = match form {
+    match form {
         Smv::Scan => smv::of_circuit(subject.circuit(), &formulas, &asked.fair),
         Smv::Rungs => smv::of_rungs(program),
-    };
-    match &arguments.output {
-        None => Answer::done(text.clone(), json!({ "text": text })),
-        Some(path) => match files::write(path, &text) {
-            Ok(()) => {
-                let name = path.display().to_string();
-                Answer::done(format!("written to {name}"), json!({ "file": name }))
-            }
-            Err(answer) => answer,
-        },
     }
 }
 
@@ -254,7 +226,7 @@ fn proved(
     asked: &Asked,
     patience: &Patience<'_>,
     bounds: Bounds<'_>,
-) -> Answer {
+) -> Result<Answer, Answer> {
     patience.turn_to("the states of every output".to_owned());
     let mut program = ProgramAnswer::of(subject, bounds, remarks);
     let formulas: Vec<Resolved> = asked
@@ -274,14 +246,9 @@ fn proved(
             .properties
             .push(Finding::new(subject.circuit(), property, formula, proof));
     }
-    let page = match &arguments.draw {
-        None => None,
-        Some(path) => match draw(path, arguments.period, ladder, subject, &program) {
-            Ok(name) => Some(name),
-            Err(answer) => return answer,
-        },
-    };
-    answer::of_programs(vec![program], None, page)
+    let page = arguments.draw.as_deref();
+    let page = page.map(|path| draw(path, arguments.period, ladder, subject, &program));
+    Ok(answer::of_programs(vec![program], None, page.transpose()?))
 }
 
 /// Writes the page of runs and returns its name.
@@ -293,30 +260,22 @@ fn draw(
     proved: &ProgramAnswer,
 ) -> Result<String, Answer> {
     let page = draw_runs(ladder, period, subject.circuit(), &proved.runs());
-    let page =
-        page.map_err(|error| Answer::failed(Status::BadInput, "U0436", error.to_string()))?;
-    files::write(path, &page)?;
+    files::write(path, &page.map_err(not_lowered)?)?;
     Ok(path.display().to_string())
 }
 
 /// Proves the standard properties of all programs of a cluster, and that the understudy is the sum of its members.
-fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Answer {
+fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Result<Answer, Answer> {
     let of_a_ladder = !arguments.property.is_empty()
         || arguments.properties.is_some()
         || arguments.smv.is_some()
         || arguments.draw.is_some();
     if of_a_ladder {
         let message = "properties, --draw and --smv apply to one program; name a ladder file instead of the cluster";
-        return Answer::failed(Status::BadInput, "U0437", message);
+        return Err(Answer::failed(Status::BadInput, "U0437", message));
     }
-    let (cluster, reports) = match files::cluster(&arguments.file, Overrides::default()) {
-        Ok(read) => read,
-        Err(answer) => return answer,
-    };
-    let understudy = match files::parity_of(&cluster, "verify") {
-        Ok(parity) => parity,
-        Err(answer) => return answer,
-    };
+    let (cluster, reports) = files::cluster(&arguments.file, Overrides::default())?;
+    let understudy = files::parity_of(&cluster, "verify")?;
     let go_on = |work| patience.goes_on(work);
     let bounds = bounds(arguments, &go_on);
     let mut programs = Vec::new();
@@ -326,19 +285,17 @@ fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Answer {
             continue;
         };
         let period = cluster.agreement().schedule.period();
-        let subject = match Subject::new(ladder, period) {
-            Ok(subject) => subject,
-            Err(error) => return Answer::failed(Status::BadInput, "U0436", error.to_string()),
-        };
-        let remarks = match subject.remarks(ladder, period, bounds) {
-            Ok(remarks) => remarks,
-            Err(error) => return Answer::failed(Status::BadInput, "U0436", error.to_string()),
-        };
+        let subject = Subject::new(ladder, period).map_err(not_lowered)?;
+        let remarks = subject
+            .remarks(ladder, period, bounds)
+            .map_err(not_lowered)?;
         programs.push(ProgramAnswer::of(&subject, bounds, &remarks));
     }
-    answer::of_programs(programs, Some(parity(&cluster, understudy)), None)
-        .with_used(reports)
-        .and_next(&[&"simulate", &arguments.file])
+    Ok(
+        answer::of_programs(programs, Some(parity(&cluster, understudy)), None)
+            .with_used(reports)
+            .and_next(&[&"simulate", &arguments.file]),
+    )
 }
 
 /// Result of the proof of the understudy.

@@ -92,11 +92,7 @@ pub(crate) struct Arguments {
     report: Option<PathBuf>,
 }
 
-pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
-    measured(arguments, console).unwrap_or_else(|answer| answer)
-}
-
-fn measured(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let mut times = Times::default();
     let mtbf = times.required("mtbf", Some(&arguments.mtbf));
     let mttr = times.required("mttr", Some(&arguments.mttr));
@@ -150,7 +146,7 @@ fn measured(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answ
     if let Some((directory, failure)) = run {
         let _ = writeln!(answer.text, "journals: {}", directory.display());
         if let Some(failure) = failure {
-            answer = answer.and_failure(Status::Failed, failure.code(), failure.to_string());
+            answer = answer.and_failure(Status::Failed, failure.code(), &failure);
         }
     }
     if let Some(folder) = &arguments.report {
@@ -185,7 +181,7 @@ fn in_the_simulator(
         console.show(&Progress::Failure { done, of });
     });
     console.show(&Progress::Ending);
-    measured.map_err(|error| Answer::failed(Status::Failed, "U0530", error.to_string()))
+    measured.map_err(|error| Answer::failed(Status::Failed, "U0530", error))
 }
 
 /// Directory of the journals of a campaign on processes, and the reason of an early end.
@@ -212,7 +208,7 @@ fn on_processes(
     let failed = |code: &str, message: String| Answer::failed(Status::Failed, code, message);
     let mut watch = |progress| console.show(&progress);
     let run = run_real_campaign(cluster, &planned.plan, &real, &mut watch)
-        .map_err(|error| failed("U0602", error.to_string()))?;
+        .map_err(files::unwritable_run)?;
     match (run.measured, run.failure) {
         (Some(measured), failure) => Ok((measured, Some((run.directory, failure)))),
         (None, Some(failure)) => Err(failed(failure.code(), failure.to_string())),
@@ -226,6 +222,6 @@ fn on_processes(
 fn not_begun(errors: &[QuestionError]) -> Answer {
     errors.iter().fold(
         Answer::done("", ()).with_status(Status::BadInput),
-        |answer, error| answer.and_failure(Status::BadInput, error.code(), error.to_string()),
+        |answer, error| answer.and_failure(Status::BadInput, error.code(), error),
     )
 }

@@ -38,11 +38,7 @@ pub(crate) struct Arguments {
     mttr: Option<String>,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
-    answered(arguments).unwrap_or_else(|answer| answer)
-}
-
-fn answered(arguments: &Arguments) -> Result<Answer, Answer> {
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let mut times = Times::default();
     let ahead = times.required("ahead", Some(&arguments.ahead));
     let mttr = times.optional("mttr", arguments.mttr.as_deref());

@@ -109,12 +109,11 @@ enum ConventionWord {
     Split,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
-    let answer = match &arguments.chain {
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
+    match &arguments.chain {
         Some(path) => of_chain(path, arguments.mission.as_deref()),
         None => of_cluster(arguments),
-    };
-    answer.unwrap_or_else(|answer| answer)
+    }
 }
 
 fn of_chain(path: &Path, mission: Option<&str>) -> Result<Answer, Answer> {
@@ -203,7 +202,7 @@ fn calculated(text: String, found: &Calculated, reports: Vec<Report>) -> Answer 
 pub(crate) fn refused(errors: &[ReliabilityError]) -> Answer {
     errors.iter().fold(
         Answer::done("", json!(null)).with_status(Status::BadInput),
-        |answer, error| answer.and_failure(Status::BadInput, error.code(), error.to_string()),
+        |answer, error| answer.and_failure(Status::BadInput, error.code(), error),
     )
 }
 
@@ -263,7 +262,7 @@ impl Times {
                 answer.and_failure(Status::BadInput, code, message)
             });
         Err(others.iter().fold(answer, |answer, error| {
-            answer.and_failure(Status::BadInput, error.code(), error.to_string())
+            answer.and_failure(Status::BadInput, error.code(), error)
         }))
     }
 }

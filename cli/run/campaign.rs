@@ -1,6 +1,5 @@
 //! `understudy campaign`: random fault injection in simulation; failing runs are shrunk to minimal ones.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -107,14 +106,13 @@ struct Found<'a> {
     findings: &'a Findings,
 }
 
-pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
-    let answer = match (&arguments.merge, &arguments.cluster) {
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
+    match (&arguments.merge, &arguments.cluster) {
         (Some(Merge::Merge { shards, out }), _) => merged(shards, out.as_deref()),
         (None, Some(cluster)) => campaign(arguments, cluster, console),
         // The parser requires one of the two.
         (None, None) => Ok(Answer::done("", ())),
-    };
-    answer.unwrap_or_else(|failed| failed)
+    }
 }
 
 fn campaign(arguments: &Arguments, path: &Path, console: &mut Console) -> Result<Answer, Answer> {
@@ -144,8 +142,7 @@ fn campaign(arguments: &Arguments, path: &Path, console: &mut Console) -> Result
         plan.shard.share(plan.runs),
         "run {pos} of {len}, {eta} left",
     );
-    let interrupted = interruption()
-        .map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))?;
+    let interrupted = interruption()?;
     let start = Instant::now();
     let in_time = || {
         bar.inc(1);
@@ -155,7 +152,7 @@ fn campaign(arguments: &Arguments, path: &Path, console: &mut Console) -> Result
         in_budget && !interrupted.load(Ordering::Relaxed)
     };
     let findings = inject(&cluster, &plan, threads, &in_time)
-        .map_err(|error| Answer::failed(Status::Failed, "U0530", error.to_string()))?;
+        .map_err(|error| Answer::failed(Status::Failed, "U0530", error))?;
     let took = start.elapsed();
     bar.finish_and_clear();
     let mut answer = kept(&findings, arguments.out.as_deref())?
@@ -218,12 +215,9 @@ fn kept(findings: &Findings, out: Option<&Path>) -> Result<Answer, Answer> {
     let mut scenarios = Vec::new();
     let mut text = findings.to_string();
     if let Some(out) = out {
-        fs::create_dir_all(out).map_err(|error| {
-            let message = format!("{} cannot be written: {error}", out.display());
-            Answer::failed(Status::Failed, "U0602", message)
-        })?;
-        let page = picture(findings)
-            .map_err(|error| Answer::failed(Status::Failed, "U0602", error.to_string()))?;
+        files::make_folder(out)?;
+        let page =
+            picture(findings).map_err(|error| Answer::failed(Status::Failed, "U0602", error))?;
         files::write(&out.join("campaign.json"), &findings.to_json())?;
         files::write(&out.join("campaign.html"), &page)?;
         for failure in &findings.failures {

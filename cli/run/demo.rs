@@ -1,15 +1,15 @@
 //! `understudy demo`: the experiment of section V.B on processes.
 
 use std::num::NonZeroU64;
-use std::path::PathBuf;
-use std::time::{Duration, SystemTime};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use clap::Args;
 use understudy_cluster::{Cluster, press_cell};
 use understudy_journal::{Members, RunDirectory};
 use understudy_scenarios::{Scenario, Summary, TABLE_TWO, read};
 
-use crate::answer::{Answer, Status};
+use crate::answer::Answer;
 use crate::console::Console;
 use crate::files;
 use crate::inspect::watch::{BesideArguments, Page};
@@ -43,24 +43,21 @@ pub(crate) struct Arguments {
     beside: BesideArguments,
 }
 
-pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let run = wakefulness::with_period(&arguments.run, console);
-    let cell = match PressCell::write(&run) {
-        Ok(cell) => cell,
-        Err(answer) => return answer,
-    };
+    let cell = PressCell::write(&run)?;
     let members = Members::of(&cell.cluster);
     let found = read("table-two.toml", TABLE_TWO, Some(&members));
     let Some(scenario) = found.scenario else {
-        return Answer::bad_files(vec![found.report]);
+        return Err(Answer::bad_files(vec![found.report]));
     };
     let page = arguments.beside.page().map(Page::staying);
     let scenario = match run.cycles {
         Some(_) => scenario,
         None => scenario.compressed(divisor(&cell.cluster)),
     };
-    let answer = cell.run(&scenario, &run, page.as_ref(), console);
-    answer.and_next(&[&"init", &"cell"])
+    let answer = cell.run(&scenario, &run, page.as_ref(), console)?;
+    Ok(answer.and_next(&[&"init", &"cell"]))
 }
 
 /// Divisor of the cycles that limits the experiment to [`LONGEST`] at long periods.
@@ -76,16 +73,20 @@ fn divisor(cluster: &Cluster) -> NonZeroU64 {
 }
 
 /// The press cell of section V, written to the directory of its run.
-pub(crate) struct PressCell {
-    pub(crate) cluster: Cluster,
+pub struct PressCell {
+    /// The cluster with its overrides.
+    pub cluster: Cluster,
     directory: RunDirectory,
     file: PathBuf,
 }
 
 impl PressCell {
-    pub(crate) fn write(arguments: &RunArguments) -> Result<Self, Answer> {
-        let directory = RunDirectory::create(&arguments.out, SystemTime::now())
-            .map_err(|error| Answer::failed(Status::Failed, "U0602", error.to_string()))?;
+    /// Writes the files of the cluster.
+    ///
+    /// # Errors
+    /// U0602 if they cannot be written.
+    pub fn write(arguments: &RunArguments) -> Result<Self, Answer> {
+        let directory = files::run_directory(&arguments.out)?;
         let folder = directory.file("cluster");
         files::write_template(&folder, press_cell())?;
         let file = folder.join("cluster.toml");
@@ -98,12 +99,15 @@ impl PressCell {
     }
 
     /// Directory of the run.
-    pub(crate) fn path(&self) -> &std::path::Path {
+    pub fn path(&self) -> &Path {
         self.directory.path()
     }
 
-    /// Same as [`Self::run`], returning the summary.
-    pub(crate) fn judged(
+    /// Runs a scenario in the laboratory, and writes the results.
+    ///
+    /// # Errors
+    /// If the processes cannot be started.
+    pub fn judged(
         &self,
         scenario: &Scenario,
         arguments: &RunArguments,
@@ -121,13 +125,13 @@ impl PressCell {
         )
     }
 
-    pub(crate) fn run(
+    fn run(
         &self,
         scenario: &Scenario,
         arguments: &RunArguments,
         page: Option<&Page>,
         console: &mut Console,
-    ) -> Answer {
+    ) -> Result<Answer, Answer> {
         let scenario = scenario.clone().shortened(arguments.cycles);
         let file = self.file.clone();
         in_laboratory(

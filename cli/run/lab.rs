@@ -2,7 +2,6 @@
 
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
 
 use clap::{Args, ValueEnum};
 use understudy_cluster::Cluster;
@@ -44,31 +43,34 @@ pub(crate) struct Arguments {
     beside: BesideArguments,
 }
 
+/// Arguments of a run on processes.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Run")]
-pub(crate) struct RunArguments {
+pub struct RunArguments {
     /// Number of cycles, overrides the scenario; later steps and expectations are ignored
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=understudy_scenarios::MAXIMUM_CYCLES))]
-    pub(crate) cycles: Option<u64>,
+    pub cycles: Option<u64>,
     /// Restart members that end unexpectedly: after 0.5 s, after up to 8 s if they end repeatedly
     #[arg(long)]
-    pub(crate) restart: bool,
+    pub restart: bool,
+    /// Overrides of the cluster file.
     #[command(flatten)]
-    pub(crate) overrides: OverrideArguments,
+    pub overrides: OverrideArguments,
     /// Directory for runs; each run gets a subdirectory
     #[arg(long, value_name = "DIR", default_value = "runs")]
-    pub(crate) out: PathBuf,
+    pub out: PathBuf,
     /// Size limit of the journal, such as 200MB; the oldest records are removed first
     #[arg(long, value_name = "SIZE", default_value = "1GB", value_parser = parse_size)]
-    pub(crate) journal_limit: u64,
+    pub journal_limit: u64,
+    /// The network between the processes.
     #[command(flatten)]
-    pub(crate) network: NetworkArguments,
+    pub network: NetworkArguments,
 }
 
 /// The network between the processes.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Network")]
-pub(crate) struct NetworkArguments {
+pub struct NetworkArguments {
     /// Hosts of the processes
     #[arg(long, value_enum, default_value_t)]
     hosts: HostArgument,
@@ -90,7 +92,7 @@ enum HostArgument {
 
 impl NetworkArguments {
     /// The same arguments with a loss of `share`, unless a loss was given.
-    pub(crate) fn losing(&self, share: Share) -> Self {
+    pub fn losing(&self, share: Share) -> Self {
         Self {
             impairment: self.impairment.losing(share),
             ..self.clone()
@@ -98,7 +100,7 @@ impl NetworkArguments {
     }
 
     /// The same arguments with another seed.
-    pub(crate) fn seeded(&self, seed: u64) -> Self {
+    pub fn seeded(&self, seed: u64) -> Self {
         Self {
             network_seed: seed,
             ..self.clone()
@@ -120,32 +122,23 @@ impl NetworkArguments {
 /// Number of cycles of a run without a scenario.
 const UNDISTURBED_CYCLES: u64 = 1000;
 
-pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let overrides = arguments.run.overrides.overrides();
-    let (cluster, reports) = match files::cluster(&arguments.cluster, overrides) {
-        Ok(read) => read,
-        Err(answer) => return answer,
-    };
-    let scenario = match scenario_or_undisturbed(arguments.scenario.as_deref(), &cluster) {
-        Ok(scenario) => scenario.shortened(arguments.run.cycles),
-        Err(answer) => return answer,
-    };
+    let (cluster, reports) = files::cluster(&arguments.cluster, overrides)?;
+    let scenario = scenario_or_undisturbed(arguments.scenario.as_deref(), &cluster)?
+        .shortened(arguments.run.cycles);
     wakefulness::warn(&cluster, console);
-    let directory = match RunDirectory::create(&arguments.run.out, SystemTime::now()) {
-        Ok(directory) => directory,
-        Err(error) => return Answer::failed(Status::Failed, "U0602", error.to_string()),
-    };
-    let cluster_file = arguments.cluster.clone();
-    in_laboratory(
+    let directory = files::run_directory(&arguments.run.out)?;
+    let answer = in_laboratory(
         &cluster,
         &scenario,
-        cluster_file,
+        arguments.cluster.clone(),
         &arguments.run,
         &directory,
         arguments.beside.page().as_ref(),
         console,
-    )
-    .with_used(reports)
+    )?;
+    Ok(answer.with_used(reports))
 }
 
 pub(crate) fn scenario_or_undisturbed(
@@ -193,8 +186,8 @@ pub(crate) fn in_laboratory(
     directory: &RunDirectory,
     page: Option<&Page>,
     console: &mut Console,
-) -> Answer {
-    let (summary, run) = match judged(
+) -> Result<Answer, Answer> {
+    let (summary, run) = judged(
         cluster,
         scenario,
         cluster_file,
@@ -202,10 +195,7 @@ pub(crate) fn in_laboratory(
         directory,
         page,
         console,
-    ) {
-        Ok(judged) => judged,
-        Err(answer) => return answer,
-    };
+    )?;
     let answered = answer(&summary, Some(directory.path()));
     let path = directory.path();
     let mut answer = match first_reconstructed(cluster, &summary) {
@@ -215,12 +205,12 @@ pub(crate) fn in_laboratory(
         None => answered.and_next(&[&"watch", &path]),
     };
     if let Err(error) = run.written {
-        answer = answer.and_failure(Status::Failed, "U0602", error.to_string());
+        answer = answer.and_failure(Status::Failed, "U0602", error);
     }
-    match run.failure {
-        Some(failure) => answer.and_failure(Status::Failed, failure.code(), failure.to_string()),
+    Ok(match run.failure {
+        Some(failure) => answer.and_failure(Status::Failed, failure.code(), &failure),
         None => answer,
-    }
+    })
 }
 
 /// First output of the first controller that the scenario kills, with a cycle in which it was reconstructed.
@@ -243,9 +233,11 @@ fn invitation(verdict: &str, url: &str) -> String {
 }
 
 /// Results of a run other than its summary.
-pub(crate) struct Judged {
-    pub(crate) written: Result<(), ResultsError>,
-    pub(crate) failure: Option<LaboratoryError>,
+pub struct Judged {
+    /// Whether the results could be written.
+    pub written: Result<(), ResultsError>,
+    /// Failure of the laboratory itself.
+    pub failure: Option<LaboratoryError>,
 }
 
 /// Runs the laboratory and writes the results.
@@ -303,7 +295,7 @@ pub(crate) fn judged(
     );
     let run = run.map_err(|error| {
         directory.take_back();
-        Answer::failed(Status::Failed, error.code(), error.to_string())
+        Answer::failed(Status::Failed, error.code(), &error)
     })?;
     let (mut summary, account) = summarised(run.account, run.machine, run.journal);
     if run.failure.is_some() {

@@ -90,22 +90,12 @@ struct Property {
     scenario: Option<String>,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let overrides = arguments.overrides.overrides();
-    let (cluster, reports) = match files::cluster(&arguments.cluster, overrides) {
-        Ok(read) => read,
-        Err(answer) => return answer,
-    };
-    let start = match start(arguments, &cluster) {
-        Ok(start) => start,
-        Err(answer) => return answer.with_used(reports),
-    };
-    let model = match Model::new(parts(&cluster), start, budget(arguments), &ALL) {
-        Ok(model) => model,
-        Err(error) => {
-            return Answer::failed(Status::Failed, "U0530", error.to_string()).with_used(reports);
-        }
-    };
+    let (cluster, reports) = files::cluster(&arguments.cluster, overrides)?;
+    let start = start(arguments, &cluster)?;
+    let model = Model::new(parts(&cluster), start, budget(arguments), &ALL)
+        .map_err(|error| Answer::failed(Status::Failed, "U0530", error))?;
     let processors = available_parallelism().map_or(1, usize::from);
     let verdict = check(model, arguments.jobs.unwrap_or(processors).max(1));
     let properties: Vec<Property> = ALL
@@ -122,11 +112,8 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         })
         .collect();
     let broken = properties.iter().find_map(|it| it.scenario.as_deref());
-    if let (Some(text), Some(path)) = (broken, &arguments.scenario)
-        && let Err(error) = std::fs::write(path, text)
-    {
-        let message = format!("{}: {error}", path.display());
-        return Answer::failed(Status::Failed, "U0602", message).with_used(reports);
+    if let (Some(text), Some(path)) = (broken, &arguments.scenario) {
+        files::write(path, text)?;
     }
     let holds = broken.is_none();
     let found = Found {
@@ -140,7 +127,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     if !holds {
         answer.status = Status::Failed;
     }
-    answer
+    Ok(answer)
 }
 
 /// The named members, or all names that belong to neither a station nor a remote I/O.

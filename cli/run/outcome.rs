@@ -8,8 +8,9 @@ use understudy_cluster::Cluster;
 use understudy_cycle::Mode;
 use understudy_member::link_kind;
 use understudy_scenarios::{Circumstances, Summary, Table, World};
+use understudy_text::shell;
 
-use crate::answer::{Answer, Status, shell_line};
+use crate::answer::{Answer, Status};
 
 pub(crate) fn circumstances(
     cluster: &Cluster,
@@ -58,8 +59,12 @@ pub(crate) fn machine() -> Vec<String> {
 
 /// Command line that repeats this command.
 pub(crate) fn command_line() -> String {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    shell_line(arguments.iter().map(String::as_str))
+    let mut arguments: Vec<String> = std::env::args().collect();
+    if let Some(program) = arguments.first_mut() {
+        let name = Path::new(program).file_name();
+        *program = name.unwrap_or_default().to_string_lossy().into_owned();
+    }
+    shell::line(arguments.iter().map(String::as_str))
 }
 
 #[derive(Serialize)]

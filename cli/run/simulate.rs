@@ -42,39 +42,23 @@ pub(crate) struct Arguments {
     out: Option<PathBuf>,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let overrides = arguments.overrides.overrides();
-    let (cluster, reports) = match files::cluster(&arguments.cluster, overrides) {
-        Ok(read) => read,
-        Err(answer) => return answer,
-    };
-    let scenario = match scenario_or_undisturbed(arguments.scenario.as_deref(), &cluster) {
-        Ok(scenario) => scenario.shortened(arguments.cycles),
-        Err(answer) => return answer,
-    };
+    let (cluster, reports) = files::cluster(&arguments.cluster, overrides)?;
+    let scenario = scenario_or_undisturbed(arguments.scenario.as_deref(), &cluster)?
+        .shortened(arguments.cycles);
     let seed = arguments.seed.or(scenario.seed);
     let seed = seed.unwrap_or_else(seed_of_the_clock);
-    let directory = match &arguments.out {
-        None => None,
-        Some(out) => match RunDirectory::create(out, SystemTime::now()) {
-            Ok(directory) => Some(directory),
-            Err(error) => return Answer::failed(Status::Failed, "U0602", error.to_string()),
-        },
-    };
-    if let Some(directory) = &directory
-        && let Err(error) = keep_cluster(directory.path(), &arguments.cluster, &cluster)
-    {
-        return Answer::failed(Status::Failed, "U0602", error.to_string());
+    let directory = arguments.out.as_deref().map(files::run_directory);
+    let directory = directory.transpose()?;
+    let mut journal = None;
+    if let Some(directory) = &directory {
+        keep_cluster(directory.path(), &arguments.cluster, &cluster)
+            .map_err(files::unwritable_run)?;
+        let path = directory.file("journal.jsonl");
+        let created = Journal::create(&path, JOURNAL_LIMIT_BYTES);
+        journal = Some(created.map_err(|error| files::unwritable(&path, &error))?);
     }
-    let mut journal = match &directory {
-        None => None,
-        Some(directory) => {
-            match Journal::create(&directory.file("journal.jsonl"), JOURNAL_LIMIT_BYTES) {
-                Ok(journal) => Some(journal),
-                Err(error) => return Answer::failed(Status::Failed, "U0602", error.to_string()),
-            }
-        }
-    };
     let mut last_ns = 0;
     let account = run_simulation(&cluster, &scenario, seed, &mut |record| {
         last_ns = record.at_ns;
@@ -86,7 +70,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         Ok(account) => account,
         Err(error) => {
             let message = format!("{error}; repeat with: {}", repeat(arguments, seed));
-            return Answer::failed(Status::Failed, "U0530", message).with_used(reports);
+            return Err(Answer::failed(Status::Failed, "U0530", message).with_used(reports));
         }
     };
     let journal = journal.map_or_else(JournalState::default, |mut journal| {
@@ -108,10 +92,10 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         None => answer.and_next(&[&"lab", cluster]),
     };
     answer = answer.and_next(&[&"campaign", cluster, &"--runs", &"1000", &"--seed", &"1"]);
-    match written {
+    Ok(match written {
         Ok(()) => answer,
-        Err(error) => answer.and_failure(Status::Failed, "U0602", error.to_string()),
-    }
+        Err(error) => answer.and_failure(Status::Failed, "U0602", error),
+    })
 }
 
 /// Command line that repeats this run, including its seed.

@@ -138,16 +138,13 @@ pub(crate) fn model(path: &Path) -> Result<Sources<Model>, Answer> {
 
 /// Writes an automaton in the format of the file extension.
 pub(crate) fn write(path: &Path, automaton: &Automaton) -> Result<(), Answer> {
-    let failed = |code: &str, message: String| Answer::failed(Status::Failed, code, message);
     let ending = path
         .extension()
         .unwrap_or_default()
         .to_string_lossy()
         .to_lowercase();
     let text = match ending.as_str() {
-        "ads" => {
-            write_ads(automaton, &[]).map_err(|error| failed(error.code(), error.to_string()))?
-        }
+        "ads" => write_ads(automaton, &[])?,
         "toml" => write_model(&Model {
             name: automaton.name().to_owned(),
             alphabet: automaton.alphabet().clone(),
@@ -155,8 +152,7 @@ pub(crate) fn write(path: &Path, automaton: &Automaton) -> Result<(), Answer> {
             ..Model::default()
         }),
         "dot" => draw_dot(automaton),
-        "svg" => draw_automaton_svg(automaton)
-            .map_err(|error| failed(error.code(), error.to_string()))?,
+        "svg" => draw_automaton_svg(automaton)?,
         _ => {
             let message = format!(
                 "{}: output formats of automata are .ADS, .toml, .dot and .svg",

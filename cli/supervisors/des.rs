@@ -121,7 +121,7 @@ fn pair(text: &str) -> Result<(State, State), String> {
     numbers.ok_or_else(|| "expected a pair of states such as 1:2".to_owned())
 }
 
-pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let bounds = Bounds {
         memory_bytes: arguments.memory.saturating_mul(1_000_000),
     };
@@ -130,36 +130,33 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
         Operation::Check { .. } => automata::all(&files),
         _ => automata::one_each(&files),
     };
-    let Sources { read, reports } = match sources {
-        Ok(sources) => sources,
-        Err(answer) => return answer,
-    };
+    let Sources { read, reports } = sources?;
     let parts: Vec<&Automaton> = read.iter().collect();
     let answer = match arguments.operation.answer(&parts, bounds, console) {
         Ok(Outcome::Answer(answer)) => answer,
-        Ok(Outcome::Automaton(automaton, answer)) => made(arguments, &automaton, answer),
-        Err(error) => Answer::failed(Status::Failed, error.code(), error.to_string()),
+        Ok(Outcome::Automaton(automaton, answer)) => made(arguments, &automaton, answer).into(),
+        Err(error) => Answer::failed(Status::Failed, error.code(), error),
     };
-    answer.with_reports(reports)
+    Ok(answer.with_reports(reports))
 }
 
 /// Adds the automaton to the answer, and writes it to the output file if one is given.
-fn made(arguments: &Arguments, automaton: &Automaton, mut answer: Answer) -> Answer {
+fn made(
+    arguments: &Arguments,
+    automaton: &Automaton,
+    mut answer: Answer,
+) -> Result<Answer, Answer> {
     answer.text = format!("{}{}", answer.text, summary(automaton));
     let mut result = description(automaton);
     if let (Value::Object(result), Value::Object(more)) = (&mut result, answer.result) {
         result.extend(more);
     }
-    if let Some(path) = &arguments.output {
-        if let Err(answer) = automata::write(path, automaton) {
-            return answer;
-        }
-        let name = path.display().to_string();
-        answer.text.push_str(&format!("\nwritten to {name}"));
-        result["file"] = Value::String(name);
-    }
     answer.result = result;
-    answer
+    let Some(path) = &arguments.output else {
+        return Ok(answer);
+    };
+    automata::write(path, automaton)?;
+    Ok(answer.and_written(path))
 }
 
 enum Outcome {
@@ -223,19 +220,15 @@ impl Operation {
                 let events: Vec<Event> = labels.into_iter().map(Event::unnamed).collect();
                 match selfloop(parts[0], &events) {
                     Ok(looped) => Outcome::of(looped),
-                    Err(error) => Outcome::Answer(Answer::failed(
-                        Status::BadInput,
-                        error.code(),
-                        error.to_string(),
-                    )),
+                    Err(error) => {
+                        Outcome::Answer(Answer::failed(Status::BadInput, error.code(), error))
+                    }
                 }
             }
             Self::Mutex { exclude, .. } => match no_such_state(parts, exclude) {
-                Some(error) => Outcome::Answer(Answer::failed(
-                    Status::BadInput,
-                    error.code(),
-                    error.to_string(),
-                )),
+                Some(error) => {
+                    Outcome::Answer(Answer::failed(Status::BadInput, error.code(), error))
+                }
                 None => Outcome::of(mutex(parts[0], parts[1], exclude, bounds)?),
             },
             Self::Nonconflict { .. } => Outcome::Answer(conflict(parts, bounds)?),

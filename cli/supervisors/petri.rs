@@ -102,12 +102,9 @@ impl Operation {
     }
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let path = arguments.operation.net();
-    let text = match files::text_of(Kind::Net, path) {
-        Ok(text) => text,
-        Err(answer) => return answer,
-    };
+    let text = files::text_of(Kind::Net, path)?;
     let read = read_net(&text);
     let report = Report {
         name: path.display().to_string(),
@@ -115,7 +112,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         diagnostics: read.diagnostics,
     };
     let Some(file) = read.file else {
-        return Answer::bad_files(vec![report]);
+        return Err(Answer::bad_files(vec![report]));
     };
     let output = arguments.output.as_deref();
     let answer = match &arguments.operation {
@@ -127,20 +124,16 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         }
         Operation::Draw { form, .. } => drawn(&file, *form, output),
     };
-    match answer {
-        Ok(answer) | Err(answer) => answer.with_reports(vec![report]),
-    }
+    Ok(Answer::from(answer).with_reports(vec![report]))
 }
 
 fn failed(code: &str, error: impl ToString) -> Answer {
-    Answer::failed(Status::Failed, code, error.to_string())
+    Answer::failed(Status::Failed, code, error)
 }
 
 fn bounds(file: &NetFile, limit: usize) -> Result<Answer, Answer> {
     let net = &file.net;
-    let explored = net
-        .explore(limit)
-        .map_err(|error| failed(error.code(), error))?;
+    let explored = net.explore(limit)?;
     let bounds = explored.bounds();
     let places = net.places().iter().zip(&bounds);
     let mut text = String::new();
@@ -180,38 +173,26 @@ fn bounds(file: &NetFile, limit: usize) -> Result<Answer, Answer> {
 }
 
 fn automaton(file: &NetFile, limit: usize, output: Option<&Path>) -> Result<Answer, Answer> {
-    let explored = file
-        .net
-        .explore(limit)
-        .map_err(|error| failed(error.code(), error))?;
-    let made = explored
-        .automaton()
-        .map_err(|error| failed(error.code(), error))?;
+    let explored = file.net.explore(limit)?;
+    let made = explored.automaton()?;
     let made = made.with_event_names(&file.events);
-    let mut text = summary(&made);
-    let mut result = description(&made);
-    if let Some(path) = output {
-        if automata::is_model(path) {
-            // The automaton is a plant of a model, so that specifications can be added.
-            let model = Model {
-                name: made.name().to_owned(),
-                alphabet: made.alphabet().clone(),
-                plants: vec![made],
-                ..Model::default()
-            };
-            files::write(path, &write_model(&model))?;
-        } else {
-            automata::write(path, &made)?;
-        }
-        said(&mut text, &mut result, path);
+    let answer = Answer::done(summary(&made), description(&made));
+    let Some(path) = output else {
+        return Ok(answer);
+    };
+    if automata::is_model(path) {
+        // The automaton is a plant of a model, so that specifications can be added.
+        let model = Model {
+            name: made.name().to_owned(),
+            alphabet: made.alphabet().clone(),
+            plants: vec![made],
+            ..Model::default()
+        };
+        files::write(path, &write_model(&model))?;
+    } else {
+        automata::write(path, &made)?;
     }
-    Ok(Answer::done(text, result))
-}
-
-fn said(text: &mut String, result: &mut Value, path: &Path) {
-    let name = path.display().to_string();
-    text.push_str(&format!("\nwritten to {name}"));
-    result["file"] = Value::String(name);
+    Ok(answer.and_written(path))
 }
 
 fn reduced(mut file: NetFile, output: Option<&Path>) -> Result<Answer, Answer> {
@@ -221,33 +202,26 @@ fn reduced(mut file: NetFile, output: Option<&Path>) -> Result<Answer, Answer> {
     file.net = net;
     let written = write_net(&file);
     let lines: String = steps.iter().map(|step| format!("{step}\n")).collect();
-    let mut text = format!("{lines}{places} places and {transitions} transitions remain");
+    let text = format!("{lines}{places} places and {transitions} transitions remain");
     let mut result = json!({ "places": places, "transitions": transitions, "removed": steps });
     match output {
         Some(path) => {
             files::write(path, &written)?;
-            said(&mut text, &mut result, path);
+            Ok(Answer::done(text, result).and_written(path))
         }
-        None => result["text"] = Value::String(written),
+        None => {
+            result["text"] = Value::String(written);
+            Ok(Answer::done(text, result))
+        }
     }
-    Ok(Answer::done(text, result))
 }
 
 fn drawn(file: &NetFile, form: Form, output: Option<&Path>) -> Result<Answer, Answer> {
     let text = match form {
         Form::Dot => draw_net_dot(&file.net),
-        Form::Svg => draw_net_svg(&file.net).map_err(|error| failed(error.code(), error))?,
+        Form::Svg => draw_net_svg(&file.net)?,
     };
-    let Some(path) = output else {
-        let result = json!({ "text": text });
-        return Ok(Answer::done(text, result));
-    };
-    files::write(path, &text)?;
-    let name = path.display().to_string();
-    Ok(Answer::done(
-        format!("written to {name}"),
-        json!({ "file": name }),
-    ))
+    files::deliver(output, &text, json!({ "text": text }))
 }
 
 fn ladder(
@@ -256,12 +230,8 @@ fn ladder(
     limit: usize,
     output: Option<&Path>,
     mut report: Report,
-) -> Answer {
-    let supervisors = match supervisors(paths) {
-        Ok(supervisors) => supervisors,
-        Err(answer) => return answer,
-    };
-    let named = supervisors.into_iter();
+) -> Result<Answer, Answer> {
+    let named = supervisors(paths)?.into_iter();
     let named: Vec<Automaton> = named
         .map(|one| one.with_event_names(&file.events))
         .collect();
@@ -271,13 +241,13 @@ fn ladder(
         // Names of ladder signals have positions in the net file.
         Err(HybridError::Invalid(found)) => {
             report.diagnostics.extend(found);
-            return Answer::bad_files(vec![report]);
+            return Err(Answer::bad_files(vec![report]));
         }
-        Err(error) => return failed(error.code(), error).with_reports(vec![report]),
+        Err(error) => return Err(failed(error.code(), error).with_reports(vec![report])),
     };
     if let Err(found) = locate(&mut made.program, &file.addresses) {
         report.diagnostics.extend(found);
-        return Answer::bad_files(vec![report]);
+        return Err(Answer::bad_files(vec![report]));
     }
     // Nets that cannot be explored in advance are still proved.
     let found = hybrid_findings(&file.net, &named, limit).map_err(|error| error.to_string());
@@ -287,9 +257,11 @@ fn ladder(
             let message = format!("the ladder differs from the net and its supervisors:\n{found}");
             failed("U0875", message)
         }
-        Ok(HybridVerdict::Proved(proof)) => proved(&print(&made.program), &proof, &found, output),
+        Ok(HybridVerdict::Proved(proof)) => {
+            proved(&print(&made.program), &proof, &found, output).into()
+        }
     };
-    answer.with_reports(vec![report])
+    Ok(answer.with_reports(vec![report]))
 }
 
 fn supervisors(paths: &[PathBuf]) -> Result<Vec<Automaton>, Answer> {
@@ -316,7 +288,7 @@ fn proved(
     proof: &HybridProof,
     found: &Result<Vec<Finding>, String>,
     output: Option<&Path>,
-) -> Answer {
+) -> Result<Answer, Answer> {
     let mut result = json!({
         "rungs": ladder.lines().filter(|line| line.starts_with("rung")).count(),
         "proof": {
@@ -332,15 +304,13 @@ fn proved(
         .ok()
         .and_then(|found| withheld(found, &result))
     {
-        return answer;
+        return Err(answer);
     }
     result["ladder"] = json!(ladder);
     let Some(path) = output else {
-        return Answer::done(ladder, result);
+        return Ok(Answer::done(ladder, result));
     };
-    if let Err(answer) = files::write(path, ladder) {
-        return answer;
-    }
+    files::write(path, ladder)?;
     let said_before = match found {
         Ok(found) => notes(found),
         Err(error) => format!("preliminary check omitted: {error}\n"),
@@ -355,6 +325,6 @@ fn proved(
             proof.never_fired.join(" ")
         ));
     }
-    said(&mut text, &mut result, path);
-    Answer::done(text, result).and_next(&[&"verify", &path])
+    let answer = Answer::done(text, result).and_written(path);
+    Ok(answer.and_next(&[&"verify", &path]))
 }

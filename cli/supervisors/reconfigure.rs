@@ -39,13 +39,7 @@ pub(crate) struct Arguments {
     output: Option<PathBuf>,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
-    match reconfigure(arguments) {
-        Ok(answer) | Err(answer) => answer,
-    }
-}
-
-fn reconfigure(arguments: &Arguments) -> Result<Answer, Answer> {
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let (mut project, mut reports) = read(&arguments.project)?;
     narrow(arguments, &mut project)?;
     let outcome = analyse(&project).map_err(|failure| failed(&failure))?;
@@ -62,10 +56,7 @@ fn reconfigure(arguments: &Arguments) -> Result<Answer, Answer> {
         return Ok(Answer::done(report, result).with_reports(reports));
     };
     let files = written(&outcome, report, &result)?;
-    std::fs::create_dir_all(folder).map_err(|error| {
-        let message = format!("{} cannot be written: {error}", folder.display());
-        Answer::failed(Status::Failed, "U0602", message)
-    })?;
+    files::make_folder(folder)?;
     for (name, text) in &files {
         files::write(&folder.join(name), text)?;
     }
@@ -135,11 +126,8 @@ fn written(
     report: String,
     result: &Value,
 ) -> Result<Vec<(&'static str, String)>, Answer> {
-    let drawn = |automaton: Result<_, understudy_supervisor::AutomatonError>| {
-        automaton.map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))
-    };
-    let controller = drawn(outcome.drawn_controller())?;
-    let mega = drawn(outcome.drawn_mega_controller())?;
+    let controller = outcome.drawn_controller()?;
+    let mega = outcome.drawn_mega_controller()?;
     let mut files = vec![
         ("report.md", report),
         ("feedback.md", outcome.tables()),

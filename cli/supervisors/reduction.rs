@@ -6,7 +6,7 @@ use understudy_bus::Interruption;
 use understudy_supervisor::operations::{Reducing, supreduce_while};
 use understudy_supervisor::{Automaton, Bounds};
 
-use crate::answer::{Answer, Status};
+use crate::answer::Answer;
 use crate::console::Console;
 
 /// Time limit: the smallest supervisor so far is the result.
@@ -46,8 +46,7 @@ pub(crate) fn reduced(
         interrupted = interruption.as_ref().is_some_and(Interruption::came);
         !interrupted && begin.elapsed() < LIMIT
     };
-    let made = supreduce_while(plant, supervisor, bounds, &mut go_on)
-        .map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))?;
+    let made = supreduce_while(plant, supervisor, bounds, &mut go_on)?;
     let warning = (!made.is_complete).then(|| {
         format!(
             "warning[U0847]: the reduction was {} after {} s at {} of {} states; the supervisor has the same effect, but may not be minimal\n",

@@ -70,13 +70,7 @@ impl From<ModeWord> for Mode {
     }
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Answer {
-    match convert_and_prove(arguments) {
-        Ok(answer) | Err(answer) => answer,
-    }
-}
-
-fn convert_and_prove(arguments: &Arguments) -> Result<Answer, Answer> {
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let supervisor = source(&arguments.supervisor)?;
     let mut plants = Vec::new();
     let mut signals = supervisor.model.signals.clone();
@@ -105,8 +99,7 @@ fn convert_and_prove(arguments: &Arguments) -> Result<Answer, Answer> {
     let mode = Mode::from(arguments.mode);
     let conversion = convert(&modules, &map, mode)
         .map_err(|diagnostics| bad_map(report.clone(), diagnostics))?;
-    let found = findings(&modules)
-        .map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))?;
+    let found = findings(&modules)?;
     let settings = ProofSettings {
         mode,
         ..ProofSettings::default()
@@ -117,8 +110,7 @@ fn convert_and_prove(arguments: &Arguments) -> Result<Answer, Answer> {
         &map,
         &conversion.correspondence,
         settings,
-    )
-    .map_err(|error| Answer::failed(Status::Failed, error.code(), error.to_string()))?;
+    )?;
     Ok(answer(arguments, &modules, &conversion, &found, verdict))
 }
 

@@ -68,14 +68,11 @@ enum Engine {
     Specified,
 }
 
-pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let Sources {
         read: model,
         reports,
-    } = match automata::model(&arguments.model) {
-        Ok(sources) => sources,
-        Err(answer) => return answer,
-    };
+    } = automata::model(&arguments.model)?;
     let findings = model_findings(&model);
     let answer = if findings
         .iter()
@@ -83,13 +80,11 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
     {
         with_findings(Answer::done("", json!({})), &findings, Status::BadInput)
     } else {
-        match made(arguments, model, console) {
-            Ok(answer) | Err(answer) => answer,
-        }
+        made(arguments, model, console).into()
     };
     let answer = answer.with_reports(reports);
-    match &arguments.output {
-        Some(path) if path.extension().is_some_and(|ending| ending == "toml") => {
+    Ok(match &arguments.output {
+        Some(path) if automata::is_model(path) => {
             answer.and_next(&[&"supervisor-to-ladder", path, &"--plant", path])
         }
         Some(_) => answer,
@@ -97,11 +92,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
             let model = &arguments.model;
             answer.and_next(&[&"synth", model, &"--reduce", &"-o", &"supervisor.toml"])
         }
-    }
-}
-
-fn failed(code: &str, message: String) -> Answer {
-    Answer::failed(Status::Failed, code, message)
+    })
 }
 
 fn made(arguments: &Arguments, model: Model, console: &mut Console) -> Result<Answer, Answer> {
@@ -122,8 +113,7 @@ fn explicit(
     bounds: Bounds,
     console: &mut Console,
 ) -> Result<Answer, Answer> {
-    let result = synthesise(&model.plants(), &model.specifications(), bounds)
-        .map_err(|error| failed(error.code(), error.to_string()))?;
+    let result = synthesise(&model.plants(), &model.specifications(), bounds)?;
     let findings = synthesis_findings(&model, &result);
     let (supervisor, warning) = reduced(
         arguments,
@@ -150,8 +140,7 @@ fn specified(arguments: &Arguments, model: Model, bounds: Bounds) -> Result<Answ
         let message = "the engine `specified` does not modify the specifications".to_owned();
         return Err(Answer::failed(Status::BadInput, "U0655", message));
     }
-    let result = synthesise(&model.plants(), &model.specifications(), bounds)
-        .map_err(|error| failed(error.code(), error.to_string()))?;
+    let result = synthesise(&model.plants(), &model.specifications(), bounds)?;
     let mut findings = synthesis_findings(&model, &result);
     findings.extend(specification_findings(&result));
     let mut value = description(&result.supervisor);
@@ -178,8 +167,7 @@ fn modular(
     bounds: Bounds,
     console: &mut Console,
 ) -> Result<Answer, Answer> {
-    let result = synthesise_modularly(&model.plants(), &model.specifications(), bounds)
-        .map_err(|error| failed(error.code(), error.to_string()))?;
+    let result = synthesise_modularly(&model.plants(), &model.specifications(), bounds)?;
     let findings = modular_findings(&model, &result);
     let mut supervisors = Vec::new();
     let mut values = Vec::new();
@@ -229,11 +217,8 @@ fn symbolic(
     console: &mut Console,
 ) -> Result<Answer, Answer> {
     let (plants, specifications) = (model.plants(), model.specifications());
-    let made = synthesise_symbolically(&plants, &specifications, SymbolicBounds::default())
-        .map_err(|error| failed(error.code(), error.to_string()))?;
-    let transitions = made
-        .transition_count()
-        .map_err(|error| failed(error.code(), error.to_string()))?;
+    let made = synthesise_symbolically(&plants, &specifications, SymbolicBounds::default())?;
+    let transitions = made.transition_count()?;
     let count = |count: Option<u128>| count.map_or("more than 2^128".to_owned(), |n| n.to_string());
     // Counts that a double would round are strings in JSON.
     let number = |value: Option<u128>| match value.map(u64::try_from) {
@@ -254,18 +239,14 @@ fn symbolic(
         made.node_count()
     );
     let mut answer = Answer::done(text, value);
-    let why = made
-        .explanation(plants.len())
-        .map_err(|error| failed(error.code(), error.to_string()))?;
+    let why = made.explanation(plants.len())?;
     if let Some(why) = &why {
         answer = with_findings(answer, &[empty_finding(model, why)], Status::Failed);
     }
     if arguments.output.is_none() && !arguments.reduce && !arguments.minstate {
         return Ok(answer);
     }
-    let listed = made
-        .to_automaton(bounds)
-        .map_err(|error| failed(error.code(), error.to_string()))?;
+    let listed = made.to_automaton(bounds)?;
     let (supervisor, warning) = reduced(arguments, &plants, listed, bounds, console)?;
     let supervisor = named(arguments, supervisor);
     let mut value = description(&supervisor);
@@ -297,7 +278,7 @@ fn reduced(
     if !arguments.reduce {
         return Ok((supervisor, String::new()));
     }
-    let plant = sync(plants, bounds).map_err(|error| failed(error.code(), error.to_string()))?;
+    let plant = sync(plants, bounds)?;
     let (supervisor, warning) = reduction::reduced(&plant, &supervisor, bounds, console)?;
     Ok((supervisor, warning.unwrap_or_default()))
 }
@@ -331,20 +312,18 @@ fn written(
     arguments: &Arguments,
     model: Model,
     supervisors: Vec<Automaton>,
-    mut answer: Answer,
+    answer: Answer,
 ) -> Result<Answer, Answer> {
     let Some(path) = &arguments.output else {
         return Ok(answer);
     };
     match supervisors.as_slice() {
         _ if automata::is_model(path) => {
-            files::write(
-                path,
-                &write_model(&Model {
-                    supervisors,
-                    ..model
-                }),
-            )?;
+            let model = Model {
+                supervisors,
+                ..model
+            };
+            files::write(path, &write_model(&model))?;
         }
         [only] => automata::write(path, only)?,
         _ => {
@@ -356,8 +335,5 @@ fn written(
             return Err(Answer::failed(Status::BadInput, "U0654", message));
         }
     }
-    let name = path.display().to_string();
-    answer.text.push_str(&format!("\nwritten to {name}"));
-    answer.result["file"] = Value::String(name);
-    Ok(answer)
+    Ok(answer.and_written(path))
 }

@@ -141,6 +141,6 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
             };
             Answer::done(text, carried)
         }
-        Err(error) => Answer::failed(Status::Failed, error.code(), error.to_string()),
+        Err(error) => Answer::failed(Status::Failed, error.code(), error),
     }
 }

@@ -49,7 +49,7 @@ pub(crate) fn completions(arguments: &CompletionsArguments) -> Answer {
 pub(crate) fn man(_: &ManArguments) -> Answer {
     match page() {
         Ok(page) => answer(page),
-        Err(error) => Answer::failed(Status::Failed, "U0602", error.to_string()),
+        Err(error) => Answer::failed(Status::Failed, "U0602", error),
     }
 }
 

@@ -1,10 +1,7 @@
 //! `cargo bench -p understudy-reliability`
 
 use divan::Bencher;
-use divan::counter::ItemsCount;
-use rand_pcg::Pcg64;
-use rand_pcg::rand_core::SeedableRng;
-use understudy_reliability::{ChainBuilder, Level, ThreeState, birth_death_mttf, simulate};
+use understudy_reliability::ChainBuilder;
 
 fn main() {
     divan::main();
@@ -13,50 +10,26 @@ fn main() {
 const FAILURE_RATE: f64 = 1e-4;
 const REPAIR_RATE: f64 = 1.0 / 24.0;
 
-fn level(pairs: f64, degraded: f64) -> Level {
-    Level {
-        up: (pairs - degraded) * 2.0 * FAILURE_RATE,
-        down: degraded * REPAIR_RATE,
-        lethal: degraded * FAILURE_RATE,
-    }
-}
-
-/// The duplex system of a million pairs, lumped.
+/// The duplex system of a million pairs, lumped: pairs fail and are repaired one by one, and any degraded one may be the end.
 #[divan::bench]
 fn duplex_of_a_million_states(bencher: Bencher<'_, '_>) {
-    bencher.bench(|| birth_death_mttf(1_000_000, |k| level(999_999.0, k as f64)).expect("a mean"));
-}
-
-/// The same as a chain of any shape, already in memory.
-#[divan::bench]
-fn duplex_of_a_million_states_as_a_chain(bencher: Bencher<'_, '_>) {
     let mut builder = ChainBuilder::new();
     let pairs = 999_999;
     for _ in 0..=pairs {
         builder.state("");
     }
     let failed = builder.failure("failed");
-    for k in 0..=pairs {
-        let level = level(pairs as f64, k as f64);
-        if k < pairs {
-            builder.transition(k, k + 1, level.up);
+    for degraded in 0..=pairs {
+        let (whole, down) = ((pairs - degraded) as f64, degraded as f64);
+        if degraded < pairs {
+            builder.transition(degraded, degraded + 1, whole * 2.0 * FAILURE_RATE);
         }
-        if k > 0 {
+        if degraded > 0 {
             builder
-                .transition(k, k - 1, level.down)
-                .transition(k, failed, level.lethal);
+                .transition(degraded, degraded - 1, down * REPAIR_RATE)
+                .transition(degraded, failed, down * FAILURE_RATE);
         }
     }
     let chain = builder.build().expect("a chain");
     bencher.bench(|| chain.mttf().expect("a mean"));
-}
-
-/// Times to failure of the three-state model.
-#[divan::bench]
-fn three_state_paths(bencher: Bencher<'_, '_>) {
-    let model = ThreeState::new(3, FAILURE_RATE, REPAIR_RATE).expect("a model");
-    let mut random = Pcg64::seed_from_u64(1);
-    bencher
-        .counter(ItemsCount::new(1_000_000_u32))
-        .bench_local(|| simulate(&model, 1_000_000, None, 0.95, &mut random).expect("a mean"));
 }

@@ -14,9 +14,9 @@ use crate::transient::AfterFailure;
 /// Result of `reliability`, as in JSON. Times in hours; absent values were not requested.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Answer {
-    /// What was asked.
+    /// The options of the calculation.
     pub options: Options,
-    /// Boxes of the cluster.
+    /// Stations of the cluster.
     pub boxes: u32,
     /// The paper's model with one spare, (20).
     pub mttf_paper_hours: f64,
@@ -30,7 +30,7 @@ pub struct Answer {
     pub mttf_tmr_hours: f64,
     /// Standard deviation of the cluster's time to failure.
     pub deviation_cluster_hours: Option<f64>,
-    /// What holds at the end of the mission.
+    /// Results at the end of the mission.
     #[serde(flatten)]
     pub mission: Option<Mission>,
 }
@@ -39,7 +39,7 @@ pub struct Answer {
 /// others has twelve digits, 1 - R as well as R.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Mission {
-    /// Its length.
+    /// Mission time.
     pub mission_hours: f64,
     /// R of the paper's model, (18).
     pub reliability_paper: Option<f64>,
@@ -61,7 +61,7 @@ pub struct Mission {
     pub unreliability_simplex: Option<f64>,
     /// 1 - R of TMR.
     pub unreliability_tmr: Option<f64>,
-    /// All stations of the paper's model work, (15).
+    /// Probability that all stations of the paper's model work, (15).
     pub p0: Option<f64>,
     /// Some box of it is down, (16).
     pub p1: Option<f64>,
@@ -69,7 +69,7 @@ pub struct Mission {
     pub p2: Option<f64>,
 }
 
-/// Calculates all that was asked.
+/// Calculates the answer to the options.
 ///
 /// # Errors
 /// Everything that is wrong with the options, or the first result that cannot be had.

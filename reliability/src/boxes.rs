@@ -10,18 +10,18 @@ use crate::quantity::Hours;
 /// The name that means the understudies, where there is no cluster file.
 pub const UNDERSTUDIES: &str = "understudies";
 
-/// Boxes with times of their own.
+/// Stations with times of their own.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct UnequalBoxes {
-    /// Which: of a cluster file, a station; otherwise any name, [`UNDERSTUDIES`] being all of these.
+    /// The name of a station of the cluster file; without one, any name, where [`UNDERSTUDIES`] means all understudies.
     pub name: String,
-    /// How many controllers; of understudies, all.
+    /// Number of controllers; for understudies it stands for all.
     pub count: u32,
     /// Whether they are understudies.
     pub understudies: bool,
-    /// Of each.
+    /// Mean time between failures of each.
     pub mtbf: Hours,
-    /// Of each, from its detection on.
+    /// Mean time to repair each, from the detection of its failure.
     pub mttr: Hours,
 }
 

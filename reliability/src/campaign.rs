@@ -24,43 +24,43 @@ const MAXIMUM_RUNNING: usize = 400;
 pub struct SystemFailure {
     /// Since the plant was whole, in its own hours (not accelerated).
     pub hours: f64,
-    /// What brought it about, such as `robot after understudy`.
+    /// The cause, such as `robot after understudy`.
     pub cause: String,
 }
 
-/// What a campaign found.
+/// Results of a campaign.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Campaign {
-    /// Where it was run: `simulator` or `processes`.
+    /// Where the campaign ran: `simulator` or `processes`.
     pub world: String,
-    /// Of all randomness.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// How many times faster than the plant.
+    /// Acceleration compared with the plant.
     pub acceleration: f64,
-    /// In the order in which they came.
+    /// Failures of the system in the order of their occurrence.
     pub failures: Vec<SystemFailure>,
     /// Hours of runs that were given up before they failed.
     pub censored_hours: Vec<f64>,
     /// Failures of single stations that should have been masked.
     pub box_failures: u64,
-    /// Those of them that were masked.
+    /// Number of these failures that were masked.
     pub masked: u64,
     /// Times from a failure of a box to its detection, in hours of the machine (not scaled).
     pub detection_hours: Vec<f64>,
     /// Times of repairs that were finished, in hours of the plant.
     pub repair_hours: Vec<f64>,
-    /// How long repairs had lasted that the failure of the system cut off, in hours of the plant.
+    /// Durations of repairs that the failure of the system interrupted, in hours of the plant.
     pub unfinished_repair_hours: Vec<f64>,
 }
 
 /// A campaign compared with the model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Assessment {
-    /// Where it was run.
+    /// Where the campaign ran.
     pub world: String,
-    /// Of the campaign's randomness.
+    /// Seed of the campaign.
     pub seed: u64,
-    /// How many times faster than the plant.
+    /// Acceleration compared with the plant.
     pub acceleration: f64,
     /// Failures of the system.
     pub failures: usize,
@@ -68,7 +68,7 @@ pub struct Assessment {
     pub censored: usize,
     /// Measured MTTF in hours.
     pub mttf_hours: Interval,
-    /// That of the model.
+    /// MTTF of the model in hours.
     pub model_hours: f64,
     /// Whether the model lies in the interval.
     pub agrees: bool,
@@ -84,13 +84,13 @@ pub struct Assessment {
     pub shape_fit: Option<Fit>,
     /// The model by simulation with failure biasing.
     pub rare_event: RareEvent,
-    /// How often each cause was found.
+    /// Number of occurrences of each cause.
     pub causes: BTreeMap<String, u64>,
     /// Estimate with its interval after a number of failures.
     pub running: Vec<(usize, Interval)>,
     /// The failures, the first of them.
     pub log: Vec<SystemFailure>,
-    /// What speaks against the model, in sentences.
+    /// Findings that contradict the model, as sentences.
     pub doubts: Vec<String>,
 }
 

@@ -163,7 +163,7 @@ impl Chain {
         state_name(&self.names, place)
     }
 
-    /// Where it starts.
+    /// The state in which the chain starts.
     pub fn start(&self) -> usize {
         self.start
     }

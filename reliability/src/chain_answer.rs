@@ -24,7 +24,7 @@ pub struct ChainAnswer {
     pub deviation_hours: Option<f64>,
     /// Probability of a failure state in the long run.
     pub unavailability: Option<f64>,
-    /// At the end of the mission.
+    /// Results at the end of the mission.
     #[serde(flatten)]
     pub mission: Option<ChainMission>,
     /// States with their probabilities.
@@ -33,10 +33,10 @@ pub struct ChainAnswer {
     pub remarks: Vec<String>,
 }
 
-/// At the end of a mission.
+/// Results at the end of a mission.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ChainMission {
-    /// Its length.
+    /// Mission time.
     pub mission_hours: f64,
     /// Probability that there was no failure.
     pub reliability: Option<f64>,
@@ -49,7 +49,7 @@ pub struct ChainMission {
 /// One state.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StateAnswer {
-    /// Its name.
+    /// Name of the state.
     pub name: String,
     /// Whether it is a failure.
     pub failure: bool,

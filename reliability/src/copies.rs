@@ -31,7 +31,7 @@ impl System {
     /// Chain with `copies` controllers in place of each, of which one may be down at a time.
     ///
     /// # Errors
-    /// As [`System::chain`].
+    /// The errors of [`System::chain`].
     pub fn copies_chain(&self, copies: u32) -> Result<Chain, Vec<ReliabilityError>> {
         self.check()?;
         self.chain_of_copies(&self.copied(), self.lethal_to_copies(), copies)
@@ -40,7 +40,7 @@ impl System {
     /// Whether [`System::copies_chain`] has failed by `hours`.
     ///
     /// # Errors
-    /// As [`System::chain`] and [`Chain::transients`].
+    /// The errors of [`System::chain`] and [`Chain::transients`].
     pub fn copies_survival(
         &self,
         copies: u32,

@@ -5,7 +5,6 @@
 //! of the state that was left. A return to where one came from is dropped on both sides, and so the rate of leaving is a sum.
 //! States are numbered as they are found from the start, which keeps the rates near the diagonal; only that band is stored.
 
-use crate::birth_death::{Level, birth_death_mttf};
 use crate::chain::Chain;
 use crate::error::ReliabilityError;
 
@@ -27,9 +26,9 @@ const MAXIMUM_SWEEPS: u32 = 20_000;
 /// Mean and variance of the time to the first failure.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct TimeToFailure {
-    /// In hours.
+    /// Mean in hours.
     pub mean_hours: f64,
-    /// In hours squared.
+    /// Variance in hours squared.
     pub variance_hours_squared: f64,
 }
 
@@ -44,8 +43,6 @@ impl Chain {
             return Ok(0.0);
         }
         let mean = match alive.band() {
-            // Without a matrix where it is a line; a line that never fails is named by the elimination.
-            Some(0 | 1) => alive.line().or_else(|_| alive.mean(1))?,
             Some(width) if alive.work(width) <= CHEAP_WORK => alive.mean(width)?,
             width => self.wide_mean(&alive, width)?,
         };
@@ -64,7 +61,7 @@ impl Chain {
     /// Mean and variance of the time to the first failure.
     ///
     /// # Errors
-    /// As [`Chain::mttf`], and a chain too large to eliminate.
+    /// The errors of [`Chain::mttf`], and a chain too large to eliminate.
     pub fn time_to_failure(&self) -> Result<TimeToFailure, ReliabilityError> {
         let alive = Alive::failing(self)?;
         if alive.order.is_empty() {
@@ -223,25 +220,6 @@ impl<'a> Alive<'a> {
         self.check_start(&eliminated)?;
         let gathered = eliminated.gather(vec![1.0; self.order.len()]);
         Ok(gathered[0] / eliminated.leaving[0])
-    }
-
-    /// Mean time to failure of a birth-death chain.
-    fn line(&self) -> Result<f64, ReliabilityError> {
-        birth_death_mttf(self.order.len(), |place| {
-            let mut level = Level {
-                up: 0.0,
-                down: 0.0,
-                lethal: 0.0,
-            };
-            for (to, rate) in self.rates(place) {
-                match to {
-                    None => level.lethal += rate,
-                    Some(to) if to > place => level.up += rate,
-                    Some(_) => level.down += rate,
-                }
-            }
-            level
-        })
     }
 
     /// The start is out last; where nothing leads from it to a failure, the chain never fails.

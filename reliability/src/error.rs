@@ -20,9 +20,9 @@ pub enum ReliabilityError {
         written(*hours)
     )]
     Time {
-        /// Which one.
+        /// Name of the time.
         what: String,
-        /// As it was given.
+        /// The given value.
         hours: f64,
     },
     /// A rate that is zero, negative, infinite or not a number.
@@ -31,37 +31,37 @@ pub enum ReliabilityError {
         written(*per_hour)
     )]
     Rate {
-        /// Which one.
+        /// Name of the rate.
         what: String,
-        /// As it was given.
+        /// The given value.
         per_hour: f64,
     },
     /// A probability outside [0, 1].
     #[error("U0703: {what} is {}; a probability lies between 0 and 1", written(*value))]
     Probability {
-        /// Which one.
+        /// Name of the probability.
         what: String,
-        /// As it was given.
+        /// The given value.
         value: f64,
     },
     /// A count that is too small or too large.
     #[error("U0704: {what} is {count}; it must be between {minimum} and {maximum}")]
     Count {
-        /// Which one.
+        /// Name of the count.
         what: String,
-        /// As it was given.
+        /// The given value.
         count: u64,
-        /// At least.
+        /// Lower bound.
         minimum: u64,
-        /// At most.
+        /// Upper bound.
         maximum: u64,
     },
     /// A text that is no time.
     #[error("U0705: {text:?} is not a time: {why}")]
     TimeText {
-        /// As it was given.
+        /// The given text.
         text: String,
-        /// What is wrong with it.
+        /// The reason.
         why: String,
     },
     /// The failure is never reached, so there is no time to it.
@@ -84,9 +84,9 @@ pub enum ReliabilityError {
     /// A transition or a start names a state that is not there.
     #[error("U0709: there is no state {place}; the chain has {states} states, counted from 0")]
     NoSuchState {
-        /// As it was given.
+        /// The given number of the state.
         place: usize,
-        /// How many there are.
+        /// Number of states.
         states: usize,
     },
     /// A transition from a state to itself changes nothing.
@@ -95,7 +95,7 @@ pub enum ReliabilityError {
         /// The state.
         state: String,
     },
-    /// In the long run the chain does not come back to where it started.
+    /// The chain does not return to its start in the long run.
     #[error(
         "U0711: the chain has no steady state: the state {state} cannot be reached again once it is left"
     )]
@@ -136,13 +136,13 @@ pub enum ReliabilityError {
     /// A result that no double holds.
     #[error("U0715: {what} is outside of the numeric range")]
     OutOfRange {
-        /// Which one.
+        /// Name of the result.
         what: String,
     },
     /// A measurement that allows no estimate.
     #[error("U0716: {why}")]
     Measurement {
-        /// What is missing or contradicts itself.
+        /// The missing or contradictory item.
         why: String,
     },
     /// An acceleration that hides what detection and repair really cost.
@@ -150,7 +150,7 @@ pub enum ReliabilityError {
         "U0717: an acceleration of {factor} is more than {maximum}; detection is not accelerated, so the result would be about the detection (force it if that is wanted)"
     )]
     Acceleration {
-        /// As it was given.
+        /// The given acceleration.
         factor: f64,
         /// The bound.
         maximum: f64,
@@ -166,15 +166,15 @@ pub enum ReliabilityError {
     /// Invalid text of stations or of a shared part.
     #[error("U0720: {text:?} names no boxes with their times: {why}")]
     BoxText {
-        /// As it was given.
+        /// The given text.
         text: String,
-        /// What is wrong with it.
+        /// The reason.
         why: String,
     },
     /// A drawing that the plotting library refused, or a template that does not fit.
     #[error("U0719: the report could not be made: {why}")]
     Report {
-        /// What the library said.
+        /// Message of the library.
         why: String,
     },
 }

@@ -41,7 +41,7 @@ pub struct FigurePoint {
 /// Points of figures 5 and 6 for stations with these times.
 ///
 /// # Errors
-/// As [`System::chain`] and [`Chain::mttf`](crate::Chain::mttf).
+/// The errors of [`System::chain`] and [`Chain::mttf`](crate::Chain::mttf).
 pub fn figures_5_and_6(
     mtbf: Hours,
     mttr: Hours,

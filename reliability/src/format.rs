@@ -27,7 +27,7 @@
 
 mod value;
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 use understudy_text::spelling::suggestion;
 
@@ -43,7 +43,7 @@ pub const MAXIMUM_TEXT_BYTES: usize = 64 << 20;
 /// Findings of one text, at most; the rest is not looked for.
 const MAXIMUM_FINDINGS: usize = 200;
 
-/// What was read.
+/// The result of reading a chain.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadChain {
     /// The chain, if it is valid.
@@ -71,7 +71,7 @@ pub fn read_chain(name: &str, text: &str) -> ReadChain {
 #[derive(Default)]
 struct Reader {
     findings: Vec<Diagnostic>,
-    constants: HashMap<String, Constant>,
+    constants: BTreeMap<String, Constant>,
     states: Vec<(String, Range<usize>)>,
     places: HashMap<String, usize>,
     failures: Vec<bool>,

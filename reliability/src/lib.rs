@@ -1,8 +1,8 @@
 //! How long it works: Markov models of redundant controllers, estimates from what was measured, and their report.
 //!
-//! Calculated: [`ThreeState`] is the paper's model, (14) to (20), in closed form; [`System`] describes a plant's boxes and gives a
-//! [`Chain`]; a chain gives mean times by elimination and transients by uniformisation. Invariant of all of it: probabilities and times
-//! are sums of terms that are not negative, so that no result loses its digits, whatever the rates are.
+//! Calculated: a [`System`] describes the stations of a plant and gives a [`Chain`]; with [`Rule::Paper`] it is the paper's model,
+//! (14) to (20). A chain gives mean times by elimination and transients by uniformisation. Invariant: probabilities and times are
+//! sums of terms that are not negative, so no result loses its digits, whatever the rates are.
 //!
 //! Measured: estimates with exact intervals, a test of fit against the law that the model implies, and simulation of what is too rare to
 //! wait for. Randomness is an argument.
@@ -10,7 +10,6 @@
 //! One function answers each question of the command line: [`calculate`], [`answer_chain`], [`assess`], [`outlook`], [`report_data`] with [`report`].
 
 mod answer;
-mod birth_death;
 mod boxes;
 mod campaign;
 mod chain;
@@ -27,16 +26,13 @@ mod graph;
 mod measured;
 mod options;
 mod poisson_weights;
-mod quantile;
 mod quantity;
 mod report;
 mod sensitivity;
 mod system;
-mod three_state;
 mod transient;
 
 pub use answer::{Answer, Mission, calculate};
-pub use birth_death::{Level, birth_death_mttf};
 pub use boxes::{UNDERSTUDIES, UnequalBoxes};
 pub use campaign::{Assessment, Campaign, SystemFailure, assess};
 pub use chain::{Chain, ChainBuilder, MAXIMUM_STATES};
@@ -48,8 +44,7 @@ pub use figures::{FigurePoint, PerUnit, figures_5_and_6};
 pub use format::{MAXIMUM_TEXT_BYTES, ReadChain, read_chain};
 pub use measured::{
     AccelerationBias, Fit, Interval, Law, MAXIMUM_ACCELERATION, Null, Observed, Outlook, RareEvent,
-    Simulated, Stopped, acceleration_bias, fit, mean_time, outlook, proportion, rare_event,
-    simulate, times_to_failure,
+    Stopped, acceleration_bias, fit, mean_time, outlook, proportion, rare_event, times_to_failure,
 };
 pub use options::Options;
 pub use quantity::{
@@ -63,7 +58,6 @@ pub use system::{
     BoxKind, CommonCause, CommonCauseConvention, MAXIMUM_BOXES, MAXIMUM_MODEL_STATES, Rule,
     SharedPart, System,
 };
-pub use three_state::{StateProbabilities, ThreeState};
 pub use transient::{AfterFailure, Transient};
 
 /// The examples of the codes of this crate are run with its own.

@@ -6,7 +6,6 @@ mod fit;
 mod law;
 mod online;
 mod rare;
-mod simulate;
 
 pub use acceleration::{AccelerationBias, MAXIMUM_ACCELERATION, acceleration_bias};
 pub use estimate::{Interval, Stopped, mean_time, proportion, times_to_failure};
@@ -14,4 +13,3 @@ pub use fit::{Fit, Null, fit};
 pub use law::Law;
 pub use online::{Observed, Outlook, outlook};
 pub use rare::{RareEvent, rare_event};
-pub use simulate::{Simulated, simulate};

@@ -16,13 +16,13 @@ pub struct Options {
     pub spares: u32,
     /// Groups that share no understudy.
     pub groups: u32,
-    /// When a group has failed.
+    /// The rule by which a group fails.
     pub rule: Rule,
-    /// Of each box.
+    /// Mean time between failures of each station.
     pub mtbf: Hours,
-    /// Of each box, from its detection on.
+    /// Mean time to repair each station, from the detection of its failure.
     pub mttr: Hours,
-    /// Boxes with times of their own; the others have these.
+    /// Stations with times of their own; all others have the times above.
     pub unequal: Vec<UnequalBoxes>,
     /// Repair crews; nothing: one for each box.
     pub crews: Option<u32>,
@@ -32,7 +32,7 @@ pub struct Options {
     pub detection: Option<Hours>,
     /// Common-cause factor β: share of failures that affect all stations.
     pub beta: f64,
-    /// How β is counted.
+    /// Convention for β.
     pub convention: CommonCauseConvention,
     /// Parts that everything depends on.
     pub shared: Vec<SharedPart>,

@@ -47,7 +47,7 @@ impl Hours {
         }
     }
 
-    /// Its number of hours.
+    /// The number of hours.
     pub fn get(self) -> f64 {
         self.0
     }
@@ -116,9 +116,9 @@ impl fmt::Display for Hours {
 pub struct Probability(f64);
 
 impl Probability {
-    /// What is certain.
+    /// A certain event.
     pub const ONE: Self = Self(1.0);
-    /// What never happens.
+    /// An impossible event.
     pub const ZERO: Self = Self(0.0);
 
     /// A probability of `value`; `what` names it where it is refused.
@@ -136,7 +136,7 @@ impl Probability {
         }
     }
 
-    /// As a number.
+    /// The probability as a number.
     pub fn get(self) -> f64 {
         self.0
     }

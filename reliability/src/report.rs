@@ -30,16 +30,16 @@ const FIGURE_CONTROLLERS: std::ops::RangeInclusive<u32> = 1..=50;
 /// Understudies in the table of what to buy, at most.
 const MOST_UNDERSTUDIES: u32 = 3;
 
-/// What the caller knows and this crate does not.
+/// Data of a report that the caller provides.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Provenance {
-    /// Of the plant or the cluster.
+    /// Title of the plant or the cluster.
     pub title: String,
     /// Hash of the cluster's configuration, where there is one.
     pub configuration: Option<String>,
     /// Version of the program.
     pub version: String,
-    /// When it was made, as the caller says it.
+    /// Date of the report, as the caller writes it.
     pub date: String,
     /// The command that makes it again.
     pub repeat: String,
@@ -48,7 +48,7 @@ pub struct Provenance {
 /// Reliability and hazard over time.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OverTime {
-    /// Of which configuration.
+    /// Name of the configuration.
     pub name: String,
     /// Hours, R, and the hazard per hour.
     pub points: Vec<(f64, f64, f64)>,
@@ -57,9 +57,9 @@ pub struct OverTime {
 /// Everything that the report says.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReportData {
-    /// Of this format: 1.
+    /// Version of this format: 1.
     pub format: u32,
-    /// Whence.
+    /// Origin of the report.
     pub provenance: Provenance,
     /// Mean times and reliabilities.
     pub answer: Answer,
@@ -67,11 +67,11 @@ pub struct ReportData {
     pub system: System,
     /// States of its chain.
     pub states: usize,
-    /// In sentences.
+    /// Assumptions of the model, as sentences.
     pub assumptions: Vec<String>,
-    /// Of the cluster, the widest first.
+    /// Sensitivities of the cluster, the widest bar first.
     pub sensitivities: Vec<Sensitivity>,
-    /// What could be done.
+    /// Possible improvements.
     pub what_if: Vec<WhatIf>,
     /// MTTF by number of understudies.
     pub by_understudies: Vec<ByUnderstudies>,
@@ -79,7 +79,7 @@ pub struct ReportData {
     pub figures: Vec<FigurePoint>,
     /// Curves; one that would take too long is left out and named in `left_out`.
     pub over_time: Vec<OverTime>,
-    /// What is not in it, and why.
+    /// Omitted parts with their reasons.
     pub left_out: Vec<String>,
     /// A campaign, where there was one.
     pub measured: Option<Assessment>,
@@ -96,7 +96,7 @@ pub struct Report {
     pub csv: String,
 }
 
-/// Calculates everything that a report says.
+/// Calculates the data of a report.
 ///
 /// # Errors
 /// Everything that is wrong with the options, or the first result that cannot be had.

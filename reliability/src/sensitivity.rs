@@ -9,9 +9,9 @@ use crate::system::System;
 /// One bar of the tornado.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Sensitivity {
-    /// What is changed.
+    /// Name of the changed parameter.
     pub parameter: String,
-    /// Its value, for people.
+    /// Value of the parameter with its unit.
     pub value: String,
     /// d ln MTTF/d ln parameter: by how many per cent the MTTF changes where the parameter changes by one.
     pub elasticity: f64,
@@ -24,7 +24,7 @@ pub struct Sensitivity {
 /// One thing that could be done.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WhatIf {
-    /// What is done.
+    /// Name of the change.
     pub change: String,
     /// MTTF in hours with it.
     pub mttf_hours: f64,
@@ -37,7 +37,7 @@ pub struct WhatIf {
 /// MTTF by number of understudies.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ByUnderstudies {
-    /// Of each group.
+    /// Number of understudies of each group.
     pub understudies: u32,
     /// MTTF in hours.
     pub mttf_hours: f64,
@@ -148,7 +148,7 @@ fn kind_at(system: &mut System, index: usize) -> &mut crate::system::BoxKind {
 /// The sensitivities of `system`, that with the widest bar first.
 ///
 /// # Errors
-/// As [`System::chain`] and [`Chain::mttf`](crate::Chain::mttf).
+/// The errors of [`System::chain`] and [`Chain::mttf`](crate::Chain::mttf).
 pub fn sensitivities(system: &System) -> Result<Vec<Sensitivity>, Vec<ReliabilityError>> {
     /// Of ln parameter; the error of the difference is of its square, that of rounding of 1e-13 over it.
     const STEP: f64 = 1e-4;
@@ -172,10 +172,10 @@ pub fn sensitivities(system: &System) -> Result<Vec<Sensitivity>, Vec<Reliabilit
     Ok(found)
 }
 
-/// What could be done, and what it would give.
+/// Possible improvements with their effects.
 ///
 /// # Errors
-/// As [`System::chain`] and [`Chain::mttf`](crate::Chain::mttf).
+/// The errors of [`System::chain`] and [`Chain::mttf`](crate::Chain::mttf).
 pub fn what_if(
     system: &System,
     mission: Option<Hours>,
@@ -247,7 +247,7 @@ pub fn what_if(
 /// MTTF with 0, 1, ..., `most` understudies in each group.
 ///
 /// # Errors
-/// As [`System::chain`] and [`Chain::mttf`](crate::Chain::mttf).
+/// The errors of [`System::chain`] and [`Chain::mttf`](crate::Chain::mttf).
 pub fn by_understudies(
     system: &System,
     most: u32,

@@ -18,18 +18,18 @@ use crate::chain::{Chain, explore};
 use crate::error::ReliabilityError;
 use crate::quantity::{Hours, Probability};
 
-/// Boxes of one system, at most.
+/// Maximum number of stations of one system.
 pub const MAXIMUM_BOXES: u32 = 1_000_000;
 
 /// States of one model, at most.
 pub const MAXIMUM_MODEL_STATES: usize = 300_000;
 
-/// Boxes that are alike.
+/// Stations of one kind.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BoxKind {
-    /// For people, such as `robot`.
+    /// Name of the kind, such as `robot`.
     pub name: String,
-    /// How many, in the whole system.
+    /// Number of stations in the whole system.
     pub count: u32,
     /// Mean time between failures of one.
     pub mtbf: Hours,
@@ -37,13 +37,13 @@ pub struct BoxKind {
     pub mttr: Hours,
 }
 
-/// When a group has failed.
+/// The rule by which a group fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rule {
-    /// At the second failure of any of its stations, (14).
+    /// The group fails at the second failure of any of its stations, (14).
     Paper,
-    /// When all understudies and at least one controller are down.
+    /// The group fails when all understudies and at least one controller are down.
     AsBuilt,
 }
 
@@ -51,9 +51,10 @@ pub enum Rule {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CommonCauseConvention {
-    /// Boxes fail at λ as before, and all of them at β λ besides.
+    /// Stations fail at λ; in addition, all of them fail together at β λ.
     Additive,
-    /// Boxes fail at (1 - β) λ, and all of them at β λ. In a large system this can *raise* the MTTF, for λ counts N times and β λ once.
+    /// Stations fail at (1 - β) λ, and all of them together at β λ. In a large system this can *raise* the MTTF, because λ counts N
+    /// times and β λ once.
     Split,
 }
 
@@ -62,20 +63,20 @@ pub enum CommonCauseConvention {
 pub struct CommonCause {
     /// β
     pub beta: Probability,
-    /// How it is counted.
+    /// Convention for β.
     pub convention: CommonCauseConvention,
 }
 
 /// A part that everything depends on, such as the network or the power supply: its first failure is the system's.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SharedPart {
-    /// For people.
+    /// Name of the part.
     pub name: String,
     /// Mean time between its failures.
     pub mtbf: Hours,
 }
 
-/// All that a model is made from.
+/// The description of a system, from which its model is made.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct System {
     /// Controllers; their counts are of the whole system and divide by `groups`.
@@ -84,7 +85,7 @@ pub struct System {
     pub understudies: BoxKind,
     /// Groups that are alike, each with its own understudies.
     pub groups: u32,
-    /// When a group has failed.
+    /// The rule by which a group fails.
     pub rule: Rule,
     /// Boxes that are repaired at the same time, at most; nothing: a crew for each box. Where more are down, each is as likely to be
     /// worked on as any other.
@@ -119,7 +120,7 @@ impl System {
         self.controllers.iter().map(|kind| kind.count).sum()
     }
 
-    /// Boxes in all, understudies too.
+    /// Number of stations, understudies included.
     pub fn boxes(&self) -> u32 {
         self.controller_count() + self.groups * self.understudies.count
     }
@@ -181,7 +182,7 @@ impl System {
     /// Markov chain of this system. In its first state all stations work; its last state is `failed`.
     ///
     /// # Errors
-    /// As [`System::check`], and more states than [`MAXIMUM_MODEL_STATES`].
+    /// The errors of [`System::check`], and more states than [`MAXIMUM_MODEL_STATES`].
     pub fn chain(&self) -> Result<Chain, Vec<ReliabilityError>> {
         self.check()?;
         let mut groups = Groups {

@@ -23,7 +23,7 @@ const STRIDE_STEPS: f64 = 1e7;
 /// Terms of a series with a mean of 1, mostly.
 const TERMS: f64 = 40.0;
 
-/// What becomes of the chain by a time.
+/// State of the chain at a time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transient {
     /// Probability of each state; where failures are final, of having failed before it was left.
@@ -58,7 +58,7 @@ impl Chain {
     /// R(t): the probability that no failure state was met by `hours`.
     ///
     /// # Errors
-    /// As [`Chain::transients`], and R(t) below [`MINIMUM_PROBABILITY`].
+    /// The errors of [`Chain::transients`], and R(t) below [`MINIMUM_PROBABILITY`].
     pub fn reliability(&self, hours: f64) -> Result<f64, ReliabilityError> {
         let found = self.transient(hours, AfterFailure::Final)?;
         if found.working < MINIMUM_PROBABILITY {
@@ -72,7 +72,7 @@ impl Chain {
     /// P(t) at `hours`.
     ///
     /// # Errors
-    /// As [`Chain::transients`].
+    /// The errors of [`Chain::transients`].
     pub fn transient(
         &self,
         hours: f64,

@@ -130,9 +130,9 @@ fn a_forced_signal_is_sampled_and_driven_so_until_its_time_is_over() {
         started.is_some(),
         "it starts cold where nobody holds a state"
     );
-    let force = |signal, value, seconds| Force {
+    let force = |signal, value: bool, seconds| Force {
         signal,
-        value,
+        value: value.into(),
         seconds,
         owner: "anna".to_owned(),
         reason: "a test".to_owned(),

@@ -6,6 +6,7 @@
 //! read one of them long before another: only [`MAXIMUM_OPEN_CYCLES`], which bound its memory, end the wait for a remote I/O that is gone.
 
 mod closing;
+mod events;
 mod presence;
 mod service;
 mod stalls;
@@ -17,9 +18,9 @@ use std::time::Duration;
 
 use understudy_bus::HostEvent;
 use understudy_cycle::Agreement;
-use understudy_journal::{Happening, Members, Numbering, Record, RunEvent, moment};
+use understudy_journal::{Happening, Members, Numbering, Record, moment};
 use understudy_node::Event as StationEvent;
-use understudy_remote_io::{Event as RemoteIoEvent, Missing};
+use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_simulator::{Action, Referee, Violation};
 use understudy_wire::{Member, Moment, ProgramId, ProgramSet, Source, StationId, StationSet};
 
@@ -266,172 +267,6 @@ impl Account {
                 let period = self.terms.agreement.schedule.period();
                 self.stalls.stalled(number, member, late, period);
             }
-        }
-    }
-
-    fn station(&mut self, station: StationId, event: &StationEvent) {
-        match event {
-            StationEvent::Published { moment, words } => {
-                let widest = words.iter().max_by_key(|word| word.mask.len());
-                let (Some(word), Some(number)) = (widest, self.numbering.of(*moment)) else {
-                    return;
-                };
-                let programs = self.terms.agreement.schedule.controllers();
-                if word.mask == ProgramSet::first(programs)
-                    && self.terms.agreement.schedule.is_understudy(station)
-                    && let Some(cycle) = self.open_cycle(number)
-                {
-                    cycle.covering.insert(station);
-                    self.look_for_origin(number, *moment);
-                }
-                if let (Some(at), Some(trace)) = (
-                    self.since_origin(number),
-                    self.traces.stations.get_mut(station.index()),
-                ) {
-                    let mut sum = word.sum.clone();
-                    let others = words.iter().filter(|other| other.mask != word.mask);
-                    others.for_each(|other| sum.add(&other.sum));
-                    trace.push(at, &sum);
-                }
-            }
-            StationEvent::Refused {
-                member,
-                theirs,
-                ours,
-            } => {
-                self.refuse(*member, theirs.to_string(), ours.to_string());
-            }
-            _ => {}
-        }
-    }
-
-    fn remote_io(&mut self, program: ProgramId, event: &RemoteIoEvent) {
-        let violation = self
-            .terms
-            .referees
-            .get_mut(program.index())
-            .and_then(|referee| referee.observe(event).err());
-        let RemoteIoEvent::Applied {
-            moment,
-            source,
-            missing,
-            heard,
-            ..
-        } = event
-        else {
-            if let RemoteIoEvent::Refused {
-                member,
-                theirs,
-                ours,
-            } = event
-            {
-                self.refuse(*member, theirs.to_string(), ours.to_string());
-            }
-            if let Some(violation) = violation {
-                self.violate(program, self.numbering.latest(), violation);
-            }
-            return;
-        };
-        let idle = *missing == Some(Missing::NoCycle);
-        let number = self.numbering.deadline(program, *moment, idle);
-        let outcome = Outcome {
-            source: *source,
-            wrong: violation.is_some(),
-        };
-        if let Some(violation) = violation {
-            self.violate(program, Some(number), violation);
-        }
-        let stations = self.terms.agreement.schedule.stations();
-        let Some(cycle) = self.open_cycle(number) else {
-            return;
-        };
-        cycle.outcomes.insert(program, outcome);
-        if !idle {
-            cycle.heard = cycle.heard.or(*heard);
-            if *source == Source::Direct && *heard == StationSet::first(stations) {
-                cycle.content.insert(program);
-            }
-        }
-        self.look_for_origin(number, *moment);
-        while self.open.len() > LAG_CYCLES && self.oldest_is_told() {
-            self.close_oldest();
-        }
-    }
-
-    fn plant(&mut self, program: ProgramId, event: &understudy_plant::Event) {
-        let understudy_plant::Event::Stepped { moment, field, .. } = event else {
-            return;
-        };
-        self.starting_plants.remove(program);
-        if let Some(referee) = self.terms.referees.get_mut(program.index()) {
-            referee.saw(&field.sensors);
-        }
-        let at = self
-            .numbering
-            .of(*moment)
-            .and_then(|number| self.since_origin(number));
-        let within = at.is_some_and(|at| at < self.cycles);
-        if let Some(service) = self.services.get_mut(program.index())
-            && (at.is_none() || within)
-        {
-            service.field(field, within);
-        }
-        if let (Some(at), Some(trace)) = (at, self.traces.plants.get_mut(program.index()))
-            && within
-        {
-            trace.push(at, field);
-        }
-    }
-
-    fn run(&mut self, event: &RunEvent) {
-        match event {
-            RunEvent::Fault {
-                action,
-                member,
-                asked,
-            } => {
-                if let (Member::RemoteIo(program), Action::Release | Action::Choose { .. }) =
-                    (*member, *action)
-                    && let Some(referee) = self.terms.referees.get_mut(program.index())
-                {
-                    referee.operator_chooses();
-                }
-                let measured = self.disturb(*member, *action).unwrap_or(0);
-                self.steps.push(DoneStep {
-                    action: *action,
-                    member: *member,
-                    asked: *asked,
-                    measured,
-                });
-            }
-            RunEvent::Ended { member, how, said } => {
-                let cycle = self.disturb(*member, Action::Crash);
-                self.death_count += 1;
-                if self.deaths.len() < MAXIMUM_DEATHS {
-                    self.deaths.push(Death {
-                        member: *member,
-                        cycle,
-                        how: how.clone(),
-                        said: said.clone(),
-                    });
-                }
-            }
-            RunEvent::Interrupted => {
-                self.interrupted = true;
-                // The newest cycle may be cut off for some: it is none of the run any more.
-                let newest = self.numbering.latest();
-                let told = newest.and_then(|newest| self.since_origin(newest));
-                self.cycles = self.cycles.min(told.unwrap_or(0));
-            }
-            RunEvent::Journal { .. }
-            | RunEvent::Started { .. }
-            | RunEvent::Origin { .. }
-            | RunEvent::Commanded { .. }
-            | RunEvent::Acknowledged(_)
-            | RunEvent::Attached { .. }
-            | RunEvent::Detached { .. }
-            | RunEvent::ScenarioOver { .. }
-            | RunEvent::Finished => {}
         }
     }
 

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::collections::HashMap;
 
-use understudy_cluster::{Cluster, Overrides, press_cell};
+use understudy_cluster::Cluster;
 use understudy_cycle::Mode;
 use understudy_executable::Scratch;
 use understudy_journal::{Happening, Members};
@@ -12,22 +12,8 @@ use understudy_node::Event as StationEvent;
 use understudy_parity::sum;
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_scenarios::{read, simulate};
+use understudy_testing::press_cell;
 use understudy_wire::{Image, Lineage, Member, Moment, ProgramId, ProgramSet, StationId, Word};
-
-fn cluster(mode: Mode) -> Cluster {
-    let files = press_cell();
-    let overrides = Overrides {
-        mode: Some(mode),
-        ..Overrides::default()
-    };
-    let loaded =
-        understudy_cluster::read_with(files[0].name, files[0].text, overrides, &mut |name| {
-            let file = files.iter().find(|file| file.name == name);
-            file.map(|file| file.text.to_owned())
-                .ok_or_else(|| "no such file".to_owned())
-        });
-    loaded.cluster.expect("the press cell is right")
-}
 
 /// What each program computes, by a run of its circuit over the samples of the journal.
 #[derive(Default)]
@@ -85,7 +71,7 @@ impl Reference {
 /// y(N+1) of each cycle in which the understudy knew all programs, by the lineages of all programs. Each word is compared with
 /// the sum of the outputs that the samples lead to.
 fn parity_outputs(mode: Mode, text: &str) -> BTreeMap<Vec<u64>, Image> {
-    let cluster = cluster(mode);
+    let cluster = press_cell(mode);
     let read = read("scenario.toml", text, Some(&Members::of(&cluster)));
     let scenario = read.scenario.expect("a scenario");
     let all = ProgramSet::first(cluster.controllers().len());

@@ -1,27 +1,13 @@
 //! Every scenario file that comes with the project, in virtual time.
 
-use understudy_cluster::{Cluster, Overrides, press_cell};
+use understudy_cluster::Cluster;
 use understudy_cycle::Mode;
 use understudy_journal::{Happening, Journal, JournalState, Members, Record, RunEvent, records};
 use understudy_scenarios::{
     Account, Circumstances, OriginRule, Scenario, Summary, Table, Terms, World, figure, read,
     report, simulate,
 };
-
-fn cluster(mode: Mode) -> Cluster {
-    let files = press_cell();
-    let overrides = Overrides {
-        mode: Some(mode),
-        ..Overrides::default()
-    };
-    let loaded =
-        understudy_cluster::read_with(files[0].name, files[0].text, overrides, &mut |name| {
-            let file = files.iter().find(|file| file.name == name);
-            file.map(|file| file.text.to_owned())
-                .ok_or_else(|| "no such file".to_owned())
-        });
-    loaded.cluster.expect("the press cell is right")
-}
+use understudy_testing::press_cell;
 
 fn scenario(cluster: &Cluster, text: &str) -> Scenario {
     let found = read("scenario.toml", text, Some(&Members::of(cluster)));
@@ -46,7 +32,7 @@ fn circumstances() -> Circumstances {
 
 /// Runs from a seed; the journal's bytes, and what it came to.
 fn run(mode: Mode, text: &str, seed: u64) -> (Vec<u8>, Summary, Account) {
-    let cluster = cluster(mode);
+    let cluster = press_cell(mode);
     let scenario = scenario(&cluster, text);
     let mut bytes = Vec::new();
     let mut journal = Journal::new(&mut bytes);
@@ -383,7 +369,7 @@ fn account_of<Changed: IntoIterator<Item = Record>>(
     text: &str,
     mut change: impl FnMut(Record) -> Changed,
 ) -> Summary {
-    let cluster = cluster(Mode::Full);
+    let cluster = press_cell(Mode::Full);
     let scenario = scenario(&cluster, text);
     let mut account = Account::new(Terms::of(&cluster), &scenario, OriginRule::Found);
     let told = records(bytes).map(|record| record.expect("a record"));

@@ -2,7 +2,6 @@
 
 mod allocate;
 mod animate;
-mod bench;
 mod book;
 mod bounded;
 mod campaign;

@@ -15,6 +15,9 @@ use super::{DEADLINE, answer, empty_folder, no_orphan, running_cluster, signal, 
 /// What the device is written for.
 const PYMODBUS: &str = "3.16.1";
 
+/// What pymodbus needs for serial lines.
+const PYSERIAL: &str = "3.5";
+
 /// A device on a port of its own. It ends with its standard input.
 struct Device {
     child: Child,
@@ -33,42 +36,51 @@ impl Drop for Device {
 }
 
 impl Device {
-    /// Nothing where this machine has no pymodbus; says so then.
+    /// That of `examples/modbus-cell`; nothing where this machine has no pymodbus, and it says so then.
     fn start(port: Option<u16>) -> Option<Self> {
+        let port = port.unwrap_or_else(|| {
+            let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+            listener.local_addr().expect("bound").port()
+        });
+        let mut device = Self::start_of("modbus-cell", &port.to_string(), "pymodbus", PYMODBUS)?;
+        device.port = port;
+        assert_eq!(device.line(), "ready");
+        Some(device)
+    }
+
+    /// The device of an example, with its argument and the module that it needs.
+    fn start_of(example: &str, argument: &str, module: &str, wanted: &str) -> Option<Self> {
         let python = std::env::var("UNDERSTUDY_PYTHON").unwrap_or_else(|_| "python3".into());
         let version = Command::new(&python)
-            .args(["-c", "import pymodbus; print(pymodbus.__version__)"])
+            .args([
+                "-c",
+                &format!("import {module}; print({module}.__version__)"),
+            ])
             .output();
         let version = version.map_or_else(
             |error| error.to_string(),
             |output| String::from_utf8_lossy(&output.stdout).trim().to_owned(),
         );
-        if version != PYMODBUS {
+        if version != wanted {
             skip(format_args!(
-                "{python} has pymodbus {version:?} and not {PYMODBUS}: pip install pymodbus=={PYMODBUS}"
+                "{python} has {module} {version:?} and not {wanted}: pip install {module}=={wanted}"
             ));
             return None;
         }
-        let port = port.unwrap_or_else(|| {
-            let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
-            listener.local_addr().expect("bound").port()
-        });
-        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/modbus-cell/device.py");
+        let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
         let mut child = Command::new(&python)
-            .arg(script)
-            .arg(port.to_string())
+            .arg(examples.join(example).join("device.py"))
+            .arg(argument)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
             .expect("it ran a moment ago");
-        let mut device = Self {
+        Some(Self {
             input: child.stdin.take(),
             output: BufReader::new(child.stdout.take().expect("piped")),
             child,
-            port,
-        };
-        assert_eq!(device.line(), "ready");
-        Some(device)
+            port: 0,
+        })
     }
 
     fn line(&mut self) -> String {
@@ -126,14 +138,25 @@ fn a_device_of_another_project_is_driven_while_its_controller_is_dead() {
     assert!(device.line().starts_with("level 0 valve 1"));
 }
 
-/// Waits for what the tank's remote I/O says from record `from` on, and answers with the number of records until then.
+/// Waits for an event of the tank's remote I/O from record `from` on, and answers with the number of records until then.
 fn wait_for(journal: &Path, from: usize, what: &str, test: impl Fn(&Value) -> bool) -> usize {
+    wait_for_member(journal, from, "tank-io", what, test)
+}
+
+/// As [`wait_for`], for any member.
+fn wait_for_member(
+    journal: &Path,
+    from: usize,
+    member: &str,
+    what: &str,
+    test: impl Fn(&Value) -> bool,
+) -> usize {
     let deadline = Instant::now() + DEADLINE;
     loop {
         let text = fs::read_to_string(journal).unwrap_or_default();
         let found = text.lines().enumerate().skip(from).find(|(_, line)| {
             serde_json::from_str::<Value>(line)
-                .is_ok_and(|record| record["name"] == "tank-io" && test(&record["event"]))
+                .is_ok_and(|record| record["name"] == member && test(&record["event"]))
         });
         if let Some((place, _)) = found {
             return place;
@@ -188,4 +211,118 @@ fn a_device_that_refuses_is_silent_or_gone_means_fail_safe_and_comes_back() {
     let summary = fs::read_to_string(runs.join("latest/summary.json")).expect("written");
     let summary: Value = serde_json::from_str(&summary).expect("JSON");
     assert_eq!(summary["violation_count"], 0, "{summary:#}");
+}
+
+/// The example with numbers, with the device's own connection.
+fn level_cluster(out: &Path, connection: &str) -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/modbus-level");
+    let text = fs::read_to_string(root.join("cluster.toml")).expect("text");
+    assert!(text.contains("127.0.0.1:5021"));
+    let text = text.replace("127.0.0.1:5021", connection);
+    fs::write(out.join("cluster.toml"), text).expect("written");
+    for file in ["level.st", "tank.st"] {
+        fs::copy(root.join(file), out.join(file)).expect("copied");
+    }
+    out.join("cluster.toml")
+}
+
+/// The level controller is dead while the tank is filled; the register of the valve follows the reconstructed REAL, and nothing is held.
+fn fill_without_a_controller(folder: &str, device: &mut Device, connection: &str) {
+    let out = empty_folder(folder);
+    let file = level_cluster(&out, connection);
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    let scenario = examples.join("modbus-level/kill.toml");
+    let runs = out.join("runs");
+    let (_, document, errors) = answer(&[
+        "lab",
+        file.to_str().expect("text"),
+        "--scenario",
+        scenario.to_str().expect("text"),
+        "--link",
+        "udp",
+        "--out",
+        runs.to_str().expect("text"),
+    ]);
+    no_orphan(&out);
+    let summary = &document["result"]["summary"];
+    assert_eq!(summary["violation_count"], 0, "{summary:#}\n{errors}");
+    assert_eq!(summary["cycles_run"], summary["cycles_asked"], "{errors}");
+    let counts = &summary["remote_ios"][0]["counts"];
+    assert!(counts["reconstructed"].as_u64() > Some(150), "{counts:#}");
+    assert_eq!(device.line(), "filled");
+    // The remote I/O ends with the fail-safe value, 12.5 % in hundredths.
+    device.mood("show");
+    let shown = device.line();
+    assert!(shown.ends_with(" inflow 1250"), "{shown}");
+}
+
+#[test]
+fn a_real_in_registers_is_driven_while_its_controller_is_dead() {
+    let _one = some_at_a_time();
+    let port = {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+        listener.local_addr().expect("bound").port()
+    };
+    let started = Device::start_of("modbus-level", &port.to_string(), "pymodbus", PYMODBUS);
+    let Some(mut device) = started else {
+        return;
+    };
+    assert_eq!(device.line(), "ready");
+    let connection = format!("127.0.0.1:{port}");
+    fill_without_a_controller("modbus_level", &mut device, &connection);
+    // A level that is not a number is bad quality, with its reason, and the next number is taken again.
+    let out = empty_folder("modbus_level_nan");
+    let file = level_cluster(&out, &connection);
+    let runs = out.join("runs");
+    let (mut child, _errors) = running_cluster(&file, &runs, &[]);
+    let journal = runs.join("latest/journal.jsonl");
+    let own = |event: &'static str, source: &'static str, missing: &'static str| {
+        move |record: &Value| {
+            record["event"] == event
+                && (source.is_empty() || record["source"] == source)
+                && (missing.is_empty() || record["missing"] == missing)
+        }
+    };
+    let at = wait_for_member(
+        &journal,
+        0,
+        "left-io",
+        "driven",
+        own("applied", "direct", ""),
+    );
+    device.mood("nan");
+    let lost = |record: &Value| {
+        let said = record["reason"].as_str().unwrap_or_default();
+        record["event"] == "field-lost"
+            && said.contains("`level` at input:0 real is infinite or not a number")
+    };
+    let at = wait_for_member(&journal, at, "left-io", "lost", lost);
+    let bad = own("applied", "fail-safe", "bad-quality");
+    let at = wait_for_member(&journal, at, "left-io", "fail-safe", bad);
+    device.mood("well");
+    wait_for_member(
+        &journal,
+        at,
+        "left-io",
+        "driven again",
+        own("applied", "direct", ""),
+    );
+    signal(child.id(), nix::sys::signal::Signal::SIGINT);
+    child.wait().expect("it ends");
+    no_orphan(&out);
+}
+
+#[test]
+fn a_real_in_registers_of_a_serial_line_is_driven_while_its_controller_is_dead() {
+    let _one = some_at_a_time();
+    if Device::start_of("modbus-level", "rtu", "serial", PYSERIAL).is_none() {
+        return;
+    }
+    let Some(mut device) = Device::start_of("modbus-level", "rtu", "pymodbus", PYMODBUS) else {
+        return;
+    };
+    let line = device.line();
+    let path = line.strip_prefix("line ").expect("its path");
+    assert_eq!(device.line(), "ready");
+    fill_without_a_controller("modbus_rtu", &mut device, &format!("rtu:{path}"));
 }

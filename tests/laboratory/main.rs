@@ -9,7 +9,6 @@
 mod boiler;
 mod campaigns;
 mod deaths;
-mod duplicates;
 mod field;
 mod handshake;
 mod hosts;

@@ -124,12 +124,18 @@ fn an_old_image_of_another_configuration_shuts_nobody_out() {
     let plant = Plant::start("old_image");
     let image = plant.copy_of_the_controller(["period = \"20ms\"", "period = \"30ms\""]);
     let remote_io = plant.journal("valve-io");
-    until("the refusal of the image", || {
-        is_said(&remote_io, "\"event\":\"refused\"")
-    });
+    for journal in [&remote_io, &plant.journal("understudy")] {
+        until("the refusal of the image", || {
+            is_said(journal, "\"event\":\"refused\"")
+        });
+    }
     plant.device.wait_for_answers(50);
-    let refused = "\"refused_as\":\"replayed\"";
-    assert!(!is_said(&remote_io, refused), "the controller is refused");
+    for refused in ["replayed", "of-another-life"] {
+        let refused = format!("\"refused_as\":\"{refused}\"");
+        assert!(!is_said(&remote_io, &refused), "the controller is refused");
+    }
+    let controller = plant.journal("valve");
+    assert_eq!(count(&controller, "new-life"), 0, "it is received");
     drop(image);
 }
 

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use understudy_cluster::{Cluster, Overrides};
-use understudy_interchange::parse_program;
 use understudy_ladder::Program;
 use understudy_logic::Circuit;
 use understudy_parity::{ParityController, generate};
@@ -12,7 +11,6 @@ use understudy_text::Report;
 
 use crate::answer::{Answer, Status};
 use crate::files;
-use crate::kind::Kind;
 
 /// Programs of the command line.
 pub(crate) struct Programs {
@@ -112,24 +110,13 @@ impl Programs {
 }
 
 fn ladder(path: &Path, period: Duration) -> Result<(Member, Report), Answer> {
-    let text = files::text_of(Kind::Ladder, path)?;
-    let name = path.display().to_string();
-    let parsed = parse_program(&name, &text);
-    let report = Report {
-        name,
-        text,
-        diagnostics: parsed.diagnostics,
-    };
-    if report.has_errors() {
-        return Err(Answer::bad_files(vec![report]));
-    }
-    let circuit = parsed
-        .program
+    let (program, report) = files::ladder(path)?;
+    let circuit = program
         .lower(period)
-        .map_err(|error| Answer::failed(Status::BadInput, "U0436", error.to_string()))?;
+        .map_err(|error| Answer::failed(Status::BadInput, "U0436", error))?;
     let member = Member {
-        name: parsed.program.name.to_string(),
-        ladder: parsed.program,
+        name: program.name.to_string(),
+        ladder: program,
         circuit,
     };
     Ok((member, report))

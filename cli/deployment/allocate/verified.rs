@@ -60,7 +60,7 @@ pub(super) fn members(
 ) -> Result<Vec<Member>, Answer> {
     let members = group.members.iter().enumerate().map(|(place, member)| {
         let subject = Subject::new(&member.ladder, group.period)
-            .map_err(|error| Answer::failed(Status::BadInput, "U0436", error.to_string()))?;
+            .map_err(|error| Answer::failed(Status::BadInput, "U0436", error))?;
         let name = group.name(&member.name);
         patience.turn_to(format!("`{name}`"));
         let properties = asked.get(&name).map_or(&[][..], Vec::as_slice);

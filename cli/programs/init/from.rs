@@ -22,20 +22,20 @@ use crate::files::{self, NewFile};
 use crate::kind::{self, Kind};
 use crate::programs::convert::code;
 
-pub(super) fn run(folder: &Path, arguments: &[PathBuf]) -> Answer {
+pub(super) fn run(folder: &Path, arguments: &[PathBuf]) -> Result<Answer, Answer> {
     let mut found = Found::default();
     for argument in arguments {
         found.read(&Source::new(argument));
     }
     found.check();
     if found.is_wrong() {
-        return found.refusal();
+        return Err(found.refusal());
     }
     let draft = found.draft(folder);
     let texts = draft.files();
     found.check_draft(&texts);
     if found.is_wrong() {
-        return found.refusal();
+        return Err(found.refusal());
     }
     let texts = texts.into_iter().map(|(name, text)| NewFile {
         name,
@@ -47,13 +47,10 @@ pub(super) fn run(folder: &Path, arguments: &[PathBuf]) -> Answer {
         !place.is_ok_and(|place| fs::canonicalize(&copy.source).is_ok_and(|source| source == place))
     });
     let all: Vec<NewFile> = texts.chain(copies.map(|copy| copy.file)).collect();
-    match files::write_new(folder, &all) {
-        Err(answer) => answer,
-        Ok(paths) => {
-            let marks = "\ncomplete the entries marked FILL IN in cluster.toml: fail-safe outputs and plants\n";
-            written(folder, &paths, marks).with_used(found.reports)
-        }
-    }
+    let paths = files::write_new(folder, &all)?;
+    let marks =
+        "\ncomplete the entries marked FILL IN in cluster.toml: fail-safe outputs and plants\n";
+    Ok(written(folder, &paths, marks).with_used(found.reports))
 }
 
 /// A file named on the command line.

@@ -106,7 +106,7 @@ impl Catalogue {
     }
 }
 
-/// What may happen to models that are there.
+/// Permission to change known models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mode {
     /// Nothing: they must not be there.
@@ -115,7 +115,7 @@ pub enum Mode {
     Update,
 }
 
-/// What was added.
+/// Result of an addition.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Added {
     /// Models that were not there.

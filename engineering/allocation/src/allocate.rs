@@ -22,7 +22,7 @@ use crate::resources::Resources;
 pub use preference::Preference;
 pub use stock::Stock;
 
-/// What was proved about the program of a box.
+/// Verification result of the program of a position.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case", tag = "verdict", content = "message")]
 pub enum Verification {
@@ -40,7 +40,7 @@ impl Verification {
         matches!(self, Self::Passed(_))
     }
 
-    /// What is to be read.
+    /// Note for the reader.
     pub fn message(&self) -> &str {
         match self {
             Self::Passed(message) | Self::NotPassed(message) => message,
@@ -52,22 +52,22 @@ impl Verification {
 /// A box that is wanted.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Item {
-    /// Its name in the plant.
+    /// Name of the position in the plant.
     pub name: String,
     /// Programs with one understudy; programs without one have no group.
     pub group: Option<usize>,
-    /// What it must have.
+    /// Requirements of the position.
     pub need: Need,
-    /// What was proved about its program.
+    /// Verification result of its program.
     pub verification: Verification,
 }
 
-/// How to choose.
+/// Rules of the choice.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
-    /// How needs are compared.
+    /// Rules for the comparison of needs.
     pub terms: Terms,
-    /// What is best among what fits.
+    /// Preference among fitting controllers.
     pub preference: Preference,
     /// Whether programs of one group may share a box.
     pub share_members: bool,
@@ -80,9 +80,9 @@ pub struct Options {
 /// Assessment of a controller for one position.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Candidate {
-    /// Who makes it.
+    /// The vendor.
     pub vendor: String,
-    /// Its model.
+    /// The model.
     pub model: String,
     /// Every criterion.
     #[serde(flatten)]
@@ -94,9 +94,9 @@ pub struct Candidate {
 /// A box that is wanted, with the controllers that could be it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Placed {
-    /// Its name in the plant.
+    /// Name of the position in the plant.
     pub name: String,
-    /// What it is for.
+    /// Purpose of the position.
     pub role: Role,
     /// Counts of its program.
     pub program: Option<Resources>,
@@ -104,7 +104,7 @@ pub struct Placed {
     pub inputs: u64,
     /// Terminals that are wired to it.
     pub outputs: u64,
-    /// What was proved.
+    /// Verification result.
     pub verification: Verification,
     /// The best first; none where its program has not passed verification.
     pub candidates: Vec<Candidate>,
@@ -113,7 +113,7 @@ pub struct Placed {
 }
 
 impl Placed {
-    /// How many candidates have this verdict.
+    /// Number of candidates with this verdict.
     pub fn count(&self, verdict: Verdict) -> usize {
         let candidates = self.candidates.iter();
         candidates
@@ -125,11 +125,11 @@ impl Placed {
 /// A part of a box that is taken.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Taken {
-    /// Of what.
+    /// The shared resource.
     pub dimension: Dimension,
-    /// By all that is on the box.
+    /// Amount that all programs of the controller take.
     pub takes: u64,
-    /// What may be used.
+    /// Usable amount.
     pub usable: u64,
 }
 
@@ -140,14 +140,14 @@ pub struct BoxOnPlan {
     pub controller: Controller,
     /// Names of what is on it.
     pub items: Vec<String>,
-    /// Of what adds up.
+    /// Shared resources with their loads.
     pub taken: Vec<Taken>,
 }
 
 /// The plan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Allocation {
-    /// Each box that is wanted.
+    /// The controllers of the plan.
     pub items: Vec<Placed>,
     /// Selected controllers.
     pub boxes: Vec<BoxOnPlan>,
@@ -170,17 +170,17 @@ pub enum AllocationError {
     /// A model of the stock is not in the catalogue.
     #[error("U1131: the catalogue has no `{name}`{}", if like.is_empty() { String::new() } else { format!("; there is {}", like.join(", ")) })]
     NoModel {
-        /// As it was written.
+        /// The name as it was written.
         name: String,
-        /// What it has.
+        /// Available number.
         like: Vec<String>,
     },
     /// Several vendors have such a model.
     #[error("U1132: `{name}` is made by several: {}", vendors.join(", "))]
     Ambiguous {
-        /// As it was written.
+        /// The name as it was written.
         name: String,
-        /// Who makes it.
+        /// The vendor.
         vendors: Vec<String>,
     },
     /// Prices of several currencies cannot be compared.

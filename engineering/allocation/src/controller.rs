@@ -5,41 +5,24 @@ use std::fmt;
 use understudy_text::spelling;
 
 use serde::Serialize;
+use understudy_text::words;
 
 use crate::figures::{FamilyQuantity, Figure, Quantity, Statement};
 
-/// What a device is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Kind {
-    /// A programmable logic controller.
-    Plc,
-    /// An embedded controller or a board.
-    Embedded,
-}
-
-impl Kind {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Plc, Self::Embedded];
-
-    /// Its name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Plc => "plc",
-            Self::Embedded => "embedded",
-        }
-    }
-
-    /// The kind of a name.
-    pub fn of(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.name() == name)
+words! {
+    /// Kind of a device.
+    pub enum Kind by name {
+        /// A programmable logic controller.
+        Plc = "plc",
+        /// An embedded controller or a board.
+        Embedded = "embedded",
     }
 }
 
 /// One model.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Controller {
-    /// Who makes it.
+    /// The vendor.
     pub vendor: String,
     /// Unique for its vendor.
     pub model: String,
@@ -47,16 +30,16 @@ pub struct Controller {
     pub family: String,
     /// PLC or embedded.
     pub kind: Kind,
-    /// What is known in numbers.
+    /// Known numbers.
     pub numbers: BTreeMap<Quantity, Figure<u64>>,
-    /// What is known in words.
+    /// Known texts.
     pub texts: BTreeMap<Statement, Figure<String>>,
     /// Note on its figures, such as conflicting sources.
     pub notes: String,
 }
 
 impl Controller {
-    /// Without figures.
+    /// A controller without figures.
     pub fn new(vendor: &str, model: &str, family: &str, kind: Kind) -> Self {
         Self {
             vendor: vendor.to_owned(),
@@ -120,10 +103,10 @@ impl fmt::Display for Controller {
     }
 }
 
-/// How a family stores programs, as far as it is known.
+/// Storage figures of a family, as far as they are known.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct Family {
-    /// Each with its source.
+    /// Known numbers with their sources.
     pub numbers: BTreeMap<FamilyQuantity, Figure<u64>>,
     /// Note on these figures.
     pub notes: String,
@@ -136,7 +119,7 @@ impl Family {
     }
 }
 
-/// All that is known.
+/// The catalogue of controllers.
 ///
 /// Invariant: no two controllers have the same vendor and model.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -147,12 +130,12 @@ pub struct Catalogue {
 }
 
 impl Catalogue {
-    /// By vendor and model.
+    /// All controllers by vendor and model.
     pub fn controllers(&self) -> impl Iterator<Item = &Controller> {
         self.controllers.values()
     }
 
-    /// How many.
+    /// Number of controllers.
     pub fn len(&self) -> usize {
         self.controllers.len()
     }
@@ -167,7 +150,7 @@ impl Catalogue {
         self.controllers.get(&(vendor.to_owned(), model.to_owned()))
     }
 
-    /// Those that a person means by `name`: the model, or vendor and model with a blank between.
+    /// Controllers with this name: the model, or vendor and model separated by a blank.
     pub fn named(&self, name: &str) -> Vec<&Controller> {
         self.controllers()
             .filter(|found| found.model == name || found.to_string() == name)

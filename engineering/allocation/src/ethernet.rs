@@ -1,6 +1,6 @@
 //! Whether a controller has an Ethernet port, from what its ports are said to be.
 
-/// What a text about ports says of Ethernet.
+/// Statement of a text about ports on Ethernet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Ethernet {
     /// It has one.

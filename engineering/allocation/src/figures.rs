@@ -2,67 +2,36 @@
 //!
 //! An unknown figure is absent, never 0. A 0 in the catalogue states that the controller has none.
 
-use std::fmt;
-
 use serde::Serialize;
+use understudy_text::words;
 
-/// A number about one model.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Quantity {
-    /// Digital inputs on board.
-    DigitalInputs,
-    /// Digital outputs on board.
-    DigitalOutputs,
-    /// Analog inputs on board.
-    AnalogIn,
-    /// Analog outputs on board.
-    AnalogOut,
-    /// For programs.
-    ProgramMemoryBytes,
-    /// For data.
-    DataMemoryBytes,
-    /// Timers that a program may have.
-    Timers,
-    /// Counters that a program may have.
-    Counters,
-    /// Time of one instruction on bits.
-    BoolInstructionNs,
-    /// In hundredths of its currency.
-    Price,
+words! {
+    /// A number about one model.
+    pub enum Quantity by name {
+        /// Digital inputs on board.
+        DigitalInputs = "digital_inputs",
+        /// Digital outputs on board.
+        DigitalOutputs = "digital_outputs",
+        /// Analog inputs on board.
+        AnalogIn = "analog_in",
+        /// Analog outputs on board.
+        AnalogOut = "analog_out",
+        /// Memory for programs in bytes.
+        ProgramMemoryBytes = "program_memory_bytes",
+        /// Memory for data in bytes.
+        DataMemoryBytes = "data_memory_bytes",
+        /// Timers that a program may have.
+        Timers = "timers",
+        /// Counters that a program may have.
+        Counters = "counters",
+        /// Time of one instruction on bits.
+        BoolInstructionNs = "bool_instruction_ns",
+        /// Price in hundredths of its currency.
+        Price = "price",
+    }
 }
 
 impl Quantity {
-    /// All, in the order of the columns of a catalogue file.
-    pub const ALL: [Self; 10] = [
-        Self::DigitalInputs,
-        Self::DigitalOutputs,
-        Self::AnalogIn,
-        Self::AnalogOut,
-        Self::ProgramMemoryBytes,
-        Self::DataMemoryBytes,
-        Self::Timers,
-        Self::Counters,
-        Self::BoolInstructionNs,
-        Self::Price,
-    ];
-
-    /// Its name in files and in the database.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::DigitalInputs => "digital_inputs",
-            Self::DigitalOutputs => "digital_outputs",
-            Self::AnalogIn => "analog_in",
-            Self::AnalogOut => "analog_out",
-            Self::ProgramMemoryBytes => "program_memory_bytes",
-            Self::DataMemoryBytes => "data_memory_bytes",
-            Self::Timers => "timers",
-            Self::Counters => "counters",
-            Self::BoolInstructionNs => "bool_instruction_ns",
-            Self::Price => "price",
-        }
-    }
-
     /// The largest number that is believed.
     pub fn most(self) -> u64 {
         match self {
@@ -95,7 +64,7 @@ impl Quantity {
         (value <= self.most()).then_some(value)
     }
 
-    /// As [`Quantity::parse`] reads it.
+    /// The text of a number, as [`Quantity::parse`] reads it.
     pub fn text(self, value: u64) -> String {
         match self {
             Self::Price => format!("{}.{:02}", value / 100, value % 100),
@@ -109,111 +78,49 @@ fn digits_of(text: &str) -> Option<u64> {
     digits.then(|| text.parse().ok()).flatten()
 }
 
-impl fmt::Display for Quantity {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(self.name())
+words! {
+    /// A text about one model.
+    pub enum Statement by name {
+        /// Communication ports.
+        CommPorts = "comm_ports",
+        /// Possible expansion.
+        MaxExpansionIo = "max_expansion_io",
+        /// Programming languages.
+        Languages = "languages",
+        /// Currency of the price.
+        Currency = "currency",
     }
 }
 
-/// A text about one model.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Statement {
-    /// Its ports.
-    CommPorts,
-    /// What it can be expanded by.
-    MaxExpansionIo,
-    /// In which it is programmed.
-    Languages,
-    /// Of the price.
-    Currency,
-}
-
-impl Statement {
-    /// All, in the order of the columns of a catalogue file.
-    pub const ALL: [Self; 4] = [
-        Self::CommPorts,
-        Self::MaxExpansionIo,
-        Self::Languages,
-        Self::Currency,
-    ];
-
-    /// Its name in files and in the database.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::CommPorts => "comm_ports",
-            Self::MaxExpansionIo => "max_expansion_io",
-            Self::Languages => "languages",
-            Self::Currency => "currency",
-        }
+words! {
+    /// How a family stores a program: what is needed to say how much memory a program takes.
+    pub enum FamilyQuantity by name {
+        /// Program bytes of one instruction, at most.
+        ProgramBytesPerInstruction = "program_bytes_per_instruction",
+        /// Further program bytes of one timer.
+        ProgramBytesPerTimer = "program_bytes_per_timer",
+        /// Further program bytes of one counter.
+        ProgramBytesPerCounter = "program_bytes_per_counter",
+        /// Data bytes of one bit that remembers.
+        DataBytesPerBit = "data_bytes_per_bit",
+        /// Data bytes of one timer.
+        DataBytesPerTimer = "data_bytes_per_timer",
+        /// Data bytes of one counter.
+        DataBytesPerCounter = "data_bytes_per_counter",
+        /// Common rule for program and data: bytes before the first point.
+        MemoryBytesBase = "memory_bytes_base",
+        /// Common rule for program and data: bytes for each input and each output.
+        MemoryBytesPerPoint = "memory_bytes_per_point",
+        /// 1 where a program may have as many timers and counters as its memory holds.
+        TimersByMemory = "timers_by_memory",
+        /// Time of one instruction on bits, for models that do not say theirs.
+        BoolInstructionNs = "bool_instruction_ns",
     }
-}
-
-impl fmt::Display for Statement {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(self.name())
-    }
-}
-
-/// How a family stores a program: what is needed to say how much memory a program takes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum FamilyQuantity {
-    /// Program bytes of one instruction, at most.
-    ProgramBytesPerInstruction,
-    /// Further program bytes of one timer.
-    ProgramBytesPerTimer,
-    /// Further program bytes of one counter.
-    ProgramBytesPerCounter,
-    /// Data bytes of one bit that remembers.
-    DataBytesPerBit,
-    /// Data bytes of one timer.
-    DataBytesPerTimer,
-    /// Data bytes of one counter.
-    DataBytesPerCounter,
-    /// Of a rule for program and data together: bytes before the first point.
-    MemoryBytesBase,
-    /// Of a rule for program and data together: bytes for each input and each output.
-    MemoryBytesPerPoint,
-    /// 1 where a program may have as many timers and counters as its memory holds.
-    TimersByMemory,
-    /// Time of one instruction on bits, for models that do not say theirs.
-    BoolInstructionNs,
 }
 
 impl FamilyQuantity {
-    /// All.
-    pub const ALL: [Self; 10] = [
-        Self::ProgramBytesPerInstruction,
-        Self::ProgramBytesPerTimer,
-        Self::ProgramBytesPerCounter,
-        Self::DataBytesPerBit,
-        Self::DataBytesPerTimer,
-        Self::DataBytesPerCounter,
-        Self::MemoryBytesBase,
-        Self::MemoryBytesPerPoint,
-        Self::TimersByMemory,
-        Self::BoolInstructionNs,
-    ];
-
     /// The largest number that is believed.
     pub const MOST: u64 = 1 << 30;
-
-    /// Its name in files and in the database.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::ProgramBytesPerInstruction => "program_bytes_per_instruction",
-            Self::ProgramBytesPerTimer => "program_bytes_per_timer",
-            Self::ProgramBytesPerCounter => "program_bytes_per_counter",
-            Self::DataBytesPerBit => "data_bytes_per_bit",
-            Self::DataBytesPerTimer => "data_bytes_per_timer",
-            Self::DataBytesPerCounter => "data_bytes_per_counter",
-            Self::MemoryBytesBase => "memory_bytes_base",
-            Self::MemoryBytesPerPoint => "memory_bytes_per_point",
-            Self::TimersByMemory => "timers_by_memory",
-            Self::BoolInstructionNs => "bool_instruction_ns",
-        }
-    }
 
     /// A whole number within its bound.
     pub fn parse(text: &str) -> Option<u64> {
@@ -221,17 +128,11 @@ impl FamilyQuantity {
     }
 }
 
-impl fmt::Display for FamilyQuantity {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(self.name())
-    }
-}
-
 /// A value with the source that says so.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Figure<T> {
-    /// What is said.
+    /// The value.
     pub value: T,
-    /// Who says it: an address, a document, a quotation. Never empty.
+    /// The source: an address, a document, a quotation. Never empty.
     pub source: String,
 }

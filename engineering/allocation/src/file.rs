@@ -23,7 +23,7 @@ pub const MAXIMUM_TEXT_BYTES: usize = 16 << 20;
 /// Longest name of a vendor, a model or a family, in bytes.
 pub const MAXIMUM_NAME_LENGTH: usize = 200;
 
-/// What was read.
+/// The result of reading a catalogue file.
 #[derive(Debug)]
 pub struct Loaded {
     /// Nothing where the file has an error.

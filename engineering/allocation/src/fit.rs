@@ -31,7 +31,7 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// As a person reads it.
+    /// The verdict in words.
     pub fn words(self) -> &'static str {
         match self {
             Self::Fits => "fits",
@@ -41,7 +41,7 @@ impl Verdict {
     }
 }
 
-/// What adds up when several programs share a box.
+/// A resource that programs on one controller share.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Dimension {
@@ -53,9 +53,9 @@ pub enum Dimension {
     AnalogInputs,
     /// Terminals.
     AnalogOutputs,
-    /// Of the program.
+    /// Timers of the program.
     Timers,
-    /// Of the program.
+    /// Counters of the program.
     Counters,
     /// Bytes for programs.
     ProgramMemory,
@@ -68,18 +68,18 @@ pub enum Dimension {
 /// A part of a box that a program takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Load {
-    /// What the program takes.
+    /// Amount that the program takes.
     pub takes: u64,
-    /// What of the box may be used.
+    /// Usable amount of the controller.
     pub usable: u64,
 }
 
 /// One criterion.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
-    /// Its name, such as `digital_inputs`.
+    /// Name of the criterion, such as `digital_inputs`.
     pub criterion: String,
-    /// What came of it.
+    /// Verdict on the criterion.
     pub verdict: Verdict,
     /// The amount that is needed, where it is one.
     pub need: Option<u64>,
@@ -87,22 +87,22 @@ pub struct Finding {
     pub has: Option<u64>,
     /// Part of what is there that is left, 0 to 1.
     pub margin: Option<f64>,
-    /// With the numbers, or with what is missing.
+    /// Message with the numbers, or with the missing figure.
     pub message: String,
-    /// Who says so.
+    /// Sources of the figures.
     pub sources: Vec<String>,
 }
 
 /// Compares a controller with the requirements of a position.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Fit {
-    /// Of all criteria together.
+    /// Verdict on all criteria.
     pub verdict: Verdict,
-    /// Each criterion.
+    /// Findings by criterion.
     pub findings: Vec<Finding>,
     /// An estimate: instructions times the time of an instruction on bits; nothing where that time is not known.
     pub scan_ns: Option<u64>,
-    /// What adds up with other programs on the box.
+    /// Loads of shared resources.
     #[serde(skip)]
     pub loads: BTreeMap<Dimension, Load>,
 }
@@ -122,7 +122,7 @@ impl Fit {
     }
 }
 
-/// Compares.
+/// Compares a controller with a need.
 pub fn fit(controller: &Controller, family: Option<&Family>, need: &Need, terms: &Terms) -> Fit {
     let mut judge = Judge::new(controller, family, terms);
     judge.points(

@@ -20,9 +20,9 @@ use understudy_ladder::{
 /// One instruction.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Instruction {
-    /// What it does.
+    /// The operator.
     pub operator: Operator,
-    /// With what; empty for [`Operator::Close`].
+    /// The operand; empty for [`Operator::Close`].
     pub operand: String,
 }
 
@@ -62,7 +62,7 @@ pub enum Operator {
 }
 
 impl Operator {
-    /// As it is written.
+    /// The spelling of the operator.
     pub fn word(self) -> &'static str {
         match self {
             Self::Load => "LD",

@@ -16,7 +16,7 @@ use crate::resources::Resources;
 /// An amount of bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Bytes {
-    /// So many, as these sources say; `fixed` of them once a box, however many programs it runs.
+    /// Known number of bytes with its sources; `fixed` of them are taken once, whatever the number of programs.
     Known {
         bytes: u64,
         fixed: u64,
@@ -29,12 +29,12 @@ pub(crate) enum Bytes {
     },
 }
 
-/// What a program takes.
+/// Memory of a program.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Memory {
     /// Program and data, each for itself.
     Apart { program: Bytes, data: Bytes },
-    /// By a rule for both.
+    /// Memory by a common rule for program and data.
     Together(Bytes),
 }
 

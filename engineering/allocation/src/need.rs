@@ -14,7 +14,7 @@ pub const MOST_RESERVE_PERCENT: u8 = 90;
 /// Needs of one box.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Need {
-    /// What the box is for.
+    /// Purpose of the position.
     pub role: Role,
     /// Digital inputs that are wired to it.
     pub inputs: u64,
@@ -32,7 +32,7 @@ pub struct Need {
     pub ethernet: bool,
 }
 
-/// How needs are compared with what a controller has.
+/// Rules for the comparison of needs with figures.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Terms {
     /// Part of each capacity that stays free, in percent; at most [`MOST_RESERVE_PERCENT`].
@@ -41,12 +41,12 @@ pub struct Terms {
     pub expansion: bool,
     /// Additional requirements.
     pub requirements: Vec<Requirement>,
-    /// How families store programs, for families of which the catalogue does not say it.
+    /// Assumed storage figures for families without figures in the catalogue.
     pub assumptions: BTreeMap<FamilyQuantity, u64>,
 }
 
 impl Terms {
-    /// What of a capacity may be used.
+    /// Usable part of a capacity.
     pub(crate) fn usable(&self, capacity: u64) -> u64 {
         let percent = 100 - u64::from(self.reserve_percent.min(MOST_RESERVE_PERCENT));
         // Capacities are below 2^41, so the product fits.

@@ -26,27 +26,27 @@ const MAXIMUM_UNKNOWNS: usize = 1500;
 /// A kind of box.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoxType {
-    /// What one costs, in any unit; not negative.
+    /// Cost of one in any unit; not negative.
     pub cost: f64,
-    /// How many there are; as many as wanted where nothing is said.
+    /// Available number; unlimited if none.
     pub stock: Option<usize>,
-    /// For each item what it takes of such a box; nothing where it cannot be there.
+    /// Amounts that each item takes of such a box; none where the item cannot be placed.
     pub loads: Vec<Option<BTreeMap<Dimension, Load>>>,
 }
 
 /// A box that is taken.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PackedBox {
-    /// Of which type, by number.
+    /// Number of the type.
     pub box_type: usize,
-    /// What is on it, by number, ascending.
+    /// Numbers of the items on it, ascending.
     pub items: Vec<usize>,
 }
 
 /// A packing.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Packing {
-    /// Those that are taken.
+    /// The boxes that are used.
     pub boxes: Vec<PackedBox>,
     /// Items that are on no box.
     pub left_over: Vec<usize>,

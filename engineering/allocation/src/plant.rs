@@ -13,11 +13,11 @@ use crate::resources::Resources;
 /// A program that is to run somewhere.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Member {
-    /// Its name in the plant.
+    /// Name of the program in the plant.
     pub name: String,
-    /// What it consists of.
+    /// Resources of the program.
     pub program: Resources,
-    /// What was proved about it.
+    /// Verification result of the program.
     pub verification: Verification,
     /// The name of the remote I/O with its terminals.
     pub remote_io: String,
@@ -26,15 +26,15 @@ pub struct Member {
 /// Programs with one generated understudy.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Group {
-    /// Its programs.
+    /// Programs of the group.
     pub members: Vec<Member>,
     /// The names of its understudies.
     pub understudies: Vec<String>,
-    /// What the generated program consists of.
+    /// Resources of the generated program.
     pub understudy: Resources,
     /// Result of the proof of the generated program.
     pub parity: Verification,
-    /// From one scan to the next.
+    /// Period of the scan.
     pub period: Duration,
 }
 

@@ -19,18 +19,18 @@ const TEMPLATE: &str = include_str!("report/report.html");
 /// Candidates of each verdict that are shown on a terminal.
 const SHOWN: usize = 5;
 
-/// What the caller knows and this crate does not.
+/// Data of a report that the caller provides.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Provenance {
-    /// Of the plant or the cluster.
+    /// Title of the plant or the cluster.
     pub title: String,
     /// Version of the program.
     pub version: String,
-    /// When it was made, as the caller says it.
+    /// Date of the report, as the caller writes it.
     pub date: String,
     /// The command that makes it again.
     pub repeat: String,
-    /// Where the figures come from.
+    /// Origin of the figures.
     pub catalogue: String,
 }
 

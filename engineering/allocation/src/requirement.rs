@@ -1,47 +1,26 @@
 //! User requirements in addition to those of the program: `digital_inputs>=24`, `vendor=Siemens`, `remote-io:ethernet`.
 
-use std::fmt;
 use std::time::Duration;
 
-use serde::Serialize;
 use understudy_text::duration;
+use understudy_text::words;
 
 use crate::controller::Kind;
 use crate::figures::{Quantity, Statement};
 
-/// What a box is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Role {
-    /// Runs one program.
-    Controller,
-    /// Runs the program that is generated from all others of its group.
-    Understudy,
-    /// Has the terminals of one program.
-    RemoteIo,
-}
-
-impl Role {
-    /// All.
-    pub const ALL: [Self; 3] = [Self::Controller, Self::Understudy, Self::RemoteIo];
-
-    /// As a person writes it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Controller => "controller",
-            Self::Understudy => "understudy",
-            Self::RemoteIo => "remote-io",
-        }
+words! {
+    /// Purpose of a position.
+    pub enum Role by name {
+        /// Runs one program.
+        Controller = "controller",
+        /// Runs the program that is generated from all others of its group.
+        Understudy = "understudy",
+        /// Has the terminals of one program.
+        RemoteIo = "remote-io",
     }
 }
 
-impl fmt::Display for Role {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(self.name())
-    }
-}
-
-/// How a number is compared.
+/// Comparison with a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Bound {
     /// `>=`
@@ -52,18 +31,18 @@ pub enum Bound {
     Exactly,
 }
 
-/// What is asked.
+/// The requested property.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Asked {
-    /// Of a number.
+    /// A number in its bound.
     Number(Quantity, Bound, u64),
     /// A text that contains this, whatever the capitals.
     Contains(Statement, String),
-    /// Who makes it.
+    /// The vendor.
     Vendor(String),
-    /// Its family.
+    /// The family.
     Family(String),
-    /// Its model.
+    /// The model.
     Model(String),
     /// PLC or embedded.
     Kind(Kind),
@@ -78,9 +57,9 @@ pub enum Asked {
 pub struct Requirement {
     /// Role of the controllers concerned; none: all roles.
     pub role: Option<Role>,
-    /// What is asked.
+    /// The requested property.
     pub asked: Asked,
-    /// As it was written.
+    /// The requirement as it was written.
     pub text: String,
 }
 
@@ -88,9 +67,9 @@ pub struct Requirement {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("U1130: `{text}` is not a requirement: {reason}")]
 pub struct RequirementError {
-    /// As it was written.
+    /// The requirement as it was written.
     pub text: String,
-    /// What is wrong with it.
+    /// The reason.
     pub reason: String,
 }
 
@@ -107,8 +86,7 @@ impl Requirement {
         let (role, rest) = match text.split_once(':') {
             // A blank belongs to a name (`vendor=A: B`), a role has none.
             Some((role, rest)) if !role.contains(['=', '~', ' ', '<', '>']) => {
-                let found = Role::ALL.into_iter().find(|known| known.name() == role);
-                let role = found.ok_or_else(|| {
+                let role = Role::of(role).ok_or_else(|| {
                     wrong(format!(
                         "`{role}` is not a role; expected controller, understudy or remote-io"
                     ))
@@ -158,8 +136,7 @@ fn asked(text: &str) -> Result<Asked, String> {
             Err(format!("`{name}` is compared by `{allowed}`"))
         }
     };
-    let statement = Statement::ALL.into_iter();
-    if let Some(statement) = statement.into_iter().find(|known| known.name() == name) {
+    if let Some(statement) = Statement::of(&name) {
         return only("~", Asked::Contains(statement, value.to_lowercase()));
     }
     match name.as_str() {
@@ -184,7 +161,7 @@ fn quantity(name: &str) -> Option<Quantity> {
         "outputs" => Some(Quantity::DigitalOutputs),
         "program_memory" => Some(Quantity::ProgramMemoryBytes),
         "data_memory" => Some(Quantity::DataMemoryBytes),
-        _ => Quantity::ALL.into_iter().find(|known| known.name() == name),
+        _ => Quantity::of(name),
     }
 }
 

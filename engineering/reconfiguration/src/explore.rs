@@ -5,7 +5,7 @@
 //! and then a scan of the plant under the outputs. An input of the ladder that the plant does not show stays 0.
 
 use rustc_hash::FxHashMap;
-use understudy_logic::{Circuit, Scan, Scratch};
+use understudy_logic::{Circuit, Scan, Scratch, bit, pack, unpack};
 
 use crate::controller::Controller;
 use crate::quotient::{Seen, quotient};
@@ -153,14 +153,6 @@ pub fn explore(
     })
 }
 
-fn bit(words: &[u64], place: usize) -> bool {
-    words[place / 64] >> (place % 64) & 1 == 1
-}
-
-fn set(words: &mut [u64], place: usize) {
-    words[place / 64] |= 1 << (place % 64);
-}
-
 /// Which signal of the ladder is which of the plant.
 struct Wiring {
     /// Of each input of the ladder, the output of the plant.
@@ -235,13 +227,9 @@ impl Walk {
 
     /// What the ladder sees of the outputs of the plant.
     fn shown(&self, outputs: &[u64]) -> Box<[u64]> {
-        let mut shown = vec![0; self.wiring.sensors.len().div_ceil(64)];
-        for (input, sensor) in self.wiring.sensors.iter().enumerate() {
-            if sensor.is_some_and(|place| bit(outputs, place)) {
-                set(&mut shown, input);
-            }
-        }
-        shown.into()
+        let sensors = self.wiring.sensors.iter();
+        let shown = sensors.map(|sensor| sensor.is_some_and(|place| bit(outputs, place)));
+        pack(shown).into()
     }
 
     fn number(&mut self, joint: Joint) -> usize {
@@ -260,20 +248,15 @@ impl Walk {
         let mut outputs = vec![0; self.ladder.output_count().div_ceil(64)];
         self.ladder
             .step(&mut self.scratch, &mut ladder, &joint.shown, &mut outputs);
-        let mut driven = vec![0; self.plant.input_count().div_ceil(64)];
-        for (input, actuator) in self.wiring.actuators.iter().enumerate() {
-            if actuator.is_some_and(|place| bit(&outputs, place)) {
-                set(&mut driven, input);
-            }
-        }
+        let actuators = self.wiring.actuators.iter();
+        let driven = actuators.map(|actuator| actuator.is_some_and(|place| bit(&outputs, place)));
+        let mut inputs: Vec<bool> = driven.collect();
         let mut successors = Vec::new();
         for choice in 0..1_usize << self.wiring.free.len() {
-            let mut inputs = driven.clone();
             for (number, &input) in self.wiring.free.iter().enumerate() {
-                if choice >> number & 1 == 1 {
-                    set(&mut inputs, input);
-                }
+                inputs[input] = choice >> number & 1 == 1;
             }
+            let inputs = pack(inputs.iter().copied());
             let mut plant = joint.plant.to_vec();
             let mut shows = vec![0; self.plant.output_count().div_ceil(64)];
             self.plant
@@ -288,11 +271,9 @@ impl Walk {
                 successors.push(next);
             }
         }
-        let unpack =
-            |words: &[u64], width: usize| Bits((0..width).map(|k| bit(words, k)).collect());
         let vector = Seen {
-            inputs: unpack(&joint.shown, self.ladder.input_count()),
-            outputs: unpack(&outputs, self.ladder.output_count()),
+            inputs: Bits(unpack(&joint.shown, self.ladder.input_count())),
+            outputs: Bits(unpack(&outputs, self.ladder.output_count())),
         };
         (vector, ladder, successors)
     }

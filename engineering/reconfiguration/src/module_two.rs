@@ -249,15 +249,15 @@ impl<'a> Writer<'a> {
         };
         for (bit, name) in self.names.failed.iter().enumerate() {
             let channel = &self.controller.signals.inputs[self.question.channels[bit]];
-            let text = format!("channel {channel} is failed, and keeps its last good value");
+            let text = format!("channel {channel} has failed; its last good value is held");
             self.program.inputs.push(input(name, text));
         }
-        let text = "the operator: plant and ladder agree".to_owned();
+        let text = "operator: plant and ladder agree".to_owned();
         self.program.inputs.push(input(&self.names.release, text));
         let names = &self.names;
         let mut declared = vec![
-            memory(&names.moved, "followed in this phase".into()),
-            memory(&names.held, "module 2 commands".into()),
+            memory(&names.moved, "state changed in this phase".into()),
+            memory(&names.held, "module 2 sets the outputs".into()),
             memory(&names.lost, "outside of the model".into()),
             memory(&names.fresh, "a channel has failed in this scan".into()),
             memory(&names.known, "the ladder is in a state of the model".into()),
@@ -265,7 +265,7 @@ impl<'a> Writer<'a> {
         for (bit, name) in names.was.iter().enumerate() {
             declared.push(memory(
                 name,
-                format!("{} of the scan before", names.failed[bit]),
+                format!("{} in the previous scan", names.failed[bit]),
             ));
         }
         for (&state, name) in &self.at {
@@ -328,7 +328,7 @@ impl<'a> Writer<'a> {
         if let Some(network) = any(states) {
             let known = coil(CoilKind::Plain, &self.names.known);
             self.program.push_titled(
-                "module 2: is the ladder in a state of the model?",
+                "module 2: the ladder is in a state of the model",
                 network,
                 vec![known],
             );
@@ -339,8 +339,11 @@ impl<'a> Writer<'a> {
             .collect();
         if let Some(network) = any(newly) {
             let fresh = coil(CoilKind::Plain, &self.names.fresh);
-            self.program
-                .push_titled("module 2: has a channel just failed?", network, vec![fresh]);
+            self.program.push_titled(
+                "module 2: a channel has failed in this scan",
+                network,
+                vec![fresh],
+            );
         }
     }
 }

@@ -13,15 +13,13 @@
 //! slowly or so fast that the ladder's timers leave S is outside of the model, and is counted.
 
 mod judge;
-mod lanes;
 
 use std::time::Duration;
 
 use rustc_hash::FxHashMap;
 use understudy_ladder::{LowerError, Name, Program};
-use understudy_logic::{Scan, Scratch};
+use understudy_logic::{LANES, Lanes, Run, Scan, Scratch, bit, pack, unpack};
 
-use self::lanes::{LANES, Lanes, Run};
 use crate::controller::Controller;
 use crate::module_two::Correspondence;
 use crate::relation::Relation;
@@ -298,20 +296,15 @@ impl Prover<'_> {
 
     /// The scans that follow, at most [`LANES`] of them.
     fn scan(&mut self, happenings: &[Happening]) -> Result<(), NotProved> {
-        let words = self.combined.scan().input_count().div_ceil(64);
         let mut shown = Vec::with_capacity(happenings.len());
         let mut runs = Vec::with_capacity(happenings.len());
         for &happening in happenings {
             let seen = self.shown(happening);
-            let mut inputs = vec![0; words];
             let bits = 0..self.claim.channels.len();
             let statuses = bits.map(|bit| happening.failed >> bit & 1 == 1);
-            for (place, value) in seen.iter().copied().chain(statuses).enumerate() {
-                inputs[place / 64] |= u64::from(value) << (place % 64);
-            }
             runs.push(Run {
                 state: self.world(happening.parent).registers.to_vec(),
-                signals: inputs,
+                signals: pack(seen.iter().copied().chain(statuses)),
             });
             shown.push(seen);
         }
@@ -339,8 +332,8 @@ impl Prover<'_> {
         let registers: Box<[u64]> = run.state.into();
         let before = self.world(parent);
         let (was_single, was_alone) = (before.is_single, before.alone.clone());
-        let is_on = |place: usize| seen[place / 64] >> (place % 64) & 1 == 1;
-        let outputs = Bits((0..self.width).map(is_on).collect());
+        let is_on = |place: usize| bit(&seen, place);
+        let outputs = Bits(unpack(&seen, self.width));
         let mut world = World {
             registers,
             alone: None,
@@ -354,17 +347,10 @@ impl Prover<'_> {
             && let Some(mut registers) = was_alone
         {
             let mut own = vec![0; self.alone.output_count().div_ceil(64)];
-            let mut inputs = vec![0; self.alone.input_count().div_ceil(64)];
-            for (place, &value) in world.shown.iter().enumerate() {
-                inputs[place / 64] |= u64::from(value) << (place % 64);
-            }
+            let inputs = pack(world.shown.iter().copied());
             self.alone
                 .step(&mut self.scratch, &mut registers, &inputs, &mut own);
-            let own = Bits(
-                (0..self.width)
-                    .map(|place| own[place / 64] >> (place % 64) & 1 == 1)
-                    .collect(),
-            );
+            let own = Bits(unpack(&own, self.width));
             if own != world.outputs {
                 let what = format!(
                     "with no channel failed the outputs are {} in place of {own}",

@@ -43,7 +43,7 @@ impl Events {
     ) -> Self {
         let mut entries: Vec<_> = match table.get("events") {
             None => Vec::new(),
-            Some(value) => form.table(value).into_iter().flatten().collect(),
+            Some(value) => form.table("events", value).into_iter().flatten().collect(),
         };
         entries.sort_by_key(|(key, _)| key.span().start);
         let mut taken: HashMap<u32, Place> = HashMap::new();
@@ -127,11 +127,12 @@ impl Declared {
         if name.split_whitespace().count() != 1 {
             form.error("U0825", "the name of an event is one word", key.span());
         }
-        let entry = form.table(value)?;
+        let entry = form.table(key.get_ref(), value)?;
         form.check_keys(entry, format);
         let label = form.number(entry, "label", 0..=MAXIMUM_LABEL);
-        let controllable = match entry.get("controllable") {
-            Some(value) => form.boolean(value)?,
+        let controllable = match form.flag(entry, "controllable") {
+            Some(controllable) => controllable,
+            None if entry.contains_key("controllable") => return None,
             None => match label {
                 Some(label) => label % 2 == 1,
                 None => {
@@ -154,14 +155,13 @@ impl Declared {
                     .push(diagnostic.with_related(first, "the other one"));
             }
         }
-        let when = form.optional(entry, "when");
         Some(Self {
             name,
             place: key.span(),
             label,
             controllable,
             signal: form.optional(entry, "signal"),
-            when: when.and_then(|when| form.one_of(&when, &When::WORDS)),
+            when: form.choice(entry, "when", &When::WORDS),
         })
     }
 }

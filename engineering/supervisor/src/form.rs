@@ -8,8 +8,8 @@ use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
 use understudy_ladder::Name;
 use understudy_text::spelling;
-use understudy_text::tables::Codes;
 use understudy_text::tables::format::Table;
+use understudy_text::tables::{Codes, Value, unknown_key};
 use understudy_text::{Diagnostic, duration};
 
 /// A place in the text, in bytes.
@@ -76,78 +76,63 @@ impl<'t> Form<'t> {
 
     /// Reports the keys of a table that its format does not have.
     pub(crate) fn check_keys(&mut self, table: &DeTable, format: &Table) {
-        let (what, known) = (format.what, format.names());
+        let known = format.names();
         for key in table.keys() {
-            let name = key.get_ref().as_ref();
-            if !known.contains(&name) {
-                self.error_near(
-                    self.codes.unknown_key,
-                    format!("{what} has no \"{name}\""),
-                    (name, key.span()),
-                    known.iter().copied(),
-                    Some(format!("it has {}", known.join(", "))),
-                );
+            if !known.contains(&key.get_ref().as_ref()) {
+                let unknown = unknown_key(self.codes, format.what, key, &known);
+                self.diagnostics.push(unknown);
             }
         }
     }
 
     pub(crate) fn missing(&mut self, key: &str, what: &str, place: Place) {
-        self.error(
-            self.codes.missing_key,
-            format!("{what} needs \"{key}\""),
-            place,
-        );
+        let message = format!("{what} needs `{key}`");
+        self.error(self.codes.missing_key, message, place);
     }
 
-    pub(crate) fn wrong_type(&mut self, value: &Spanned<DeValue>, wanted: &str) {
-        let found = value.get_ref().type_str();
-        let message = format!("{wanted} is wanted, not {found}");
-        self.error(self.codes.wrong_type, message, value.span());
+    fn value<'v, 'w>(&self, key: &'v str, value: &'v Spanned<DeValue<'w>>) -> Value<'v, 'w> {
+        Value::new(key, value, self.codes)
+    }
+
+    /// What was found as the value of `key`, or that something else was expected.
+    pub(crate) fn expect<T>(
+        &mut self,
+        key: &str,
+        value: &Spanned<DeValue>,
+        found: Option<T>,
+        expected: &str,
+    ) -> Option<T> {
+        let value = self.value(key, value);
+        let found = value.expect(found, expected, &mut self.diagnostics)?;
+        Some(found.value)
     }
 
     pub(crate) fn table<'v, 'w>(
         &mut self,
+        key: &str,
         value: &'v Spanned<DeValue<'w>>,
     ) -> Option<&'v DeTable<'w>> {
-        let table = value.get_ref().as_table();
-        if table.is_none() {
-            self.wrong_type(value, "a table");
-        }
-        table
+        self.expect(key, value, value.get_ref().as_table(), "a table")
     }
 
     pub(crate) fn array<'v, 'w>(
         &mut self,
+        key: &str,
         value: &'v Spanned<DeValue<'w>>,
     ) -> Option<&'v DeArray<'w>> {
-        let array = value.get_ref().as_array();
-        if array.is_none() {
-            self.wrong_type(value, "a list");
-        }
-        array
-    }
-
-    pub(crate) fn boolean(&mut self, value: &Spanned<DeValue>) -> Option<bool> {
-        let boolean = value.get_ref().as_bool();
-        if boolean.is_none() {
-            self.wrong_type(value, "true or false");
-        }
-        boolean
+        self.expect(key, value, value.get_ref().as_array(), "a list")
     }
 
     /// A text as it is.
-    pub(crate) fn string(&mut self, value: &Spanned<DeValue>) -> Option<String> {
-        let word = value.get_ref().as_str();
-        if word.is_none() {
-            self.wrong_type(value, "a text");
-        }
-        word.map(str::to_owned)
+    pub(crate) fn string(&mut self, key: &str, value: &Spanned<DeValue>) -> Option<String> {
+        let text = self.value(key, value).text(&mut self.diagnostics)?;
+        Some(text.value.to_owned())
     }
 
     /// The name under `key`, if there is one.
     pub(crate) fn optional(&mut self, table: &DeTable, key: &str) -> Option<Name> {
         let value = table.get(key)?;
-        let text = self.string(value)?;
+        let text = self.string(key, value)?;
         Some(Name::at(&*text, value.span()))
     }
 
@@ -159,9 +144,9 @@ impl<'t> Form<'t> {
         self.optional(table, key).unwrap_or_default()
     }
 
-    pub(crate) fn flag(&mut self, table: &DeTable, key: &str) -> bool {
-        let value = table.get(key);
-        value.and_then(|value| self.boolean(value)).unwrap_or(false)
+    pub(crate) fn flag(&mut self, table: &DeTable, key: &str) -> Option<bool> {
+        let value = self.value(key, table.get(key)?);
+        Some(value.flag(&mut self.diagnostics)?.value)
     }
 
     /// A number from `range` under `key`.
@@ -171,55 +156,31 @@ impl<'t> Form<'t> {
         key: &str,
         range: std::ops::RangeInclusive<u32>,
     ) -> Option<u32> {
-        let value = table.get(key)?;
-        let Some(number) = value.get_ref().as_integer() else {
-            self.wrong_type(value, "a number");
-            return None;
-        };
-        let number = u32::from_str_radix(number.as_str(), number.radix()).ok();
-        let number = number.filter(|number| range.contains(number));
-        if number.is_none() {
-            let message = format!(
-                "\"{key}\" is a number from {} to {}",
-                range.start(),
-                range.end()
-            );
-            self.error(self.codes.out_of_bounds, message, value.span());
-        }
-        number
+        let value = self.value(key, table.get(key)?);
+        let range = u64::from(*range.start())..=u64::from(*range.end());
+        let number = value.count(range, &mut self.diagnostics)?;
+        u32::try_from(number.value).ok()
     }
 
-    /// One of `words` under `key`; the default where nothing is said.
-    pub(crate) fn choice<T: Copy + Default>(
+    /// What one of `words` under `key` means.
+    pub(crate) fn choice<T: Copy>(
         &mut self,
         table: &DeTable,
         key: &str,
         words: &[(&str, T)],
-    ) -> T {
-        let text = self.optional(table, key);
-        text.and_then(|text| self.one_of(&text, words))
-            .unwrap_or_default()
+    ) -> Option<T> {
+        let value = self.value(key, table.get(key)?);
+        let known: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
+        let place = value.word(&known, &mut self.diagnostics)?;
+        Some(words[place.value].1)
     }
 
-    /// What `text` means among `words`.
-    pub(crate) fn one_of<T: Copy>(&mut self, text: &Name, words: &[(&str, T)]) -> Option<T> {
-        let found = words.iter().find(|(word, _)| *word == text.as_str());
-        if found.is_none() {
-            let listed: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
-            let message = format!("{:?} is none of {}", text.as_str(), listed.join(", "));
-            let word = (text.as_str(), text.span());
-            self.error_near(self.codes.unknown_word, message, word, listed, None);
-        }
-        found.map(|(_, value)| *value)
-    }
-
-    /// The time that `text` says.
-    pub(crate) fn time(&mut self, text: &Name) -> Option<Duration> {
-        let time = duration::parse(text);
+    /// The time under `key`.
+    pub(crate) fn time(&mut self, table: &DeTable, key: &str) -> Option<Duration> {
+        let value = table.get(key)?;
+        let time = duration::parse(&self.string(key, value)?);
         if let Err(error) = &time {
-            let error = Diagnostic::error(self.codes.unknown_word, error.to_string(), text.span());
-            self.diagnostics
-                .push(error.with_help("such as \"15s\", \"1.5s\" or \"2m\""));
+            self.error(self.codes.unknown_word, error.to_string(), value.span());
         }
         time.ok()
     }
@@ -231,21 +192,25 @@ impl<'t> Form<'t> {
         key: &str,
         mut read: impl FnMut(&mut Self, &DeTable, &Place) -> T,
     ) -> Vec<T> {
-        let entries = table.get(key).and_then(|value| self.array(value));
+        let entries = table.get(key).and_then(|value| self.array(key, value));
         let mut list = Vec::new();
         for entry in entries.into_iter().flatten() {
-            if let Some(table) = self.table(entry) {
+            if let Some(table) = self.table(key, entry) {
                 list.push(read(self, table, &entry.span()));
             }
         }
         list
     }
 
-    /// The texts of a list, each with the words in it.
-    pub(crate) fn phrases(&mut self, list: &Spanned<DeValue>) -> Vec<(Vec<Word<'t>>, Place)> {
+    /// The texts of the list under `key`, each with the words in it.
+    pub(crate) fn phrases(
+        &mut self,
+        key: &str,
+        list: &Spanned<DeValue>,
+    ) -> Vec<(Vec<Word<'t>>, Place)> {
         let mut phrases = Vec::new();
-        for item in self.array(list).into_iter().flatten() {
-            if self.string(item).is_some() {
+        for item in self.array(key, list).into_iter().flatten() {
+            if self.string(key, item).is_some() {
                 phrases.push((split(self.text, item.span()), item.span()));
             }
         }

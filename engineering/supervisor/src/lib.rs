@@ -25,7 +25,7 @@ mod schema;
 mod symbolic;
 mod synthesis;
 
-pub use ads::{Read, read_ads, write_ads};
+pub use ads::{AdsError, Read, read_ads, write_ads};
 pub use alphabet::{Alphabet, Event, Label};
 pub use automaton::{Automaton, AutomatonError, Edge, State, Transition};
 pub use drawing::{TooLargeToDraw, draw_automaton_svg, draw_dot};

@@ -37,6 +37,4 @@ pub use products::{meet, mutex, sync};
 pub use project::project;
 pub(crate) use supcon::explicit_supcon;
 pub use supcon::{Explanation, Supcon, Violation, lift, supcon};
-pub use supreduce::{
-    Inequivalent, Reducing, Reduction, control_equivalent, supreduce, supreduce_while,
-};
+pub use supreduce::{Reducing, Reduction, supreduce, supreduce_while};

@@ -17,8 +17,7 @@ mod view;
 
 pub use explore::{ProofSettings, prove};
 pub use findings::{
-    Finding, FindingKind, FindingSeverity, HybridFindingsError, bounded_response, findings,
-    hybrid_findings,
+    Finding, FindingKind, FindingSeverity, HybridFindingsError, findings, hybrid_findings,
 };
 pub use hybrid::{HybridCounterexample, HybridDeviation, HybridProof, HybridVerdict, prove_hybrid};
 pub use verdict::{Counterexample, Deviation, Proof, ProofError, ScanRecord, Verdict};

@@ -101,19 +101,19 @@ fn what_is_missing_from_the_ladder_is_found() {
         }
     }
     insta::assert_snapshot!(unnoticed.join("\n"), @r#"
-delay of done: NormallyClosed done.fired
-placed: NormallyClosed robot_busy.fresh
-keeper: 1 -- placed --> 3: (placed.keeper)
-keeper: 4 -- placed --> 5: (placed.keeper)
-keeper: 4 -- placed --> 5: NormallyOpen keeper.q4
-fed: NormallyClosed feeder_busy.fresh
-done: (done.fired)
-done: NormallyOpen assembler_busy
-done: NormallyClosed assembler_busy.fresh
-pick: (robot_busy.fresh)
-feed: (feeder_busy.fresh)
-events that moved no supervisor are gone: (placed.keeper)
-"#);
+    delay of done: NormallyClosed done.fired
+    placed: NormallyClosed robot_busy.fresh
+    keeper: 1 -- placed --> 3: (placed.keeper)
+    keeper: 4 -- placed --> 5: (placed.keeper)
+    keeper: 4 -- placed --> 5: NormallyOpen keeper.q4
+    fed: NormallyClosed feeder_busy.fresh
+    done: (done.fired)
+    done: NormallyOpen assembler_busy
+    done: NormallyClosed assembler_busy.fresh
+    pick: (robot_busy.fresh)
+    feed: (feeder_busy.fresh)
+    reset events that moved no supervisor: (placed.keeper)
+    "#);
 }
 
 /// A supervisor that forbids what the net does by itself is none.

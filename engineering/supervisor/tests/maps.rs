@@ -53,15 +53,15 @@ x_a = "IX0.0"
     let read = read_map(text);
     assert_eq!(read.map, None);
     insta::assert_snapshot!(shown(text, read.diagnostics), @r#"
-    2:11 U0864 a text is wanted, not integer
-    3:1 U0862 a map has no "strat" (did you mean `start`?)
-    5:5 U0864 a number of an event is wanted, not string
-    6:1 U0863 an input needs "signal"
-    8:8 U0865 "pulse " is none of pulse, rising, falling, high, low (did you mean `pulse`?)
-    9:1 U0863 a switch needs "positions"
-    11:10 U0864 true or false is wanted, not string
-    16:10 U0865 invalid duration `5 sec`: expected a number with a unit, such as `10ms` (such as "15s", "1.5s" or "2m")
-    18:9 U0864 a text is wanted, not array
+    2:11 U0864 `program` is the number 5
+    3:1 U0862 a map has no key `strat` (did you mean `start`?)
+    5:5 U0864 `a` is the text "zero"
+    6:1 U0863 an input needs `signal`
+    8:8 U0865 `when` cannot be "pulse " (did you mean `pulse`?)
+    9:1 U0863 a switch needs `positions`
+    11:10 U0864 `memory` is the text "yes"
+    16:10 U0865 invalid duration `5 sec`: expected a number with a unit, such as `10ms`
+    18:9 U0864 `event` is a list
     21:7 U0867 "IX0.0" is no address of a bit (addresses look like %IX0.3, %QX1.0 or %MX2.7)
     "#);
 }
@@ -213,6 +213,6 @@ fn signals_of_a_model_are_a_map() {
     let both = both.with_addresses(&model.addresses);
     insta::assert_snapshot!(program(&both), @r"
     down  plant: done when it becomes 1; lifted when it becomes 0
-    lower  on from start
+    lower  on since start
     ");
 }

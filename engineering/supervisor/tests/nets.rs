@@ -107,38 +107,38 @@ door = "%IX"
     let ReadNet { file, diagnostics } = read_net(text);
     assert_eq!(file, None);
     insta::assert_snapshot!(shown(text, diagnostics), @r#"
-2:1 U0862 a net has no "title" [it has name, events, place, transition, addresses]
-4:40 U0827 label 2: odd labels are controllable, even ones are not
-4:43 U0862 an event has no "signal" [it has controllable, label]
-7:10 U0865 "tokens" is a number from 0 to 32767
-8:9 U0855 this cannot be a name in a ladder [letters, digits and `_`, single dots between its parts, a letter or `_` first, no word of the format]
-10:8 U0894 `held` begins with 4 tokens, its capacity is 3
-13:11 U0856 `door` is the signal of a condition and of an action
-13:18 U0864 a text is wanted, not integer
-15:8 U0891 `held` is the name of two places or two transitions
-16:1 U0863 a place needs "name"
-17:12 U0865 "capacity" is a number from 1 to 32767
-20:9 U0824 there is no event brign [did you mean `bring`?]
-21:13 U0892 there is no place `fre` [did you mean `free`?]
-21:19 U0893 an arc of weight 0 to `free` says nothing
-21:30 U0865 the weight of an arc is a number from 1 to 32767
-21:39 U0865 an arc is a place, or a weight and a place
-22:17 U0888 this is no condition: a branch is empty [a condition looks like "body_present /stop [ +start | -door ]"]
-25:1 U0862 a transition has no "taks" [did you mean `takes`?]
-26:15 U0888 this is no condition: this bracket is not closed [a condition looks like "body_present /stop [ +start | -door ]"]
-27:9 U0865 invalid duration `5`: expected a number with a unit, such as `10ms` [such as "15s", "1.5s" or "2m"]
-29:8 U0890 `wait` has a delay and a condition on an edge, which holds for one scan only
-30:13 U0888 this is no condition: a `]` or `|` without its `[` [a condition looks like "body_present /stop [ +start | -door ]"]
-32:1 U0863 a transition needs "name"
-35:8 U0867 "%IX" is no address of a bit [addresses look like %IX0.3, %QX1.0 or %MX2.7]
-35:13 U0863 a net needs "name"
-"#);
+    2:1 U0862 a net has no key `title` [known: name, events, place, transition, addresses]
+    4:40 U0827 label 2: odd labels are controllable, even ones are not
+    4:43 U0862 an event has no key `signal` [known: controllable, label]
+    7:10 U0865 `tokens` is -1
+    8:9 U0855 this cannot be a name in a ladder [letters, digits and `_`, single dots between its parts, a letter or `_` first, no word of the format]
+    10:8 U0894 `held` begins with 4 tokens, its capacity is 3
+    13:11 U0856 `door` is the signal of a condition and of an action
+    13:18 U0864 `level` is the number 5
+    15:8 U0891 `held` is the name of two places or two transitions
+    16:1 U0863 a place needs `name`
+    17:12 U0865 `capacity` is 0
+    20:9 U0824 there is no event brign [did you mean `bring`?]
+    21:13 U0892 there is no place `fre` [did you mean `free`?]
+    21:19 U0893 an arc of weight 0 to `free` says nothing
+    21:30 U0865 the weight of an arc is a number from 1 to 32767
+    21:39 U0865 an arc is a place, or a weight and a place
+    22:17 U0888 this is no condition: a branch is empty [a condition looks like "body_present /stop [ +start | -door ]"]
+    25:1 U0862 a transition has no key `taks` [did you mean `takes`?]
+    26:15 U0888 this is no condition: this bracket is not closed [a condition looks like "body_present /stop [ +start | -door ]"]
+    27:9 U0865 invalid duration `5`: expected a number with a unit, such as `10ms`
+    29:8 U0890 `wait` has a delay and a condition on an edge, which holds for one scan only
+    30:13 U0888 this is no condition: a `]` or `|` without its `[` [a condition looks like "body_present /stop [ +start | -door ]"]
+    32:1 U0863 a transition needs `name`
+    35:8 U0867 "%IX" is no address of a bit [addresses look like %IX0.3, %QX1.0 or %MX2.7]
+    35:13 U0863 a net needs `name`
+    "#);
     let text = "name = \"a\"\n[[place]";
     insta::assert_snapshot!(shown(text, read_net(text).diagnostics), @r#"
 2:9 U0861 invalid TOML: unclosed array table, expected `]`
 "#);
     insta::assert_snapshot!(shown("", read_net("").diagnostics), @r#"
-1:1 U0863 a net needs "name"
+1:1 U0863 a net needs `name`
 "#);
 }
 

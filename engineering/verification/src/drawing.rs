@@ -116,7 +116,7 @@ fn evaluations(
 }
 
 /// The rungs on which signals depend, now and later, by what they write and read; by their place.
-pub fn rungs_behind<'a>(program: &Program, names: impl IntoIterator<Item = &'a str>) -> Vec<usize> {
+fn rungs_behind<'a>(program: &Program, names: impl IntoIterator<Item = &'a str>) -> Vec<usize> {
     let mut wanted: BTreeSet<String> = names.into_iter().map(stem).collect();
     let mut rungs = BTreeSet::new();
     loop {

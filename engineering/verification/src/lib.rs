@@ -11,7 +11,7 @@ pub mod smv;
 pub mod symbolic;
 mod table;
 
-pub use drawing::{MAXIMUM_DRAWN, Shown, draw_runs, rungs_behind};
+pub use drawing::{MAXIMUM_DRAWN, Shown, draw_runs};
 pub use effort::{GoOn, Stopped, Work};
 pub use parity::{
     Assignment, Place, Proof, Refutation, prove_parity, prove_parity_while, prove_parity_within,

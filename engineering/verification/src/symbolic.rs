@@ -24,7 +24,7 @@ use crate::property::{Formula, Named};
 pub(crate) use self::core::Core;
 pub(crate) use model::Cone;
 pub(crate) use trace::rows;
-pub use trace::{ScanRow, Trace, replays};
+pub use trace::{ScanRow, Trace};
 
 /// A property whose signals are known to be those of a circuit, by their number in it.
 pub type Resolved = Formula<Signal>;

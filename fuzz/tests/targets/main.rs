@@ -12,25 +12,11 @@ use std::time::Duration;
 
 use attack::attack;
 use understudy_allocation::file;
-use understudy_cluster::Cluster;
 use understudy_ladder::{MAXIMUM_NESTING, check, parse, print};
 use understudy_reconfiguration::{Signals, project, record};
 
 fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
-}
-
-/// The cluster of the examples.
-pub(crate) fn press_cell() -> Cluster {
-    let text = include_str!("../../../examples/press-cell/cluster.toml");
-    let read = understudy_cluster::read("cluster.toml", text, &mut |name| {
-        Ok(match name {
-            "robot.ladder" => include_str!("../../../examples/press-cell/robot.ladder"),
-            _ => include_str!("../../../examples/press-cell/press.ladder"),
-        }
-        .to_owned())
-    });
-    read.cluster.expect("the example is right")
 }
 
 #[test]
@@ -80,6 +66,7 @@ fn cluster() {
         "examples/press-cell/cluster.toml",
         "examples/boiler/cluster.toml",
         "examples/modbus-cell/cluster.toml",
+        "examples/modbus-level/cluster.toml",
     ];
     let ladder = include_str!("../../../examples/press-cell/press.ladder");
     attack("cluster", &seeds, |bytes| {

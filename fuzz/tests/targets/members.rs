@@ -3,16 +3,16 @@
 use std::sync::Arc;
 
 use understudy_bus::{Endpoints, Peer};
-use understudy_cycle::{Input, Machine, RemoteIoInput};
+use understudy_cycle::{Input, Machine, Mode, RemoteIoInput};
 use understudy_remote_io::RemoteIo;
 use understudy_seal::{ClusterSecret, Opener, Revocations, Seal, Title};
+use understudy_testing::press_cell;
 use understudy_wire::{
     ClusterHash, Force, MAXIMUM_FRAME_BYTES, Member, ProgramId, SignalPlace, StationId, Time,
     decode, encode,
 };
 
 use crate::attack::attack;
-use crate::press_cell;
 
 /// Behind the prefix and before the checksum, where a reader has to understand something.
 fn framed(payload: &[u8]) -> Vec<u8> {
@@ -105,7 +105,7 @@ fn register_of_keys() {
 /// What a line of standard input or a page may ask of a remote I/O.
 #[test]
 fn force() {
-    let settings = press_cell()
+    let settings = press_cell(Mode::Full)
         .remote_io_settings(ProgramId(0))
         .expect("the robot's");
     attack("force", &[], |bytes| {

@@ -3,15 +3,16 @@
 use std::sync::Arc;
 
 use understudy_campaigns::{Findings, merge};
+use understudy_cycle::Mode;
 use understudy_journal::records;
+use understudy_testing::press_cell;
 use understudy_view::{Bounds, Model};
 
 use crate::attack::attack;
-use crate::press_cell;
 
 #[test]
 fn journal() {
-    let cluster = Arc::new(press_cell());
+    let cluster = Arc::new(press_cell(Mode::Full));
     attack("journal", &[], |bytes| {
         let mut model = Model::new(Arc::clone(&cluster), Bounds::default());
         for record in records(bytes).map_while(Result::ok) {

@@ -1,7 +1,8 @@
 //! How long 1,000 failures of the simulated press cell take at MTBF/MTTR = 50 and an MTTR of 50 cycles; the bar is 120 s on two cores.
 
 use understudy_campaigns::{CampaignPlan, run_campaign};
-use understudy_cluster::{Overrides, press_cell, read_with};
+use understudy_cycle::Mode;
+use understudy_testing::press_cell;
 
 const FAILURES: u64 = 1_000;
 
@@ -12,18 +13,7 @@ fn main() {
 /// Divan prints the whole time, and failures a second as items.
 #[divan::bench(sample_count = 1, sample_size = 1)]
 fn a_thousand_failures_of_the_press_cell(bencher: divan::Bencher<'_, '_>) {
-    let files = press_cell();
-    let loaded = read_with(
-        files[0].name,
-        files[0].text,
-        Overrides::default(),
-        &mut |name| {
-            let file = files.iter().find(|file| file.name == name);
-            file.map(|file| file.text.to_owned())
-                .ok_or_else(|| "no such file".to_owned())
-        },
-    );
-    let cell = loaded.cluster.expect("the press cell is right");
+    let cell = press_cell(Mode::Full);
     let plan = CampaignPlan {
         mtbf_cycles: 2_500.0,
         mttr_cycles: 50.0,

@@ -5,10 +5,8 @@
 
 mod campaign;
 mod injection;
-mod joining;
 mod observed;
 mod outlook;
-mod troubles;
 
 pub use campaign::{
     CampaignError, CampaignPlan, Found, Measured, OwnTime, Planned, Question, QuestionError,
@@ -20,7 +18,5 @@ pub use injection::{
     MAXIMUM_FAILURES, MAXIMUM_RUN_CYCLES, MINIMUM_RUN_CYCLES, MergeError, NoShard, Phase,
     PictureError, Property, Role, Shard, inject, merge, picture,
 };
-pub use joining::{JOIN_CYCLES, Joined, join_trial};
 pub use observed::{JournalView, ObservationError, observe_journal};
 pub use outlook::{JournalOutlook, look_ahead};
-pub use troubles::{Target, Trouble, TroubleRow};

@@ -33,6 +33,14 @@ pub enum GatewayError {
         /// At most.
         most: usize,
     },
+    /// More numbers than a Modbus address can name.
+    #[error("U0592: the register map has {registers} registers; it holds {most} at most")]
+    TooManyRegisters {
+        /// Of the run and all programs.
+        registers: usize,
+        /// At most.
+        most: usize,
+    },
     /// The journal cannot be read.
     #[error("U0593: {0}")]
     Journal(Trouble),
@@ -47,7 +55,7 @@ impl GatewayError {
         match self {
             Self::Listen { .. } => "U0590",
             Self::System { .. } => "U0591",
-            Self::TooManyBits { .. } => "U0592",
+            Self::TooManyBits { .. } | Self::TooManyRegisters { .. } => "U0592",
             Self::Journal(_) => "U0593",
             Self::Bus(error) => error.code(),
         }

@@ -1,15 +1,21 @@
 //! The register map: the meaning of each bit and each register of Modbus.
 //!
 //! ```text
-//!   discrete inputs   u(1), u(2), ... one after the other, element 1 first
-//!   coils             y(1), y(2), ... as driven; read-only
-//!   registers         0..16 the run, 16.. the stations, 96.. the programs; read as input or as holding registers
+//!   discrete inputs   the BOOLs of u(1), u(2), ... one after the other, in order of declaration
+//!   coils             the BOOLs of y(1), y(2), ... as driven; read-only
+//!   registers         0..16 the run, 16.. the stations, 96.. the programs, 1120.. the numbers of u(1), y(1), u(2), ...;
+//!                     read as input or as holding registers
 //! ```
 //!
-//! Numbers of 32 bits take two registers, the upper half first. Addresses are those on the wire, from 0.
+//! Numbers of 32 bits take two registers and numbers of 64 bits four, the most significant one first. Addresses are those on the wire, from 0.
+
+use std::borrow::Cow;
 
 use understudy_cluster::Cluster;
-use understudy_view::{RunState, Snapshot, StationState};
+use understudy_executable::Interface;
+use understudy_typed::{Elementary, Point, Points};
+use understudy_view::{RunState, Snapshot, StationState, stored};
+use understudy_wire::MAXIMUM_PROGRAMS;
 
 use crate::error::GatewayError;
 
@@ -25,8 +31,11 @@ const PROGRAMS: usize = 96;
 /// Number of registers of a program.
 const OF_PROGRAM: usize = 16;
 
+/// First register of the numbers among the inputs and outputs of the programs, behind as many programs as there can be.
+const NUMBERS: usize = PROGRAMS + MAXIMUM_PROGRAMS * OF_PROGRAM;
+
 /// Number of addresses of 16 bits.
-const MOST_BITS: usize = 1 << 16;
+const ADDRESSES: usize = 1 << 16;
 
 /// One of the tables of Modbus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
@@ -47,20 +56,22 @@ pub struct Place {
     pub area: Area,
     /// Its address, from 0.
     pub address: u16,
-    /// 1, or 2 for a number of 32 bits.
+    /// Number of registers: 1, 2 for a number of 32 bits, 4 for one of 64 bits.
     pub width: u16,
     /// A signal as `program.signal`, or the name of the register.
     pub name: String,
     /// Meaning of its values.
-    pub meaning: &'static str,
+    pub meaning: Cow<'static, str>,
 }
 
 /// The map of one cluster.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RegisterMap {
     places: Vec<Place>,
-    /// Widths of u(i) and y(i).
-    widths: Vec<(usize, usize)>,
+    /// u(i) and y(i), point by point.
+    interfaces: Vec<Interface>,
+    /// Registers of all numbers.
+    numbers: usize,
     stations: usize,
 }
 
@@ -77,6 +88,12 @@ pub struct ProcessImage {
 
 /// The numbers of [`StationState::ALL`].
 const STATION_STATES: &str = "0 not-started, 1 publishing, 2 not-received, 3 flagged, 4 joining, 5 shadow-mode, 6 refused, 7 suspended, 8 killed, 9 ended";
+
+/// Meaning of an input.
+const INPUT: &str = "input, as last sampled";
+
+/// Meaning of an output.
+const OUTPUT: &str = "output, as driven";
 
 const SOURCES: &str = "0 not known, 1 direct, 2 reconstructed, 3 held, 4 fail-safe";
 
@@ -118,41 +135,38 @@ impl RegisterMap {
     pub fn new(cluster: &Cluster) -> Result<Self, GatewayError> {
         let programs = cluster.controllers();
         let mut places = Vec::new();
-        for (area, meaning) in [
-            (Area::DiscreteInput, "input, as last sampled"),
-            (Area::Coil, "output, as driven"),
-        ] {
-            let names: Vec<String> = programs
-                .iter()
-                .flat_map(|program| {
-                    let signals = match area {
-                        Area::DiscreteInput => program.interface.inputs.bit_names(),
-                        _ => program.interface.outputs.bit_names(),
-                    };
-                    let named = move |signal| format!("{}.{signal}", program.name);
-                    signals.into_iter().map(named)
-                })
-                .collect();
-            if names.len() > MOST_BITS {
-                return Err(GatewayError::TooManyBits {
-                    bits: names.len(),
-                    most: MOST_BITS,
-                });
-            }
-            places.extend(names.into_iter().enumerate().map(|(address, name)| Place {
+        for (area, meaning) in [(Area::DiscreteInput, INPUT), (Area::Coil, OUTPUT)] {
+            let signals = programs.iter().flat_map(|program| {
+                let Interface { inputs, outputs } = &program.interface;
+                let points = match area {
+                    Area::DiscreteInput => inputs,
+                    _ => outputs,
+                };
+                let bits = points.iter().filter(|point| point.of == Elementary::Bool);
+                bits.map(move |point| format!("{}.{}", program.name, point.name))
+            });
+            let first = places.len();
+            places.extend(signals.enumerate().map(|(address, name)| Place {
                 area,
                 address: address as u16,
                 width: 1,
                 name,
-                meaning,
+                meaning: meaning.into(),
             }));
+            let bits = places.len() - first;
+            if bits > ADDRESSES {
+                return Err(GatewayError::TooManyBits {
+                    bits,
+                    most: ADDRESSES,
+                });
+            }
         }
-        let register = |address: usize, width, name, meaning| Place {
+        let register = |address: usize, width, name, meaning: &'static str| Place {
             area: Area::Register,
             address: address as u16,
             width,
             name,
-            meaning,
+            meaning: meaning.into(),
         };
         for (address, width, name, meaning) in OF_RUN {
             places.push(register(address.into(), width, name.to_owned(), meaning));
@@ -178,13 +192,33 @@ impl RegisterMap {
                 places.push(register(address, width, name, meaning));
             }
         }
-        let widths = programs.iter().map(|program| {
-            let interface = &program.interface;
-            (interface.inputs.width(), interface.outputs.width())
-        });
+        let interfaces: Vec<Interface> = programs.iter().map(|it| it.interface.clone()).collect();
+        let mut address = NUMBERS;
+        for (program, interface) in programs.iter().zip(&interfaces) {
+            for (points, meaning) in [(&interface.inputs, INPUT), (&interface.outputs, OUTPUT)] {
+                for point in points.iter().filter(|point| point.of != Elementary::Bool) {
+                    let width = registers_of(point);
+                    places.push(Place {
+                        area: Area::Register,
+                        address: address as u16,
+                        width: width as u16,
+                        name: format!("{}.{}", program.name, point.name),
+                        meaning: format!("{}: {meaning}", point.of).into(),
+                    });
+                    address += width;
+                }
+            }
+        }
+        if address > ADDRESSES {
+            return Err(GatewayError::TooManyRegisters {
+                registers: address,
+                most: ADDRESSES,
+            });
+        }
         Ok(Self {
             places,
-            widths: widths.collect(),
+            interfaces,
+            numbers: address - NUMBERS,
             stations: count,
         })
     }
@@ -197,7 +231,7 @@ impl RegisterMap {
     /// The process image of a snapshot.
     pub fn image(&self, snapshot: &Snapshot) -> ProcessImage {
         let mut image = ProcessImage {
-            registers: vec![0; PROGRAMS + self.widths.len() * OF_PROGRAM],
+            registers: vec![0; PROGRAMS + self.interfaces.len() * OF_PROGRAM],
             ..ProcessImage::default()
         };
         let set = |registers: &mut Vec<u16>, address: usize, value: u64| {
@@ -222,12 +256,17 @@ impl RegisterMap {
         set(registers, 4, snapshot.period_us);
         registers[6] = u16::from(snapshot.margin.survives);
         registers[7] = small(snapshot.alarms.len());
-        registers[8] = small(self.widths.len());
+        registers[8] = small(self.interfaces.len());
         registers[9] = small(self.stations);
         for (rank, station) in snapshot.stations.iter().enumerate().take(self.stations) {
             registers[STATIONS + rank] = state_number(station.state);
         }
-        for (index, (width, program)) in self.widths.iter().zip(&snapshot.programs).enumerate() {
+        for (index, program) in snapshot
+            .programs
+            .iter()
+            .enumerate()
+            .take(self.interfaces.len())
+        {
             let base = PROGRAMS + index * OF_PROGRAM;
             registers[base] = match program.source {
                 None => 0,
@@ -254,19 +293,52 @@ impl RegisterMap {
                 base + 14,
                 program.plant_faults.unwrap_or_default(),
             );
-            add_bits(&mut image.inputs, program.inputs.as_deref(), width.0);
-            add_bits(&mut image.coils, program.outputs.as_deref(), width.1);
+        }
+        if self.numbers > 0 {
+            image.registers.resize(NUMBERS, 0);
+        }
+        for (interface, program) in self.interfaces.iter().zip(&snapshot.programs) {
+            let (inputs, outputs) = (program.inputs.as_deref(), program.outputs.as_deref());
+            add_points(
+                &interface.inputs,
+                inputs,
+                &mut image.inputs,
+                &mut image.registers,
+            );
+            add_points(
+                &interface.outputs,
+                outputs,
+                &mut image.coils,
+                &mut image.registers,
+            );
         }
         image
     }
 }
 
-/// `width` bits of a text such as `0110`; 0 where nothing is known.
-fn add_bits(bits: &mut Vec<bool>, text: Option<&str>, width: usize) {
-    let end = bits.len() + width;
-    let known = text.unwrap_or_default().bytes().take(width);
-    bits.extend(known.map(|byte| byte == b'1'));
-    bits.resize(end, false);
+/// The points of an image that is written as bits, such as `0110`: BOOLs as bits, numbers as registers; 0 where nothing is known.
+fn add_points(points: &Points, text: Option<&str>, bits: &mut Vec<bool>, registers: &mut Vec<u16>) {
+    for point in points {
+        let stored = text
+            .and_then(|text| stored(point, text))
+            .unwrap_or_default();
+        if point.of == Elementary::Bool {
+            bits.push(stored != 0);
+            continue;
+        }
+        // A SINT keeps its sign.
+        let value = match point.of.is_signed() {
+            true => point.of.signed(stored) as u64,
+            false => stored,
+        };
+        let places = (0..registers_of(point)).rev();
+        registers.extend(places.map(|place| (value >> (16 * place)) as u16));
+    }
+}
+
+/// Registers that a number takes: one for 8 or 16 bits, two for 32, four for 64.
+fn registers_of(point: &Point) -> usize {
+    point.of.bits().div_ceil(16) as usize
 }
 
 /// The place of a state in [`StationState::ALL`].

@@ -165,6 +165,8 @@ pub fn records(journal: impl BufRead) -> impl Iterator<Item = Result<Record, Jou
 
 #[cfg(test)]
 mod tests {
+    use understudy_testing::Folder;
+
     use super::*;
     use crate::record::RunEvent;
 
@@ -222,11 +224,7 @@ mod tests {
 
     #[test]
     fn readers_follow_the_segments() {
-        let name = format!("understudy-journal-{}", std::process::id());
-        let folder = std::env::temp_dir().join(name);
-        // It is there only where a run before was killed.
-        let _ = std::fs::remove_dir_all(&folder);
-        std::fs::create_dir_all(&folder).expect("a folder");
+        let folder = Folder::new("journal");
         let path = folder.join("journal.jsonl");
         let mut journal = Journal::create(&path, 0).expect("created");
         for at_ns in 0..5000 {
@@ -241,6 +239,5 @@ mod tests {
         let first = 5000 - times.len() as u64;
         assert!(first > 0 && times.len() > 100, "{}", times.len());
         assert_eq!(times, (first..5000).collect::<Vec<_>>());
-        std::fs::remove_dir_all(folder).expect("it goes");
     }
 }

@@ -174,15 +174,13 @@ fn unique(name: &str, taken: &BTreeMap<String, String>) -> String {
 #[cfg(test)]
 mod tests {
     use understudy_cluster::press_cell;
+    use understudy_testing::Folder;
 
     use super::*;
 
     #[test]
     fn what_was_kept_is_the_same_cluster() {
-        let name = format!("understudy-kept-{}", std::process::id());
-        let folder = std::env::temp_dir().join(name);
-        // It is there only where a run before was killed.
-        let _ = fs::remove_dir_all(&folder);
+        let folder = Folder::new("kept");
         let source = folder.join("source");
         fs::create_dir_all(source.join("ladders")).expect("a folder");
         for file in press_cell() {
@@ -224,6 +222,5 @@ mod tests {
         );
         fs::write(run.join("cluster/robot.ladder"), "rung oh").expect("written");
         assert!(matches!(kept_cluster(&run), Err(KeptError::Files { .. })));
-        fs::remove_dir_all(folder).expect("it goes");
     }
 }

@@ -54,15 +54,14 @@ fn entries_of(folder: &Path) -> Vec<PathBuf> {
 mod tests {
     use std::os::unix::fs::symlink;
 
+    use understudy_testing::Folder;
+
     use super::*;
     use crate::writer::WriterLock;
 
     #[test]
     fn what_a_dead_writer_left_goes_and_all_else_stays() {
-        let name = format!("understudy-leftovers-{}", std::process::id());
-        let runs = std::env::temp_dir().join(name);
-        // It is there only where a run before was killed.
-        let _ = fs::remove_dir_all(&runs);
+        let runs = Folder::new("leftovers");
         let run = |name: &str| {
             let run = runs.join(name);
             fs::create_dir_all(run.join(KEYS).join("members")).expect("a folder");
@@ -91,6 +90,5 @@ mod tests {
         drop(lock);
         remove_leftovers(&runs);
         assert!(!living.join(KEYS).exists() && !living.join(SOCKET).exists());
-        fs::remove_dir_all(runs).expect("it goes");
     }
 }

@@ -75,12 +75,13 @@ fn written(path: &Path) -> io::Result<PathBuf> {
 
 #[cfg(test)]
 mod tests {
+    use understudy_testing::Folder;
+
     use super::*;
 
     #[test]
     fn names_lead_below_the_folder_or_nowhere() {
-        let name = format!("understudy-named-files-{}", std::process::id());
-        let root = env::temp_dir().join(name);
+        let root = Folder::new("named-files");
         let cell = root.join("cell");
         fs::create_dir_all(cell.join("ladders")).expect("a folder");
         fs::create_dir_all(root.join("cell-two")).expect("a folder");
@@ -117,6 +118,5 @@ mod tests {
         let other = read_below(&cell, &allowed, "../cell-two/other");
         assert_eq!(other, bytes("cell-two/other"));
         assert!(read_below(&cell, &allowed, "../secret").is_err());
-        fs::remove_dir_all(root).expect("removed");
     }
 }

@@ -122,7 +122,7 @@ impl Refusal {
             SignalPlace::Input(place) => (place, inputs, "inputs"),
             SignalPlace::Output(place) => (place, outputs, "outputs"),
         };
-        (usize::from(place) >= count)
+        (!force.fits(count))
             .then(|| Self::Force(format!("{name} has {count} {kind}, and no number {place}")))
     }
 }

@@ -181,12 +181,13 @@ pub fn time_name(now: SystemTime) -> String {
 mod tests {
     use std::time::Duration;
 
+    use understudy_testing::Folder;
+
     use super::*;
 
     #[test]
     fn a_run_that_never_began_is_taken_back() {
-        let runs =
-            std::env::temp_dir().join(format!("understudy-taken-back-{}", std::process::id()));
+        let runs = Folder::new("taken-back");
         let second = |seconds| SystemTime::UNIX_EPOCH + Duration::from_secs(seconds);
         let latest = || fs::read_link(runs.join("latest")).ok();
         let first = RunDirectory::create(&runs, second(1)).expect("a directory");
@@ -198,7 +199,6 @@ mod tests {
         first.take_back();
         assert_eq!(latest(), None);
         assert_eq!(fs::read_dir(&runs).expect("a folder").count(), 0);
-        fs::remove_dir(&runs).expect("empty");
     }
 
     #[test]

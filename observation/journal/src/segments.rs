@@ -167,15 +167,9 @@ fn closed(path: &Path) -> io::Result<Vec<(u64, PathBuf)>> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use understudy_testing::Folder;
 
-    fn folder(name: &str) -> PathBuf {
-        let folder = std::env::temp_dir().join(format!("understudy-{name}-{}", std::process::id()));
-        // It is there only where a run before was killed.
-        let _ = fs::remove_dir_all(&folder);
-        fs::create_dir_all(&folder).expect("a folder");
-        folder
-    }
+    use super::*;
 
     fn lines(path: &Path) -> Vec<u64> {
         let files = segments_of(path).expect("readable");
@@ -200,7 +194,7 @@ mod tests {
 
     #[test]
     fn the_newest_lines_are_kept_whole_and_the_limit_holds() {
-        let folder = folder("segments");
+        let folder = Folder::new("segments");
         let path = folder.join("journal.jsonl");
         let mut segments = Segments::create(&path, LEAST_LIMIT).expect("created");
         let filler = "x".repeat(100);
@@ -226,12 +220,11 @@ mod tests {
         segments.flush().expect("written");
         assert_eq!(lines(&path).last(), Some(&5000));
         assert!(lines(&path).len() > kept.len() / 2);
-        fs::remove_dir_all(folder).expect("it goes");
     }
 
     #[test]
     fn other_files_of_the_folder_are_left_alone() {
-        let folder = folder("segments-others");
+        let folder = Folder::new("segments-others");
         for name in [
             "journal.jsonl.bak",
             "journal.1.jsonl",
@@ -256,6 +249,5 @@ mod tests {
             let text = fs::read_to_string(folder.join(name));
             assert_eq!(text.expect("it is there"), "kept");
         }
-        fs::remove_dir_all(folder).expect("it goes");
     }
 }

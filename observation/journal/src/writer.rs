@@ -69,13 +69,13 @@ pub fn writing(run: &Path) -> Writing {
 
 #[cfg(test)]
 mod tests {
+    use understudy_testing::Folder;
+
     use super::*;
 
     #[test]
     fn whoever_looks_does_not_keep_the_lock_of_a_new_run() {
-        let name = format!("understudy-writer-new-{}", std::process::id());
-        let run = std::env::temp_dir().join(name);
-        std::fs::create_dir_all(&run).expect("a folder");
+        let run = Folder::new("writer-new");
         let looks = File::create(run.join(LOCK)).expect("a file");
         looks.lock_shared().expect("locked");
         let looking = std::thread::spawn(move || {
@@ -86,14 +86,11 @@ mod tests {
         assert_eq!(writing(&run), Writing::Now);
         looking.join().expect("it looks");
         drop(lock);
-        std::fs::remove_dir_all(run).expect("it goes");
     }
 
     #[test]
     fn one_writes_and_the_others_see_it() {
-        let name = format!("understudy-writer-{}", std::process::id());
-        let run = std::env::temp_dir().join(name);
-        std::fs::create_dir_all(&run).expect("a folder");
+        let run = Folder::new("writer");
         assert_eq!(writing(&run), Writing::Unknown);
         let lock = WriterLock::take(&run).expect("a file");
         assert!(lock.is_some());
@@ -102,6 +99,5 @@ mod tests {
         drop(lock);
         assert_eq!(writing(&run), Writing::Over);
         assert!(WriterLock::take(&run).expect("a file").is_some());
-        std::fs::remove_dir_all(run).expect("it goes");
     }
 }

@@ -54,27 +54,12 @@ const SECONDS_TO_1970: u64 = 11_644_473_600;
 /// The folder that all others are in.
 const ROOT: &str = "Understudy";
 
+#[rustfmt::skip]
 const SECURE: [(&str, SecurityPolicy, MessageSecurityMode); 4] = [
-    (
-        "basic256sha256_sign",
-        SecurityPolicy::Basic256Sha256,
-        MessageSecurityMode::Sign,
-    ),
-    (
-        "basic256sha256_encrypt",
-        SecurityPolicy::Basic256Sha256,
-        MessageSecurityMode::SignAndEncrypt,
-    ),
-    (
-        "aes256_sha256_rsapss_sign",
-        SecurityPolicy::Aes256Sha256RsaPss,
-        MessageSecurityMode::Sign,
-    ),
-    (
-        "aes256_sha256_rsapss_encrypt",
-        SecurityPolicy::Aes256Sha256RsaPss,
-        MessageSecurityMode::SignAndEncrypt,
-    ),
+    ("basic256sha256_sign", SecurityPolicy::Basic256Sha256, MessageSecurityMode::Sign),
+    ("basic256sha256_encrypt", SecurityPolicy::Basic256Sha256, MessageSecurityMode::SignAndEncrypt),
+    ("aes256_sha256_rsapss_sign", SecurityPolicy::Aes256Sha256RsaPss, MessageSecurityMode::Sign),
+    ("aes256_sha256_rsapss_encrypt", SecurityPolicy::Aes256Sha256RsaPss, MessageSecurityMode::SignAndEncrypt),
 ];
 
 /// Serves `run` until SIGINT or SIGTERM; `ready` gets the address.

@@ -17,7 +17,8 @@ use std::time::Duration;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
-use understudy_cluster::{Cluster, press_cell, read};
+use understudy_cluster::{Cluster, press_cell};
+use understudy_cycle::Mode;
 use understudy_journal::{Journal, Members, keep_cluster};
 use understudy_scenarios::{read as read_scenario, simulate};
 use understudy_testing::skip;
@@ -43,13 +44,7 @@ fn empty_folder(name: &str) -> PathBuf {
 }
 
 fn cell() -> Cluster {
-    let files = press_cell();
-    let loaded = read("cluster.toml", files[0].text, &mut |name| {
-        let file = files.iter().find(|file| file.name == name);
-        file.map(|file| file.text.to_owned())
-            .ok_or_else(|| "no such file".to_owned())
-    });
-    loaded.cluster.expect("it comes with the program")
+    understudy_testing::press_cell(Mode::Full)
 }
 
 /// A folder with `run`, a finished one of the press cell in virtual time: the robot's station crashes in cycle 20.

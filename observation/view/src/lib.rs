@@ -61,5 +61,5 @@ pub use station::StationState;
 pub use terminal::{Key, Screen};
 pub use timeline::{Span, Timeline};
 pub use timing::CycleTiming;
-pub use value::{number_of, stored, value_of};
+pub use value::{forced_point, forced_value, number_of, stored, value_of};
 pub use why::{Addend, Reason, Reconstructed, Why};

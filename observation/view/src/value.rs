@@ -1,8 +1,9 @@
 //! The value of a point in an image that is written as bits, `0110`.
 
 use serde_json::Value;
+use understudy_cluster::Controller;
 use understudy_typed::{Elementary, Point, Points};
-use understudy_wire::Image;
+use understudy_wire::{Force, Image, SignalPlace};
 
 /// The bits of a point as they are stored; nothing where the text ends before them.
 pub fn stored(point: &Point, bits: &str) -> Option<u64> {
@@ -53,6 +54,25 @@ pub(crate) fn value_text(value: &Value) -> String {
 /// The value of a point in a packed image, for drawing: a BOOL as 0 or 1, all else as [`value_of`] has it.
 pub fn number_of(point: &Point, words: &[u64]) -> Value {
     number(point.of, point.get(words))
+}
+
+/// The point of a program that is forced; nothing where the program has none of that place and width.
+pub fn forced_point<'a>(controller: &'a Controller, force: &Force) -> Option<&'a Point> {
+    let points = match force.signal {
+        SignalPlace::Input(_) => &controller.interface.inputs,
+        SignalPlace::Output(_) => &controller.interface.outputs,
+    };
+    let (bit, width) = (force.signal.first_bit(), force.value.width());
+    let is_it = |point: &&Point| (point.bit, point.of.bits()) == (u32::from(bit), u32::from(width));
+    points.iter().find(is_it)
+}
+
+/// The forced value of a point as [`value_of`] has it.
+pub fn forced_value(point: &Point, force: &Force) -> Value {
+    match point.of {
+        Elementary::Bool => Value::Bool(force.value.stored() != 0),
+        of => number(of, force.value.stored()),
+    }
 }
 
 fn number(of: Elementary, value: u64) -> Value {

@@ -79,49 +79,9 @@ impl Problem {
         }
     }
 
-    /// Unknown name.
-    pub(crate) fn unknown(message: impl Into<String>) -> Self {
-        Self::new(StatusCode::NOT_FOUND, "U0681", message)
-    }
-
-    /// Malformed request.
-    pub(crate) fn bad(message: impl Into<String>) -> Self {
-        Self::new(StatusCode::BAD_REQUEST, "U0682", message)
-    }
-
-    /// Wrong method.
-    pub(crate) fn wrong_method(message: impl Into<String>) -> Self {
-        Self::new(StatusCode::METHOD_NOT_ALLOWED, "U0682", message)
-    }
-
-    /// The journal does not contain it.
-    pub(crate) fn unrecorded(message: impl Into<String>) -> Self {
-        Self::new(StatusCode::NOT_FOUND, "U0683", message)
-    }
-
     /// The run cannot answer the question.
     pub(crate) fn of_view(error: &ViewError) -> Self {
         Self::new(StatusCode::NOT_FOUND, error.code(), error.words())
-    }
-
-    /// The page or the person is not allowed to do this.
-    pub(crate) fn forbidden(message: impl Into<String>) -> Self {
-        Self::new(StatusCode::FORBIDDEN, "U0684", message)
-    }
-
-    /// The request comes from another page.
-    pub(crate) fn foreign(message: impl Into<String>) -> Self {
-        Self::new(StatusCode::FORBIDDEN, "U0685", message)
-    }
-
-    /// Login required.
-    pub(crate) fn log_in(message: impl Into<String>) -> Self {
-        Self::new(StatusCode::UNAUTHORIZED, "U0686", message)
-    }
-
-    /// Too many requests at once.
-    pub(crate) fn too_many(message: impl Into<String>) -> Self {
-        Self::new(StatusCode::SERVICE_UNAVAILABLE, "U0687", message)
     }
 
     /// The laboratory refused a command; its text begins with the code.
@@ -129,6 +89,37 @@ impl Problem {
         let (code, message) = words.split_once(": ").unwrap_or(("U0682", words));
         Self::new(StatusCode::CONFLICT, code, message)
     }
+}
+
+/// Constructors of problems: name, status and code.
+macro_rules! problems {
+    ($($(#[$meaning:meta])* $name:ident $status:ident $code:literal;)*) => {
+        impl Problem {
+            $($(#[$meaning])*
+            pub(crate) fn $name(message: impl Into<String>) -> Self {
+                Self::new(StatusCode::$status, $code, message)
+            })*
+        }
+    };
+}
+
+problems! {
+    /// Unknown name.
+    unknown NOT_FOUND "U0681";
+    /// Malformed request.
+    bad BAD_REQUEST "U0682";
+    /// Wrong method.
+    wrong_method METHOD_NOT_ALLOWED "U0682";
+    /// The journal does not contain it.
+    unrecorded NOT_FOUND "U0683";
+    /// The page or the person is not allowed to do this.
+    forbidden FORBIDDEN "U0684";
+    /// The request comes from another page.
+    foreign FORBIDDEN "U0685";
+    /// Login required.
+    log_in UNAUTHORIZED "U0686";
+    /// Too many requests at once.
+    too_many SERVICE_UNAVAILABLE "U0687";
 }
 
 impl From<Reading> for Problem {

@@ -6,7 +6,7 @@
 //!                    requests by GET ─────┘      commands by POST ──► the laboratory, where it runs in this process
 //! ```
 //!
-//! Invariant: it disturbs no cycle. The members are other processes and do nothing for it; it reads the journal on two threads of the lowest
+//! Invariant: it disturbs no cycle. The members are other processes and do nothing for it; it reads the journal on two threads of a low
 //! priority. A slow viewer costs nothing: it gets the newest state when it can take it, and no missed states.
 //!
 //! It is read-only unless commands are allowed. It is served to this machine only, unless there are logins, and then only over TLS.

@@ -6,7 +6,7 @@ use std::sync::{Arc, RwLock};
 use std::thread::JoinHandle;
 
 use thread_priority::{
-    NormalThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy,
+    NormalThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
     set_thread_priority_and_policy, thread_native_id,
 };
 use tokio::net::TcpListener;
@@ -203,10 +203,17 @@ fn run_server(
     runtime.shutdown_background();
 }
 
-/// What the page does has time; what controls a plant has not.
+/// Nice value 10: behind what controls a plant, but not starved by other programs of the machine.
+const PRIORITY: u8 = 22;
+
+/// Gives the threads of the page a low priority.
 fn step_back() {
     let policy = ThreadSchedulePolicy::Normal(NormalThreadSchedulePolicy::Batch);
-    let stepped = set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Min, policy);
+    let stepped = ThreadPriorityValue::try_from(PRIORITY).and_then(|priority| {
+        let priority = ThreadPriority::Crossplatform(priority);
+        set_thread_priority_and_policy(thread_native_id(), priority, policy)
+            .map_err(|error| error.to_string())
+    });
     if let Err(error) = stepped {
         tracing::debug!(%error, "a thread of the page keeps its priority");
     }

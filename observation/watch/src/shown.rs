@@ -6,10 +6,11 @@ use std::time::Instant;
 
 use serde::Serialize;
 use serde_json::Value;
+use understudy_cluster::Controller;
 use understudy_typed::Points;
 use understudy_view::{
     Alarm, LostState, MarginSnapshot, Model as RunModel, OutcomeSnapshot, ProgramSnapshot,
-    Protection, Snapshot, value_of,
+    Protection, Snapshot, forced_point, forced_value, value_of,
 };
 use understudy_wire::{Force, Member, ProgramId, SignalPlace, StationId};
 
@@ -89,7 +90,7 @@ struct ShownLost {
 struct ShownForce {
     kind: &'static str,
     index: u16,
-    value: bool,
+    value: serde_json::Value,
     seconds: u32,
     owner: String,
     reason: String,
@@ -199,6 +200,8 @@ fn shown_program(
     index: usize,
     program: &ProgramSnapshot,
 ) -> ShownProgram {
+    let controllers = run.cluster().controllers();
+    let controller_of = controllers.get(index);
     let interface = &run.cluster().controllers()[index].interface;
     let values = |points: &Points, bits: Option<&str>| {
         let bits = bits?;
@@ -225,7 +228,11 @@ fn shown_program(
         output_values: values(&interface.outputs, program.outputs.as_deref()),
         published_values: values(&interface.outputs, published.map(|word| word.sum.as_str())),
         awaits_release: program.awaits_release,
-        forced: program.forces.iter().map(shown_force).collect(),
+        forced: program
+            .forces
+            .iter()
+            .map(|force| shown_force(controller_of, force))
+            .collect(),
         protection: program
             .protection
             .clone()
@@ -246,7 +253,8 @@ fn shown_program(
     }
 }
 
-fn shown_force(force: &Force) -> ShownForce {
+fn shown_force(controller: Option<&Controller>, force: &Force) -> ShownForce {
+    let point = controller.and_then(|controller| forced_point(controller, force));
     let (kind, index) = match force.signal {
         SignalPlace::Input(index) => ("input", index),
         SignalPlace::Output(index) => ("output", index),
@@ -254,7 +262,10 @@ fn shown_force(force: &Force) -> ShownForce {
     ShownForce {
         kind,
         index,
-        value: force.value,
+        value: match point {
+            Some(point) => forced_value(point, force),
+            None => force.value.stored().into(),
+        },
         seconds: force.seconds,
         owner: force.owner.clone(),
         reason: force.reason.clone(),

@@ -14,6 +14,7 @@ mod power;
 mod sequence;
 mod standard;
 mod statements;
+mod typed;
 mod units;
 mod write;
 pub(crate) mod xml;
@@ -26,6 +27,7 @@ use understudy_ladder::{Program, check};
 use understudy_text::{Diagnostic, has_errors};
 
 pub use fidelity::{Count, Fidelity, Note};
+pub use typed::read_typed;
 pub use write::write;
 pub use xml::{MAXIMUM_BYTES, MAXIMUM_DEPTH, MAXIMUM_NODES};
 

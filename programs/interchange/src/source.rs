@@ -8,6 +8,8 @@ use understudy_structured_text::{Lowered, Options, lower, parse};
 use understudy_text::{Diagnostic, has_errors};
 use understudy_typed::Program as Typed;
 
+use understudy_structured_text::syntax::File;
+use crate::plcopen;
 use crate::format::{Format, Reading, read, unknown_form};
 
 /// What a file holds.
@@ -55,7 +57,8 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
         diagnostics,
         ..
     } = read(format, name, text, wanted.program);
-    if program.is_some() || format != Format::StructuredText {
+    let has_numbers = matches!(format, Format::StructuredText | Format::PlcOpen);
+    if program.is_some() || !has_numbers {
         return SourceFile {
             source: program.map(Source::Ladder),
             period,
@@ -63,11 +66,19 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
         };
     }
     // What no ladder can hold may be a program with numbers, or a library.
-    typed(text, wanted, period)
+    let parsed = match format {
+        Format::PlcOpen => plcopen::read_typed(text),
+        _ => parse(text),
+    };
+    typed(text, parsed, wanted, period)
 }
 
-fn typed(text: &str, wanted: Wanted<'_>, in_file: Option<Duration>) -> SourceFile {
-    let (file, mut diagnostics) = parse(text);
+fn typed(
+    text: &str,
+    (file, mut diagnostics): (File, Vec<Diagnostic>),
+    wanted: Wanted<'_>,
+    in_file: Option<Duration>,
+) -> SourceFile {
     let nanoseconds = |period: Duration| i64::try_from(period.as_nanos()).unwrap_or(i64::MAX);
     let options = Options {
         text,

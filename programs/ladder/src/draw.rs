@@ -3,5 +3,5 @@
 mod svg;
 mod text;
 
-pub use svg::{draw_svg, draw_svg_rungs, draw_svg_with_flow};
+pub use svg::{draw_svg, draw_svg_rungs};
 pub use text::{draw_text, draw_text_rungs};

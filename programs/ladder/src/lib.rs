@@ -32,7 +32,7 @@ mod program;
 mod structured_text;
 
 pub use check::check;
-pub use draw::{draw_svg, draw_svg_rungs, draw_svg_with_flow, draw_text, draw_text_rungs};
+pub use draw::{draw_svg, draw_svg_rungs, draw_text, draw_text_rungs};
 pub use flow::{ElementFlow, Evaluation, Reading, RungFlow};
 pub use from_circuit::from_circuit;
 pub use interpreter::Interpreter;

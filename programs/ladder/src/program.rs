@@ -10,6 +10,7 @@ use std::fmt;
 
 pub use block::{Block, BlockKind, Feed};
 pub use name::Name;
+use understudy_text::words;
 
 /// A whole program.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -134,36 +135,17 @@ pub struct Contact {
     pub operand: Name,
 }
 
-/// When a contact passes power.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum ContactKind {
-    /// While its operand is 1.
-    NormallyOpen,
-    /// While its operand is 0.
-    NormallyClosed,
-    /// In the scan in which its operand has become 1 since the last scan of this contact (`R_TRIG`).
-    Rising,
-    /// In the scan in which its operand has become 0 since the last scan of this contact (`F_TRIG`).
-    Falling,
-}
-
-impl ContactKind {
-    /// All kinds.
-    pub const ALL: [Self; 4] = [
-        Self::NormallyOpen,
-        Self::NormallyClosed,
-        Self::Rising,
-        Self::Falling,
-    ];
-
-    /// Its sign in the text, before the operand.
-    pub fn sign(self) -> &'static str {
-        match self {
-            Self::NormallyOpen => "",
-            Self::NormallyClosed => "/",
-            Self::Rising => "+",
-            Self::Falling => "-",
-        }
+words! {
+    /// When a contact passes power.
+    pub enum ContactKind by sign {
+        /// While its operand is 1.
+        NormallyOpen = "",
+        /// While its operand is 0.
+        NormallyClosed = "/",
+        /// In the scan in which its operand has become 1 since the last scan of this contact (`R_TRIG`).
+        Rising = "+",
+        /// In the scan in which its operand has become 0 since the last scan of this contact (`F_TRIG`).
+        Falling = "-",
     }
 }
 
@@ -178,46 +160,25 @@ pub struct Comparison {
     pub value: u16,
 }
 
-/// A relation between two numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Relation {
-    /// `=`
-    Equal,
-    /// `<>`
-    NotEqual,
-    /// `<`
-    Less,
-    /// `<=`
-    LessOrEqual,
-    /// `>`
-    Greater,
-    /// `>=`
-    GreaterOrEqual,
+words! {
+    /// A relation between two numbers.
+    pub enum Relation by sign {
+        /// `=`
+        Equal = "=",
+        /// `<>`
+        NotEqual = "<>",
+        /// `<`
+        Less = "<",
+        /// `<=`
+        LessOrEqual = "<=",
+        /// `>`
+        Greater = ">",
+        /// `>=`
+        GreaterOrEqual = ">=",
+    }
 }
 
 impl Relation {
-    /// All relations.
-    pub const ALL: [Self; 6] = [
-        Self::Equal,
-        Self::NotEqual,
-        Self::Less,
-        Self::LessOrEqual,
-        Self::Greater,
-        Self::GreaterOrEqual,
-    ];
-
-    /// As it is written.
-    pub fn sign(self) -> &'static str {
-        match self {
-            Self::Equal => "=",
-            Self::NotEqual => "<>",
-            Self::Less => "<",
-            Self::LessOrEqual => "<=",
-            Self::Greater => ">",
-            Self::GreaterOrEqual => ">=",
-        }
-    }
-
     /// The relation that holds where this one does not.
     #[must_use]
     pub fn opposite(self) -> Self {
@@ -265,46 +226,25 @@ pub struct Coil {
     pub target: Name,
 }
 
-/// What a coil writes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum CoilKind {
-    /// The power.
-    Plain,
-    /// The power, negated.
-    Negated,
-    /// 1 when there is power, else nothing.
-    Set,
-    /// 0 when there is power, else nothing.
-    Reset,
-    /// 1 for the scan in which the power has come, else 0.
-    Rising,
-    /// 1 for the scan in which the power has gone, else 0.
-    Falling,
+words! {
+    /// What a coil writes.
+    pub enum CoilKind by sign {
+        /// The power.
+        Plain = "",
+        /// The power, negated.
+        Negated = "/",
+        /// 1 when there is power, else nothing.
+        Set = "S",
+        /// 0 when there is power, else nothing.
+        Reset = "R",
+        /// 1 for the scan in which the power has come, else 0.
+        Rising = "+",
+        /// 1 for the scan in which the power has gone, else 0.
+        Falling = "-",
+    }
 }
 
 impl CoilKind {
-    /// All kinds.
-    pub const ALL: [Self; 6] = [
-        Self::Plain,
-        Self::Negated,
-        Self::Set,
-        Self::Reset,
-        Self::Rising,
-        Self::Falling,
-    ];
-
-    /// Its sign in the text, before the target.
-    pub fn sign(self) -> &'static str {
-        match self {
-            Self::Plain => "",
-            Self::Negated => "/",
-            Self::Set => "S",
-            Self::Reset => "R",
-            Self::Rising => "+",
-            Self::Falling => "-",
-        }
-    }
-
     /// True for set and reset coils, which leave the target alone when there is no power.
     pub fn is_latch(self) -> bool {
         matches!(self, Self::Set | Self::Reset)

@@ -107,11 +107,6 @@ impl Diagrams {
         }
     }
 
-    /// How often the order was changed.
-    pub fn reorderings(&self) -> usize {
-        self.need.as_ref().map_or(0, Need::changes)
-    }
-
     /// Diagrams over the variables that `roots` depend on, in the order of [`depth_first_order`].
     pub fn for_roots(graph: &Graph, roots: &[Expression], limit: usize) -> Self {
         Self::new(depth_first_order(graph, roots), limit)

@@ -188,20 +188,6 @@ impl Graph {
         roots: &[Expression],
         mut place: impl FnMut(&mut Self, Variable) -> Expression,
     ) -> Vec<Expression> {
-        self.copy(other, roots, |graph, operation| match operation {
-            Operation::Variable(variable) => place(graph, variable),
-            same => graph.apply(same),
-        })
-    }
-
-    /// Makes each operation of `other` that `roots` reach anew by `make`, which is given the operation with its operands
-    /// already in this graph. Answers with what the roots became.
-    pub(crate) fn copy(
-        &mut self,
-        other: &Graph,
-        roots: &[Expression],
-        mut make: impl FnMut(&mut Self, Operation) -> Expression,
-    ) -> Vec<Expression> {
         let reached = other.reached(roots);
         let mut copies: Vec<Option<Expression>> = vec![None; other.operations.len()];
         for (index, &operation) in other.operations.iter().enumerate() {
@@ -211,31 +197,19 @@ impl Graph {
             let copy_of = |operand: Expression| {
                 copies[operand.index()].expect("operands come before their use")
             };
-            let operation = match operation {
-                Operation::Constant(_) | Operation::Variable(_) => operation,
-                Operation::Not(operand) => Operation::Not(copy_of(operand)),
-                Operation::And(left, right) => Operation::And(copy_of(left), copy_of(right)),
-                Operation::Or(left, right) => Operation::Or(copy_of(left), copy_of(right)),
-                Operation::Xor(left, right) => Operation::Xor(copy_of(left), copy_of(right)),
-            };
-            copies[index] = Some(make(self, operation));
+            copies[index] = Some(match operation {
+                Operation::Constant(value) => self.constant(value),
+                Operation::Variable(variable) => place(self, variable),
+                Operation::Not(operand) => self.not(copy_of(operand)),
+                Operation::And(left, right) => self.and(copy_of(left), copy_of(right)),
+                Operation::Or(left, right) => self.or(copy_of(left), copy_of(right)),
+                Operation::Xor(left, right) => self.xor(copy_of(left), copy_of(right)),
+            });
         }
         roots
             .iter()
             .map(|root| copies[root.index()].expect("roots are reached"))
             .collect()
-    }
-
-    /// Makes an operation on expressions of this graph, by the constructor of its kind.
-    pub(crate) fn apply(&mut self, operation: Operation) -> Expression {
-        match operation {
-            Operation::Constant(value) => self.constant(value),
-            Operation::Variable(variable) => self.variable(variable),
-            Operation::Not(operand) => self.not(operand),
-            Operation::And(left, right) => self.and(left, right),
-            Operation::Or(left, right) => self.or(left, right),
-            Operation::Xor(left, right) => self.xor(left, right),
-        }
     }
 
     /// For each operation, whether one of `roots` depends on it.

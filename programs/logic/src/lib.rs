@@ -1,8 +1,8 @@
 //! Boolean expressions, polynomials over GF(2) and synchronous circuits.
 //!
-//! The keystone of the house is [`Circuit`], equations (1)-(2) of Fujimoto and Sekiguchi: a ladder lowers to it, the
-//! parity controller is one, a station evaluates it, and proofs explore it. [`transform`] holds (3) and (6), [`Polynomial`] and
-//! [`NormalForm`] what (3) is written as, [`bdd`] decides equality and finds short Boolean formulas.
+//! The central structure is [`Circuit`], equations (1)-(2) of Fujimoto and Sekiguchi: a ladder lowers to it, the
+//! parity controller is one, a station evaluates it, and proofs explore it. [`Polynomial`] and [`NormalForm`] are written in GF(2),
+//! (3); [`bdd`] decides equality and finds short Boolean formulas, (6).
 
 pub mod bdd;
 mod circuit;
@@ -11,16 +11,17 @@ mod expression;
 mod lanes;
 mod normal_form;
 pub mod notation;
+mod packed;
 mod polynomial;
 mod running;
 mod scan;
-pub mod transform;
 
 pub use circuit::{Circuit, CircuitBuilder, CircuitError, Output, Register, RegisterId};
 pub use cover::{Cover, Literal};
 pub use expression::{Expression, Graph, Operation, Variable};
-pub use lanes::transpose;
+pub use lanes::{LANES, Lanes, Run, transpose};
 pub use normal_form::{Monomial, NormalForm, TooManyMonomials};
+pub use packed::{bit, pack, unpack};
 pub use polynomial::Polynomial;
 pub use running::Running;
 pub use scan::{Scan, Scratch};

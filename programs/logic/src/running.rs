@@ -1,6 +1,7 @@
 //! A circuit that is stepped with bits, for those who look at single scans: tests, and commands that replay a table.
 
 use crate::circuit::Circuit;
+use crate::packed::{pack, unpack};
 use crate::scan::{Scan, Scratch};
 
 /// A circuit and its state x(t).
@@ -40,19 +41,14 @@ impl Running {
             inputs.len() >= self.scan.input_count(),
             "inputs are missing"
         );
-        let mut packed = vec![0_u64; inputs.len().div_ceil(64)];
-        for (place, &input) in inputs.iter().enumerate() {
-            packed[place / 64] |= u64::from(input) << (place % 64);
-        }
+        let packed = pack(inputs.iter().copied());
         self.scan.step(
             &mut self.scratch,
             &mut self.state,
             &packed,
             &mut self.outputs,
         );
-        (0..self.scan.output_count())
-            .map(|place| self.outputs[place / 64] >> (place % 64) & 1 == 1)
-            .collect()
+        unpack(&self.outputs, self.scan.output_count())
     }
 
     /// x(t), packed.

@@ -4,11 +4,7 @@ mod common;
 
 use common::{circuit, configuration, recipe};
 use proptest::prelude::*;
-use understudy_logic::{Circuit, CircuitBuilder, Expression, Scan, Scratch, Variable};
-
-fn bit(words: &[u64], place: usize) -> bool {
-    words[place / 64] >> (place % 64) & 1 == 1
-}
+use understudy_logic::{Circuit, CircuitBuilder, Expression, Scan, Scratch, Variable, bit, pack};
 
 /// One step of `circuit` from packed `state` under packed `inputs`, by [`understudy_logic::Graph::evaluate`].
 fn expected(circuit: &Circuit, state: &[u64], inputs: &[u64]) -> (Vec<bool>, Vec<bool>) {
@@ -26,17 +22,6 @@ fn expected(circuit: &Circuit, state: &[u64], inputs: &[u64]) -> (Vec<bool>, Vec
     (next.collect(), outputs.collect())
 }
 
-fn packed(bits: &[bool]) -> Vec<u64> {
-    let chunks = bits.chunks(64);
-    chunks
-        .map(|bits| {
-            (0..)
-                .zip(bits)
-                .fold(0, |word, (place, &bit)| word | u64::from(bit) << place)
-        })
-        .collect()
-}
-
 /// Steps through `samples` in one state; and in 64, each with the samples rotated by its lane; and in twice 64, of which the second half is one sample ahead.
 fn check(circuit: &Circuit, samples: &[Vec<u64>]) {
     let scan = Scan::new(circuit);
@@ -45,7 +30,7 @@ fn check(circuit: &Circuit, samples: &[Vec<u64>]) {
         .iter()
         .map(|register| register.initial)
         .collect();
-    assert_eq!(scan.initial(), packed(&initial));
+    assert_eq!(scan.initial(), pack(initial.iter().copied()));
     let mut scratch = Scratch::default();
     let mut lane_states: Vec<u64> = initial
         .iter()
@@ -96,8 +81,8 @@ fn check(circuit: &Circuit, samples: &[Vec<u64>]) {
         for (lane, state) in states.iter_mut().enumerate() {
             let (next, values) = expected(circuit, state, sample(lane));
             scan.step(&mut scratch, state, sample(lane), &mut outputs);
-            assert_eq!(*state, packed(&next));
-            assert_eq!(outputs, packed(&values));
+            assert_eq!(*state, pack(next.iter().copied()));
+            assert_eq!(outputs, pack(values.iter().copied()));
             let of_lane = |words: &[u64]| -> Vec<bool> {
                 words.iter().map(|word| word >> lane & 1 == 1).collect()
             };

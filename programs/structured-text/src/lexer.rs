@@ -48,6 +48,8 @@ pub(crate) struct Comments {
 pub(crate) struct Placed<'a> {
     pub(crate) lexeme: Lexeme<'a>,
     pub(crate) span: Range<usize>,
+    /// In the text that was read, where that stands in a larger one.
+    pub(crate) within: Range<usize>,
     /// Whether it is the first on its line.
     pub(crate) starts_line: bool,
     /// None where there are none.
@@ -149,6 +151,7 @@ pub(crate) fn lex(text: &str) -> Lexemes<'_> {
             placed.push(Placed {
                 lexeme,
                 span: start..lexer.place,
+                within: start..lexer.place,
                 starts_line: line_broken,
                 comments: boxed(&mut above),
             });
@@ -158,6 +161,7 @@ pub(crate) fn lex(text: &str) -> Lexemes<'_> {
     placed.push(Placed {
         lexeme: Lexeme::End,
         span: text.len()..text.len(),
+        within: text.len()..text.len(),
         starts_line: true,
         comments: boxed(&mut above),
     });

@@ -8,5 +8,6 @@ pub mod parser;
 pub mod print;
 pub mod syntax;
 
+pub use library::file as library;
 pub use lower::{Lowered, Options, lower};
 pub use parser::parse;

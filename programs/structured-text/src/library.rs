@@ -12,7 +12,7 @@ pub(crate) const TEXT: &str = concat!(
 );
 
 /// The library, read once.
-pub(crate) fn file() -> &'static File {
+pub fn file() -> &'static File {
     static FILE: OnceLock<File> = OnceLock::new();
     FILE.get_or_init(|| crate::parser::parse(TEXT).0)
 }

@@ -4,12 +4,17 @@
 //! it is called. A name is looked up in the unit, then among the global variables, the values of enumerations and the units. A body is
 //! lowered once for each block that has it, so a method of a base calls the methods of the block it runs on.
 
+mod addresses;
+mod arguments;
 mod blocks;
 mod body;
+mod callees;
 mod calls;
 mod chains;
 mod constants;
 mod convert;
+mod expand;
+mod expressions;
 mod fold;
 mod images;
 mod initial;
@@ -20,6 +25,7 @@ mod programs;
 mod routines;
 mod standard;
 mod statements;
+mod times;
 mod types;
 
 use std::collections::HashMap;
@@ -80,7 +86,10 @@ pub struct Lowered {
 /// Lowers the programs of a file, or checks the units of a library.
 pub fn lower(file: &File, options: &Options<'_>) -> Lowered {
     let library = library::file();
+    let mut found = Vec::new();
+    let file = &*expand::expand(file, &mut found);
     let mut lowering = Lowering::new(file, library, options.text);
+    lowering.diagnostics = found;
     lowering.declare(file, library);
     let checked = lowering.programs(file, options);
     lowering.finish(checked)
@@ -124,6 +133,8 @@ struct Lowering<'a> {
     /// Which routines each routine calls, and where it first does.
     calls: Vec<Vec<(u32, Range<usize>)>>,
     scope: Scope,
+    /// How often something was reported, or found that was reported before.
+    blamed: usize,
     /// The file has no PROGRAM.
     is_library: bool,
     nesting: u32,
@@ -175,6 +186,7 @@ impl<'a> Lowering<'a> {
             queue: Vec::new(),
             calls: Vec::new(),
             scope: Scope::default(),
+            blamed: 0,
             is_library: false,
             nesting: 0,
             length: 0,
@@ -207,6 +219,7 @@ impl<'a> Lowering<'a> {
     }
 
     fn report(&mut self, found: Diagnostic) {
+        self.blamed += 1;
         if self.silent == 0 && self.diagnostics.len() <= MAXIMUM_FINDINGS {
             self.diagnostics.push(found);
         }
@@ -236,6 +249,15 @@ impl<'a> Lowering<'a> {
         if !self.in_library() {
             self.report(Diagnostic::warning(code, message, span).with_help(help));
         }
+    }
+
+    /// What fails is reported: where nothing says why, that it is not supported.
+    fn accounted<T>(&mut self, before: usize, found: Option<T>, span: &Range<usize>) -> Option<T> {
+        if found.is_none() && self.blamed == before {
+            let help = "write it with other operators or functions";
+            self.error_with("U1040", "this is not supported here", span.clone(), help);
+        }
+        found
     }
 
     /// The line of a place, from 1.

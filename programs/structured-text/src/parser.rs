@@ -35,6 +35,9 @@ use crate::syntax::{
     Statement, TypeName,
 };
 
+/// The place in a larger text of a place in the one that is read. What follows here follows there.
+pub type Places<'p> = &'p dyn Fn(Span) -> Span;
+
 /// The largest text.
 pub const MAXIMUM_TEXT_BYTES: usize = 16 << 20;
 
@@ -49,7 +52,12 @@ pub fn parse(text: &str) -> (File, Vec<Diagnostic>) {
 /// The declaration part of a unit, a type or a list of variables, as TwinCAT and CODESYS keep them: the header of a unit with
 /// its blocks of variables and without its end, `VAR_GLOBAL … END_VAR`, `TYPE … END_TYPE`. A METHOD is a unit of the file.
 pub fn parse_declarations(text: &str) -> (File, Vec<Diagnostic>) {
-    read(text, |parser| {
+    parse_declarations_at(text, &|span| span)
+}
+
+/// As [`parse_declarations`], of a text that stands in a larger one.
+pub fn parse_declarations_at(text: &str, places: Places<'_>) -> (File, Vec<Diagnostic>) {
+    read_at(text, places, |parser| {
         parser.headers_only = true;
         parser.file()
     })
@@ -67,7 +75,12 @@ pub fn parse_variables(text: &str) -> (Vec<Declaration>, Vec<Diagnostic>) {
 
 /// The body of a unit: statements, a chart or an instruction list.
 pub fn parse_body(text: &str) -> (Body, Vec<Diagnostic>) {
-    read(text, |parser| {
+    parse_body_at(text, &|span| span)
+}
+
+/// As [`parse_body`], of a text that stands in a larger one.
+pub fn parse_body_at(text: &str, places: Places<'_>) -> (Body, Vec<Diagnostic>) {
+    read_at(text, places, |parser| {
         let mut body = parser.body(&[]);
         while *parser.peek() != Lexeme::End {
             // What ends a statement is where no statement is open.
@@ -84,7 +97,12 @@ pub fn parse_body(text: &str) -> (Body, Vec<Diagnostic>) {
 
 /// Statements alone.
 pub fn parse_statements(text: &str) -> (Vec<Statement>, Vec<Diagnostic>) {
-    read(text, |parser| {
+    parse_statements_at(text, &|span| span)
+}
+
+/// As [`parse_statements`], of a text that stands in a larger one.
+pub fn parse_statements_at(text: &str, places: Places<'_>) -> (Vec<Statement>, Vec<Diagnostic>) {
+    read_at(text, places, |parser| {
         let mut statements = parser.statements(&[]);
         while *parser.peek() != Lexeme::End {
             parser.expected("a statement");
@@ -97,7 +115,15 @@ pub fn parse_statements(text: &str) -> (Vec<Statement>, Vec<Diagnostic>) {
 
 /// An instruction list.
 pub fn parse_instructions(text: &str) -> (Vec<Instruction>, Vec<Diagnostic>) {
-    read(text, |parser| {
+    parse_instructions_at(text, &|span| span)
+}
+
+/// As [`parse_instructions`], of a text that stands in a larger one.
+pub fn parse_instructions_at(
+    text: &str,
+    places: Places<'_>,
+) -> (Vec<Instruction>, Vec<Diagnostic>) {
+    read_at(text, places, |parser| {
         let instructions = parser.instructions(&[]);
         parser.need_end("an instruction");
         instructions
@@ -115,7 +141,12 @@ pub fn parse_type(text: &str) -> (Option<TypeName>, Vec<Diagnostic>) {
 
 /// One expression.
 pub fn parse_expression(text: &str) -> (Expression, Vec<Diagnostic>) {
-    read(text, |parser| {
+    parse_expression_at(text, &|span| span)
+}
+
+/// As [`parse_expression`], of a text that stands in a larger one.
+pub fn parse_expression_at(text: &str, places: Places<'_>) -> (Expression, Vec<Diagnostic>) {
+    read_at(text, places, |parser| {
         let found = parser.expression();
         parser.need_end("the end of the value");
         found
@@ -124,7 +155,15 @@ pub fn parse_expression(text: &str) -> (Expression, Vec<Diagnostic>) {
 
 /// One initial value, `[1, 2, 3(0)]` and its like.
 pub fn parse_initializer(text: &str) -> (Option<crate::syntax::Initializer>, Vec<Diagnostic>) {
-    read(text, |parser| {
+    parse_initializer_at(text, &|span| span)
+}
+
+/// As [`parse_initializer`], of a text that stands in a larger one.
+pub fn parse_initializer_at(
+    text: &str,
+    places: Places<'_>,
+) -> (Option<crate::syntax::Initializer>, Vec<Diagnostic>) {
+    read_at(text, places, |parser| {
         let found = parser.initializer();
         parser.need_end("the end of the value");
         found
@@ -132,6 +171,14 @@ pub fn parse_initializer(text: &str) -> (Option<crate::syntax::Initializer>, Vec
 }
 
 fn read<T: Absent>(text: &str, read: impl FnOnce(&mut Parser<'_>) -> T) -> (T, Vec<Diagnostic>) {
+    read_at(text, &|span| span, read)
+}
+
+fn read_at<T: Absent>(
+    text: &str,
+    places: Places<'_>,
+    read: impl FnOnce(&mut Parser<'_>) -> T,
+) -> (T, Vec<Diagnostic>) {
     if text.len() > MAXIMUM_TEXT_BYTES {
         let message = format!(
             "the text has {} bytes; at most {MAXIMUM_TEXT_BYTES} are read",
@@ -139,7 +186,7 @@ fn read<T: Absent>(text: &str, read: impl FnOnce(&mut Parser<'_>) -> T) -> (T, V
         );
         return (T::absent(), vec![Diagnostic::error("U1033", message, 0..0)]);
     }
-    let mut parser = Parser::new(text);
+    let mut parser = Parser::new(text, places);
     let found = read(&mut parser);
     (found, parser.finish())
 }
@@ -175,12 +222,18 @@ struct Parser<'a> {
 }
 
 impl<'a> Parser<'a> {
-    fn new(text: &'a str) -> Self {
+    fn new(text: &'a str, places: Places<'_>) -> Self {
         let Lexemes {
-            placed,
+            mut placed,
             has_local_marks,
-            diagnostics,
+            mut diagnostics,
         } = lex(text);
+        for lexeme in &mut placed {
+            lexeme.span = places(lexeme.within.clone());
+        }
+        for found in &mut diagnostics {
+            found.span = places(found.span.clone());
+        }
         let is_siemens = has_local_marks || siemens::is_siemens(&placed);
         Self {
             text,
@@ -218,6 +271,12 @@ impl<'a> Parser<'a> {
 
     fn at_end(&self) -> bool {
         *self.peek() == Lexeme::End
+    }
+
+    /// The lexeme as it is written.
+    fn written(&self) -> &'a str {
+        let within = self.placed().within.clone();
+        self.text.get(within).unwrap_or_default()
     }
 
     fn span(&self) -> Span {
@@ -322,7 +381,7 @@ impl<'a> Parser<'a> {
             Lexeme::Faulty => return,
             Lexeme::End => "the end of the text".to_owned(),
             _ => {
-                let written: String = self.text[self.span()].chars().take(60).collect();
+                let written: String = self.written().chars().take(60).collect();
                 format!("`{}`", written.escape_debug())
             }
         };
@@ -363,7 +422,7 @@ impl<'a> Parser<'a> {
         }
         if self.placed().starts_line && *self.peek() != Lexeme::Faulty {
             let end = self.end();
-            let found = self.text[self.span()].chars().take(60).collect::<String>();
+            let found = self.written().chars().take(60).collect::<String>();
             let found = match self.at_end() {
                 true => "the end of the text".to_owned(),
                 false => format!("`{}`", found.escape_debug()),

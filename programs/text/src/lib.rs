@@ -14,6 +14,7 @@ pub mod shell;
 mod shown;
 pub mod spelling;
 pub mod tables;
+mod words;
 
 use std::fmt;
 use std::ops::Range;
@@ -22,6 +23,8 @@ use serde::Serialize;
 
 pub use encoding::{NotText, decode};
 pub use lines::Lines;
+#[doc(hidden)]
+pub use serde;
 pub use shown::{MAXIMUM_FINDINGS, MAXIMUM_MESSAGE, MAXIMUM_SHOWN, shortened};
 
 /// How bad it is: an error stops whatever was asked for, a warning does not.

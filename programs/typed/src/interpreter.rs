@@ -116,7 +116,7 @@ impl Interpreter {
     fn execute(&self, run: &mut Run<'_>) -> Result<(), Fault> {
         let scans = run.memory.slots()[crate::scan::SCANS];
         for task in self.frame.tasks() {
-            if scans % u64::from(task.every.max(1)) == 0 {
+            if scans.is_multiple_of(u64::from(task.every.max(1))) {
                 let context = Context {
                     routine: task.routine,
                     own: u64::from(task.own),

@@ -7,6 +7,7 @@
 mod compile;
 mod execute;
 mod instruction;
+mod working;
 
 use std::sync::Arc;
 
@@ -141,12 +142,8 @@ impl Machine {
                 run.map_err(|stop| compiled.tables.fault(&stop))?;
             }
         }
-        compiled.frame.end(row_of(&mut run))
+        compiled.frame.end(run.row)
     }
-}
-
-fn row_of<'a>(run: &'a mut Run<'_>) -> &'a mut [u64] {
-    run.row
 }
 
 impl Tables {

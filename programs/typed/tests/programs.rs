@@ -112,9 +112,11 @@ fn a_value_that_no_actuator_can_follow_is_a_fault_that_names_the_output() {
     assert_eq!(state[4..], machine.initial()[4..]);
 }
 
+type Breaks = fn(&mut Program);
+
 #[test]
 fn validation_names_what_is_wrong() {
-    let broken: [(fn(&mut Program), &str); 6] = [
+    let broken: [(Breaks, &str); 6] = [
         (|program| program.tasks[0].every = 0, "task of routine 0"),
         (|program| program.state = 5, "outside the state"),
         (

@@ -14,7 +14,7 @@ use crate::canonical::{circuit_text, typed_text};
 #[derive(Debug, Clone)]
 pub enum Code {
     /// All Boolean: a ladder and its circuit for the period of the cluster. What is proved is proved of the circuit.
-    Ladder(LadderProgram, Circuit),
+    Ladder(Box<LadderProgram>, Circuit),
     /// With numbers, and the text of its file, whose lines a program fault names.
     Typed(Arc<TypedProgram>, Arc<str>),
 }
@@ -23,7 +23,7 @@ impl Code {
     /// The ladder, of one that is Boolean.
     pub fn ladder(&self) -> Option<&LadderProgram> {
         match self {
-            Self::Ladder(program, _) => Some(program),
+            Self::Ladder(program, _) => Some(program.as_ref()),
             Self::Typed(..) => None,
         }
     }

@@ -1,124 +1,95 @@
-//! Equipment behind a remote I/O: where it is, and which signal lies at which of its addresses.
+//! Equipment behind a remote I/O: how it is reached, and which signal is at which of its addresses.
 
 use std::fmt;
 use std::net::SocketAddr;
-use std::str::FromStr;
 use std::time::Duration;
 
-/// A device that is reached by Modbus TCP.
-#[derive(Debug, Clone, PartialEq, Eq)]
+use understudy_typed::Elementary;
+
+use crate::place::Place;
+
+/// Device with Modbus TCP or Modbus RTU.
+#[derive(Debug, Clone, PartialEq)]
 pub struct FieldDevice {
-    /// Where it listens.
-    pub address: SocketAddr,
-    /// The unit behind that address.
+    /// How it is reached.
+    pub connection: Connection,
+    /// Unit behind that address, or device on the serial line.
     pub unit: u8,
-    /// How long one exchange with it may take.
+    /// Maximum duration of one exchange.
     pub timeout: Duration,
-    /// The age at which its last answer is worth nothing any more.
+    /// Age at which its last answer is too old.
     pub stale_after: Duration,
-    /// For each input of the program, in order; one without a place stays 0.
-    pub inputs: Vec<Option<Point>>,
-    /// For each output of the program, in order; one without a place moves nothing.
-    pub outputs: Vec<Option<Point>>,
+    /// Inputs of the program with a place; all others stay 0.
+    pub inputs: Side,
+    /// Outputs of the program with a place; all others reach no actuator.
+    pub outputs: Side,
 }
 
-/// One bit of a device, by its table and its address there, counted from 0 as on the wire.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Point {
-    /// A discrete input, read only.
-    Discrete(u16),
-    /// A coil.
-    Coil(u16),
-    /// A bit of an input register, read only; bit 0 counts 1.
-    Input(u16, u8),
-    /// A bit of a holding register; bit 0 counts 1.
-    Holding(u16, u8),
+/// How a device is reached.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Connection {
+    /// Modbus TCP.
+    Tcp(SocketAddr),
+    /// Modbus RTU.
+    Rtu(SerialLine),
 }
 
-impl Point {
-    /// How one is written.
-    pub const EXAMPLES: &str =
-        "\"discrete:0\", \"coil:3\", \"input:10.4\" or \"holding:10.4\" (register and bit)";
-
-    /// Whether it may be written.
-    pub fn is_writable(self) -> bool {
-        matches!(self, Self::Coil(_) | Self::Holding(..))
-    }
+/// Serial line of Modbus RTU, with 8 data bits.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SerialLine {
+    /// The terminal device, such as `/dev/ttyUSB0`.
+    pub path: String,
+    /// Bits per second, one of [`BAUD_RATES`].
+    pub baud: u32,
+    /// Parity bit.
+    pub parity: Parity,
+    /// 1 or 2.
+    pub stop_bits: u8,
 }
 
-/// A text that is no place of a device.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?} is no place of a Modbus device")]
-pub struct NoPoint(String);
+/// Rates of a serial line.
+pub const BAUD_RATES: [u32; 11] = [
+    1200, 2400, 4800, 9600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600,
+];
 
-impl FromStr for Point {
-    type Err = NoPoint;
-
-    fn from_str(text: &str) -> Result<Self, NoPoint> {
-        let read = || {
-            let (table, place) = text.split_once(':')?;
-            let number = |text: &str| -> Option<u16> {
-                // A sign is no part of an address.
-                let digits = text.bytes().all(|byte| byte.is_ascii_digit());
-                digits.then(|| text.parse().ok()).flatten()
-            };
-            let bit_of = |place: &str| {
-                let (register, bit) = place.split_once('.')?;
-                let bit = number(bit).filter(|bit| *bit < 16)?;
-                Some((number(register)?, bit as u8))
-            };
-            Some(match table {
-                "discrete" => Self::Discrete(number(place)?),
-                "coil" => Self::Coil(number(place)?),
-                "input" => bit_of(place).map(|(register, bit)| Self::Input(register, bit))?,
-                "holding" => bit_of(place).map(|(register, bit)| Self::Holding(register, bit))?,
-                _ => return None,
-            })
-        };
-        read().ok_or_else(|| NoPoint(text.to_owned()))
-    }
+/// Parity bit of a serial line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Parity {
+    /// Even number of ones.
+    Even,
+    /// Odd number of ones.
+    Odd,
+    /// No parity bit.
+    None,
 }
 
-impl fmt::Display for Point {
+impl fmt::Display for Connection {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Discrete(address) => write!(formatter, "discrete:{address}"),
-            Self::Coil(address) => write!(formatter, "coil:{address}"),
-            Self::Input(register, bit) => write!(formatter, "input:{register}.{bit}"),
-            Self::Holding(register, bit) => write!(formatter, "holding:{register}.{bit}"),
+            Self::Tcp(address) => address.fmt(formatter),
+            Self::Rtu(line) => line.path.fmt(formatter),
         }
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// The inputs or the outputs of a program, as far as they have a place in the device.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Side {
+    /// Width of the process image in bits.
+    pub width: usize,
+    /// In order of declaration.
+    pub bindings: Vec<Binding>,
+}
 
-    #[test]
-    fn places_are_read_as_they_are_written() {
-        for point in [
-            Point::Discrete(0),
-            Point::Coil(65_535),
-            Point::Input(10, 15),
-            Point::Holding(0, 0),
-        ] {
-            assert_eq!(point.to_string().parse(), Ok(point));
-        }
-        for text in [
-            "",
-            "coil",
-            "coil:",
-            "coil:65536",
-            "coil:-1",
-            "coil:+1",
-            "coil:1.0",
-            "input:1",
-            "input:1.16",
-            "holding:1.",
-            "relay:1",
-            "coil:1 ",
-        ] {
-            assert!(text.parse::<Point>().is_err(), "{text}");
-        }
-    }
+/// A signal of the program and its place in the device.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Binding {
+    /// Name of the signal.
+    pub name: String,
+    /// Type of the signal.
+    pub of: Elementary,
+    /// First bit of the signal in the process image.
+    pub bit: usize,
+    /// Its place.
+    pub place: Place,
 }

@@ -13,7 +13,8 @@ use understudy_text::Diagnostic;
 pub(crate) use understudy_text::tables::Placed;
 use understudy_text::tables::{Codes, Constant, Value, unknown_key};
 
-use crate::format::{Key, Kind, Section};
+use crate::format::{Key, Kind, POINT, Section};
+use crate::place::{ByteOrder, Place, Registers, register};
 
 /// The longest name of a member, in characters.
 pub const MAXIMUM_NAME_LENGTH: usize = 48;
@@ -50,6 +51,26 @@ pub fn is_name(text: &str) -> bool {
     let legal = |character: char| character.is_ascii_alphanumeric() || "-_".contains(character);
     let starts = text.starts_with(|first: char| first.is_ascii_alphabetic());
     starts && text.chars().all(legal) && text.len() <= MAXIMUM_NAME_LENGTH
+}
+
+/// A signal with its place in a device.
+#[derive(Debug)]
+pub(crate) struct PlaceEntry {
+    /// Where its name is.
+    pub(crate) name: Range<usize>,
+    /// Where its place is.
+    pub(crate) span: Range<usize>,
+    /// Nothing where it has errors.
+    pub(crate) place: Option<Place>,
+}
+
+/// How a device is reached, as it is written.
+#[derive(Debug)]
+pub(crate) enum ConnectionText {
+    /// Modbus TCP.
+    Tcp(SocketAddr),
+    /// The terminal device of Modbus RTU.
+    Rtu(String),
 }
 
 /// One table of the file.
@@ -163,6 +184,64 @@ impl<'a, 't> Fields<'a, 't> {
         }
     }
 
+    /// An address, or a serial line.
+    pub(crate) fn connection(
+        &self,
+        name: &'static str,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Option<ConnectionText> {
+        let (key, value) = self.get(name);
+        let text = value?.text_as(&key.kind.expected(), diagnostics)?;
+        match text.value.strip_prefix("rtu:") {
+            Some(path) if path.starts_with('/') => Some(ConnectionText::Rtu(path.to_owned())),
+            Some(path) => {
+                let message = format!("{path:?} is not a path from the root");
+                diagnostics
+                    .push(Diagnostic::error("U0210", message, text.span).with_help(
+                        "the terminal device of the line, such as \"rtu:/dev/ttyUSB0\"",
+                    ));
+                None
+            }
+            None => self
+                .address(name, diagnostics)
+                .map(|address| ConnectionText::Tcp(address.value)),
+        }
+    }
+
+    /// Where the value of a key is; nothing where the key is absent.
+    pub(crate) fn place_of(&self, name: &str) -> Option<Range<usize>> {
+        self.table.get(name).map(|value| value.span())
+    }
+
+    /// A number in its bounds; its default where absent or wrong.
+    fn number(&self, name: &'static str, diagnostics: &mut Vec<Diagnostic>) -> f64 {
+        let (key, value) = self.get(name);
+        let Kind::Number { most, default } = key.kind else {
+            unreachable!("`{name}` is a number in its table");
+        };
+        let number = value.and_then(|value| value.number(-most..=most, diagnostics));
+        number.map_or(default, |number| number.value)
+    }
+
+    /// A table from signals to places in a device.
+    pub(crate) fn places(
+        &self,
+        name: &'static str,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> BTreeMap<String, PlaceEntry> {
+        let entries = self.entries(name, diagnostics).into_iter();
+        entries
+            .map(|(name, value)| {
+                let entry = PlaceEntry {
+                    name: name.span,
+                    span: value.span(),
+                    place: place(value, diagnostics),
+                };
+                (name.value, entry)
+            })
+            .collect()
+    }
+
     /// A whole number in its bounds; its default where absent or wrong.
     pub(crate) fn count(&self, name: &'static str, diagnostics: &mut Vec<Diagnostic>) -> u32 {
         let (key, value) = self.get(name);
@@ -264,4 +343,58 @@ impl<'a, 't> Fields<'a, 't> {
         };
         Fields::new(section, table.unwrap_or(empty), diagnostics)
     }
+}
+
+/// A place of a device, in the short or in the long form.
+fn place(value: Value<'_, '_>, diagnostics: &mut Vec<Diagnostic>) -> Option<Place> {
+    let Some(table) = value.as_table() else {
+        let text = value.text_as("a place in quotes, or its table", diagnostics)?;
+        let place = text.value.parse::<Place>();
+        if let Err(error) = &place {
+            diagnostics.push(
+                Diagnostic::error("U0222", error.to_string(), text.span)
+                    .with_help(format!("write {}", Place::EXAMPLES)),
+            );
+        }
+        return place.ok();
+    };
+    let before = diagnostics.len();
+    let fields = Fields::new(&POINT, table, diagnostics);
+    let at = fields.text("at", diagnostics);
+    let first = at.as_ref().and_then(|at| {
+        let first = register(&at.value);
+        if first.is_none() {
+            let message = format!("{:?} is not a register of a Modbus device", at.value);
+            diagnostics.push(
+                Diagnostic::error("U0222", message, at.span.clone())
+                    .with_help("write \"input:10\" or \"holding:10\"; a BOOL has no table"),
+            );
+        }
+        first
+    });
+    let of = fields.word("as", diagnostics);
+    let order = fields.word("order", diagnostics);
+    let scale = fields.number("scale", diagnostics);
+    let offset = fields.number("offset", diagnostics);
+    if scale == 0.0 {
+        let span = fields.place_of("scale").unwrap_or_else(|| value.span());
+        diagnostics.push(
+            Diagnostic::error("U0205", "`scale` is 0", span)
+                .with_help("each value of the signal needs a number of its own"),
+        );
+    }
+    let (table, address) = first?;
+    let registers = Registers {
+        table,
+        address,
+        of: Registers::TYPES[of],
+        order: ByteOrder::ALL[order],
+        scale,
+        offset,
+    };
+    if !registers.is_in_table() {
+        let message = format!("`{registers}` ends behind register 65535");
+        diagnostics.push(Diagnostic::error("U0222", message, value.span()));
+    }
+    (diagnostics.len() == before).then_some(Place::Number(registers))
 }

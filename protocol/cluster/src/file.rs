@@ -11,7 +11,8 @@ use understudy_text::Diagnostic;
 use understudy_text::tables::Constant;
 use understudy_text::tables::{Value, unknown_key};
 
-use crate::fields::{CODES, Fields, Placed};
+use crate::device::{BAUD_RATES, Connection, Parity, SerialLine};
+use crate::fields::{CODES, ConnectionText, Fields, PlaceEntry, Placed};
 use crate::format::{
     CLUSTER, CONTROLLER, FIELD, LADDER_PARAMETERS, MODELS, PLANT, PRESS_PARAMETERS, REMOTE_IO,
     ROBOT_PARAMETERS, SECTIONS, Section, UNDERSTUDY,
@@ -80,14 +81,14 @@ pub(crate) struct RemoteIoSection {
 #[derive(Debug)]
 pub(crate) struct FieldSection {
     pub(crate) span: Range<usize>,
-    pub(crate) address: Option<Placed<SocketAddr>>,
+    pub(crate) connection: Option<Connection>,
     pub(crate) unit: u8,
     pub(crate) timeout: Duration,
     pub(crate) stale_after: Duration,
-    /// By signal: where the signal stands, and its place in the device.
-    pub(crate) inputs: BTreeMap<String, (Range<usize>, Placed<String>)>,
-    /// As `inputs`.
-    pub(crate) outputs: BTreeMap<String, (Range<usize>, Placed<String>)>,
+    /// By signal.
+    pub(crate) inputs: BTreeMap<String, PlaceEntry>,
+    /// By signal.
+    pub(crate) outputs: BTreeMap<String, PlaceEntry>,
 }
 
 #[derive(Debug)]
@@ -238,13 +239,62 @@ fn field<'a, 't>(
     let fields = fields.table("field", &FIELD, empty, diagnostics);
     Some(FieldSection {
         span: fields.span.clone(),
-        address: fields.address("modbus", diagnostics),
-        unit: fields.count("unit", diagnostics) as u8,
+        connection: connection(&fields, diagnostics),
+        unit: fields.count("unit", &mut Vec::new()) as u8,
         timeout: fields.time("timeout", diagnostics),
         stale_after: fields.time("stale_after", diagnostics),
-        inputs: fields.names("inputs", diagnostics),
-        outputs: fields.names("outputs", diagnostics),
+        inputs: fields.places("inputs", diagnostics),
+        outputs: fields.places("outputs", diagnostics),
     })
+}
+
+/// How the device is reached; nothing where that has errors.
+fn connection(fields: &Fields<'_, '_>, diagnostics: &mut Vec<Diagnostic>) -> Option<Connection> {
+    let before = diagnostics.len();
+    let connection = fields.connection("modbus", diagnostics);
+    let line = SerialLine {
+        path: String::new(),
+        baud: fields.count("baud", diagnostics),
+        parity: [Parity::Even, Parity::Odd, Parity::None][fields.word("parity", diagnostics)],
+        stop_bits: fields.count("stop_bits", diagnostics) as u8,
+    };
+    let unit = fields.count("unit", diagnostics);
+    let connection = match connection? {
+        ConnectionText::Tcp(address) => {
+            for name in ["baud", "parity", "stop_bits"] {
+                if let Some(span) = fields.place_of(name) {
+                    let message = format!("`{name}` of a device that is reached by TCP");
+                    diagnostics.push(Diagnostic::error("U0202", message, span).with_help(
+                        "only a serial line has it, such as modbus = \"rtu:/dev/ttyUSB0\"",
+                    ));
+                }
+            }
+            Connection::Tcp(address)
+        }
+        ConnectionText::Rtu(path) => {
+            if !BAUD_RATES.contains(&line.baud)
+                && let Some(span) = fields.place_of("baud")
+            {
+                let rates = BAUD_RATES.map(|rate| rate.to_string()).join(", ");
+                let message = format!("no serial line has {} bits per second", line.baud);
+                diagnostics.push(
+                    Diagnostic::error("U0205", message, span).with_help(format!("one of {rates}")),
+                );
+            }
+            if unit == 0
+                && let Some(span) = fields.place_of("unit")
+            {
+                let message =
+                    "unit 0 of a serial line is all of its devices, and none of them answers";
+                diagnostics.push(
+                    Diagnostic::error("U0205", message, span)
+                        .with_help("the number of the device, 1 to 247"),
+                );
+            }
+            Connection::Rtu(SerialLine { path, ..line })
+        }
+    };
+    (diagnostics.len() == before).then_some(connection)
 }
 
 fn model<'a, 't>(

@@ -7,6 +7,8 @@ use std::time::Duration;
 use understudy_text::duration;
 use understudy_wire::MAXIMUM_HISTORY;
 
+use crate::place::{ByteOrder, Registers};
+
 /// The bounds of a cluster's period.
 pub(crate) const SHORTEST_PERIOD: Duration = Duration::from_micros(200);
 pub(crate) const LONGEST_PERIOD: Duration = Duration::from_secs(10);
@@ -39,8 +41,12 @@ pub(crate) enum Kind {
     Text,
     /// `host:port` with a numeric host.
     Address,
+    /// `host:port` with a numeric host, or `rtu:` and a terminal device.
+    Connection,
     /// A whole number.
     Count { least: u32, most: u32, default: u32 },
+    /// A number with or without a fraction; at most so large, with either sign.
+    Number { most: f64, default: f64 },
     /// A number with its unit.
     Time {
         least: Duration,
@@ -62,6 +68,8 @@ pub(crate) enum Kind {
     Device,
     /// A table from signals to places in a device.
     Points,
+    /// `input:N` or `holding:N`.
+    Register,
 }
 
 const fn key(name: &'static str, kind: Kind, meaning: &'static str) -> Key {
@@ -119,6 +127,7 @@ pub(crate) const SECURITIES: [&str; 2] = ["keys", "off"];
 pub(crate) const RELEASES: [&str; 2] = ["automatic", "operator"];
 pub(crate) const VALUE_FAULTS: [&str; 3] = ["hold", "alarm", "fail-safe"];
 pub(crate) const STALE_STATES: [&str; 2] = ["operator", "cold"];
+pub(crate) const PARITIES: [&str; 3] = ["even", "odd", "none"];
 pub(crate) const MODELS: [&str; 2] = ["robot", "press"];
 
 pub(crate) static CLUSTER: Section = Section {
@@ -181,14 +190,30 @@ pub(crate) static REMOTE_IO: Section = Section {
 pub(crate) static FIELD: Section = Section {
     name: "remote_io.field",
     repeated: false,
-    meaning: "a device that the remote I/O reads and drives by Modbus TCP, below its `[[remote_io]]`",
+    meaning: "a device that the remote I/O reads and drives by Modbus TCP or Modbus RTU, below its `[[remote_io]]`",
     keys: keys! {
-        required modbus: Kind::Address, "where the device listens";
-        key unit: count(0, 255, 1), "the unit behind that address, where it is a gateway";
+        required modbus: Kind::Connection, "where the device listens, or the serial line that it is connected to";
+        key baud: count(1200, 921_600, 19_200), "bits per second of a serial line: 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200, 230400, 460800 or 921600";
+        key parity: word(&PARITIES), "parity bit of a serial line";
+        key stop_bits: count(1, 2, 1), "stop bits of a serial line";
+        key unit: count(0, 255, 1), "the unit behind that address, where it is a gateway; the device on a serial line";
         key timeout: time(Duration::from_millis(1), Duration::from_secs(10), Duration::from_millis(100)), "maximum time of one exchange with the device; then the connection is opened again";
         key stale_after: time(Duration::from_millis(1), Duration::from_secs(60), Duration::from_millis(200)), "the age at which its last answer is too old: the outputs are held, and then fail-safe";
         key inputs: Kind::Points, "sources of the inputs of the program; an input without one is 0";
         key outputs: Kind::Points, "targets of the outputs of the program; each named register belongs to the remote I/O completely";
+    },
+};
+
+pub(crate) static POINT: Section = Section {
+    name: "remote_io.field.inputs.NAME",
+    repeated: false,
+    meaning: "the place of a number, in the long form",
+    keys: keys! {
+        required at: Kind::Register, "the first register";
+        required as: Kind::Word { words: &Registers::TYPE_WORDS, default: false }, "the type of the number in the registers";
+        key order: word(&ByteOrder::WORDS), "order of the bytes, `a` is the most significant one: `abcd`, as Modbus prescribes; `cdab`, least significant register first; `badc`, bytes of each register exchanged; `dcba`, both";
+        key scale: Kind::Number { most: 1e12, default: 1.0 }, "units of the signal for each unit of the number; not 0";
+        key offset: Kind::Number { most: 1e12, default: 0.0 }, "value of the signal where the number is 0";
     },
 };
 
@@ -278,7 +303,11 @@ impl Kind {
             Self::Name => "a name in quotes".into(),
             Self::Text => "a text in quotes".into(),
             Self::Address => "an address in quotes, such as \"192.168.1.11:7450\"".into(),
+            Self::Connection => {
+                "an address or a serial line in quotes, such as \"192.168.1.40:502\" or \"rtu:/dev/ttyUSB0\"".into()
+            }
             Self::Count { least, most, .. } => format!("a whole number from {least} to {most}"),
+            Self::Number { most, .. } => format!("a number from -{most} to {most}"),
             Self::Time { least, most, .. } => format!(
                 "a time with its unit in quotes, from \"{}\" to \"{}\"",
                 duration::text(*least),
@@ -295,9 +324,9 @@ impl Kind {
             Self::Parameters => "a table, [plant.parameters]".into(),
             Self::Device => "a table, [remote_io.field]".into(),
             Self::Points => {
-                "a table from signals to places in quotes, such as { start = \"discrete:0\" }"
-                    .into()
+                "a table from signals to places, such as { start = \"discrete:0\", level = \"input:10 real\" }".into()
             }
+            Self::Register => "a register in quotes, such as \"holding:4\"".into(),
         }
     }
 
@@ -305,6 +334,7 @@ impl Kind {
     pub(crate) fn default(&self) -> Option<String> {
         match self {
             Self::Count { default, .. } => Some(default.to_string()),
+            Self::Number { default, .. } => Some(format!("{default:?}")),
             Self::Time { default, .. } => Some(format!("\"{}\"", duration::text(*default))),
             Self::Word {
                 words,
@@ -323,7 +353,7 @@ mod tests {
     #[test]
     fn the_documentation_has_every_key_with_its_bounds() {
         let page = include_str!("../../../docs/reference/cluster-file.md");
-        let parameters = [&ROBOT_PARAMETERS, &PRESS_PARAMETERS, &FIELD];
+        let parameters = [&ROBOT_PARAMETERS, &PRESS_PARAMETERS, &FIELD, &POINT];
         for section in SECTIONS.into_iter().chain(parameters) {
             assert!(page.contains(&section.header()), "{}", section.header());
             for key in section.keys {

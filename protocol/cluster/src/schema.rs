@@ -6,8 +6,10 @@ use understudy_text::duration;
 
 use crate::fields::MAXIMUM_NAME_LENGTH;
 use crate::format::{
-    CLUSTER, CONTROLLER, FIELD, Key, Kind, PRESS_PARAMETERS, ROBOT_PARAMETERS, SECTIONS, Section,
+    CLUSTER, CONTROLLER, FIELD, Key, Kind, POINT, PRESS_PARAMETERS, ROBOT_PARAMETERS, SECTIONS,
+    Section,
 };
+use crate::place::{ByteOrder, Registers};
 
 /// JSON Schema 2020-12 of the data of a `cluster.toml`.
 ///
@@ -54,6 +56,14 @@ fn table(section: &Section) -> Value {
     })
 }
 
+/// A place of a signal in its short form.
+fn place_pattern() -> String {
+    let (types, orders) = (Registers::TYPE_WORDS.join("|"), ByteOrder::WORDS.join("|"));
+    format!(
+        "^((discrete|coil):[0-9]{{1,5}}|(input|holding):[0-9]{{1,5}}(\\.[0-9]{{1,2}}| ({types})( ({orders}))?))$"
+    )
+}
+
 fn property(key: &Key) -> Value {
     let mut property = match &key.kind {
         Kind::Name => json!({
@@ -61,7 +71,7 @@ fn property(key: &Key) -> Value {
             "pattern": "^[A-Za-z][A-Za-z0-9_-]*$",
             "maxLength": MAXIMUM_NAME_LENGTH,
         }),
-        Kind::Text | Kind::Address => json!({ "type": "string" }),
+        Kind::Text | Kind::Address | Kind::Connection => json!({ "type": "string" }),
         Kind::Count {
             least,
             most,
@@ -80,10 +90,13 @@ fn property(key: &Key) -> Value {
         Kind::Points => json!({
             "type": "object",
             "additionalProperties": {
-                "type": "string",
-                "pattern": "^((discrete|coil):[0-9]{1,5}|(input|holding):[0-9]{1,5}\\.[0-9]{1,2})$",
+                "anyOf": [{ "type": "string", "pattern": place_pattern() }, table(&POINT)],
             },
         }),
+        Kind::Register => json!({ "type": "string", "pattern": "^(input|holding):[0-9]{1,5}$" }),
+        Kind::Number { most, default } => {
+            json!({ "type": "number", "minimum": -most, "maximum": most, "default": default })
+        }
         Kind::Names => json!({ "type": "object", "additionalProperties": { "type": "string" } }),
         Kind::Parameters => {
             json!({ "anyOf": [table(&ROBOT_PARAMETERS), table(&PRESS_PARAMETERS)] })

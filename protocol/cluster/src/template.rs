@@ -1,5 +1,7 @@
 //! Clusters that come with the program: the press cell of section V, and a small one to begin with.
 
+use crate::read::{Loaded, Overrides, read_with};
+
 /// A file of a cluster that comes with the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TemplateFile {
@@ -13,6 +15,15 @@ macro_rules! files {
     ($folder:literal: $($name:literal),* $(,)?) => {
         &[$(TemplateFile { name: $name, text: include_str!(concat!($folder, $name)) }),*]
     };
+}
+
+/// Reads the text of a cluster file whose programs are among some files.
+pub fn read_with_files(text: &str, files: &[TemplateFile], overrides: Overrides) -> Loaded {
+    read_with("cluster.toml", text, overrides, &mut |name| {
+        let file = files.iter().find(|file| file.name == name);
+        let text = file.map(|file| file.text.to_owned());
+        text.ok_or_else(|| "no such file".to_owned())
+    })
 }
 
 /// The robot and the press of section V, with the ladders of their working reading.

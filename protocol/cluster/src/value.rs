@@ -3,6 +3,24 @@
 use understudy_text::tables::Constant;
 use understudy_typed::Elementary;
 
+/// The value of a signal as a person types it, such as `true`, `12.5` or `1.5 s`, as the process image stores it.
+///
+/// # Errors
+/// What is written instead for a signal of that type.
+pub fn typed_value(text: &str, of: Elementary) -> Result<u64, String> {
+    let word = text.to_ascii_lowercase();
+    let value = match (of, word.as_str()) {
+        (Elementary::Bool, "1" | "true") => Constant::Flag(true),
+        (Elementary::Bool, "0" | "false") => Constant::Flag(false),
+        _ => match (text.parse(), text.parse()) {
+            (Ok(whole), _) => Constant::Whole(whole),
+            (_, Ok(number)) => Constant::Number(number),
+            _ => Constant::Text(text.to_owned()),
+        },
+    };
+    stored(&value, of)
+}
+
 /// The value as a signal of that type stores it.
 ///
 /// # Errors

@@ -16,14 +16,79 @@ pub const MAXIMUM_OWNER_LENGTH: usize = 40;
 /// Maximum number of characters of the reason.
 pub const MAXIMUM_REASON_LENGTH: usize = 120;
 
-/// A signal of the program of a remote I/O, counted from 0.
+/// A signal of the program of a remote I/O, by its first bit in the process image, counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SignalPlace {
-    /// An element of u(i).
+    /// In u(i).
     Input(u16),
-    /// An element of y(i).
+    /// In y(i).
     Output(u16),
+}
+
+/// Value of a force.
+///
+/// As JSON `true` or `false` for a BOOL, and `{"width":32,"stored":1095237632}` for a number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum ForcedValue {
+    /// Of a BOOL.
+    Bit(bool),
+    /// Of a number: all its bits at once.
+    Number {
+        /// Width of the number in bits: 8, 16, 32 or 64.
+        width: u8,
+        /// Its bits, as the process image stores them; those above the width are 0.
+        stored: u64,
+    },
+}
+
+impl From<bool> for ForcedValue {
+    fn from(bit: bool) -> Self {
+        Self::Bit(bit)
+    }
+}
+
+impl ForcedValue {
+    /// Its bits, the lowest first.
+    pub fn bits(self) -> impl Iterator<Item = bool> {
+        let (width, stored) = (self.width(), self.stored());
+        (0..width.min(64)).map(move |bit| stored >> bit & 1 == 1)
+    }
+
+    /// Width in bits.
+    pub fn width(self) -> u16 {
+        match self {
+            Self::Bit(_) => 1,
+            Self::Number { width, .. } => width.into(),
+        }
+    }
+
+    /// Its bits, as the process image stores them.
+    pub fn stored(self) -> u64 {
+        match self {
+            Self::Bit(bit) => bit.into(),
+            Self::Number { stored, .. } => stored,
+        }
+    }
+
+    /// Whether it has one of the widths, and no bit above it.
+    fn is_valid(self) -> bool {
+        match self {
+            Self::Bit(_) => true,
+            Self::Number { width, stored } => {
+                matches!(width, 8 | 16 | 32 | 64) && (width == 64 || stored >> width == 0)
+            }
+        }
+    }
+}
+
+impl SignalPlace {
+    /// The first bit in u(i) or y(i).
+    pub fn first_bit(self) -> u16 {
+        let (Self::Input(bit) | Self::Output(bit)) = self;
+        bit
+    }
 }
 
 /// Value in the place of a signal's own.
@@ -32,7 +97,7 @@ pub struct Force {
     /// Signal that is forced.
     pub signal: SignalPlace,
     /// Forced value.
-    pub value: bool,
+    pub value: ForcedValue,
     /// Duration in seconds, 1 to [`MAXIMUM_FORCE_SECONDS`].
     pub seconds: u32,
     /// Operator who forces it.
@@ -47,6 +112,9 @@ pub enum ForceError {
     /// Its duration is zero or too long.
     #[error("a force lasts 1 to {MAXIMUM_FORCE_SECONDS} seconds, not {0}")]
     Seconds(u32),
+    /// Its value has a width that no number has, or more bits than its width, or crosses the bits of two numbers.
+    #[error("a forced number has 8, 16, 32 or 64 bits, at a multiple of its width")]
+    Value,
     /// Its operator is missing, too long or not readable.
     #[error("who forces is 1 to {MAXIMUM_OWNER_LENGTH} readable characters")]
     Owner,
@@ -56,7 +124,24 @@ pub enum ForceError {
 }
 
 impl Force {
-    /// Checks duration, operator and reason.
+    /// Whether both are forces of one bit.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        let same_side =
+            std::mem::discriminant(&self.signal) == std::mem::discriminant(&other.signal);
+        let bits = |force: &Self| {
+            let first = u32::from(force.signal.first_bit());
+            first..first + u32::from(force.value.width())
+        };
+        let (own, others) = (bits(self), bits(other));
+        same_side && own.start < others.end && others.start < own.end
+    }
+
+    /// Whether all its bits are in an image of that width.
+    pub fn fits(&self, width: usize) -> bool {
+        usize::from(self.signal.first_bit()) + usize::from(self.value.width()) <= width
+    }
+
+    /// Checks duration, value, operator and reason.
     ///
     /// # Errors
     /// The first of them that is invalid.
@@ -69,6 +154,10 @@ impl Force {
         };
         if !(1..=MAXIMUM_FORCE_SECONDS).contains(&self.seconds) {
             return Err(ForceError::Seconds(self.seconds));
+        }
+        let is_aligned = || self.signal.first_bit().is_multiple_of(self.value.width());
+        if !self.value.is_valid() || !is_aligned() {
+            return Err(ForceError::Value);
         }
         if !readable(&self.owner, MAXIMUM_OWNER_LENGTH) {
             return Err(ForceError::Owner);
@@ -89,7 +178,7 @@ mod tests {
         let check = |seconds, owner: &str, reason: &str, expected| {
             let force = Force {
                 signal: SignalPlace::Input(0),
-                value: true,
+                value: true.into(),
                 seconds,
                 owner: owner.to_owned(),
                 reason: reason.to_owned(),
@@ -107,5 +196,61 @@ mod tests {
         check(1, "anna", "", Err(ForceError::Reason));
         check(1, "anna", &"ä".repeat(120), Ok(()));
         check(1, "anna", &"ä".repeat(121), Err(ForceError::Reason));
+    }
+
+    #[test]
+    fn a_number_is_forced_as_a_whole() {
+        let check = |place, text: &str, expected| {
+            let force = Force {
+                signal: SignalPlace::Output(place),
+                value: serde_json::from_str(text).expect(text),
+                seconds: 1,
+                owner: "anna".to_owned(),
+                reason: "why".to_owned(),
+            };
+            assert_eq!(serde_json::to_string(&force.value).expect("JSON"), text);
+            assert_eq!(force.check(), expected, "{force:?}");
+        };
+        check(3, "true", Ok(()));
+        check(64, r#"{"width":32,"stored":4294967295}"#, Ok(()));
+        check(64, r#"{"width":64,"stored":18446744073709551615}"#, Ok(()));
+        check(
+            64,
+            r#"{"width":32,"stored":4294967296}"#,
+            Err(ForceError::Value),
+        );
+        check(16, r#"{"width":32,"stored":0}"#, Err(ForceError::Value));
+        check(0, r#"{"width":1,"stored":0}"#, Err(ForceError::Value));
+        check(0, r#"{"width":0,"stored":0}"#, Err(ForceError::Value));
+    }
+
+    #[test]
+    fn forces_of_one_bit_overlap() {
+        let force = |signal, value| Force {
+            signal,
+            value,
+            seconds: 1,
+            owner: "anna".to_owned(),
+            reason: "why".to_owned(),
+        };
+        let number = ForcedValue::Number {
+            width: 32,
+            stored: 0,
+        };
+        let wide = force(SignalPlace::Input(32), number);
+        for (signal, expected) in [
+            (SignalPlace::Input(31), false),
+            (SignalPlace::Input(32), true),
+            (SignalPlace::Input(63), true),
+            (SignalPlace::Input(64), false),
+            (SignalPlace::Output(32), false),
+        ] {
+            let bit = force(signal, true.into());
+            assert_eq!(
+                (wide.overlaps(&bit), bit.overlaps(&wide)),
+                (expected, expected)
+            );
+        }
+        assert!(wide.fits(64) && !wide.fits(63));
     }
 }

@@ -17,8 +17,8 @@ mod time;
 pub use audience::Topic;
 pub use codec::{FrameError, MAXIMUM_FRAME_BYTES, decode, encode};
 pub use force::{
-    Force, ForceError, MAXIMUM_FORCE_SECONDS, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH,
-    SignalPlace,
+    Force, ForceError, ForcedValue, MAXIMUM_FORCE_SECONDS, MAXIMUM_OWNER_LENGTH,
+    MAXIMUM_REASON_LENGTH, SignalPlace,
 };
 pub use frame::{
     Actuation, Body, Field, Frame, Header, Holding, Join, MAXIMUM_HISTORY, Recalled, Relayed,

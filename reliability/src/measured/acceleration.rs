@@ -10,10 +10,10 @@ use crate::system::System;
 /// Accelerations past this one say more about the detection than about the plant.
 pub const MAXIMUM_ACCELERATION: f64 = 1e4;
 
-/// What acceleration does to the MTTF.
+/// Effect of an acceleration on the MTTF.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AccelerationBias {
-    /// How many times faster.
+    /// The acceleration.
     pub factor: f64,
     /// MTTF of the plant in hours, with its detection.
     pub true_hours: f64,

@@ -1,7 +1,7 @@
 //! Estimates with exact intervals: chi-squared for mean times, Clopper-Pearson for proportions.
 
 use serde::Serialize;
-use statrs::distribution::{Beta, ChiSquared, ContinuousCDF};
+use statrs::distribution::{Beta, ChiSquared, ContinuousCDF, Normal};
 
 use crate::error::ReliabilityError;
 use crate::quantity::Probability;
@@ -26,7 +26,7 @@ impl Interval {
     }
 }
 
-/// What ended the measurement.
+/// The end of a measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stopped {
@@ -83,7 +83,7 @@ pub fn mean_time(
 /// MTTF from the times of runs that ended in a failure and of those that were given up before one.
 ///
 /// # Errors
-/// As [`mean_time`], and a time that is negative or not finite.
+/// The errors of [`mean_time`], and a time that is negative or not finite.
 pub fn times_to_failure(
     failed_hours: &[f64],
     censored_hours: &[f64],
@@ -150,6 +150,12 @@ pub(crate) fn significance(confidence: f64) -> Result<f64, ReliabilityError> {
         });
     }
     Ok(1.0 - confidence)
+}
+
+/// Number of standard errors by which a two-sided interval extends to each side.
+pub(crate) fn normal_quantile(confidence: f64) -> Result<f64, ReliabilityError> {
+    let alpha = significance(confidence)?;
+    Ok(Normal::standard().inverse_cdf(1.0 - alpha / 2.0))
 }
 
 /// The quantile of the chi-squared law.

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::law::Law;
 use crate::error::ReliabilityError;
 
-/// What the model alone says, without the sample.
+/// The part of the null hypothesis that is independent of the sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Null {
@@ -25,7 +25,7 @@ pub enum Null {
 pub struct Fit {
     /// Times in the sample.
     pub times: usize,
-    /// What was tested.
+    /// The null hypothesis of the test.
     pub null: Null,
     /// Anderson-Darling's A².
     pub anderson_darling: f64,

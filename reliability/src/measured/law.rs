@@ -19,10 +19,10 @@ pub struct Law {
 }
 
 impl Law {
-    /// Of the first failure of a chain.
+    /// The law of the first failure of a chain.
     ///
     /// # Errors
-    /// As [`Chain::mttf`] and [`Chain::transients`].
+    /// The errors of [`Chain::mttf`] and [`Chain::transients`].
     pub fn of_chain(chain: &Chain) -> Result<Self, ReliabilityError> {
         let mean = chain.mttf()?;
         let hours = times(mean);

@@ -18,7 +18,7 @@ use crate::transient::AfterFailure;
 /// Draws of one prediction, at least.
 const MINIMUM_DRAWS: usize = 100;
 
-/// What a journal shows, all stations together.
+/// Observations of a journal, summed over all stations.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Observed {
     /// Hours from the first record to the last.
@@ -27,9 +27,9 @@ pub struct Observed {
     pub working_hours: f64,
     /// Times of station failures, in hours since the first record, ascending.
     pub failures_at: Vec<f64>,
-    /// How many of these failures the redundancy that was left should have masked.
+    /// Number of these failures that the remaining redundancy should have masked.
     pub asked: u64,
-    /// How many of those were masked.
+    /// Number of those failures that were masked.
     pub masked: u64,
     /// Repairs that were finished.
     pub repairs: u64,
@@ -39,7 +39,7 @@ pub struct Observed {
     pub detection_hours: Vec<f64>,
 }
 
-/// What follows from it. Intervals are credible intervals.
+/// Estimates from observations. Intervals are credible intervals.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outlook {
     /// λ of one box, per hour.

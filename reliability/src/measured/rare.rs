@@ -10,8 +10,7 @@
 use rand::{Rng, RngExt};
 use serde::Serialize;
 
-use super::estimate::Interval;
-use super::simulate::normal_quantile;
+use super::estimate::{Interval, normal_quantile};
 use crate::chain::Chain;
 use crate::error::ReliabilityError;
 
@@ -32,7 +31,7 @@ pub struct RareEvent {
     pub failure_probability: f64,
     /// Mean length of a cycle in hours.
     pub cycle_hours: f64,
-    /// By how much biasing lowers the variance of that probability, against as many plain cycles.
+    /// Factor by which biasing lowers the variance of that probability, compared with the same number of plain cycles.
     pub variance_reduction: f64,
     /// Half the interval, relative to the estimate.
     pub relative_half_width: f64,
@@ -54,7 +53,7 @@ struct Place {
 /// Estimates the MTTF of `chain` from `cycles` cycles, drawn with `random`.
 ///
 /// # Errors
-/// As [`Chain::mttf`]; fewer than 100 cycles, no failing cycle among them, or one that does not end.
+/// The errors of [`Chain::mttf`]; fewer than 100 cycles, no failing cycle, or a cycle without an end.
 pub fn rare_event(
     chain: &Chain,
     cycles: u64,

@@ -1,10 +1,11 @@
 //! The answers to whole questions: what is printed, what stands in JSON, and the report.
 
+use rand::RngExt;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 use understudy_reliability::{
-    Campaign, CommonCauseConvention, Hours, Options, Provenance, SharedPart, SystemFailure,
-    ThreeState, answer_chain, assess, by_understudies, calculate, figures_5_and_6, read_chain,
+    Answer, Campaign, CommonCauseConvention, Hours, Law, Options, Provenance, SharedPart,
+    SystemFailure, answer_chain, assess, by_understudies, calculate, figures_5_and_6, read_chain,
     report, report_data, sensitivities, what_if,
 };
 
@@ -31,25 +32,26 @@ fn check(found: impl Into<Option<f64>>, expected: f64, what: &str) {
 fn twenty_controllers() {
     let answer = calculate(&options(20)).expect("an answer");
     insta::assert_snapshot!(answer.to_text());
-    let closed = ThreeState::new(20, 1e-4, 1.0 / 24.0).expect("a model");
-    check(answer.mttf_paper_hours, closed.mttf(), "paper");
+    // (20): ((2N+1) MTTR + MTBF) MTBF/(N (N+1) MTTR)
+    let mttf = (41.0 * 24.0 + 10_000.0) * 10_000.0 / (20.0 * 21.0 * 24.0);
+    check(answer.mttf_paper_hours, mttf, "(20)");
     let mission = answer.mission.expect("a mission");
-    check(
-        mission.reliability_paper,
-        closed.reliability(1000.0),
-        "paper",
-    );
-    let pair = ThreeState::new(1, 1e-4, 1.0 / 24.0).expect("a model");
+    let paper = |controllers| {
+        let answer = calculate(&options(controllers)).expect("an answer");
+        answer
+            .mission
+            .and_then(|at| at.reliability_paper)
+            .expect("R")
+    };
     check(
         mission.reliability_duplex,
-        pair.reliability(1000.0).powi(20),
-        "(21) with theta at N = 1",
+        paper(1).powi(20),
+        "(21): (18) at N = 1",
     );
-    let three = ThreeState::new(2, 1e-4, 1.0 / 24.0).expect("a model");
     check(
         mission.reliability_tmr,
-        three.reliability(1000.0).powi(20),
-        "TMR",
+        paper(2).powi(20),
+        "TMR: (18) at N = 2",
     );
     check(mission.reliability_simplex, (-2.0_f64).exp(), "no spare");
 }
@@ -97,21 +99,14 @@ fn a_part_that_hardly_fails_changes_nothing() {
         name: "network".into(),
         mtbf: hours("1e15h"),
     }];
-    let closed = ThreeState::new(5, 1e-4, 1.0 / 24.0).expect("a model");
-    let states = closed.probabilities(1_000.0);
-    let near = |a: Option<f64>, b: f64, what: &str| {
-        let a = a.expect(what);
-        assert!((a / b - 1.0).abs() < 1e-9, "{what}: {a} {b}");
-    };
-    for answer in [plain, calculate(&shared).expect("an answer")] {
-        near(Some(answer.mttf_paper_hours), closed.mttf(), "paper");
+    let shared = calculate(&shared).expect("an answer");
+    let figures = |answer: &Answer| {
         let at = answer.mission.expect("a mission");
-        near(at.p0, states.p0, "p0");
-        near(at.p1, states.p1, "p1");
-        near(at.p2, states.p2, "p2");
-        let pair = ThreeState::new(1, 1e-4, 1.0 / 24.0).expect("a model");
-        let duplex = pair.reliability(1_000.0).powi(5);
-        near(at.reliability_duplex, duplex, "duplex");
+        let shares = [at.p0, at.p1, at.p2, at.reliability_duplex].map(|share| share.expect("R"));
+        [&[answer.mttf_paper_hours][..], &shares].concat()
+    };
+    for (with, without) in figures(&shared).into_iter().zip(figures(&plain)) {
+        assert!((with / without - 1.0).abs() < 1e-9, "{with} {without}");
     }
 }
 
@@ -189,7 +184,13 @@ fn sensitivities_are_derivatives() {
 }
 
 fn campaign(acceleration: f64, mttr: f64, failures: usize) -> Campaign {
-    let model = ThreeState::new(1, 1e-4, 1.0 / mttr).expect("a model");
+    let pair = Options::new(
+        1,
+        hours("10000h"),
+        Hours::new("mttr", mttr).expect("a time"),
+    );
+    let chain = pair.system().expect("a system").chain();
+    let law = Law::of_chain(&chain.expect("a chain")).expect("a law");
     let mut random = Pcg64::seed_from_u64(11);
     let causes = ["robot after understudy", "understudy after robot"];
     Campaign {
@@ -198,7 +199,7 @@ fn campaign(acceleration: f64, mttr: f64, failures: usize) -> Campaign {
         acceleration,
         failures: (0..failures)
             .map(|k| SystemFailure {
-                hours: model.draw(&mut random),
+                hours: law.quantile(random.random()),
                 cause: causes[k % 2].into(),
             })
             .collect(),

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use proptest::prelude::*;
-use understudy_reliability::{ThreeState, read_chain};
+use understudy_reliability::read_chain;
 
 const GOOD: &str = "\
 # Three controllers and an understudy.
@@ -42,10 +42,12 @@ fn findings(text: &str) -> String {
 fn a_chain_is_read() {
     assert_eq!(findings(GOOD), "");
     let chain = read_chain("a.chain", GOOD).chain.expect("a chain");
-    let coverage = understudy_reliability::Probability::new("c", 0.999).expect("a coverage");
-    let closed = ThreeState::with_coverage(3, 1e-4, 1.0 / 24.0, coverage).expect("a model");
+    // (p + q c)/(q p - q c μ), with q = 4 λ and p = 3 λ + μ: (19) with coverage.
+    let (lambda, mu, c) = (1e-4, 1.0 / 24.0, 0.999);
+    let (q, p) = (4.0 * lambda, 3.0 * lambda + mu);
+    let expected = (p + q * c) / (q * p - q * c * mu);
     let mean = chain.mttf().expect("a mean");
-    assert!((mean / closed.mttf() - 1.0).abs() < 1e-12, "{mean}");
+    assert!((mean / expected - 1.0).abs() < 1e-11, "{mean}");
     assert_eq!(
         (chain.states(), chain.start(), chain.name(2)),
         (3, 0, "failed".into())

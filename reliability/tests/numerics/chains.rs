@@ -1,50 +1,7 @@
 use proptest::prelude::*;
-use understudy_reliability::{AfterFailure, Chain, ChainBuilder, ReliabilityError, ThreeState};
+use understudy_reliability::{AfterFailure, Chain, ChainBuilder, ReliabilityError};
 
 use crate::support::{check, check_within};
-
-fn three(lambda: f64, mu: f64) -> Chain {
-    let mut builder = ChainBuilder::new();
-    let (whole, degraded, failed) = (
-        builder.state("whole"),
-        builder.state("degraded"),
-        builder.failure("failed"),
-    );
-    builder
-        .transition(whole, degraded, 4.0 * lambda)
-        .transition(degraded, whole, mu)
-        .transition(degraded, failed, 3.0 * lambda);
-    builder.build().expect("a chain")
-}
-
-#[test]
-fn transients_keep_their_digits_over_every_time() {
-    // Short times by uniformisation, long ones by squaring.
-    for ratio in [1.0, 416.0, 1e4, 1e8] {
-        let (lambda, mu) = (1e-4, 1e-4 * ratio);
-        let (chain, closed) = (three(lambda, mu), ThreeState::new(3, lambda, mu).unwrap());
-        let mut times: Vec<f64> = vec![
-            1e-3,
-            1.0,
-            100.0,
-            10_000.0,
-            closed.mttf() / 10.0,
-            closed.mttf(),
-        ];
-        times.sort_by(f64::total_cmp);
-        let found = chain
-            .transients(&times, AfterFailure::Final)
-            .expect("transients");
-        for (time, found) in times.iter().zip(found) {
-            check_within(
-                found.failed,
-                closed.unreliability(*time),
-                2e-12,
-                &format!("ratio {ratio}, {time} h"),
-            );
-        }
-    }
-}
 
 #[test]
 fn a_repaired_failure_is_not_the_end() {

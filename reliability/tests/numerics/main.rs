@@ -1,7 +1,11 @@
-//! What is calculated, against high precision, against each other, and against the figures that follow from the models.
+//! What is calculated, against high precision, against each other, and against the figures that follow from the models; what is
+//! estimated from measurements and simulations, against exact quantiles, and how often intervals contain the truth.
 
 mod chains;
-mod closed_forms;
+mod fits;
+mod intervals;
+mod outlooks;
+mod simulations;
 mod support;
 mod survival;
 mod systems;

@@ -1,10 +1,10 @@
 //! Signals that the operator has forced, each with its end.
 //!
-//! Invariant: at most one force for each signal, and none after its end.
+//! Invariant: at most one force for each bit, and none after its end.
 
 use std::time::Duration;
 
-use understudy_wire::{Force, Image, SignalPlace, Time};
+use understudy_wire::{Force, ForcedValue, Image, SignalPlace, Time};
 
 use super::RemoteIo;
 use crate::event::Event;
@@ -18,12 +18,12 @@ pub(super) struct Forcing {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 struct Active {
     signal: SignalPlace,
-    value: bool,
+    value: ForcedValue,
     until: Time,
 }
 
 impl Forcing {
-    fn put(&mut self, signal: SignalPlace, value: bool, until: Time) {
+    fn put(&mut self, signal: SignalPlace, value: ForcedValue, until: Time) {
         self.remove(signal);
         self.active.push(Active {
             signal,
@@ -36,6 +36,20 @@ impl Forcing {
         let before = self.active.len();
         self.active.retain(|active| active.signal != signal);
         self.active.len() < before
+    }
+
+    /// Removes a force of another signal that has a bit of this one.
+    fn remove_overlapping(&mut self, force: &Force) -> Option<SignalPlace> {
+        let overlaps = |active: &Active| {
+            let other = Force {
+                signal: active.signal,
+                value: active.value,
+                ..force.clone()
+            };
+            active.signal != force.signal && other.overlaps(force)
+        };
+        let place = self.active.iter().position(overlaps)?;
+        Some(self.active.remove(place).signal)
     }
 
     /// Removes a force whose time is over.
@@ -64,7 +78,9 @@ impl Forcing {
         let mut forced = image.clone();
         for active in &self.active {
             if let Some(place) = place(active.signal) {
-                forced.set(usize::from(place), active.value);
+                for (bit, value) in (usize::from(place)..).zip(active.value.bits()) {
+                    forced.set(bit, value);
+                }
             }
         }
         forced
@@ -78,9 +94,12 @@ impl RemoteIo {
             SignalPlace::Input(_) => self.settings.inputs,
             SignalPlace::Output(_) => self.settings.fail_safe.width(),
         };
-        let (SignalPlace::Input(place) | SignalPlace::Output(place)) = force.signal;
-        if usize::from(place) >= width || force.check().is_err() {
+        if !force.fits(width) || force.check().is_err() {
             return;
+        }
+        // The operator sees one force for each bit.
+        while let Some(signal) = self.forcing.remove_overlapping(force) {
+            self.report_unforced(signal, false);
         }
         let until = now + Duration::from_secs(u64::from(force.seconds));
         self.forcing.put(force.signal, force.value, until);
@@ -108,5 +127,40 @@ impl RemoteIo {
             signal,
             expired,
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn force(signal: SignalPlace, value: ForcedValue) -> Force {
+        Force {
+            signal,
+            value,
+            seconds: 1,
+            owner: "anna".to_owned(),
+            reason: "a test".to_owned(),
+        }
+    }
+
+    #[test]
+    fn a_number_is_forced_with_all_its_bits_and_alone() {
+        let number = ForcedValue::Number {
+            width: 32,
+            stored: 0x4148_0000,
+        };
+        let place = SignalPlace::Output(32);
+        let mut forcing = Forcing::default();
+        forcing.put(SignalPlace::Output(0), true.into(), Time(1));
+        forcing.put(place, number, Time(1));
+        let driven = forcing.outputs(&Image::from_bits([true; 64]));
+        assert_eq!(driven.words(), [0x4148_0000_FFFF_FFFF]);
+        assert_eq!(forcing.inputs(&Image::zero(64)), Image::zero(64));
+        // A force of one of its bits ends it.
+        let bit = force(SignalPlace::Output(63), true.into());
+        assert_eq!(forcing.remove_overlapping(&bit), Some(place));
+        assert_eq!(forcing.remove_overlapping(&bit), None);
+        assert!(forcing.remove(SignalPlace::Output(0)));
     }
 }

@@ -10,25 +10,25 @@
 //!
 //! A library that accepts for itself gets its connections from [`relay`], which is the only one to know where it listens.
 
+mod relay;
+
 use std::collections::BTreeMap;
-use std::convert::Infallible;
 use std::future::Future;
 use std::io;
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::net::{IpAddr, Ipv6Addr, SocketAddr};
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll};
-use std::thread::JoinHandle;
 use std::time::Duration;
 
 use nix::sys::resource::{Resource, getrlimit, setrlimit};
 use nix::sys::socket::{Backlog, listen};
-use tokio::io::{AsyncRead, AsyncWrite, ReadBuf, copy, split};
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::oneshot;
 use tokio::time::{Instant, Sleep, sleep};
 
-use crate::rights::run_in_background;
+pub(crate) use relay::Relay;
+pub use relay::{inner_address, relay};
 
 /// Descriptors that no listener gives to its callers; half of all where a process may have fewer than twice as many.
 pub const RESERVED_DESCRIPTORS: usize = 512;
@@ -286,89 +286,6 @@ impl Listener {
                     sleep(REFUSAL_PAUSE).await;
                 }
             }
-        }
-    }
-}
-
-/// A free port of the loopback interface, for a library that accepts for itself.
-///
-/// It is only found free: another process may take it before it is used, and the library then says so.
-///
-/// # Errors
-/// What the system says.
-pub fn inner_address() -> io::Result<SocketAddr> {
-    std::net::TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?.local_addr()
-}
-
-/// Hands every connection that `listener` accepts over to the listener at `inner`, byte by byte, until either side has ended it. Each takes
-/// three descriptors: two here, and one there.
-pub async fn relay(mut listener: Listener, inner: SocketAddr) -> Infallible {
-    loop {
-        let (caller, _) = listener.accept().await;
-        tokio::spawn(async move {
-            let Ok(answerer) = TcpStream::connect(inner).await else {
-                return;
-            };
-            let _ = answerer.set_nodelay(true);
-            let (mut from_caller, mut to_caller) = split(caller);
-            let (mut from_answerer, mut to_answerer) = answerer.into_split();
-            // Why it ends is the matter of those who talk.
-            tokio::select! {
-                _ = copy(&mut from_caller, &mut to_answerer) => {}
-                _ = copy(&mut from_answerer, &mut to_caller) => {}
-            }
-        });
-    }
-}
-
-/// A [`relay`] in a thread of its own, out of real time; it and its connections end when this is dropped.
-#[derive(Debug)]
-pub(crate) struct Relay {
-    stop: Option<oneshot::Sender<Infallible>>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Relay {
-    pub(crate) fn start(
-        listener: std::net::TcpListener,
-        connections: Connections,
-        patience: Duration,
-        inner: SocketAddr,
-    ) -> io::Result<Self> {
-        listener.set_nonblocking(true)?;
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()?;
-        let listener = {
-            let _inside = runtime.enter();
-            TcpListener::from_std(listener)?
-        };
-        let listener = Listener::new(listener, connections, patience);
-        let (stop, stopped) = oneshot::channel();
-        let thread = std::thread::Builder::new()
-            .name("relay".into())
-            .spawn(move || {
-                run_in_background();
-                runtime.block_on(async {
-                    tokio::select! {
-                        never = relay(listener, inner) => match never {},
-                        _ = stopped => {}
-                    }
-                });
-            })?;
-        Ok(Self {
-            stop: Some(stop),
-            thread: Some(thread),
-        })
-    }
-}
-
-impl Drop for Relay {
-    fn drop(&mut self) {
-        self.stop = None;
-        if let Some(thread) = self.thread.take() {
-            // One that panicked has said so on standard error.
-            let _ = thread.join();
         }
     }
 }

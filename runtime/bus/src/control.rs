@@ -205,7 +205,7 @@ mod tests {
             |line: &str, expected: Option<Order>| assert_eq!(order(line), expected, "{line}");
         let force = Force {
             signal: SignalPlace::Output(3),
-            value: true,
+            value: true.into(),
             seconds: 60,
             owner: "anna".into(),
             reason: "to see the lamp".into(),

@@ -90,14 +90,6 @@ pub enum BusError {
         /// What.
         request: &'static str,
     },
-    /// A process of a benchmark did not do its part.
-    #[error("U0508: {member:?} of the benchmark {reason}")]
-    Benchmark {
-        /// Which of its members.
-        member: Member,
-        /// What it did instead.
-        reason: String,
-    },
 }
 
 /// What Zenoh says, without the places in its source files: ` at /…/file.rs:12.`.
@@ -129,7 +121,6 @@ impl BusError {
             Self::SharedAddress { .. } => "U0505",
             Self::System { .. } => "U0506",
             Self::Panicked { .. } => "U0507",
-            Self::Benchmark { .. } => "U0508",
             Self::Uncalled { .. } => "U0509",
             Self::Unanswered { .. } => "U0510",
         }

@@ -19,10 +19,10 @@ use crate::field::{FieldDriver, Look};
 use crate::guard::Guard;
 use crate::journal::{EventSink, HostEvent, Noted};
 use crate::link::{Link, LinkCounters, Reopening};
-use crate::observer::Observer;
 use crate::orders::{Order, Orders};
 use crate::trouble::{Duplicates, Refusals};
 use crate::unreceived::Unreceived;
+use crate::watchdog::Watchdog;
 
 /// Datagrams taken before the member's own times are looked at again.
 const INPUTS_IN_A_ROW: usize = 64;
@@ -62,8 +62,8 @@ pub struct Host<'a, M: Machine> {
     pub field: &'a mut dyn FieldDriver,
     /// Takes what it reports.
     pub sink: &'a mut dyn EventSink<M::Event>,
-    /// Looks on.
-    pub observer: &'a mut dyn Observer,
+    /// Signs of life for systemd, where systemd asks for them.
+    pub watchdog: Option<Watchdog>,
     /// What the operator and the system want of it.
     pub orders: &'a Orders,
     /// Its time.
@@ -106,7 +106,7 @@ struct Round {
 }
 
 impl<M: Machine> Host<'_, M> {
-    /// Runs the member on the calling thread until it is told to stop, or its observer is satisfied.
+    /// Runs the member on the calling thread until it is told to stop.
     ///
     /// # Errors
     /// [`BusError::System`] where the system refuses to let it sleep.
@@ -114,7 +114,7 @@ impl<M: Machine> Host<'_, M> {
         let mut round = Round::default();
         self.drain(self.clock.now(), &mut round);
         loop {
-            if self.obey(&mut round) || self.observer.satisfied() {
+            if self.obey(&mut round) {
                 break;
             }
             self.look(&mut round);
@@ -128,12 +128,16 @@ impl<M: Machine> Host<'_, M> {
                 if due > Time::default() {
                     round.summary.latest_wakeup_ns = round.summary.latest_wakeup_ns.max(late_ns);
                 }
-                self.observer.woken(now);
+                if let Some(watchdog) = &mut self.watchdog {
+                    watchdog.woken(now);
+                }
                 self.machine.handle_input(now, Input::Wakeup);
                 self.drain(now, &mut round);
             } else if heard < INPUTS_IN_A_ROW {
                 let until = if now >= due { now + BREATH } else { due };
-                self.observer.rests(now, until);
+                if let Some(watchdog) = &mut self.watchdog {
+                    watchdog.rests(now, until);
+                }
                 self.sleep(now, until)?;
                 round.wakeups_in_a_row = 0;
             }
@@ -142,8 +146,8 @@ impl<M: Machine> Host<'_, M> {
         }
         let now = self.clock.now();
         self.report_trouble(now, Duration::ZERO, &mut round);
-        if let Some(event) = self.observer.finish() {
-            self.sink.record(now, Noted::Host(event));
+        if let Some(watchdog) = &self.watchdog {
+            watchdog.stopping();
         }
         round.summary.link = self.link.counters();
         let stopped = HostEvent::Stopped(round.summary);
@@ -219,7 +223,6 @@ impl<M: Machine> Host<'_, M> {
                 Ok(Some(frame)) => {
                     let frame = Arc::new(frame);
                     round.summary.frames_heard += 1;
-                    self.observer.frame(now, &frame);
                     if let Some(unreceived) = &mut round.unreceived
                         && unreceived.shown_by(now, &frame)
                     {
@@ -257,11 +260,11 @@ impl<M: Machine> Host<'_, M> {
             match output {
                 Output::Send(frame) => {
                     round.moment = frame.header.moment;
-                    self.say(now, &frame, round);
+                    self.say(&frame, round);
                 }
                 Output::Drive(outputs) => {
                     if let Some(frame) = self.field.drive(round.moment, &outputs) {
-                        self.say(now, &frame, round);
+                        self.say(&frame, round);
                     }
                 }
                 Output::Report(event) => self.sink.record(now, Noted::Member(event)),
@@ -269,7 +272,7 @@ impl<M: Machine> Host<'_, M> {
         }
     }
 
-    fn say(&mut self, now: Time, frame: &Frame, round: &mut Round) {
+    fn say(&mut self, frame: &Frame, round: &mut Round) {
         // Who sends for the first time says by it who it is.
         let sender = frame.header.sender;
         round
@@ -281,7 +284,6 @@ impl<M: Machine> Host<'_, M> {
         match datagram {
             Ok(datagram) => {
                 round.summary.frames_said += 1;
-                self.observer.frame(now, frame);
                 self.link.send(frame, datagram);
             }
             Err(reason) => {

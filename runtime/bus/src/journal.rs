@@ -170,8 +170,6 @@ pub enum HostEvent {
         /// The line.
         line: String,
     },
-    /// From the first frame of a cycle to the last turn heard, over all cycles that were complete.
-    Exchange(crate::exchange::Exchange),
     /// The member ends as it was told to.
     Stopped(Summary),
 }

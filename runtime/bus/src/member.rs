@@ -20,10 +20,9 @@ use crate::guard::Guard;
 use crate::host::{Host, Summary};
 use crate::journal::{EventSink, HostEvent, JOURNAL_RECORDS, JOURNAL_VERSION, Journal, Noted};
 use crate::link::LinkKind;
-use crate::observer::Observer;
 use crate::orders::{Order, orders};
-use crate::rights::{CYCLE_PRIORITY, Rights, run_in_real_time, sleep_exactly};
-use crate::watchdog::{Watchdog, Watched};
+use crate::rights::{Rights, keep_times};
+use crate::watchdog::Watchdog;
 
 /// What a process needs to know besides its member.
 pub struct MemberSettings {
@@ -37,8 +36,6 @@ pub struct MemberSettings {
     pub channel: Option<ChannelSettings>,
     /// Sensors and actuators.
     pub field: Box<dyn FieldDriver>,
-    /// Who looks on.
-    pub observer: Box<dyn Observer>,
     /// Whether commands are read from standard input.
     pub commands: Commands,
     /// Whether the process is killed when the thread that started it ends (PR_SET_PDEATHSIG).
@@ -72,7 +69,6 @@ where
         mut guard,
         channel,
         mut field,
-        mut observer,
         commands,
         ends_with_parent,
         real_time,
@@ -113,9 +109,9 @@ where
         link: kind,
         rights,
     };
-    if let Some(watchdog) = Watchdog::of_environment() {
+    let watchdog = Watchdog::of_environment();
+    if let Some(watchdog) = &watchdog {
         watchdog.ready();
-        observer = Box::new(Watched::new(observer, watchdog));
     }
     let status = serde_json::to_string(&ready).unwrap_or_default();
     sink.record(clock.now(), Noted::Host(ready));
@@ -134,17 +130,14 @@ where
             .name("cycle".into())
             .spawn_scoped(scope, move || {
                 let _finished = Finished(finished_here);
-                sleep_exactly();
-                if raises && let Err(error) = run_in_real_time(CYCLE_PRIORITY) {
-                    tracing::warn!(error, "the cycle keeps the priority of the link");
-                }
+                keep_times(raises);
                 Host {
                     machine: &mut machine,
                     link: link.as_mut(),
                     guard: &mut guard,
                     field: field.as_mut(),
                     sink: &mut sink,
-                    observer: observer.as_mut(),
+                    watchdog,
                     orders: &orders,
                     clock,
                 }

@@ -117,6 +117,14 @@ pub(crate) fn run_in_background() {
     }
 }
 
+/// Gives the calling thread what the thread of a cycle needs: exact sleep and, with `real_time`, SCHED_FIFO.
+pub fn keep_times(real_time: bool) {
+    sleep_exactly();
+    if real_time && let Err(error) = run_in_real_time(CYCLE_PRIORITY) {
+        tracing::warn!(error, "the cycle keeps the priority of the link");
+    }
+}
+
 /// Without SCHED_FIFO the system may add 50 µs to every sleep so as to wake several threads at once.
 pub(crate) fn sleep_exactly() {
     // It can only fail on kernels that do not know it, and costs exactness there, nothing else.

@@ -12,17 +12,14 @@ use std::os::linux::net::SocketAddrExt;
 use std::os::unix::net::{SocketAddr, UnixDatagram};
 use std::time::Duration;
 
-use understudy_wire::{Frame, Time};
-
-use crate::journal::HostEvent;
-use crate::observer::Observer;
+use understudy_wire::Time;
 
 /// Signs in the time after which systemd believes a member dead.
 const SIGNS: u32 = 4;
 
-/// Where signs go, and how often.
+/// Signs of life of this process: the socket that takes them, and how often systemd asks for one.
 #[derive(Debug)]
-pub(crate) struct Watchdog {
+pub struct Watchdog {
     socket: UnixDatagram,
     timeout: Option<Duration>,
     last: Option<Time>,
@@ -58,7 +55,13 @@ impl Watchdog {
         self.say("READY=1\nSTATUS=the cycle runs");
     }
 
-    fn woken(&mut self, now: Time) {
+    /// The member ends.
+    pub(crate) fn stopping(&self) {
+        self.say("STOPPING=1");
+    }
+
+    /// The member was woken for one of its own times.
+    pub(crate) fn woken(&mut self, now: Time) {
         let Some(timeout) = self.timeout else {
             return;
         };
@@ -71,7 +74,8 @@ impl Watchdog {
         }
     }
 
-    fn rests(&mut self, now: Time, until: Time) {
+    /// The member has nothing left to do, and sleeps until its own next time, `until`, or until something comes.
+    pub(crate) fn rests(&mut self, now: Time, until: Time) {
         if self
             .timeout
             .is_some_and(|timeout| until.since(now) < timeout)
@@ -86,47 +90,9 @@ impl Watchdog {
     }
 }
 
-/// Another observer, with a watchdog beside it.
-pub(crate) struct Watched {
-    inner: Box<dyn Observer>,
-    watchdog: Watchdog,
-}
-
-impl Watched {
-    pub(crate) fn new(inner: Box<dyn Observer>, watchdog: Watchdog) -> Self {
-        Self { inner, watchdog }
-    }
-}
-
-impl Observer for Watched {
-    fn frame(&mut self, now: Time, frame: &Frame) {
-        self.inner.frame(now, frame);
-    }
-
-    fn woken(&mut self, now: Time) {
-        self.watchdog.woken(now);
-        self.inner.woken(now);
-    }
-
-    fn rests(&mut self, now: Time, until: Time) {
-        self.watchdog.rests(now, until);
-        self.inner.rests(now, until);
-    }
-
-    fn satisfied(&self) -> bool {
-        self.inner.satisfied()
-    }
-
-    fn finish(&mut self) -> Option<HostEvent> {
-        self.watchdog.say("STOPPING=1");
-        self.inner.finish()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::observer::NoObserver;
 
     fn systemd(name: &str) -> (String, UnixDatagram) {
         let name = format!("understudy-watchdog-{name}-{}", std::process::id());
@@ -149,16 +115,15 @@ mod tests {
     fn signs_are_given_while_the_member_is_woken_and_not_too_often() {
         let (path, socket) = systemd("signs");
         let timeout = Some(Duration::from_millis(400));
-        let watchdog = Watchdog::at(&path, timeout).expect("somebody listens");
+        let mut watchdog = Watchdog::at(&path, timeout).expect("somebody listens");
         watchdog.ready();
-        let mut watched = Watched::new(Box::new(NoObserver), watchdog);
         // The system keeps some few datagrams only, so they are taken as they come.
         let mut all = said(&socket);
         for milliseconds in 0..1000 {
-            watched.woken(Time(0) + Duration::from_millis(milliseconds));
+            watchdog.woken(Time(0) + Duration::from_millis(milliseconds));
             all.extend(said(&socket));
         }
-        watched.finish();
+        watchdog.stopping();
         all.extend(said(&socket));
         assert_eq!(all.first().map(|text| &text[..7]), Some("READY=1"));
         let signs = all.iter().filter(|text| *text == "WATCHDOG=1").count();

@@ -8,8 +8,10 @@
 //!   place for each sender, so it waits without end for a sender whose session has just ended, and then no peer is received any more.
 //! * Scouting and gossip are off. A member subscribes to the stations, and to the remote I/Os, by one expression each.
 //! * A member that publishes no frame for a [`PULSE`] publishes an empty message, however long its cycle is. A member that receives none
-//!   of its peers for [`SILENT_PULSES`] opens its session anew, whatever the reason; the pause doubles each time.
+//!   of its peers for [`silence::SILENT_PULSES`] opens its session anew, whatever the reason; the pause doubles each time.
 //! * Callbacks only enqueue, and nothing that the cycle's thread calls waits for a peer: what does not fit into a queue is dropped.
+
+mod silence;
 
 use std::collections::BTreeSet;
 use std::net::{SocketAddr, TcpListener};
@@ -32,19 +34,13 @@ use crate::endpoints::Endpoints;
 use crate::error::{BusError, reason};
 use crate::link::{Link, LinkCounters, LinkKind, Reopening};
 use crate::rights::raise_link_thread;
+use silence::Silence;
 
 /// Datagrams that wait for the cycle's thread, at most; one of 64 stations and 64 remote I/Os hears fewer in a cycle.
 const QUEUE_FRAMES: usize = 1024;
 
 /// How often each member publishes something.
 const PULSE: Duration = Duration::from_millis(250);
-
-/// A member that receives none of its peers during so many pulses, which take a second, opens its session anew. Not by the clock: on a
-/// machine without time for its pulses, the peers have none for theirs, and new sessions would cost all of them more.
-const SILENT_PULSES: u32 = 4;
-
-/// The longest pause between two openings: a member whose peers are all switched off opens its session no more often.
-const MOST_SILENT_PULSES: u32 = 128;
 
 /// How long it may take to connect to a peer. Long compared with what a busy machine needs, because an attempt that is given up is an
 /// attempt that is begun again.
@@ -348,43 +344,6 @@ impl Keeper {
     }
 }
 
-/// How long no peer was received, and when that is long enough to open the session anew.
-struct Silence {
-    since: Time,
-    pulses: u32,
-    /// After so many pulses the session is opened anew.
-    patience: u32,
-}
-
-impl Silence {
-    fn new(now: Time) -> Self {
-        Self {
-            since: now,
-            pulses: 0,
-            patience: SILENT_PULSES,
-        }
-    }
-
-    /// At each pulse: whether the session is to be opened anew.
-    fn look(&mut self, now: Time, heard: bool) -> bool {
-        if heard {
-            *self = Self::new(now);
-            return false;
-        }
-        self.pulses += 1;
-        let due = self.pulses >= self.patience;
-        if due {
-            self.pulses = 0;
-            self.patience = (self.patience * 2).min(MOST_SILENT_PULSES);
-        }
-        due
-    }
-
-    fn lasts(&self, now: Time) -> Duration {
-        now.since(self.since)
-    }
-}
-
 fn key(cluster: ClusterHash, topic: Topic, speaker: Member) -> String {
     let (kind, number) = match speaker {
         Member::Station(station) => ("station", station.0),
@@ -478,27 +437,4 @@ fn settings(endpoints: &Endpoints) -> zenoh::Result<zenoh::Config> {
             .map_err(|error| format!("{setting} = {value}: {error}"))?;
     }
     Ok(config)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_session_is_opened_anew_after_a_second_and_then_less_often() {
-        let start = Time::default();
-        let mut silence = Silence::new(start);
-        let mut opened = Vec::new();
-        for tick in 1..=40_u32 {
-            if silence.look(start + PULSE * tick, false) {
-                opened.push(tick);
-            }
-        }
-        // Seconds 1, 3, and 7: pauses of 1, 2 and 4 s.
-        assert_eq!(opened, [4, 12, 28]);
-        assert_eq!(silence.lasts(start + PULSE * 40), PULSE * 40);
-        assert!(!silence.look(start + PULSE * 41, true));
-        let next = (42..60).find(|&tick| silence.look(start + PULSE * tick, false));
-        assert_eq!(next, Some(45));
-    }
 }

@@ -19,23 +19,15 @@ use members::{Chatter, endpoints, peers, station};
 use serde_json::json;
 use understudy_bus::{
     Admitted, BusError, Call, ChannelSettings, Commands, DONE, Guard, LinkKind, MemberSettings,
-    NoField, NoObserver, Request, TlsKeys, run_member,
+    NoField, Request, TlsKeys, run_member,
 };
-use understudy_cluster::{Cluster, press_cell, read};
+use understudy_cycle::Mode;
 use understudy_keys::{Authority, Date, Operators};
+use understudy_testing::press_cell;
 use understudy_wire::{ConfigurationHash, Force, SignalPlace};
 use zenoh::Wait;
 
 const DEADLINE: Duration = Duration::from_secs(60);
-
-fn cluster() -> Cluster {
-    let files = press_cell();
-    let loaded = read(files[0].name, files[0].text, &mut |name| {
-        let file = files.iter().find(|file| file.name == name);
-        Ok(file.expect("the template is whole").text.to_owned())
-    });
-    loaded.cluster.expect("the template is right")
-}
 
 /// Keys of the robot, of the router, and of two who call through it.
 fn issued() -> PathBuf {
@@ -44,7 +36,7 @@ fn issued() -> PathBuf {
         fs::remove_dir_all(&folder).expect("an old folder goes");
     }
     let now = Date::of(SystemTime::now());
-    let cluster = cluster();
+    let cluster = press_cell(Mode::Full);
     let mut authority = Authority::init(&folder, &cluster, now).expect("an empty folder");
     let names = ["site-router", "control-room", "shift-leader", "passer-by"].map(str::to_owned);
     let operators = Operators {
@@ -133,7 +125,6 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
                 configuration: "what everybody has to agree on".into(),
             }),
             field: Box::new(NoField),
-            observer: Box::new(NoObserver),
             commands: Commands::None,
             ends_with_parent: false,
             real_time: false,
@@ -152,7 +143,7 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
     assert_eq!(hash_there.ok(), Some(expected));
     let force = Request::Force(Force {
         signal: SignalPlace::Output(0),
-        value: true,
+        value: true.into(),
         seconds: 0,
         owner: "anna".to_owned(),
         reason: "to see it".to_owned(),

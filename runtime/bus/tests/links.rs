@@ -20,8 +20,8 @@ use std::time::{Duration, Instant};
 
 use members::{Chat, Chatter, agreement, endpoints, guard, peers, plant, remote_io, station};
 use understudy_bus::{
-    Clock, Control, EventSink, FieldDriver, Host, HostEvent, LinkKind, NoField, NoObserver, Noted,
-    Order, Peer, SimulatedField, Summary, free_addresses, orders,
+    Clock, Control, EventSink, FieldDriver, Host, HostEvent, LinkKind, NoField, Noted, Order, Peer,
+    SimulatedField, Summary, free_addresses, orders,
 };
 use understudy_wire::{Member, Time};
 
@@ -71,7 +71,7 @@ impl Running {
                 guard: &mut guard,
                 field: field.as_mut(),
                 sink: &mut sink,
-                observer: &mut NoObserver,
+                watchdog: None,
                 orders: &orders,
                 clock: Clock::start(),
             }

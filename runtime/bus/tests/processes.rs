@@ -25,8 +25,8 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde::{Deserialize, Serialize};
 use understudy_bus::{
-    Commands, FieldDriver, Guard, HostEvent, LinkKind, MemberSettings, NoField, NoObserver, Noted,
-    Peer, Record, SimulatedField, ZENOH_RUNTIME, run_member,
+    Commands, FieldDriver, Guard, HostEvent, LinkKind, MemberSettings, NoField, Noted, Peer,
+    Record, SimulatedField, ZENOH_RUNTIME, run_member,
 };
 use understudy_wire::Member;
 
@@ -100,7 +100,6 @@ fn act(part: &Part) -> ExitCode {
         endpoints: endpoints(part.own, &part.peers),
         link: part.link,
         field,
-        observer: Box::new(NoObserver),
         commands: if part.ends_with_input {
             Commands::ReadAndEndWithInput
         } else {

@@ -19,8 +19,8 @@ use std::time::{Duration, Instant};
 
 use members::{Chat, Chatter, agreement, endpoints, guard, key, peers, plant, remote_io, station};
 use understudy_bus::{
-    Clock, Control, EventSink, Host, HostEvent, LinkKind, NoObserver, Noted, Order, Peer,
-    RefusedAs, SimulatedField, orders,
+    Clock, Control, EventSink, Host, HostEvent, LinkKind, Noted, Order, Peer, RefusedAs,
+    SimulatedField, orders,
 };
 use understudy_seal::{FrameKey, Seal};
 use understudy_wire::{Body, Cycle, Epoch, Frame, Header, Member, Moment, ProgramId, Time, encode};
@@ -59,7 +59,7 @@ fn start(
             guard: &mut guard,
             field: &mut SimulatedField::new(ProgramId(0), agreement()),
             sink: &mut Sink { own, reports },
-            observer: &mut NoObserver,
+            watchdog: None,
             orders: &orders,
             clock: Clock::start(),
         }

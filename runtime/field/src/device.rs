@@ -26,7 +26,7 @@ use understudy_cluster::FieldDevice;
 use understudy_wire::Image;
 
 use crate::contest::{Contest, READ_BACK_EVERY};
-use crate::exchange::{Trouble, connect, exchange, read_back};
+use crate::exchange::{Link, Trouble, connect, exchange, read_back};
 use crate::plan::Plan;
 
 /// Of SCHED_FIFO: behind the cycle and the link, before programs that are not in real time.
@@ -225,7 +225,7 @@ struct Worker {
 
 impl Worker {
     async fn run(self) {
-        let address = self.settings.address;
+        let address = &self.settings.connection;
         let mut pause = FIRST_PAUSE;
         while !self.shared.lock().ending {
             let patience = self.settings.timeout;
@@ -248,7 +248,7 @@ impl Worker {
     }
 
     /// Exchanges until the connection is of no use, or it is over; whether it was of use before.
-    async fn serve(&self, mut device: tokio_modbus::client::Context) -> bool {
+    async fn serve(&self, mut device: Link) -> bool {
         let mut was_of_use = false;
         // What this connection wrote last: what was there before may be what the device starts with.
         let mut written: Option<Image> = None;
@@ -275,13 +275,14 @@ impl Worker {
                 match read {
                     Ok(Ok(Some(read))) => {
                         self.unread.set(0);
-                        self.shared.lock().contested = contest.compare(written, &read);
+                        let written = self.outputs.words(written);
+                        self.shared.lock().contested = contest.compare(&written, &read);
                     }
                     Ok(Ok(None)) => self.unread.set(UNREAD),
                     Ok(Err(_)) | Err(_) => {
                         // An answer that is still to come would be taken for that to the next request.
                         self.unread.set(self.unread.get() + 1);
-                        let address = self.settings.address;
+                        let address = &self.settings.connection;
                         self.lose(format!("{address} breaks off when its outputs are read"));
                         return was_of_use;
                     }
@@ -298,7 +299,9 @@ impl Worker {
                     self.shared.see(Look::Sensors(sensors));
                 }
                 Ok(Err(trouble)) => {
-                    written = None;
+                    // Where only the values of the answer are wrong, the outputs were written.
+                    let is_written = matches!(trouble, Trouble::Unread(_));
+                    written = outputs.filter(|_| is_written);
                     let spared = trouble.spares_the_connection();
                     self.lose(self.said(&trouble));
                     if !spared {
@@ -306,7 +309,7 @@ impl Worker {
                     }
                 }
                 Err(_) => {
-                    let address = self.settings.address;
+                    let address = &self.settings.connection;
                     self.lose(format!("{address} does not answer within {patience:?}"));
                     return was_of_use;
                 }
@@ -317,7 +320,7 @@ impl Worker {
     }
 
     fn said(&self, trouble: &Trouble) -> String {
-        format!("{}: {trouble}", self.settings.address)
+        format!("{}: {trouble}", self.settings.connection)
     }
 
     fn lose(&self, reason: String) {

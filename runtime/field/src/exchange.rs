@@ -1,14 +1,17 @@
 //! One exchange with the device: all outputs go out, all inputs come in.
 
 use std::io;
-use std::net::SocketAddr;
+use std::time::Duration;
 
 use tokio::net::TcpStream;
-use tokio_modbus::client::{Context, Reader, Writer, tcp};
+use tokio::time::sleep;
+use tokio_modbus::client::{Context, Reader, Writer, rtu, tcp};
 use tokio_modbus::{Error, ExceptionCode, Slave};
+use understudy_cluster::Connection;
 use understudy_wire::Image;
 
-use crate::plan::{Plan, Run, Table};
+use crate::plan::{Plan, Run, Table, Unread};
+use crate::serial;
 
 /// What went wrong with a device.
 #[derive(Debug, thiserror::Error)]
@@ -22,6 +25,9 @@ pub(crate) enum Trouble {
     /// It answered with less than it was asked for.
     #[error("it answered {what} too shortly")]
     Short { what: String },
+    /// Its answers are no values of the signals.
+    #[error("{0}")]
+    Unread(#[from] Unread),
 }
 
 impl Trouble {
@@ -31,16 +37,44 @@ impl Trouble {
     }
 }
 
-pub(crate) async fn connect(address: SocketAddr, unit: u8) -> io::Result<Context> {
-    let stream = TcpStream::connect(address).await?;
-    // An exchange is many small requests, each of which is waited for.
-    stream.set_nodelay(true)?;
-    Ok(tcp::attach_slave(stream, Slave(unit)))
+/// An open connection to the device.
+pub(crate) struct Link {
+    device: Context,
+    /// Before each request; only serial lines need it.
+    silence: Option<Duration>,
+}
+
+pub(crate) async fn connect(connection: &Connection, unit: u8) -> io::Result<Link> {
+    match connection {
+        Connection::Tcp(address) => {
+            let stream = TcpStream::connect(address).await?;
+            // An exchange is many small requests, each of which is waited for.
+            stream.set_nodelay(true)?;
+            Ok(Link {
+                device: tcp::attach_slave(stream, Slave(unit)),
+                silence: None,
+            })
+        }
+        Connection::Rtu(line) => Ok(Link {
+            device: rtu::attach_slave(serial::open(line)?, Slave(unit)),
+            silence: Some(serial::silence(line)),
+        }),
+    }
+}
+
+impl Link {
+    /// The device, when it may be asked: frames on a serial line are told apart by the silence between them.
+    async fn ready(&mut self) -> &mut Context {
+        if let Some(silence) = self.silence {
+            sleep(silence).await;
+        }
+        &mut self.device
+    }
 }
 
 /// u(i), once `outputs` are driven.
 pub(crate) async fn exchange(
-    device: &mut Context,
+    device: &mut Link,
     outputs: Option<(&Plan, &Image)>,
     inputs: &Plan,
 ) -> Result<Image, Trouble> {
@@ -53,33 +87,32 @@ pub(crate) async fn exchange(
     for run in &inputs.runs {
         answers.push(read(device, *run).await?);
     }
-    inputs.image(&answers).ok_or(Trouble::Short {
-        what: "a reading".into(),
-    })
+    Ok(inputs.image(&answers)?)
 }
 
-/// y(i), as the device holds it; nothing where it does not let its outputs be read.
+/// The words of y(i), as the device holds them; nothing where it does not let its outputs be read.
 pub(crate) async fn read_back(
-    device: &mut Context,
+    device: &mut Link,
     outputs: &Plan,
-) -> Result<Option<Image>, Trouble> {
+) -> Result<Option<Vec<Vec<u16>>>, Trouble> {
     let mut answers = Vec::with_capacity(outputs.runs.len());
     for run in &outputs.runs {
         match read(device, *run).await {
             Ok(words) => answers.push(words),
             Err(Trouble::Connection(error)) => return Err(error.into()),
-            Err(Trouble::Exception { .. } | Trouble::Short { .. }) => return Ok(None),
+            Err(_) => return Ok(None),
         }
     }
-    Ok(outputs.image(&answers))
+    Ok(Some(outputs.named(answers)))
 }
 
-async fn read(device: &mut Context, run: Run) -> Result<Vec<u16>, Trouble> {
+async fn read(device: &mut Link, run: Run) -> Result<Vec<u16>, Trouble> {
     let Run {
         table,
         start,
         count,
     } = run;
+    let device = device.ready().await;
     let bits = |bits: Vec<bool>| bits.into_iter().map(u16::from).collect();
     let answer: Result<Vec<u16>, ExceptionCode> = match table {
         Table::Discrete => device.read_discrete_inputs(start, count).await?.map(bits),
@@ -95,8 +128,9 @@ async fn read(device: &mut Context, run: Run) -> Result<Vec<u16>, Trouble> {
     Ok(words)
 }
 
-async fn write(device: &mut Context, run: Run, words: &[u16]) -> Result<(), Trouble> {
+async fn write(device: &mut Link, run: Run, words: &[u16]) -> Result<(), Trouble> {
     let Run { table, start, .. } = run;
+    let device = device.ready().await;
     let answer = match (table, words) {
         (Table::Holding, [word]) => device.write_single_register(start, *word).await?,
         (Table::Holding, words) => device.write_multiple_registers(start, words).await?,

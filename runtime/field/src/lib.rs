@@ -1,4 +1,4 @@
-//! Real sensors and actuators behind a remote I/O: a device that speaks Modbus TCP. The only crate that names tokio-modbus.
+//! Real sensors and actuators behind a remote I/O: a device with Modbus TCP or Modbus RTU. The only crate that names tokio-modbus.
 //!
 //! The cycle never waits for the device: a thread of its own exchanges with it, takes the newest outputs, and leaves the newest
 //! answer, which the cycle looks at ([`Device::look`]). Invariant: an answer that is looked at as good is whole, no older than
@@ -12,6 +12,8 @@
 mod contest;
 mod device;
 mod exchange;
+mod number;
 mod plan;
+mod serial;
 
 pub use device::{Device, Look};

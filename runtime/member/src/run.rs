@@ -8,8 +8,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::Serialize;
 use understudy_bus::{
-    Commands, Endpoints, FieldDriver, LinkKind, MemberSettings, NoField, NoObserver, Peer,
-    SimulatedField, ZENOH_RUNTIME, run_member,
+    Commands, Endpoints, FieldDriver, LinkKind, MemberSettings, NoField, Peer, SimulatedField,
+    ZENOH_RUNTIME, run_member,
 };
 use understudy_cluster::{Cluster, Link};
 use understudy_cycle::Machine;
@@ -136,7 +136,6 @@ where
         guard: keys.guard,
         channel: keys.channel,
         field,
-        observer: Box::new(NoObserver),
         commands: if options.in_laboratory {
             Commands::ReadAndEndWithInput
         } else {

@@ -1,12 +1,18 @@
-//! What the tests of several crates share: skipped tests, random numbers, random programs and tables of states.
+//! What the tests of several crates share: the press cell, skipped tests, random numbers, random programs and tables of states.
 
+mod cells;
+mod folder;
 pub mod random;
 pub mod states;
+
+pub use folder::Folder;
 
 use std::fmt::Display;
 use std::fs::OpenOptions;
 use std::io::{self, Write as _};
 use std::thread;
+
+pub use cells::{cluster, line, press_cell};
 
 /// Where [`skip`] writes a line for each test, for whoever counts them.
 pub const LIST: &str = "UNDERSTUDY_SKIPPED";

@@ -69,8 +69,7 @@ fn family(row: &Row<'_>, catalogue: &mut Catalogue, wrong: &mut Vec<Diagnostic>)
     let name = row.name("family", wrong);
     let known = FamilyQuantity::ALL.map(FamilyQuantity::name);
     let text = row.text("figure");
-    let quantity = FamilyQuantity::ALL.into_iter();
-    let Some(quantity) = quantity.into_iter().find(|known| known.name() == text) else {
+    let Some(quantity) = FamilyQuantity::of(text) else {
         let message = format!("`{text}` is not a figure of a family");
         let diagnostic = Diagnostic::error("U1111", message, row.span("figure"));
         wrong.push(diagnostic.with_help(suggestion(text, known)));
@@ -112,15 +111,13 @@ fn model(row: &Row<'_>, catalogue: &mut Catalogue, wrong: &mut Vec<Diagnostic>) 
     }
     let (figure, value) = (row.text("figure"), row.text("value"));
     let source = row.text("source").to_owned();
-    let quantity = Quantity::ALL.into_iter();
-    let statement = Statement::ALL.into_iter();
-    if let Some(quantity) = quantity.into_iter().find(|known| known.name() == figure) {
+    if let Some(quantity) = Quantity::of(figure) {
         if let Some(value) = number(quantity, value, row.span("value"), wrong) {
             controller
                 .numbers
                 .insert(quantity, Figure { value, source });
         }
-    } else if let Some(statement) = statement.into_iter().find(|known| known.name() == figure) {
+    } else if let Some(statement) = Statement::of(figure) {
         if value.is_empty() {
             let message = format!("no {statement} is said");
             wrong.push(Diagnostic::error("U1107", message, row.span("value")));

@@ -16,7 +16,7 @@ impl Writer<'_> {
             let [diagnosed, last, moves, moved, recalled] =
                 ["diagnosed", "last", "moves", "moved", "recalled"].map(|what| of(&channel, what));
             let raw = Name::from(channel.clone());
-            let title = format!("{channel}: does it move?");
+            let title = format!("{channel}: value changed");
             let differs = vec![vec![on(&raw), off(&last)], vec![off(&raw), on(&last)]];
             let mut network = vec![on(&started)];
             network.extend(any(differs));
@@ -27,7 +27,7 @@ impl Writer<'_> {
             self.program
                 .push_rung(vec![on(&moves), on(&diagnosed)], vec![coil(Set, &moved)]);
             let title =
-                format!("{channel}: repaired, when it is quiet and shows what the plant may show");
+                format!("{channel}: repaired when its value is stable and possible in the model");
             let quiet = BlockKind::Ton(self.ground.patience.quiet);
             let network = vec![
                 on(&diagnosed),
@@ -55,7 +55,7 @@ impl Writer<'_> {
             vec![on(&lost)],
         ]);
         self.program.push_titled(
-            "may the plant be in any state?",
+            "state of the plant unknown",
             network,
             vec![coil(Plain, &anywhere)],
         );
@@ -90,7 +90,7 @@ impl Writer<'_> {
                 ["out", "seen", "differs", "accepted", "waits", "gone"]
                     .map(|what| of(&channel, what));
             let failed = ["failed", "diagnosed"].map(|what| vec![on(&of(&channel, what))]);
-            let title = format!("{channel}: what it shows, once it has lasted");
+            let title = format!("{channel}: accepted value");
             self.program
                 .push_titled(&title, any(failed.into()), vec![coil(Plain, &out)]);
             // A failed channel, and a channel in its first scan, is accepted as it is.
@@ -133,14 +133,14 @@ impl Writer<'_> {
             changes.extend(other);
         }
         let out = Name::from("diagnosis.out");
-        self.program
-            .push_titled("is a channel failed?", any(outs), vec![coil(Plain, &out)]);
-        let change = Name::from("diagnosis.change");
         self.program.push_titled(
-            "has anything changed?",
-            any(changes),
-            vec![coil(Plain, &change)],
+            "at least one channel failed",
+            any(outs),
+            vec![coil(Plain, &out)],
         );
+        let change = Name::from("diagnosis.change");
+        self.program
+            .push_titled("input change", any(changes), vec![coil(Plain, &change)]);
         for name in self.unwatched() {
             let network = vec![on(&Name::from(name.clone()))];
             self.program
@@ -267,7 +267,7 @@ impl Writer<'_> {
             network
         });
         self.program.push_titled(
-            "does a state explain it?",
+            "a state of the model explains the inputs",
             any(branches.collect()),
             vec![coil(Plain, &possible)],
         );
@@ -284,7 +284,7 @@ impl Writer<'_> {
             let own = of(&channel, "accepted");
             network.extend(any(vec![vec![on(&own)], vec![off(&change), on(&followed)]]));
             network.extend(any(branches.collect()));
-            let title = format!("{channel}: if it is failed, is there one?");
+            let title = format!("{channel}: its failure would explain the inputs");
             self.program
                 .push_titled(&title, network, vec![coil(Plain, &explains)]);
         }
@@ -293,7 +293,7 @@ impl Writer<'_> {
                 ["explains", "gone", "accused", "diagnosed", "moved"]
                     .map(|what| of(&channel, what));
             let network = any(vec![vec![on(&explains)], vec![on(&gone)]]);
-            let title = format!("{channel}: failed");
+            let title = format!("{channel}: fault detected");
             self.program
                 .push_titled(&title, network, vec![coil(Plain, &accused)]);
             self.program
@@ -338,7 +338,7 @@ impl Writer<'_> {
             .push_rung(vec![on(&one)], vec![coil(Plain, &tracked)]);
         let lost = Name::from("diagnosis.lost");
         self.program.push_titled(
-            "no state explains it: the plant may be in any state",
+            "no state of the model explains the inputs: state of the plant unknown",
             vec![off(&one)],
             vec![coil(Plain, &lost)],
         );
@@ -357,7 +357,7 @@ impl Writer<'_> {
         let mut network = vec![on(&one), off(&two), on(&driven), off(&out)];
         network.extend(any(own.collect()));
         self.program.push_titled(
-            "is the plant in one state, under its own outputs?",
+            "exactly one state possible, with the outputs of this state",
             network,
             vec![coil(Set, &followed)],
         );
@@ -384,7 +384,7 @@ impl Writer<'_> {
     /// Whether the plant may be in one state, and in two.
     fn count(&mut self, one: &Name, two: &Name) {
         self.program.push_titled(
-            "in how many states may the plant be?",
+            "number of possible states: none, one, or at least two",
             Vec::new(),
             vec![coil(Reset, one), coil(Reset, two)],
         );

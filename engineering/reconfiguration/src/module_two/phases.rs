@@ -53,7 +53,7 @@ impl Writer<'_> {
 
     /// What the working channels show, step 3, and ω.
     pub(super) fn follow(&mut self) {
-        self.open_phase("module 2: what is seen");
+        self.open_phase("module 2: input changes");
         let mega = self.mega;
         for place in self.latched_places() {
             let state = &mega.states[place];
@@ -121,7 +121,7 @@ impl Writer<'_> {
         coils.push(coil(CoilKind::Reset, &self.names.lost));
         coils.push(held);
         self.program
-            .push_titled("module 2: the operator gives back", network, coils);
+            .push_titled("module 2: release by the operator", network, coils);
     }
 
     /// From transparent into Θ.

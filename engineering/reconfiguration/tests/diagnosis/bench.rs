@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use understudy_logic::{Circuit, Scan, Scratch};
+use understudy_logic::{Circuit, Running};
 use understudy_reconfiguration::project::{self, Project};
 use understudy_reconfiguration::{Outcome, analyse};
 
@@ -10,34 +10,22 @@ use understudy_reconfiguration::{Outcome, analyse};
 #[derive(Clone)]
 pub(crate) struct Machine {
     circuit: Circuit,
-    scan: Scan,
-    state: Vec<u64>,
+    running: Running,
     pub(crate) outputs: Vec<bool>,
 }
 
 impl Machine {
     pub(crate) fn new(circuit: Circuit) -> Self {
-        let scan = Scan::new(&circuit);
         Self {
-            state: scan.initial().to_vec(),
+            running: Running::new(&circuit),
             outputs: vec![false; circuit.outputs().len()],
-            scan,
             circuit,
         }
     }
 
     pub(crate) fn step(&mut self, input: &dyn Fn(&str) -> bool) {
-        let mut inputs = vec![0; self.scan.input_count().div_ceil(64)];
-        for (place, name) in self.circuit.inputs().iter().enumerate() {
-            inputs[place / 64] |= u64::from(input(name)) << (place % 64);
-        }
-        let mut said = vec![0; self.scan.output_count().div_ceil(64)];
-        let mut scratch = Scratch::default();
-        self.scan
-            .step(&mut scratch, &mut self.state, &inputs, &mut said);
-        for (place, bit) in self.outputs.iter_mut().enumerate() {
-            *bit = said[place / 64] >> (place % 64) & 1 == 1;
-        }
+        let inputs = self.circuit.inputs().iter().map(|name| input(name));
+        self.outputs = self.running.step(&inputs.collect::<Vec<_>>());
     }
 
     pub(crate) fn get(&self, name: &str) -> bool {

@@ -31,10 +31,12 @@ impl Located {
 
 /// Addresses under the key `addresses`; U0867 for an invalid one.
 pub(crate) fn read_addresses(form: &mut Form<'_>, table: &DeTable) -> Vec<Located> {
-    let entries = table.get("addresses").and_then(|value| form.table(value));
+    let entries = table
+        .get("addresses")
+        .and_then(|value| form.table("addresses", value));
     let mut located = Vec::new();
     for (name, value) in entries.into_iter().flatten() {
-        let Some(text) = form.string(value) else {
+        let Some(text) = form.string(name.get_ref(), value) else {
             continue;
         };
         match text.strip_prefix('%').and_then(parse_address) {

@@ -131,7 +131,7 @@ impl<'a> Converter<'a> {
         }
         if !self.left.is_empty() {
             let coils = self.left.iter().map(reset).collect();
-            self.push("events that no state has used are gone", Vec::new(), coils);
+            self.push("reset events that no state has used", Vec::new(), coils);
         }
         Conversion {
             program: self.program,
@@ -158,7 +158,7 @@ impl<'a> Converter<'a> {
             .collect();
         self.program.comments = vec![
             format!("Generated from {}.", names.join(", ")),
-            "Each state has a bit, and one of them is on. Events come first; then at most one command is generated.".into(),
+            "One bit for each state; exactly one of them is on. Each scan evaluates the events, then generates at most one command.".into(),
         ];
     }
 
@@ -174,7 +174,7 @@ impl<'a> Converter<'a> {
         let map = self.map;
         let mut inputs = Vec::new();
         if let Some(start) = &map.start {
-            inputs.push(described(start, "starts the program".into()));
+            inputs.push(described(start, "start of the program".into()));
         }
         for input in &map.inputs {
             let by = match input.by {
@@ -204,10 +204,11 @@ impl<'a> Converter<'a> {
         for switch in &map.switches {
             for position in &switch.positions {
                 if switch.memory {
-                    let signal = kept(&position.signal, format!("on from {}", position.event));
+                    let signal = kept(&position.signal, format!("on since {}", position.event));
                     self.program.memory.push(signal);
                 } else {
-                    let signal = described(&position.signal, format!("on from {}", position.event));
+                    let signal =
+                        described(&position.signal, format!("on since {}", position.event));
                     self.program.outputs.push(signal);
                 }
             }
@@ -232,7 +233,7 @@ impl<'a> Converter<'a> {
 
     fn declare_states(&mut self) {
         if self.map.start.is_some() {
-            let started = self.memory(&["started"], "the program has started");
+            let started = self.memory(&["started"], "program started");
             self.started = Some(started);
         }
         let alone = self.automata.len() == 1;
@@ -284,7 +285,7 @@ impl<'a> Converter<'a> {
             None => self.names.fresh(&[wanted]),
         };
         self.program.inputs.push(Signal {
-            description: Some(format!("operator: asks for {}", self.event_name(label))),
+            description: Some(format!("operator: request for {}", self.event_name(label))),
             ..Signal::new(name.clone())
         });
         self.requests.insert(label, name.clone());
@@ -315,13 +316,13 @@ impl<'a> Converter<'a> {
             });
         let mut coils = Vec::new();
         if chains {
-            let commanded = self.memory(&["commanded"], "this scan has generated its command");
+            let commanded = self.memory(&["commanded"], "command generated in this scan");
             coils.push(reset(&commanded));
             self.commanded = Some(commanded);
         }
         coils.extend(self.map.pulses.iter().map(|pulse| reset(&pulse.signal)));
         if !coils.is_empty() {
-            self.push("a scan begins without a command", Vec::new(), coils);
+            self.push("no command at the start of the scan", Vec::new(), coils);
         }
     }
 
@@ -345,7 +346,7 @@ impl<'a> Converter<'a> {
                 kind: BlockKind::Ton(timer.preset),
                 pins: Vec::new(),
             });
-            let title = format!("time until {}", timer.event);
+            let title = format!("delay of {}", timer.event);
             self.push(&title, vec![open(&timer.runs_while), block], Vec::new());
         }
     }
@@ -366,7 +367,7 @@ impl<'a> Converter<'a> {
                     When::Low => vec![closed(signal)],
                     When::Rising => vec![rising(signal)],
                     When::Falling => {
-                        let last = self.memory(&[signal, "last"], "in the last scan");
+                        let last = self.memory(&[signal, "last"], "value in the previous scan");
                         vec![open(&last), closed(signal)]
                     }
                 }
@@ -422,7 +423,7 @@ impl<'a> Converter<'a> {
         let coil = self.announce(&bit, is_consumed);
         self.push(&format!("{event} occurs"), network, vec![coil]);
         if let Some((last, signal)) = last {
-            let title = format!("{signal} is remembered");
+            let title = format!("{signal}: value for the next scan");
             self.push(&title, vec![open(&signal)], vec![write(&last)]);
         }
         bit

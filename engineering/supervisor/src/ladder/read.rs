@@ -76,8 +76,8 @@ fn map(form: &mut Form<'_>, table: &DeTable) -> InputOutputMap {
             InputEvent {
                 event: form.name(entry, "event", "an input", place),
                 signal: form.name(entry, "signal", "an input", place),
-                when: form.choice(entry, "when", &When::WORDS),
-                by: form.choice(entry, "by", &Agent::WORDS),
+                when: form.choice(entry, "when", &When::WORDS).unwrap_or_default(),
+                by: form.choice(entry, "by", &Agent::WORDS).unwrap_or_default(),
             }
         }),
         switches: form.list(table, "switch", |form, entry, place| {
@@ -94,7 +94,7 @@ fn map(form: &mut Form<'_>, table: &DeTable) -> InputOutputMap {
                         signal: form.name(entry, "signal", "a position", place),
                     }
                 }),
-                memory: form.flag(entry, "memory"),
+                memory: form.flag(entry, "memory").unwrap_or(false),
             }
         }),
         pulses: form.list(table, "pulse", |form, entry, place| {
@@ -102,21 +102,19 @@ fn map(form: &mut Form<'_>, table: &DeTable) -> InputOutputMap {
             Pulse {
                 event: form.name(entry, "event", "a pulse", place),
                 signal: form.name(entry, "signal", "a pulse", place),
-                memory: form.flag(entry, "memory"),
+                memory: form.flag(entry, "memory").unwrap_or(false),
             }
         }),
         timers: form.list(table, "timer", |form, entry, place| {
             form.check_keys(entry, &format::TIMER);
-            let preset = form.name(entry, "preset", "a timer", place);
+            if !entry.contains_key("preset") {
+                form.missing("preset", "a timer", place.clone());
+            }
             Timer {
                 event: form.name(entry, "event", "a timer", place),
                 name: form.name(entry, "name", "a timer", place),
                 runs_while: form.name(entry, "runs_while", "a timer", place),
-                preset: if preset.is_empty() {
-                    std::time::Duration::ZERO
-                } else {
-                    form.time(&preset).unwrap_or_default()
-                },
+                preset: form.time(entry, "preset").unwrap_or_default(),
             }
         }),
         requests: form.list(table, "request", |form, entry, place| {
@@ -131,17 +129,18 @@ fn map(form: &mut Form<'_>, table: &DeTable) -> InputOutputMap {
 }
 
 fn event_names(form: &mut Form<'_>, table: &DeTable) -> Vec<EventName> {
-    let entries = table.get("events").and_then(|value| form.table(value));
+    let entries = table
+        .get("events")
+        .and_then(|value| form.table("events", value));
     let mut events = Vec::new();
     for (name, value) in entries.into_iter().flatten() {
         let number = value.get_ref().as_integer();
         let number = number.and_then(|number| number.as_str().parse().ok());
-        match number {
-            Some(number) => events.push(EventName {
+        if let Some(number) = form.expect(name.get_ref(), value, number, "the number of an event") {
+            events.push(EventName {
                 name: Name::at(name.get_ref().as_ref(), name.span()),
                 label: Label::new(number),
-            }),
-            None => form.wrong_type(value, "a number of an event"),
+            });
         }
     }
     events

@@ -32,12 +32,12 @@ pub(super) fn read_component(
     };
     let mut states = States::default();
     if let Some(list) = table.get("states") {
-        for word in words(form, list) {
+        for word in words(form, "states", list) {
             states.number(word);
         }
     }
     let initial = table.get("initial").and_then(|initial| {
-        form.string(initial)?;
+        form.string("initial", initial)?;
         Some(trimmed(form.text, initial.span()))
     });
     let transitions = match table.get("transitions") {
@@ -55,7 +55,7 @@ pub(super) fn read_component(
         vec![true; states.names.len().max(1)]
     } else {
         let mut is_marked = vec![false; states.names.len().max(1)];
-        for word in &words(form, marked) {
+        for word in &words(form, "marked", marked) {
             if let Some(state) = states.known(form, word, "a marked state") {
                 is_marked[state as usize] = true;
             }
@@ -63,7 +63,7 @@ pub(super) fn read_component(
         is_marked
     };
     let own = match table.get("events") {
-        Some(list) => words(form, list),
+        Some(list) => words(form, "events", list),
         None => Vec::new(),
     };
     let own = own.iter().filter_map(|word| events.find(form, word));
@@ -158,7 +158,7 @@ fn transitions<'t>(
 ) -> Vec<Transition> {
     let mut transitions = Vec::new();
     let mut known: HashMap<(u32, Label), (u32, Place)> = HashMap::new();
-    for (words, place) in form.phrases(list) {
+    for (words, place) in form.phrases("transitions", list) {
         let [source, event, target] = words.as_slice() else {
             let message =
                 "a transition is three words: a state, an event, and the state to which it leads";
@@ -195,9 +195,9 @@ fn transitions<'t>(
 }
 
 /// The names of a list.
-fn words<'t>(form: &mut Form<'t>, list: &Spanned<DeValue>) -> Vec<Word<'t>> {
+fn words<'t>(form: &mut Form<'t>, key: &str, list: &Spanned<DeValue>) -> Vec<Word<'t>> {
     let mut words = Vec::new();
-    for (phrase, place) in form.phrases(list) {
+    for (phrase, place) in form.phrases(key, list) {
         match phrase.as_slice() {
             [word] => words.push(word.clone()),
             _ => form.error("U0825", "a name is one word", place),

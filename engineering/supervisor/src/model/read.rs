@@ -68,8 +68,13 @@ pub(super) struct Loader<'l> {
 
 impl Loader<'_> {
     /// The name and the text of the file that `value` names.
-    fn text(&mut self, form: &mut Form<'_>, value: &Spanned<DeValue>) -> Option<(String, String)> {
-        let path = form.string(value)?;
+    fn text(
+        &mut self,
+        form: &mut Form<'_>,
+        key: &str,
+        value: &Spanned<DeValue>,
+    ) -> Option<(String, String)> {
+        let path = form.string(key, value)?;
         match (self.load)(&path) {
             Ok(text) => Some((path, text)),
             Err(error) => {
@@ -82,7 +87,7 @@ impl Loader<'_> {
 
     /// The net of a file, with its file's name and its errors as a report.
     fn net(&mut self, form: &mut Form<'_>, value: &Spanned<DeValue>) -> Option<NetFile> {
-        let (path, text) = self.text(form, value)?;
+        let (path, text) = self.text(form, "net", value)?;
         let read = read_net(&text);
         self.files.push(Report {
             name: path,
@@ -99,7 +104,7 @@ impl Loader<'_> {
         value: &Spanned<DeValue>,
         name: Option<String>,
     ) -> Option<Automaton> {
-        let (path, text) = self.text(form, value)?;
+        let (path, text) = self.text(form, "file", value)?;
         let read = read_ads(&text);
         self.files.push(Report {
             name: path,

@@ -108,7 +108,7 @@ pub fn isomorph(left: &Automaton, right: &Automaton) -> Result<Vec<State>, Diffe
 }
 
 /// The first event that only one of the two states enables.
-pub(super) fn enabled_difference(
+fn enabled_difference(
     left: &Automaton,
     state: State,
     right: &Automaton,

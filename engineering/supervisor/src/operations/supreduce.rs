@@ -3,12 +3,7 @@
 //! Two states of a supervisor may become one when neither enables what the other disables, when they agree on marking wherever the
 //! plant leaves it to them, and when the same holds for all that follows. Finding the fewest states is NP-hard; merging greedily
 //! is not, and what comes out depends on the order in which pairs are tried. A few orders are tried and the smallest result is kept.
-//! Whether the result has the same effect is not taken on trust: [`control_equivalent`] decides it.
 
-use std::collections::VecDeque;
-
-use super::isomorph::enabled_difference;
-use crate::alphabet::Label;
 use crate::automaton::{Automaton, Edge, State};
 use crate::explicit::{Bounds, Joint, Product, TooLarge};
 
@@ -408,68 +403,4 @@ impl Cells {
         // A cell represents many states; the name of one would mislead.
         Automaton::from_parts("SIMSUP".to_owned(), alphabet, marked, first, edges)
     }
-}
-
-/// Where two supervisors have a different effect on one plant.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Inequivalent {
-    /// A shortest sequence of events that leads there.
-    pub word: Vec<Label>,
-    /// The event that one allows and the other does not; none where they differ in marking.
-    pub event: Option<Label>,
-}
-
-/// Whether `plant` under `left` and under `right` does and marks the same: L(G) ∩ L(S) and Lm(G) ∩ Lm(S) for both.
-///
-/// # Errors
-/// A product with the plant passes the bounds.
-pub fn control_equivalent(
-    plant: &Automaton,
-    left: &Automaton,
-    right: &Automaton,
-    bounds: Bounds,
-) -> Result<Option<Inequivalent>, TooLarge> {
-    let under = |supervisor| {
-        let product = Product::explore(&[plant, supervisor], &[], Joint::Meet, bounds)?;
-        Ok(product.into_automaton(String::new()))
-    };
-    Ok(language_difference(&under(left)?, &under(right)?))
-}
-
-/// A shortest word after which two automata do not enable or mark the same.
-fn language_difference(left: &Automaton, right: &Automaton) -> Option<Inequivalent> {
-    let (one, two) = match (left.initial(), right.initial()) {
-        (None, None) => return None,
-        (Some(one), Some(two)) => (one, two),
-        _ => {
-            return Some(Inequivalent {
-                word: Vec::new(),
-                event: None,
-            });
-        }
-    };
-    let mut arrived = std::collections::HashMap::from([((one, two), None)]);
-    let mut pending = VecDeque::from([(one, two)]);
-    while let Some(pair) = pending.pop_front() {
-        let (one, two) = pair;
-        let event = enabled_difference(left, one, right, two);
-        if event.is_some() || left.is_marked(one) != right.is_marked(two) {
-            let mut word = Vec::new();
-            let mut at = pair;
-            while let Some(Some((before, label))) = arrived.get(&at).copied() {
-                word.push(label);
-                at = before;
-            }
-            word.reverse();
-            return Some(Inequivalent { word, event });
-        }
-        for (edge, other) in left.edges(one).iter().zip(right.edges(two)) {
-            let next = (edge.target, other.target);
-            arrived.entry(next).or_insert_with(|| {
-                pending.push_back(next);
-                Some((pair, left.label(*edge)))
-            });
-        }
-    }
-    None
 }

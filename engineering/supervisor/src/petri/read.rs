@@ -131,9 +131,8 @@ impl Numbers {
             Some(event) => events.find(form, &(event.as_str(), event.span())),
             None => events.get(name),
         };
-        let after = form.optional(entry, "after");
         let when = entry.get("when");
-        let when = when.filter(|value| form.string(value).is_some());
+        let when = when.filter(|value| form.string("when", value).is_some());
         NetTransition {
             name: name.to_string(),
             label,
@@ -148,7 +147,7 @@ impl Numbers {
                 }
                 None => super::net::Condition::Always,
             },
-            delay: after.and_then(|after| form.time(&after)),
+            delay: form.time(entry, "after"),
         }
     }
 
@@ -288,6 +287,6 @@ fn phrases<'t>(
         Some(value) if value.get_ref().as_str().is_some() => {
             vec![(split(form.text, value.span()), value.span())]
         }
-        Some(value) => form.phrases(value),
+        Some(value) => form.phrases(key, value),
     }
 }

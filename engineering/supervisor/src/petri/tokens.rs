@@ -138,14 +138,14 @@ impl Tokens {
             if change > 0 {
                 network.extend(self.at_least(count.saturating_sub(width) as u32));
                 rung(
-                    format!("{name}: {width} more, {count} or more"),
+                    format!("{name}: add {width}, {count} or more"),
                     network,
                     vec![set(flag)],
                 )
             } else {
                 network.extend(self.fewer((count + width) as u32));
                 rung(
-                    format!("{name}: {width} less, below {count}"),
+                    format!("{name}: remove {width}, below {count}"),
                     network,
                     vec![reset(flag)],
                 )

@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::time::Duration;
 
 use understudy_ladder::{Name, Program};
-use understudy_logic::{Circuit, Scan, Scratch};
+use understudy_logic::{Circuit, LANES, Lanes, Run, Scan, bit};
 
 use super::environment::Environment;
 use super::reference::{Allowed, Happening, Joint, Reference};
@@ -64,7 +64,7 @@ pub fn prove(
     );
     let view = View::new(&circuit, program, map, correspondence)?;
     let mut exploration = Exploration {
-        scan: Scan::new(&circuit),
+        lanes: Lanes::new(Scan::new(&circuit)),
         circuit: &circuit,
         reference,
         environment,
@@ -82,7 +82,7 @@ pub fn prove(
 
 /// A reached state, and how.
 struct Node {
-    registers: Box<[u64]>,
+    registers: Vec<u64>,
     kept: Vec<bool>,
     state: Joint,
     positions: Box<[u8]>,
@@ -92,14 +92,14 @@ struct Node {
 type Question = (Joint, Box<[u8]>, Vec<Label>, Vec<Label>, bool);
 
 struct Exploration<'a> {
-    scan: Scan,
+    lanes: Lanes,
     circuit: &'a Circuit,
     reference: Reference<'a>,
     environment: Environment,
     view: View,
     settings: ProofSettings,
     nodes: Vec<Node>,
-    known: HashSet<(Box<[u64]>, Vec<bool>)>,
+    known: HashSet<(Vec<u64>, Vec<bool>)>,
     cache: HashMap<Question, Vec<Allowed>>,
     joint: HashSet<Box<[State]>>,
     used: HashSet<Label>,
@@ -108,7 +108,7 @@ struct Exploration<'a> {
 
 impl Exploration<'_> {
     fn run(&mut self) -> Result<Verdict, ProofError> {
-        let registers: Box<[u64]> = self.scan.initial().into();
+        let registers = self.lanes.scan().initial().to_vec();
         let seen = self.see(&registers, &[]);
         let state = seen
             .states
@@ -123,13 +123,12 @@ impl Exploration<'_> {
             parent: None,
         });
         self.known.insert((registers, self.nodes[0].kept.clone()));
-        let mut scratch = Scratch::default();
         let mut next = 0;
         while next < self.nodes.len() {
             if let Some(state) = &self.nodes[next].state {
                 self.joint.insert(state.clone());
             }
-            if let Some(counterexample) = self.expand(next, &mut scratch)? {
+            if let Some(counterexample) = self.expand(next)? {
                 return Ok(Verdict::Refuted(Box::new(counterexample)));
             }
             next += 1;
@@ -144,43 +143,19 @@ impl Exploration<'_> {
         }))
     }
 
-    fn expand(
-        &mut self,
-        index: usize,
-        scratch: &mut Scratch,
-    ) -> Result<Option<Counterexample>, ProofError> {
+    fn expand(&mut self, index: usize) -> Result<Option<Counterexample>, ProofError> {
         let node = &self.nodes[index];
         let is_on = |name: &Name| {
             let place = self.view.register_of.get(name.as_str());
             place.is_some_and(|&place| bit(&node.registers, place))
         };
         let images = self.environment.following(&node.kept, is_on);
-        let register_count = self.circuit.registers().len();
-        let broadcast: Vec<u64> = (0..register_count)
-            .map(|place| {
-                if bit(&node.registers, place) {
-                    u64::MAX
-                } else {
-                    0
-                }
-            })
-            .collect();
-        for images in images.chunks(64) {
-            let mut state = broadcast.clone();
-            let mut outputs = vec![0; self.circuit.outputs().len()];
-            let mut inputs = vec![0_u64; self.circuit.inputs().len()];
-            for (lane, image) in images.iter().enumerate() {
-                for (word, &value) in inputs.iter_mut().zip(image) {
-                    *word |= u64::from(value) << lane;
-                }
-            }
-            self.scan
-                .step_lanes(scratch, &mut state, &inputs, &mut outputs);
-            for (lane, image) in images.iter().enumerate() {
+        let registers = node.registers.clone();
+        for images in images.chunks(LANES) {
+            let runs = self.lanes.fan_out(&registers, images);
+            for (run, image) in runs.into_iter().zip(images) {
                 self.scans += 1;
-                let registers = pack(&state, lane);
-                let outputs = pack(&outputs, lane);
-                if let Some(found) = self.judge(index, image, registers, &outputs) {
+                if let Some(found) = self.judge(index, image, run) {
                     return Ok(Some(found));
                 }
             }
@@ -194,13 +169,7 @@ impl Exploration<'_> {
     }
 
     /// Compares one scan with what is allowed, and keeps where it leads.
-    fn judge(
-        &mut self,
-        index: usize,
-        image: &[bool],
-        registers: Box<[u64]>,
-        outputs: &[u64],
-    ) -> Option<Counterexample> {
+    fn judge(&mut self, index: usize, image: &[bool], run: Run) -> Option<Counterexample> {
         let node = &self.nodes[index];
         let happening = self.environment.happening(&node.kept, image);
         if let Some(state) = &node.state {
@@ -211,7 +180,7 @@ impl Exploration<'_> {
                         automaton: automaton.name().to_owned(),
                         event: automaton.alphabet().name(event),
                     };
-                    let seen = self.see(&registers, outputs);
+                    let seen = self.see(&run.state, &run.signals);
                     return Some(self.refute(index, image, &seen, deviation, &[]));
                 }
             }
@@ -229,7 +198,7 @@ impl Exploration<'_> {
                 .scan(&node.state, &node.positions, &happening);
             self.cache.insert(question.clone(), allowed);
         }
-        let seen = self.see(&registers, outputs);
+        let seen = self.see(&run.state, &run.signals);
         let found = self.cache[&question]
             .iter()
             .find(|allowed| seen.is(allowed));
@@ -240,9 +209,9 @@ impl Exploration<'_> {
         };
         self.used.extend(found.word.iter().copied());
         let kept = self.environment.kept(image);
-        if self.known.insert((registers.clone(), kept.clone())) {
+        if self.known.insert((run.state.clone(), kept.clone())) {
             self.nodes.push(Node {
-                registers,
+                registers: run.state,
                 kept,
                 state: found.state.clone(),
                 positions: found.positions.clone(),
@@ -415,19 +384,4 @@ impl Exploration<'_> {
             states: self.state_names(seen.states.iter().map(Vec::as_slice)),
         }
     }
-}
-
-fn bit(words: &[u64], place: usize) -> bool {
-    words[place / 64] >> (place % 64) & 1 == 1
-}
-
-/// One lane of words that hold a bit of 64 runs each.
-pub(super) fn pack(lanes: &[u64], lane: usize) -> Box<[u64]> {
-    let words = lanes.chunks(64).map(|chunk| {
-        let bits = chunk.iter().enumerate();
-        bits.fold(0, |word, (place, value)| {
-            word | (value >> lane & 1) << place
-        })
-    });
-    words.collect()
 }

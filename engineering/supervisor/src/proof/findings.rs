@@ -162,13 +162,3 @@ impl HybridFindingsError {
         }
     }
 }
-
-/// The longest run of uncontrollable events and the longest run of commands in the closed loop; `None` where there is no
-/// longest, so that a response is not bounded.
-///
-/// # Errors
-/// More than 2,000,000 states together.
-pub fn bounded_response(modules: &Modules) -> Result<(Option<usize>, Option<usize>), ProofError> {
-    let closed = ClosedLoop::of(modules)?;
-    Ok((closed.longest(false).ok(), closed.longest(true).ok()))
-}

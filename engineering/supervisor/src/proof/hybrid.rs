@@ -14,11 +14,11 @@ use std::collections::{HashMap, HashSet};
 use std::time::Duration;
 
 use understudy_ladder::{BlockKind, Element, Name, Program, Signal};
-use understudy_logic::{Circuit, Scan, Scratch};
+use understudy_logic::{Circuit, LANES, Lanes, Run, Scan, bit};
 
 use self::reference::{Joint, Reference, Seen};
 use super::environment::images;
-use super::explore::{ProofSettings, pack};
+use super::explore::ProofSettings;
 use super::verdict::{ProofError, ScanRecord};
 use crate::Automaton;
 use crate::ladder::rung::{open, rung, write};
@@ -47,7 +47,7 @@ pub fn prove_hybrid(
     let bits = Bits::new(&circuit, ladder, net)?;
     let reference = Reference::new(net, supervisors, ladder, circuit.inputs());
     let exploration = Exploration {
-        scan: Scan::new(&circuit),
+        lanes: Lanes::new(Scan::new(&circuit)),
         circuit: &circuit,
         reference,
         bits,
@@ -141,9 +141,9 @@ impl Bits {
         })
     }
 
-    /// What one lane of a step shows.
-    fn see(&self, registers: &[u64], outputs: &[u64], lane: usize) -> Seen {
-        let on = |&place: &usize| outputs[place] >> lane & 1 == 1;
+    /// What a run shows after a scan.
+    fn see(&self, run: &Run) -> Seen {
+        let on = |&place: &usize| bit(&run.signals, place);
         let all = |places: &Vec<usize>| places.iter().map(on).collect::<Vec<bool>>();
         let places = self.places.iter().zip(&self.counters);
         let tokens = places.map(|(bits, counter)| {
@@ -154,7 +154,7 @@ impl Bits {
                 return is_row.then_some(held as u32);
             }
             let value = counter.iter().zip(0..);
-            let value = value.map(|(&place, bit)| ((registers[place] >> lane & 1) as u32) << bit);
+            let value = value.map(|(&place, power)| u32::from(bit(&run.state, place)) << power);
             Some(value.sum())
         });
         Seen {
@@ -173,20 +173,20 @@ impl Bits {
 
 /// A reached state, and how.
 struct Node {
-    registers: Box<[u64]>,
+    registers: Vec<u64>,
     kept: Vec<bool>,
     joint: Joint,
     parent: Option<(usize, Vec<bool>, Seen)>,
 }
 
 struct Exploration<'a> {
-    scan: Scan,
+    lanes: Lanes,
     circuit: &'a Circuit,
     reference: Reference<'a>,
     bits: Bits,
     settings: ProofSettings,
     nodes: Vec<Node>,
-    known: HashSet<(Box<[u64]>, Vec<bool>, Joint)>,
+    known: HashSet<(Vec<u64>, Vec<bool>, Joint)>,
     fired: Vec<bool>,
     scans: u64,
 }
@@ -194,12 +194,11 @@ struct Exploration<'a> {
 impl Exploration<'_> {
     fn run(mut self) -> Result<HybridVerdict, ProofError> {
         let kept = vec![false; self.circuit.inputs().len()];
-        let registers: Box<[u64]> = self.scan.initial().into();
+        let registers = self.lanes.scan().initial().to_vec();
         self.keep(registers, kept, self.reference.initial(), None);
-        let mut scratch = Scratch::default();
         let mut next = 0;
         while next < self.nodes.len() {
-            if let Some(counterexample) = self.expand(next, &mut scratch) {
+            if let Some(counterexample) = self.expand(next) {
                 return Ok(HybridVerdict::Refuted(Box::new(counterexample)));
             }
             if self.nodes.len() > self.settings.maximum_states {
@@ -221,7 +220,7 @@ impl Exploration<'_> {
 
     fn keep(
         &mut self,
-        registers: Box<[u64]>,
+        registers: Vec<u64>,
         kept: Vec<bool>,
         joint: Joint,
         parent: Option<(usize, Vec<bool>, Seen)>,
@@ -238,30 +237,16 @@ impl Exploration<'_> {
         }
     }
 
-    fn expand(&mut self, index: usize, scratch: &mut Scratch) -> Option<HybridCounterexample> {
+    fn expand(&mut self, index: usize) -> Option<HybridCounterexample> {
         let node = &self.nodes[index];
-        let kept = node.kept.clone();
+        let (kept, registers) = (node.kept.clone(), node.registers.clone());
         let rest = self.reference.rest(&kept);
         let choices: Vec<usize> = (0..rest.len()).collect();
-        let count = self.circuit.registers().len();
-        let is_on = |place: usize| node.registers[place / 64] >> (place % 64) & 1 == 1;
-        let before: Vec<u64> = (0..count)
-            .map(|place| if is_on(place) { u64::MAX } else { 0 })
-            .collect();
-        for images in images(&rest, &choices, self.settings.simultaneous).chunks(64) {
-            let mut registers = before.clone();
-            let mut outputs = vec![0; self.circuit.outputs().len()];
-            let mut inputs = vec![0_u64; self.circuit.inputs().len()];
-            for (lane, image) in images.iter().enumerate() {
-                for (word, &value) in inputs.iter_mut().zip(image) {
-                    *word |= u64::from(value) << lane;
-                }
-            }
-            self.scan
-                .step_lanes(scratch, &mut registers, &inputs, &mut outputs);
-            for (lane, image) in images.iter().enumerate() {
+        for images in images(&rest, &choices, self.settings.simultaneous).chunks(LANES) {
+            let runs = self.lanes.fan_out(&registers, images);
+            for (run, image) in runs.into_iter().zip(images) {
                 self.scans += 1;
-                let seen = self.bits.see(&registers, &outputs, lane);
+                let seen = self.bits.see(&run);
                 let joint = &self.nodes[index].joint;
                 match self.reference.scan(joint, &kept, image, &seen) {
                     Ok(next) => {
@@ -270,7 +255,7 @@ impl Exploration<'_> {
                         }
                         let parent = Some((index, image.clone(), seen));
                         let kept = self.reference.kept(image);
-                        self.keep(pack(&registers, lane), kept, next, parent);
+                        self.keep(run.state, kept, next, parent);
                     }
                     Err(deviation) => return Some(self.refute(index, image, &seen, deviation)),
                 }

@@ -243,24 +243,24 @@ transitions = 3
     let read = read_model(text, |_| Err("no such file".to_owned()));
     assert!(read.model.is_none());
     assert_snapshot!(places(text, &read.diagnostics), @r#"
-2:1 U0821 a model has no "title" [it has name, events, addresses, plant, specification, supervisor]
-4:41 U0827 label 2: odd labels are controllable, even ones are not
-5:52 U0823 "risin" is none of pulse, rising, falling, high, low [did you mean `rising`?]
-6:12 U0821 an event has no "controlable" [did you mean `controllable`?]
-6:40 U0827 label 4 stands for two events
-7:1 U0825 the name of an event is one word
-7:32 U0823 true or false is wanted, not integer
-10:55 U0856 `door` is the signal of two events [one uncontrollable event for `rising` and one for `falling` are possible]
-11:54 U0855 "the bar" cannot be a name in a ladder [letters, digits and `_`, single dots between its parts, a letter or `_` first, no word of the format]
-14:7 U0867 "QX1" is no address of a bit [addresses look like %IX0.3, %QX1.0 or %MX2.7]
-18:11 U0824 there is no event strat [did you mean `start`?]
-19:5 U0825 a transition is three words: a state, an event, and the state to which it leads
-21:5 U0826 from state idle event finish leads to state working and to state idle; an automaton must be deterministic
-22:6 U0828 no event leads to state wroking of machine [did you mean `working`?]
-24:12 U0828 a marked state is idel, and no transition knows it [did you mean `idle`?]
-26:8 U0829 GONE.ADS cannot be read: no such file
-27:1 U0822 an automaton needs "name"
-"#);
+    2:1 U0821 a model has no key `title` [known: name, events, addresses, plant, specification, supervisor]
+    4:41 U0827 label 2: odd labels are controllable, even ones are not
+    5:52 U0823 `when` cannot be "risin" [did you mean `rising`?]
+    6:12 U0821 an event has no key `controlable` [did you mean `controllable`?]
+    6:40 U0827 label 4 stands for two events
+    7:1 U0825 the name of an event is one word
+    7:32 U0823 `controllable` is the number 1
+    10:55 U0856 `door` is the signal of two events [one uncontrollable event for `rising` and one for `falling` are possible]
+    11:54 U0855 "the bar" cannot be a name in a ladder [letters, digits and `_`, single dots between its parts, a letter or `_` first, no word of the format]
+    14:7 U0867 "QX1" is no address of a bit [addresses look like %IX0.3, %QX1.0 or %MX2.7]
+    18:11 U0824 there is no event strat [did you mean `start`?]
+    19:5 U0825 a transition is three words: a state, an event, and the state to which it leads
+    21:5 U0826 from state idle event finish leads to state working and to state idle; an automaton must be deterministic
+    22:6 U0828 no event leads to state wroking of machine [did you mean `working`?]
+    24:12 U0828 a marked state is idel, and no transition knows it [did you mean `idle`?]
+    26:8 U0829 GONE.ADS cannot be read: no such file
+    27:1 U0822 an automaton needs `name`
+    "#);
     let text = "name = \"a\n[events";
     assert_snapshot!(places(text, &read_model(text, |_| Err(String::new())).diagnostics), @r#"
 1:10 U0820 invalid TOML: invalid basic string, expected `"`

@@ -4,7 +4,7 @@
 //! *lasso*: it goes on from its last scan to an earlier one.
 
 use understudy_logic::bdd::Diagram;
-use understudy_logic::{Circuit, Scan, Scratch, Variable};
+use understudy_logic::{Circuit, Running, Variable, pack, unpack};
 
 use super::Signal;
 use super::core::Core;
@@ -59,14 +59,14 @@ struct State {
 /// Finds runs in the sets of a model.
 pub(super) struct Tracer<'m, 'c> {
     model: &'m Model<'c>,
-    scan: Scan,
+    running: Running,
 }
 
 impl<'m, 'c> Tracer<'m, 'c> {
     pub(super) fn new(model: &'m Model<'c>) -> Self {
         Self {
             model,
-            scan: Scan::new(model.circuit),
+            running: Running::new(model.circuit),
         }
     }
 
@@ -256,16 +256,10 @@ impl<'m, 'c> Tracer<'m, 'c> {
 
     /// x(t+1), by the circuit itself.
     fn next(&self, state: &State) -> Vec<bool> {
-        let mut registers = packed(&state.registers);
-        let mut outputs = vec![0; self.scan.output_count().div_ceil(64)];
-        let inputs = packed(&state.inputs);
-        self.scan.step(
-            &mut Scratch::default(),
-            &mut registers,
-            &inputs,
-            &mut outputs,
-        );
-        unpacked(&registers, state.registers.len())
+        let mut running = self.running.clone();
+        running.go_to(&pack(state.registers.iter().copied()));
+        running.step(&state.inputs);
+        unpack(running.state(), state.registers.len())
     }
 
     fn told(&self, run: Run) -> Trace {
@@ -279,16 +273,10 @@ impl<'m, 'c> Tracer<'m, 'c> {
 
 /// The run from the first scan on with these inputs, one list a scan.
 pub(crate) fn rows(circuit: &Circuit, cone: &Cone, inputs: Vec<Vec<bool>>) -> Trace {
-    let scan = Scan::new(circuit);
-    let mut scratch = Scratch::default();
-    let mut state = scan.initial().to_vec();
-    let mut outputs = vec![0; scan.output_count().div_ceil(64)];
-    let rows = inputs.into_iter().map(|inputs| {
-        scan.step(&mut scratch, &mut state, &packed(&inputs), &mut outputs);
-        ScanRow {
-            inputs,
-            outputs: unpacked(&outputs, scan.output_count()),
-        }
+    let mut running = Running::new(circuit);
+    let rows = inputs.into_iter().map(|inputs| ScanRow {
+        outputs: running.step(&inputs),
+        inputs,
     });
     Trace {
         signals: cone.shown(),
@@ -316,47 +304,4 @@ fn shows(formula: &Core) -> bool {
         Core::And(left, right) => shows(left) || shows(right),
         _ => true,
     }
-}
-
-fn packed(bits: &[bool]) -> Vec<u64> {
-    let mut words = vec![0; bits.len().div_ceil(64)];
-    for (place, &bit) in bits.iter().enumerate() {
-        words[place / 64] |= u64::from(bit) << (place % 64);
-    }
-    words
-}
-
-fn unpacked(words: &[u64], width: usize) -> Vec<bool> {
-    (0..width)
-        .map(|place| words[place / 64] >> (place % 64) & 1 == 1)
-        .collect()
-}
-
-/// Does the circuit do on the inputs of `trace` what the trace says? The check of what was found shares nothing with the search.
-pub fn replays(circuit: &Circuit, trace: &Trace) -> bool {
-    let graph = circuit.graph();
-    let registers = circuit.registers();
-    let mut state: Vec<bool> = registers.iter().map(|register| register.initial).collect();
-    let mut entered = Vec::new();
-    for row in &trace.scans {
-        entered.push(state.clone());
-        let value = |variable: Variable| match variable {
-            Variable::Input(input) => row.inputs[input as usize],
-            Variable::Register(register) => state[register as usize],
-        };
-        let outputs = circuit.outputs().iter();
-        let same = outputs
-            .zip(&row.outputs)
-            .all(|(output, told)| graph.evaluate(output.value, value) == *told);
-        if !same {
-            return false;
-        }
-        state = registers
-            .iter()
-            .map(|register| graph.evaluate(register.next, value))
-            .collect();
-    }
-    trace
-        .again_from
-        .is_none_or(|from| entered.get(from).is_some())
 }

@@ -8,8 +8,10 @@ use understudy_logic::Circuit;
 use understudy_logic::bdd::Diagrams;
 use understudy_verification::program::{Answer, Bounds, Lamp, OutputFinding, Subject};
 use understudy_verification::property::read_one;
-use understudy_verification::symbolic::{Checker, Trace, Verdict, replays, resolve};
+use understudy_verification::symbolic::{Checker, Trace, Verdict, resolve};
 use understudy_verification::{Stopped, Work, smv};
+
+use crate::replay::replays;
 
 const SEAL_IN: &str = "\
 program pump

@@ -5,4 +5,5 @@ mod naive;
 mod random;
 mod reading;
 mod remarks;
+mod replay;
 mod smv;

@@ -6,9 +6,10 @@ use understudy_logic::{Circuit, CircuitBuilder, Expression};
 use understudy_verification::explicit::Explicit;
 use understudy_verification::induction::{Depth, Induction, prove_always};
 use understudy_verification::property::{Formula, Path};
-use understudy_verification::symbolic::{Checker, Resolved, Signal, Verdict, replays};
+use understudy_verification::symbolic::{Checker, Resolved, Signal, Verdict};
 
 use crate::naive::Naive;
+use crate::replay::replays;
 
 const REGISTERS: usize = 3;
 const INPUTS: usize = 2;

@@ -5,9 +5,10 @@ use std::time::Duration;
 
 use proptest::prelude::*;
 use understudy_ladder::{CoilKind, Element, Program, Write, parse, visit};
-use understudy_logic::{Circuit, Scan, Scratch};
+use understudy_logic::{Circuit, Scan, Scratch, bit};
 use understudy_verification::program::{Bounds, Remarks, Subject};
-use understudy_verification::symbolic::replays;
+
+use crate::replay::replays;
 use understudy_verification::{Shown, draw_runs};
 
 const PERIOD: Duration = Duration::from_millis(100);
@@ -133,7 +134,7 @@ fn every_scan(circuit: &Circuit, writes: &[Write], see: &mut dyn FnMut(&[[bool; 
         for inputs in 0..1_u64 << scan.input_count() {
             let mut next = state.clone();
             scan.step(&mut scratch, &mut next, &[inputs], &mut outputs);
-            let bit = |place: usize| outputs[place / 64] >> (place % 64) & 1 == 1;
+            let bit = |place: usize| bit(&outputs, place);
             let bits = writes.iter();
             let bits: Vec<[bool; 3]> = bits
                 .map(|write| [bit(write.power), bit(write.before), bit(write.after)])

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use proptest::prelude::*;
-use understudy_logic::{Circuit, Scan, Scratch};
+use understudy_logic::{Circuit, Running, bit};
 use understudy_verification::property::read_one;
 use understudy_verification::smv;
 use understudy_verification::symbolic::resolve;
@@ -148,27 +148,19 @@ fn run_beside(circuit: &Circuit, module: &Module, mut seed: u64) {
     let inputs = circuit.inputs().len();
     let (given, kept) = module.variables.split_at(inputs);
     assert_eq!(kept.len(), circuit.registers().len());
-    let scan = Scan::new(circuit);
-    let mut scratch = Scratch::default();
-    let mut state = scan.initial().to_vec();
-    let mut outputs = vec![0; scan.output_count().div_ceil(64)];
+    let mut running = Running::new(circuit);
     let mut values = module.initial.clone();
     assert_eq!(values.len(), kept.len());
     for _ in 0..12 {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-        let word = seed >> 40 & ((1 << inputs) - 1);
-        for (place, name) in given.iter().enumerate() {
-            values.insert(name.clone(), word >> place & 1 == 1);
-        }
-        scan.step(&mut scratch, &mut state, &[word], &mut outputs);
-        for (place, output) in circuit.outputs().iter().enumerate() {
+        let inputs: Vec<bool> = (0..inputs)
+            .map(|place| seed >> (40 + place) & 1 == 1)
+            .collect();
+        values.extend(given.iter().cloned().zip(inputs.iter().copied()));
+        let outputs = running.step(&inputs);
+        for (output, expected) in circuit.outputs().iter().zip(outputs) {
             let said = [output.name.replace('.', "_")];
-            let value = Reading::of(&said, module, &values);
-            assert_eq!(
-                value,
-                outputs[place / 64] >> (place % 64) & 1 == 1,
-                "{said:?}"
-            );
+            assert_eq!(Reading::of(&said, module, &values), expected, "{said:?}");
         }
         let next = module.next.iter().map(|(name, tokens)| {
             let value = Reading::of(tokens, module, &values);
@@ -176,11 +168,7 @@ fn run_beside(circuit: &Circuit, module: &Module, mut seed: u64) {
         });
         values = next.collect();
         for (place, name) in kept.iter().enumerate() {
-            assert_eq!(
-                values[name],
-                state[place / 64] >> (place % 64) & 1 == 1,
-                "{name}"
-            );
+            assert_eq!(values[name], bit(running.state(), place), "{name}");
         }
     }
 }

@@ -1,18 +1,13 @@
 //! A small comparison: the same twice, and with what no pair can have.
 
-use understudy_cluster::press_cell;
+use understudy_cycle::Mode;
+use understudy_testing::press_cell;
 
 use super::*;
 use crate::figure;
 
 fn cell() -> Cluster {
-    let files = press_cell();
-    let loaded = understudy_cluster::read(files[0].name, files[0].text, &mut |name| {
-        let file = files.iter().find(|file| file.name == name);
-        let text = file.map(|file| file.text.to_owned());
-        text.ok_or_else(|| "no such file".to_owned())
-    });
-    loaded.cluster.expect("the press cell is right")
+    press_cell(Mode::Full)
 }
 
 #[test]

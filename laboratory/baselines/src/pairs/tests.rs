@@ -1,17 +1,12 @@
 //! The pairs do what such pairs are bought for; otherwise a comparison with them would prove nothing.
 
-use understudy_cluster::press_cell;
+use understudy_cycle::Mode;
+use understudy_testing::press_cell;
 
 use super::*;
 
 fn cell() -> Cluster {
-    let files = press_cell();
-    let loaded = understudy_cluster::read(files[0].name, files[0].text, &mut |name| {
-        let file = files.iter().find(|file| file.name == name);
-        let text = file.map(|file| file.text.to_owned());
-        text.ok_or_else(|| "no such file".to_owned())
-    });
-    loaded.cluster.expect("the press cell is right")
+    press_cell(Mode::Full)
 }
 
 fn pairs(redundancy: Redundancy, network: Network) -> Pairs {

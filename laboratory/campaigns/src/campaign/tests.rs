@@ -1,26 +1,12 @@
-use understudy_cluster::{Cluster, Overrides, press_cell, read_with};
 use understudy_cycle::Mode;
 use understudy_reliability::Hours;
 use understudy_simulator::Action;
+use understudy_testing::press_cell;
 use understudy_wire::{ProgramId, StationId, Time};
 
 use super::lives::{Lives, Order};
 use super::seen::Seen;
 use super::*;
-
-fn cell(mode: Mode) -> Cluster {
-    let files = press_cell();
-    let overrides = Overrides {
-        mode: Some(mode),
-        ..Overrides::default()
-    };
-    let loaded = read_with(files[0].name, files[0].text, overrides, &mut |name| {
-        let file = files.iter().find(|file| file.name == name);
-        file.map(|file| file.text.to_owned())
-            .ok_or_else(|| "no such file".to_owned())
-    });
-    loaded.cluster.expect("the press cell is right")
-}
 
 fn plan(failures: u64, threads: usize) -> CampaignPlan {
     CampaignPlan {
@@ -37,7 +23,7 @@ fn plan(failures: u64, threads: usize) -> CampaignPlan {
 
 #[test]
 fn a_campaign_is_the_same_on_any_number_of_processors() {
-    let cell = cell(Mode::Full);
+    let cell = press_cell(Mode::Full);
     let one = run_campaign(&cell, &plan(6, 1), &mut |_| {});
     let three = run_campaign(&cell, &plan(6, 3), &mut |_| {});
     assert_eq!(one, three);
@@ -51,7 +37,8 @@ fn a_campaign_is_the_same_on_any_number_of_processors() {
 #[test]
 fn every_failure_of_the_system_has_the_cause_that_its_definition_names() {
     for (mode, second) in [(Mode::Full, "understudy"), (Mode::Paper, " after ")] {
-        let found = run_campaign(&cell(mode), &plan(30, 2), &mut |_| {}).expect("synchronised");
+        let found =
+            run_campaign(&press_cell(mode), &plan(30, 2), &mut |_| {}).expect("synchronised");
         assert_eq!(found.campaign.failures.len(), 30);
         assert_eq!(found.violations, Vec::<String>::new());
         assert_eq!(found.unmasked, 0, "one failure at a time is masked");
@@ -71,7 +58,7 @@ fn a_replica_that_does_not_fail_is_censored() {
         maximum_cycles: 200,
         ..plan(2, 1)
     };
-    let found = run_campaign(&cell(Mode::Full), &lasting, &mut |_| {}).expect("synchronised");
+    let found = run_campaign(&press_cell(Mode::Full), &lasting, &mut |_| {}).expect("synchronised");
     assert_eq!(found.campaign.failures.len(), 0);
     assert_eq!(found.campaign.censored_hours.len(), 2);
 }
@@ -89,7 +76,7 @@ fn the_model_with_the_protocols_own_time_lies_in_the_interval() {
         (Mode::Paper, None),
         (Mode::Full, Some(1)),
     ] {
-        let cell = cell(mode);
+        let cell = press_cell(mode);
         let question = Question {
             mtbf: hours(300.0),
             mttr: hours(50.0),
@@ -135,7 +122,7 @@ const UNDERSTUDY: StationId = StationId(2);
 
 #[test]
 fn a_station_is_down_until_it_holds_every_state() {
-    let cell = cell(Mode::Full);
+    let cell = press_cell(Mode::Full);
     let plan = plan(1, 1);
     let mut lives = Lives::new(&cell, &plan, 0);
     lives.begin();
@@ -167,7 +154,7 @@ fn a_station_is_down_until_it_holds_every_state() {
 
 #[test]
 fn one_crew_works_on_one_station_at_a_time() {
-    let cell = cell(Mode::Full);
+    let cell = press_cell(Mode::Full);
     let plan = CampaignPlan {
         crews: Some(1),
         ..plan(1, 1)
@@ -194,7 +181,7 @@ fn one_crew_works_on_one_station_at_a_time() {
 fn a_deadline_beside_a_stall_of_the_host_says_nothing_of_the_masking() {
     let period = 10_000_000;
     let check = |seen: &[(u64, Seen)], asked, unmasked, excused| {
-        let cell = cell(Mode::Full);
+        let cell = press_cell(Mode::Full);
         let plan = plan(1, 1);
         let mut lives = Lives::new(&cell, &plan, 0);
         lives.see(Time(0), Seen::Crashed(ROBOT));

@@ -1,8 +1,9 @@
 //! Campaigns on the press cell: the same on any number of threads and shards, and small failures that a scenario file repeats.
 
-use understudy_cluster::press_cell;
+use understudy_cycle::Mode;
 use understudy_journal::{JournalState, Members};
 use understudy_simulator::{Action, Fault};
+use understudy_testing::press_cell;
 use understudy_wire::{Member, Source, StationId};
 
 use super::faultload::Injection;
@@ -10,13 +11,7 @@ use super::*;
 use understudy_scenarios::{Circumstances, Scenario, Summary, World, read, simulate, write};
 
 fn cell() -> Cluster {
-    let files = press_cell();
-    let loaded = understudy_cluster::read(files[0].name, files[0].text, &mut |name| {
-        let file = files.iter().find(|file| file.name == name);
-        let text = file.map(|file| file.text.to_owned());
-        text.ok_or_else(|| "no such file".to_owned())
-    });
-    loaded.cluster.expect("the press cell is right")
+    press_cell(Mode::Full)
 }
 
 fn plan(runs: u64, property: Property, kinds: &[Kind]) -> InjectionPlan {

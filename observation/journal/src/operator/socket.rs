@@ -158,6 +158,7 @@ mod tests {
     use std::io::{BufRead, BufReader, Write};
     use std::os::unix::net::UnixStream as Stream;
 
+    use understudy_testing::Folder;
     use understudy_wire::{Member, StationId};
 
     use super::super::{Acknowledgement, Command, commands};
@@ -167,12 +168,9 @@ mod tests {
     use crate::version::journal_header;
     use crate::writer::WriterLock;
 
-    fn folder(name: &str) -> PathBuf {
-        // Longer than the address of a socket may be.
-        let name = format!("understudy-{name}-{}-{:0>100}", std::process::id(), 1);
-        let folder = std::env::temp_dir().join(name);
-        std::fs::create_dir_all(&folder).expect("a folder");
-        folder
+    /// A run whose path is longer than the address of a socket may be.
+    fn folder(name: &str) -> Folder {
+        Folder::new(&format!("{name}-{:0>100}", 1))
     }
 
     fn seen() -> Acknowledgement {
@@ -221,7 +219,7 @@ mod tests {
             let _ = BufReader::new(stream).read_line(&mut answer);
             assert!(answer.is_empty() || answer.contains("U0557"), "{answer}");
         }
-        let there = Commander::of_run(run.clone());
+        let there = Commander::of_run(run.to_path_buf());
         let asked = runtime.block_on(async {
             let member = Member::Station(StationId(0));
             let by = ("anna".to_owned(), "to see it".to_owned());
@@ -232,7 +230,6 @@ mod tests {
         assert_eq!(asked, (Ok(()), Err(refused)));
         drop(socket);
         assert!(!run.join(SOCKET).exists());
-        std::fs::remove_dir_all(run).expect("it goes");
     }
 
     #[test]
@@ -242,7 +239,7 @@ mod tests {
         // Its writer was killed in the middle of a line.
         let begun = [journal_header().as_slice(), b"{\"at_ns\":1,\"na"].concat();
         std::fs::write(&journal, begun).expect("written");
-        let there = Commander::of_run(run.clone());
+        let there = Commander::of_run(run.to_path_buf());
         let writer = WriterLock::take(&run).expect("a file");
         assert_eq!(there.acknowledge_and_wait(seen()), Err(Refusal::Busy));
         drop(writer);
@@ -252,6 +249,5 @@ mod tests {
         let events: Vec<_> = read.flatten().map(|record| record.event).collect();
         let expected = Happening::Run(RunEvent::Acknowledged(seen()));
         assert_eq!(events, [expected.clone(), expected]);
-        std::fs::remove_dir_all(run).expect("it goes");
     }
 }

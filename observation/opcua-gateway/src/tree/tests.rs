@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use understudy_cluster::{press_cell, read};
+use understudy_cycle::Mode;
 use understudy_gateway::BOUNDS;
 use understudy_journal::Members;
 use understudy_scenarios::{read as read_scenario, simulate};
@@ -13,13 +13,7 @@ use understudy_view::{Model, RunState};
 use super::*;
 
 fn cell() -> Cluster {
-    let files = press_cell();
-    let loaded = read("cluster.toml", files[0].text, &mut |name| {
-        let file = files.iter().find(|file| file.name == name);
-        file.map(|file| file.text.to_owned())
-            .ok_or_else(|| "no such file".to_owned())
-    });
-    loaded.cluster.expect("it comes with the program")
+    understudy_testing::press_cell(Mode::Full)
 }
 
 /// What was the case when `cycle` of a run with these faults was over.

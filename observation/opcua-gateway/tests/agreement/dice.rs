@@ -247,7 +247,7 @@ impl Dice<'_> {
                 moment,
                 force: Force {
                     signal,
-                    value: true,
+                    value: true.into(),
                     seconds: 9,
                     owner: "anna".to_owned(),
                     reason: "a test".to_owned(),

@@ -17,7 +17,8 @@ use opcua::types::Variant;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use serde_json::{Value, json};
-use understudy_cluster::{Cluster, press_cell, read};
+use understudy_cluster::Cluster;
+use understudy_cycle::Mode;
 use understudy_gateway::{BOUNDS, Metrics, Observation, RegisterMap};
 use understudy_opcua_gateway::variables;
 use understudy_view::{Bounds, Model, Snapshot, StationState};
@@ -32,13 +33,7 @@ const JOURNALS: u64 = 60;
 const CYCLES: usize = 70;
 
 fn cell() -> Arc<Cluster> {
-    let files = press_cell();
-    let loaded = read("cluster.toml", files[0].text, &mut |name| {
-        let file = files.iter().find(|file| file.name == name);
-        file.map(|file| file.text.to_owned())
-            .ok_or_else(|| "no such file".to_owned())
-    });
-    Arc::new(loaded.cluster.expect("it comes with the program"))
+    Arc::new(understudy_testing::press_cell(Mode::Full))
 }
 
 fn model(cluster: &Arc<Cluster>, bounds: Bounds, entries: &[Entry]) -> Model {
@@ -263,7 +258,7 @@ fn check_modbus(cluster: &Cluster, top: &Snapshot, snapshot: &Snapshot, context:
         let value = registers
             .iter()
             .fold(0, |value, next| value << 16 | u64::from(*next));
-        (value, place.meaning)
+        (value, place.meaning.clone())
     };
     let check = |name: &str, expected: u64| {
         assert_eq!(register(name).0, expected, "{name}, {context}");

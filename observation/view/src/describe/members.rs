@@ -4,7 +4,9 @@ use understudy_journal::Members;
 use understudy_node::Event as StationEvent;
 use understudy_plant::Event as PlantEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason, ValueFault};
-use understudy_wire::{Member, Moment, ProgramSet, SignalPlace, StationId, StationSet, Word};
+use understudy_wire::{
+    ForcedValue, Member, Moment, ProgramSet, SignalPlace, StationId, StationSet, Word,
+};
 
 use super::{Words, list, program_name, programs, source_text, stations};
 
@@ -89,7 +91,7 @@ descriptions! { remote_io: RemoteIoEvent, members;
     Refused { member, theirs, ours } => "refused" Warning refused_text(*member, theirs, ours, members);
     Stalled { late, .. } => "stalled" Notice format!("host stall: woken {late:.1?} late");
     Forced { force, .. } => "forced" Alarm {
-        let (signal, value) = (place(force.signal), u8::from(force.value));
+        let (signal, value) = (place(force.signal), forced_text(force.value));
         format!("{signal} is forced to {value} for {} s by {}: {}", force.seconds, force.owner, force.reason)
     };
     Unforced { signal, expired: true, .. } => "unforced" Notice
@@ -161,6 +163,17 @@ fn place(signal: SignalPlace) -> String {
     match signal {
         SignalPlace::Input(place) => format!("input {}", place + 1),
         SignalPlace::Output(place) => format!("output {}", place + 1),
+    }
+}
+
+/// A number as its bits: the event does not know its type.
+fn forced_text(value: ForcedValue) -> String {
+    match value {
+        ForcedValue::Bit(bit) => u8::from(bit).to_string(),
+        ForcedValue::Number { width, stored } => {
+            let digits = usize::from(width) / 4;
+            format!("16#{stored:0digits$X}")
+        }
     }
 }
 

@@ -37,7 +37,6 @@ descriptions! { host: HostEvent, members;
     FieldUncontested => "field-uncontested" Notice "its equipment holds the outputs that it wrote";
     JournalLost { records } => "journal-lost" Warning format!("{records} records are lost");
     UnknownCommand { line } => "unknown-command" Warning format!("received an unknown command: {line}");
-    Exchange(exchange) => "exchange" Info format!("{} complete cycles", exchange.complete_cycles);
     Stopped(_) => "stopped" Info "ended as requested";
 }
 

@@ -138,7 +138,6 @@ impl Model {
                     self.misses_records(program);
                 }
             }
-            HostEvent::Exchange(_) => return,
             _ => {}
         }
         self.host_alarm(record, member, cycle, event);

@@ -6,7 +6,8 @@ use serde_json::Value;
 use understudy_cycle::Mode;
 use understudy_journal::{Process, SourceCounts, source_word};
 use understudy_remote_io::Missing;
-use understudy_wire::{Member, ProgramId, ProgramSet, SignalPlace, StationId};
+use understudy_typed::Elementary;
+use understudy_wire::{Member, ProgramId, ProgramSet, StationId};
 
 use super::{
     LinkSnapshot, MarginSnapshot, OutcomeSnapshot, PlantSnapshot, PlantState, ProgramSnapshot,
@@ -19,7 +20,7 @@ use crate::history::Driven;
 use crate::margin::{Margin, Outcome};
 use crate::model::{Model, Standing};
 use crate::station::StationState;
-use crate::value::named;
+use crate::value::{forced_point, forced_value, named};
 
 impl Model {
     /// The present: the newest cycle of which every living remote I/O has reported, with every change that was read since.
@@ -254,21 +255,17 @@ impl Picture<'_> {
         let own = self.standing.program(program);
         let forced = own.into_iter().flat_map(|own| &own.forced);
         let texts = forced.map(|force| {
-            let name = self.signal_name(program, force.signal);
-            let value = u8::from(force.value);
+            let controller = &self.model.cluster().controllers()[program.index()];
+            let (name, value) = match forced_point(controller, force) {
+                Some(point) if point.of == Elementary::Bool => {
+                    (point.name.as_str(), force.value.stored().to_string())
+                }
+                Some(point) => (point.name.as_str(), forced_value(point, force).to_string()),
+                None => ("an unknown signal", force.value.stored().to_string()),
+            };
             format!("{name} = {value} by {}: {}", force.owner, force.reason)
         });
         texts.collect()
-    }
-
-    fn signal_name(&self, program: ProgramId, signal: SignalPlace) -> String {
-        let interface = &self.model.cluster().controllers()[program.index()].interface;
-        let (points, place) = match signal {
-            SignalPlace::Input(place) => (&interface.inputs, place),
-            SignalPlace::Output(place) => (&interface.outputs, place),
-        };
-        let name = points.bit_names().into_iter().nth(usize::from(place));
-        name.unwrap_or_else(|| "an unknown signal".to_owned())
     }
 
     fn remote_io(&self, program: ProgramId) -> RemoteIoSnapshot {

@@ -1,27 +1,19 @@
 //! A run in its directory, while it is written and afterwards.
 
 use std::fs;
-use std::path::PathBuf;
 
 use understudy_cluster::press_cell;
 use understudy_journal::{Journal, keep_cluster};
+use understudy_testing::Folder;
 use understudy_view::{Bounds, Filter, Run, find_run_of};
 
 use crate::support::{KILL_EACH, cell, model, records, scenario};
-
-fn folder(name: &str) -> PathBuf {
-    let folder = std::env::temp_dir().join(format!("understudy-{name}-{}", std::process::id()));
-    // It is there only where a run before was killed.
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).expect("a folder");
-    folder
-}
 
 /// Who follows a journal of a few segments knows at the end what one knows who reads it then, or who was handed its records.
 #[test]
 fn a_run_is_followed_while_it_is_written() {
     let cell = cell();
-    let folder = folder("view-run");
+    let folder = Folder::new("view-run");
     let source = folder.join("source");
     fs::create_dir_all(&source).expect("a folder");
     for file in press_cell() {
@@ -92,5 +84,4 @@ fn a_run_is_followed_while_it_is_written() {
     );
     let found = find_run_of(&folder.join("runs"), &cell).expect("the newest");
     assert_eq!(found.path(), path);
-    fs::remove_dir_all(folder).expect("it goes");
 }

@@ -9,7 +9,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use understudy_journal::Command;
 use understudy_wire::{
-    Force, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH, SignalPlace, StateChoice,
+    Force, ForcedValue, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH, SignalPlace, StateChoice,
 };
 
 use super::Answered;
@@ -43,7 +43,7 @@ enum AskedCommand {
     Rejoin,
     Force {
         signal: SignalPlace,
-        value: bool,
+        value: ForcedValue,
         seconds: u32,
     },
     Unforce {

@@ -12,7 +12,7 @@ use understudy_ladder::Name;
 use super::xml::Passage;
 
 pub(crate) use objects::CONDITION;
-pub(crate) use read::read;
+pub(crate) use read::{read, read_bodies};
 
 /// A whole file.
 #[derive(Debug, Default)]

@@ -111,16 +111,45 @@ pub(crate) fn plan(
     is_block: &dyn Fn(&str) -> bool,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Plan {
+    let plan = walked(graph, is_block, Rules::Bits, diagnostics);
+    jumps::check(graph, &plan, diagnostics);
+    plan
+}
+
+/// Plans a graph whose values may be numbers: what goes round in a circle is what it was in the last scan, jumps go anywhere,
+/// and a function with an `executionOrderId` has its turn.
+pub(crate) fn plan_numbers(
+    graph: &Graph,
+    is_block: &dyn Fn(&str) -> bool,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Plan {
+    walked(graph, is_block, Rules::Numbers, diagnostics)
+}
+
+/// What a graph may hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Rules {
+    Bits,
+    Numbers,
+}
+
+fn walked(
+    graph: &Graph,
+    is_block: &dyn Fn(&str) -> bool,
+    rules: Rules,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Plan {
     let links = Links::new(graph, is_block, diagnostics);
     let mut found = Vec::new();
-    let (mut plan, trace) = Walk::new(graph, &links, &HashSet::new()).run(&mut found);
-    let stale = stale(graph, &links, &plan, &trace);
+    let (mut plan, trace) = Walk::new(graph, &links, &HashSet::new(), rules).run(&mut found);
+    let mut stale = stale(graph, &links, &plan, &trace);
+    stale.extend(&trace.fed_back);
     if !stale.is_empty() {
         found.clear();
-        plan = Walk::new(graph, &links, &stale).run(&mut found).0;
+        plan = Walk::new(graph, &links, &stale, rules).run(&mut found).0;
+        stale.retain(|object| !trace.fed_back.contains(object));
     }
     diagnostics.append(&mut found);
-    jumps::check(graph, &plan, diagnostics);
     for object in stale {
         let message = "it is asked for again after its variable has been written: it keeps what it let through first, where tools that \
                        write Structured Text read the variable again";

@@ -4,7 +4,7 @@
 //! Transitions that leave one step are tried by their priority, and then from left to right; the first that can fires. Function blocks
 //! that stand in the chart itself, and the networks of transitions, act in every scan.
 
-mod structure;
+pub(super) mod structure;
 
 use std::collections::HashMap;
 

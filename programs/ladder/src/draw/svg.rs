@@ -43,18 +43,9 @@ const FLOW_STYLE: &str = "
 /// The picture of a program: its signals, then its rungs between their rails. Signals show address and comment on hover.
 pub fn draw_svg(program: &Program) -> String {
     let mut picture = Picture::new(program);
-    picture.header(program, None);
+    picture.header(program);
     let rungs: Vec<usize> = (0..program.rungs.len()).collect();
     picture.rungs(program, &rungs, None);
-    picture.finish(program)
-}
-
-/// [`draw_svg`] with one scan of the program in it: which wires have power, and every value.
-pub fn draw_svg_with_flow(program: &Program, evaluation: &Evaluation) -> String {
-    let mut picture = Picture::new(program);
-    picture.header(program, Some(evaluation));
-    let rungs: Vec<usize> = (0..program.rungs.len()).collect();
-    picture.rungs(program, &rungs, Some(evaluation));
     picture.finish(program)
 }
 
@@ -136,7 +127,7 @@ impl Picture {
         self.width = self.width.max(right);
     }
 
-    fn header(&mut self, program: &Program, evaluation: Option<&Evaluation>) {
+    fn header(&mut self, program: &Program) {
         self.text(MARGIN, "heading", &program.name);
         self.top += LINE_HEIGHT * 1.3;
         let lines = program.description.iter().chain(&program.comments);
@@ -144,29 +135,23 @@ impl Picture {
             self.text(MARGIN, "soft", line);
             self.top += LINE_HEIGHT;
         }
-        let none = Evaluation::default();
-        let values = evaluation.unwrap_or(&none);
         let groups = [
-            ("inputs", &program.inputs, &values.inputs),
-            ("outputs", &program.outputs, &values.outputs),
-            ("memory", &program.memory, &values.memory),
+            ("inputs", &program.inputs),
+            ("outputs", &program.outputs),
+            ("memory", &program.memory),
         ];
-        let signals = groups.iter().flat_map(|(_, signals, _)| signals.iter());
+        let signals = groups.iter().flat_map(|(_, signals)| signals.iter());
         let widest = signals.map(|signal| signal.name.chars().count()).max();
         let column = MARGIN
             + CELL_WIDTH * (4.0 + f64::from(u32::try_from(widest.unwrap_or(0)).unwrap_or(0)));
-        for (heading, signals, values) in groups {
+        for (heading, signals) in groups {
             if signals.is_empty() {
                 continue;
             }
             self.top += LINE_HEIGHT * 0.5;
             self.text(MARGIN, "title", heading);
             self.top += LINE_HEIGHT;
-            for (place, signal) in signals.iter().enumerate() {
-                if let Some(&value) = values.get(place) {
-                    let (class, text) = if value { ("one", "1") } else { ("zero", "0") };
-                    self.text(MARGIN, class, text);
-                }
+            for signal in signals {
                 self.text(MARGIN + CELL_WIDTH * 2.0, "name", &signal.name);
                 self.text(column, "soft", &meaning(signal));
                 self.top += LINE_HEIGHT;

@@ -5,7 +5,7 @@
 
 use std::time::Duration;
 
-use understudy_logic::{Expression, Scan, Scratch};
+use understudy_logic::{Expression, Scan, Scratch, unpack};
 
 use super::number::Number;
 use super::{LowerError, Lowering, preset_scans, validate};
@@ -176,11 +176,7 @@ impl Observer {
         let mut state = state.to_vec();
         let mut packed = vec![0; self.scan.output_count().div_ceil(64)];
         self.scan.step(scratch, &mut state, inputs, &mut packed);
-        let mut bits = (0..).map(|place| {
-            packed
-                .get(place / 64)
-                .is_some_and(|word| word >> (place % 64) & 1 == 1)
-        });
+        let mut bits = unpack(&packed, self.scan.output_count()).into_iter();
         let mut take = |count: usize| -> Vec<bool> { bits.by_ref().take(count).collect() };
         let outputs = take(self.outputs);
         let memory = take(self.memory);
@@ -206,9 +202,8 @@ impl Observer {
                 coils: take(shape.coils),
             });
         }
-        let bit = |place: usize| inputs[place / 64] >> (place % 64) & 1 == 1;
         Evaluation {
-            inputs: (0..self.inputs).map(bit).collect(),
+            inputs: unpack(inputs, self.inputs),
             outputs,
             memory,
             rungs,

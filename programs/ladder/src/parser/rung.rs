@@ -112,9 +112,7 @@ impl Parser {
         }
         let operand = self.name("the name of a signal")?;
         let relation = match self.lexeme() {
-            Lexeme::Sign(sign) => Relation::ALL
-                .into_iter()
-                .find(|relation| relation.sign() == *sign),
+            Lexeme::Sign(sign) => Relation::of(sign),
             _ => None,
         };
         let Some(relation) = relation else {

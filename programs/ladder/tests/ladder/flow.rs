@@ -7,7 +7,7 @@ use understudy_ladder::{
     BlockKind, ContactKind, Element, ElementFlow, Interpreter, Observer, Program, Reading, Series,
     visit,
 };
-use understudy_logic::{Scan, Scratch};
+use understudy_logic::{Scan, Scratch, pack};
 
 use crate::support::PERIOD;
 use understudy_testing::random::{Dice, random_program};
@@ -126,10 +126,7 @@ fn check_observer(program: &Program, seed: u64) {
     let mut dice = Dice::new(seed);
     for _ in 0..30 {
         let inputs = dice.bits(program.inputs.len());
-        let mut packed = vec![0_u64; inputs.len().div_ceil(64)];
-        for (place, &input) in inputs.iter().enumerate() {
-            packed[place / 64] |= u64::from(input) << (place % 64);
-        }
+        let packed = pack(inputs.iter().copied());
         let mut expected = naive.scan_observed(&inputs);
         let mut found = observer.evaluate(&mut scratch, &state, &packed);
         // Before its first pulse an off-delay has no time yet; its state does not tell that from one that is over.

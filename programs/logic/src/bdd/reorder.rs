@@ -24,8 +24,6 @@ pub(super) struct Need {
     count_at: AtomicUsize,
     /// Living nodes at which the order is changed.
     change_at: AtomicUsize,
-    /// How often it was changed.
-    changes: AtomicUsize,
 }
 
 impl Need {
@@ -36,12 +34,7 @@ impl Need {
             limit,
             count_at: AtomicUsize::new(first),
             change_at: AtomicUsize::new(first),
-            changes: AtomicUsize::new(0),
         }
-    }
-
-    pub(super) fn changes(&self) -> usize {
-        self.changes.load(Ordering::Relaxed)
     }
 
     /// Nodes that there are in all: swaps need room.
@@ -83,7 +76,6 @@ impl Need {
     }
 
     fn change(&self, manager: &BDDManagerRef) {
-        self.changes.fetch_add(1, Ordering::Relaxed);
         let slack = (self.limit / 8).min(1 << 17);
         let room = Self::room(self.limit) - slack;
         manager.with_manager_exclusive(|manager| {

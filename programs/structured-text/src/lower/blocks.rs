@@ -123,7 +123,10 @@ impl<'a> Lowering<'a> {
     pub(super) fn block(&mut self, unit: usize, span: &Span) -> Option<Rc<Block>> {
         match &self.units[unit].block {
             BlockState::Done(block) => return Some(block.clone()),
-            BlockState::Faulty => return None,
+            BlockState::Faulty => {
+                self.blamed += 1;
+                return None;
+            }
             BlockState::Busy => {
                 let name = &self.units[unit].unit.name;
                 let message = format!("the block `{name}` contains itself");
@@ -191,7 +194,6 @@ impl<'a> Lowering<'a> {
         let info = StructureInfo {
             fields: fields.collect(),
             unit: Some(unit),
-            image: image.clone(),
         };
         let structure = Structure {
             name: found.name.as_str().to_owned(),
@@ -369,7 +371,10 @@ impl<'a> Lowering<'a> {
         let of = match &found {
             Symbol::Variable(variable) => variable.of.clone(),
             Symbol::Constant(constant) => constant.expression().of,
-            Symbol::Faulty => return Symbol::Faulty,
+            Symbol::Faulty => {
+                self.blamed += 1;
+                return Symbol::Faulty;
+            }
         };
         match self.resolve(&declaration.of) {
             Some(resolved) if resolved.of != of => {

@@ -23,7 +23,10 @@ impl Lowering<'_> {
     ) -> Symbol {
         let key = (owner, declaration.name.key());
         match self.constant_state(key.clone()) {
-            Some(ConstantState::Done(symbol)) => return symbol,
+            Some(ConstantState::Done(symbol)) => {
+                self.blamed += usize::from(matches!(symbol, Symbol::Faulty));
+                return symbol;
+            }
             Some(ConstantState::Busy) => {
                 let message = format!("the constant `{}` is defined by itself", declaration.name);
                 self.error("U1047", message, declaration.name.span());

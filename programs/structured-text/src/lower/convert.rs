@@ -142,11 +142,13 @@ impl Lowering<'_> {
         to: &Type,
         span: &Span,
     ) -> Option<Expression> {
-        match operand {
-            Operand::Faulty => None,
+        let before = self.blamed;
+        let found = match operand {
+            Operand::Faulty => return None,
             Operand::Number(number) => self.coerce_number(number, to, span),
             Operand::Typed(value) => self.coerce_typed(value, to, span),
-        }
+        };
+        self.accounted(before, found, span)
     }
 
     fn coerce_number(&mut self, value: Number, to: &Type, span: &Span) -> Option<Expression> {

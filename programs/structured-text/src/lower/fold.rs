@@ -94,11 +94,6 @@ pub(super) fn boolean(value: bool) -> Expression {
     number(Type::Elementary(Elementary::Bool), u64::from(value))
 }
 
-/// A LINT.
-pub(super) fn long(value: i64) -> Expression {
-    number(Type::Elementary(Elementary::Lint), value as u64)
-}
-
 /// The second where the first is TRUE, else the third, of any type.
 pub(super) fn choose(condition: Expression, then: Expression, otherwise: Expression) -> Expression {
     Expression {

@@ -107,14 +107,19 @@ impl Lowering<'_> {
 
     /// Where a path leads.
     pub(super) fn target(&mut self, path: &Path) -> Option<Target> {
+        let before = self.blamed;
         let symbol = self.root_symbol(&path.root);
-        self.target_of(symbol, path)
+        let found = self.target_of(symbol, path);
+        self.accounted(before, found, &path.span)
     }
 
     fn target_of(&mut self, symbol: Option<Symbol>, path: &Path) -> Option<Target> {
         let mut steps = path.steps.as_slice();
         let variable = match symbol {
-            Some(Symbol::Faulty) => return None,
+            Some(Symbol::Faulty) => {
+                self.blamed += 1;
+                return None;
+            }
             Some(Symbol::Constant(_)) => {
                 let message = format!("`{}` is a constant", path.root);
                 self.error("U1044", message, path.root.span());
@@ -149,9 +154,7 @@ impl Lowering<'_> {
 
     /// `THIS^.speed`
     fn own_part(&mut self, path: &Path) -> Option<Target> {
-        let Some(own) = self.own_block(&path.root) else {
-            return None;
-        };
+        let own = self.own_block(&path.root)?;
         let steps = match path.steps.as_slice() {
             [Step::Follow, rest @ ..] => rest,
             rest => rest,
@@ -315,7 +318,7 @@ impl Lowering<'_> {
         let mut strides = vec![array.stride(); indices.len()];
         for at in (1..indices.len()).rev() {
             let (low, high) = array.ranges[at];
-            strides[at - 1] = strides[at] * (high.abs_diff(low) + 1);
+            strides[at - 1] = strides[at].saturating_mul(high.abs_diff(low).saturating_add(1));
         }
         let mut bits = u64::from(target.place.bit);
         for ((index, stride), (low, high)) in indices.iter().zip(strides).zip(&array.ranges) {
@@ -334,7 +337,7 @@ impl Lowering<'_> {
                     self.error("U1036", message, index.span.clone());
                     return None;
                 }
-                bits += (at - i128::from(*low)) as u64 * stride;
+                bits = bits.saturating_add(((at - i128::from(*low)) as u64).saturating_mul(stride));
                 continue;
             }
             target.place.indices.push(Index {
@@ -344,7 +347,7 @@ impl Lowering<'_> {
                 stride,
             });
         }
-        target.place.offset += (bits / 64) as u32;
+        target.place.offset = target.place.offset.saturating_add((bits / 64) as u32);
         target.place.bit = (bits % 64) as u32;
         target.place.is_packed = array.element.elementary().is_some();
         target.place.of = array.element.clone();

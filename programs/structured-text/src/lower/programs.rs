@@ -3,14 +3,18 @@
 use std::rc::Rc;
 
 use understudy_text::spelling;
-use understudy_typed::{Elementary, Root, Task, Type, Variable as Shown};
+use understudy_typed::{
+    Root, Routine as Lowered, RoutineId, RoutineKind, Statement, StatementKind, Task, Type,
+    Variable as Shown,
+};
 
-use crate::syntax::{Class, Declaration, File, Name, Span, Unit, UnitKind};
+use crate::syntax::{Argument, Class, Declaration, File, Name, Span, Unit, UnitKind};
 
-use super::blocks::{Block, Key};
+use super::blocks::{Block, Key, Routine};
 use super::images::initial;
 use super::names::{Owner, Symbol, Variable};
-use super::types::{Resolved, TypeState};
+use super::places::{load, place};
+use super::types::TypeState;
 use super::{DEFAULT_PERIOD, Lowering, Options};
 
 /// A PROGRAM that is run.
@@ -20,6 +24,8 @@ struct Instance<'a> {
     /// Nanoseconds, and how urgent it is.
     interval: Option<i64>,
     priority: i64,
+    /// What its inputs and outputs are connected to.
+    connections: &'a [Argument],
 }
 
 impl<'a> Lowering<'a> {
@@ -107,134 +113,6 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    /// A variable at an address: `%I` is an input point, `%Q` an output point, `%M` memory.
-    pub(super) fn located(&mut self, declaration: &Declaration, resolved: &Resolved) -> Symbol {
-        let Some(address) = &declaration.address else {
-            return Symbol::Faulty;
-        };
-        let name = &declaration.name;
-        let key = normal(address.as_str());
-        // An incomplete address is one of its own.
-        let key = match key.contains('*') {
-            true => format!("{key} {}", name.key()),
-            false => key,
-        };
-        if let Some(known) = self.addresses.get(&key).cloned() {
-            if let Symbol::Variable(first) = &known
-                && first.of != resolved.of
-            {
-                let (own, other) = (self.describe(&resolved.of), self.describe(&first.of));
-                let message = format!(
-                    "`{name}` is {own} at {address}, where `{}` is {other}",
-                    first.name
-                );
-                let found = understudy_text::Diagnostic::error("U1083", message, address.span());
-                let found = found.with_related(first.span.clone(), "declared here");
-                self.report(found.with_help("give both one type, or two addresses"));
-                return Symbol::Faulty;
-            }
-            return known;
-        }
-        let symbol = self
-            .at_address(name, address, resolved)
-            .unwrap_or(Symbol::Faulty);
-        self.addresses.insert(key, symbol.clone());
-        symbol
-    }
-
-    fn at_address(&mut self, name: &Name, address: &Name, resolved: &Resolved) -> Option<Symbol> {
-        let kind = address
-            .as_str()
-            .chars()
-            .nth(1)
-            .map(|kind| kind.to_ascii_uppercase());
-        let is_input = kind == Some('I');
-        let is_point = is_input || kind == Some('Q');
-        if !is_point && kind != Some('M') {
-            let message = format!("`{address}` is not an address");
-            let help =
-                "write an input such as %IX0.0, an output such as %QW3 or a memory such as %MD8";
-            self.error_with("U1083", message, address.span(), help);
-            return None;
-        }
-        let elementary = resolved.of.elementary();
-        if is_point && elementary.is_none() {
-            let found = self.describe(&resolved.of);
-            let message =
-                format!("`{name}` at {address} is {found}; a point is one number, bit or time");
-            let help = "declare each element as a variable with an address of its own";
-            self.error_with("U1083", message, name.span(), help);
-            return None;
-        }
-        if let Some(of) = elementary {
-            self.fits_address(name, address, of);
-        }
-        let slot = self.state(resolved.of.slots(), &name.span())?;
-        self.program.initial.extend(initial(&resolved.image, slot));
-        if let Some(of) = elementary.filter(|_| is_point) {
-            let points = match is_input {
-                true => &mut self.program.inputs,
-                false => &mut self.program.outputs,
-            };
-            let mut shown = name.as_str().to_owned();
-            if points
-                .iter()
-                .any(|point| point.name.eq_ignore_ascii_case(&shown))
-            {
-                shown = format!("{name} {address}");
-            }
-            points.push(shown, of, slot);
-        }
-        Some(Symbol::Variable(Rc::new(Variable {
-            name: name.as_str().to_owned(),
-            root: Root::Global(slot),
-            of: resolved.of.clone(),
-            class: Class::Local,
-            is_constant: false,
-            is_point: is_input,
-            span: name.span(),
-        })))
-    }
-
-    /// Warns where the size in an address is not that of the variable.
-    fn fits_address(&mut self, name: &Name, address: &Name, of: Elementary) {
-        let size = normal(address.as_str()).chars().nth(2);
-        let bits = match size {
-            Some('X') => 1,
-            Some('B') => 8,
-            Some('W') => 16,
-            Some('D') => 32,
-            Some('L') => 64,
-            _ => return,
-        };
-        if bits != of.bits() {
-            let message = format!("`{name}` is {of}, and {address} has {bits} bits");
-            let help = "the type counts: write the letter of its width, X, B, W, D or L";
-            self.warn("U1083", message, address.span(), help);
-        }
-    }
-
-    /// An address in a body.
-    pub(super) fn direct(&mut self, address: &Name) -> Symbol {
-        let key = normal(address.as_str());
-        if let Some(known) = self.addresses.get(&key) {
-            return known.clone();
-        }
-        let of = match key.chars().nth(2) {
-            Some('B') => Elementary::Byte,
-            Some('W') => Elementary::Word,
-            Some('D') => Elementary::Dword,
-            Some('L') => Elementary::Lword,
-            _ => Elementary::Bool,
-        };
-        let resolved: Resolved = Type::Elementary(of).into();
-        let symbol = self
-            .at_address(address, address, &resolved)
-            .unwrap_or(Symbol::Faulty);
-        self.addresses.insert(key, symbol.clone());
-        symbol
-    }
-
     /// Lowers the programs that run; for a library its units, whose names are the answer.
     pub(super) fn programs(&mut self, file: &'a File, options: &Options<'_>) -> Vec<String> {
         let is_program = |unit: &&Unit| unit.kind == UnitKind::Program;
@@ -295,6 +173,7 @@ impl<'a> Lowering<'a> {
             unit: index,
             interval: None,
             priority: 0,
+            connections: &[],
         };
         if let Some(chosen) = options.program {
             let found = programs.iter().find(|program| program.name.is(chosen));
@@ -340,6 +219,7 @@ impl<'a> Lowering<'a> {
             };
             let mut instance = whole(unit, self.unit_names[&unit.name.key()]);
             instance.name = &declared.name;
+            instance.connections = &declared.connections;
             instance.priority = i64::MAX;
             if let Some(name) = &declared.task {
                 let Some(task) = file.tasks.iter().find(|task| task.name == *name) else {
@@ -404,8 +284,9 @@ impl<'a> Lowering<'a> {
             return;
         };
         self.program.initial.extend(initial(&block.image, own));
+        let connected = self.connected(instance, &routine, &block);
         self.program.tasks.push(Task {
-            routine: routine.id,
+            routine: connected.unwrap_or(routine.id),
             own,
             every,
         });
@@ -413,10 +294,68 @@ impl<'a> Lowering<'a> {
             true => format!("{}.", instance.name),
             false => String::new(),
         };
-        self.program_variables(&block, own, &prefix);
+        self.program_variables(&block, own, &prefix, instance.connections);
     }
 
-    fn program_variables(&mut self, block: &Block, own: u32, prefix: &str) {
+    /// A routine that copies what the program is connected to, before and behind its body.
+    fn connected(
+        &mut self,
+        instance: &Instance<'a>,
+        routine: &Routine,
+        block: &Block,
+    ) -> Option<RoutineId> {
+        if instance.connections.is_empty() {
+            return None;
+        }
+        let id = RoutineId(self.program.routines.len() as u32);
+        self.scope.symbols = Some(Rc::default());
+        self.scope.routine = id.0;
+        let whole = place(Root::Own(0), block.of.clone());
+        let name = instance.name.as_str();
+        let bound = self.bind(
+            name,
+            &routine.parameters,
+            instance.connections,
+            &instance.name.span(),
+        );
+        let mut body = Vec::new();
+        let line = self.line(&instance.name.span());
+        if let Some(bound) = bound {
+            for (at, value) in &bound.given {
+                let parameter = &routine.parameters[*at];
+                let to = place(Root::Own(parameter.slot), parameter.of.clone());
+                let value = self.expression(value, &parameter.of);
+                let kind = value.map(|value| StatementKind::Assign(to, value));
+                body.extend(kind.map(|kind| Statement { line, kind }));
+            }
+            let kind = StatementKind::Invoke(routine.id, whole);
+            body.push(Statement { line, kind });
+            for (at, path, negated) in &bound.taken {
+                let parameter = &routine.parameters[*at];
+                let value = load(place(Root::Own(parameter.slot), parameter.of.clone()));
+                let kind = self.take_output(value, path, *negated);
+                body.extend(kind.map(|kind| Statement { line, kind }));
+            }
+        }
+        self.scope = super::names::Scope::default();
+        self.calls.push(vec![(routine.id.0, instance.name.span())]);
+        self.program.routines.push(Lowered {
+            name: name.to_owned(),
+            kind: RoutineKind::Block,
+            frame: (self.program.frames, 0),
+            initial: Vec::new(),
+            body,
+        });
+        Some(id)
+    }
+
+    fn program_variables(
+        &mut self,
+        block: &Block,
+        own: u32,
+        prefix: &str,
+        connections: &[Argument],
+    ) {
         for name in &block.order {
             let Some(member) = block.members.get(name) else {
                 continue;
@@ -424,6 +363,10 @@ impl<'a> Lowering<'a> {
             let Symbol::Variable(variable) = &member.symbol else {
                 continue;
             };
+            // Memories that no person declared, as of charts.
+            if variable.name.contains('.') {
+                continue;
+            }
             let parameter = block
                 .parameters
                 .iter()
@@ -435,7 +378,14 @@ impl<'a> Lowering<'a> {
                 _ => continue,
             };
             let shown = format!("{prefix}{}", variable.name);
-            if matches!(variable.root, Root::Own(_))
+            let is_connected = connections.iter().any(|connection| match connection {
+                Argument::Given(name, _) | Argument::Taken { from: name, .. } => {
+                    name.is(&variable.name)
+                }
+                Argument::Placed(_) => false,
+            });
+            if !is_connected
+                && matches!(variable.root, Root::Own(_))
                 && let Class::Input | Class::Output = member.class
             {
                 self.point(&shown, variable, slot, member.class == Class::Input);
@@ -473,8 +423,8 @@ impl<'a> Lowering<'a> {
         let globals = file.globals.iter().map(|declaration| &declaration.name);
         let names = types.chain(globals);
         let mut checked: Vec<String> = names.map(|name| name.as_str().to_owned()).collect();
-        for unit in &file.units {
-            let index = self.unit_names[&unit.name.key()];
+        // The file's units come first among all.
+        for (index, unit) in file.units.iter().enumerate() {
             let class = (unit.kind == UnitKind::FunctionBlock).then_some(index);
             self.check(index, None, class, unit);
             for method in 0..unit.methods.len() {
@@ -517,19 +467,6 @@ impl<'a> Lowering<'a> {
         let key = Key { owner, class, open };
         self.routine(key, &unit.name.span());
     }
-}
-
-/// An address in capitals, with the X that may be left out.
-fn normal(address: &str) -> String {
-    let mut key = address.to_ascii_uppercase();
-    if key
-        .chars()
-        .nth(2)
-        .is_some_and(|digit| digit.is_ascii_digit())
-    {
-        key.insert(2, 'X');
-    }
-    key
 }
 
 fn variable(declaration: &Declaration, root: Root, of: &Type, is_point: bool) -> Symbol {

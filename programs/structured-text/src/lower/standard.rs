@@ -1,6 +1,9 @@
 //! The standard functions of IEC 61131-3, overloaded as they are there.
 
+mod alike;
 mod conversions;
+mod inputs;
+mod reals;
 mod selection;
 mod texts;
 mod times;
@@ -10,7 +13,7 @@ use understudy_typed::{Comparison, Elementary, Expression, Operation, RealFuncti
 use crate::syntax::{self, Argument, Operator, Span};
 
 use super::Lowering;
-use super::convert::{as_bits, as_integer, common, is_number, is_whole, limits};
+use super::convert::{as_bits, is_whole};
 use super::fold::{apply, boolean, choose, convert, reinterpret};
 use super::names::number;
 use super::numbers::{Number, Operand};
@@ -160,12 +163,6 @@ fn comparison(key: &str) -> Option<Comparison> {
     })
 }
 
-/// The values of a call by the names of its inputs.
-pub(super) struct Values<'s> {
-    pub(super) of: Vec<&'s syntax::Expression>,
-    enable: Option<&'s syntax::Expression>,
-}
-
 impl Lowering<'_> {
     /// A call of a standard function.
     pub(super) fn standard(
@@ -233,73 +230,6 @@ impl Lowering<'_> {
         found.map_or(Operand::Faulty, Operand::Typed)
     }
 
-    /// The arguments in the order of the function's inputs.
-    fn values<'s>(
-        &mut self,
-        key: &str,
-        arguments: &'s [Argument],
-        span: &Span,
-    ) -> Option<Values<'s>> {
-        let (names, least, extensible) = inputs(key);
-        let mut found: Vec<Option<&'s syntax::Expression>> = Vec::new();
-        let mut enable = None;
-        let mut placed = 0;
-        for argument in arguments {
-            let (at, value) = match argument {
-                Argument::Placed(value) => {
-                    placed += 1;
-                    (placed - 1, value)
-                }
-                Argument::Given(name, value) if name.is("EN") => {
-                    enable = Some(value);
-                    continue;
-                }
-                Argument::Given(name, value) => match input(&name.key(), names, extensible) {
-                    Some(at) => (at, value),
-                    None => {
-                        let message = format!("{key} has no input `{name}`");
-                        let help = format!("its inputs: {}", names.join(", "));
-                        self.error_with("U1049", message, name.span(), help);
-                        return None;
-                    }
-                },
-                Argument::Taken { from, .. } => {
-                    let message = format!("{key} has no output `{from}`");
-                    let help = "assign its result with `:=`; ENO is for calls that stand alone";
-                    self.error_with("U1049", message, from.span(), help);
-                    return None;
-                }
-            };
-            if at >= found.len() && at < 1_000 {
-                found.resize(at + 1, None);
-            }
-            match found.get_mut(at) {
-                Some(place @ None) => *place = Some(value),
-                _ => {
-                    let message = format!("{key} is given one input twice, or too many");
-                    self.error("U1049", message, value.span.clone());
-                    return None;
-                }
-            }
-        }
-        let most = if extensible { 1_000 } else { names.len() };
-        if found.len() < least || found.len() > most || found.iter().any(Option::is_none) {
-            let wanted = match (extensible, least == most) {
-                (true, _) => format!("at least {least}"),
-                (false, true) => format!("{least}"),
-                _ => format!("{least} to {most}"),
-            };
-            let message = format!("{key} needs {wanted} inputs, and {} are given", found.len());
-            let help = format!("its inputs: {}", names.join(", "));
-            self.error_with("U1049", message, span.clone(), help);
-            return None;
-        }
-        Some(Values {
-            of: found.into_iter().flatten().collect(),
-            enable,
-        })
-    }
-
     fn operator_call(
         &mut self,
         operator: Operator,
@@ -347,106 +277,6 @@ impl Lowering<'_> {
             });
         }
         all
-    }
-
-    /// A value as a real: what is whole becomes the real type of the hint, else LREAL.
-    fn real_value(
-        &mut self,
-        value: &syntax::Expression,
-        hint: Option<&Type>,
-    ) -> Option<(Expression, Elementary)> {
-        let hint = hint.filter(|of| of.elementary().is_some_and(Elementary::is_real));
-        let hinted = hint.and_then(Type::elementary);
-        let operand = self.operand(value, hint);
-        if let Operand::Number(value) = operand {
-            let of = hinted.unwrap_or(Elementary::Lreal);
-            return Some((value.in_real(of), of));
-        }
-        let found = self.settle(operand, hint)?;
-        match found.of.elementary() {
-            Some(of) if of.is_real() => Some((found, of)),
-            Some(of) if is_number(of) => {
-                let of = hinted.unwrap_or(Elementary::Lreal);
-                Some((convert(found, of), of))
-            }
-            _ => {
-                let found = self.describe(&found.of);
-                let message = format!("expected a REAL or LREAL, found {found}");
-                let help = "convert it first, such as with TO_REAL(…)";
-                self.error_with("U1043", message, value.span.clone(), help);
-                None
-            }
-        }
-    }
-
-    fn real_call(
-        &mut self,
-        function: RealFunction,
-        value: &syntax::Expression,
-        hint: Option<&Type>,
-    ) -> Option<Expression> {
-        let (value, of) = self.real_value(value, hint)?;
-        Some(apply(
-            Operation::Real(function, of),
-            vec![value],
-            Type::Elementary(of),
-        ))
-    }
-
-    /// FLOOR, CEIL, ROUND: of the type that is wanted, DINT where none is.
-    fn rounded(
-        &mut self,
-        key: &str,
-        value: &syntax::Expression,
-        hint: Option<&Type>,
-    ) -> Option<Expression> {
-        let (value, of) = self.real_value(value, hint)?;
-        let real = |function, value| {
-            apply(
-                Operation::Real(function, of),
-                vec![value],
-                Type::Elementary(of),
-            )
-        };
-        let rounded = match key {
-            "FLOOR" => real(RealFunction::Floor, value),
-            "CEIL" => real(RealFunction::Ceiling, value),
-            "ROUND" => real(RealFunction::Round, value),
-            _ => {
-                let whole = apply(
-                    Operation::Truncate(of, Elementary::Lint),
-                    vec![value.clone()],
-                    Type::Elementary(Elementary::Lint),
-                );
-                let operands = vec![value, convert(whole, of)];
-                return Some(apply(
-                    Operation::Subtract(of),
-                    operands,
-                    Type::Elementary(of),
-                ));
-            }
-        };
-        match hint.and_then(Type::elementary) {
-            Some(wanted) if wanted.is_real() => Some(rounded),
-            Some(wanted) if wanted.is_integer() => Some(convert(rounded, wanted)),
-            _ => Some(convert(rounded, Elementary::Dint)),
-        }
-    }
-
-    fn absolute(&mut self, value: &syntax::Expression, hint: Option<&Type>) -> Option<Expression> {
-        let found = self.typed(value, hint)?;
-        match found.of.elementary() {
-            Some(of) if is_number(of) || of == Elementary::Time => {
-                let of = as_integer(of);
-                let found = reinterpret(found, of);
-                Some(apply(
-                    Operation::Absolute(of),
-                    vec![found],
-                    Type::Elementary(of),
-                ))
-            }
-            _ => self.not_a_number(&found, &value.span),
-        }
     }
 
     pub(super) fn not_a_number<T>(&mut self, found: &Expression, span: &Span) -> Option<T> {
@@ -565,164 +395,6 @@ impl Lowering<'_> {
         };
         let bound = if key == "LOWER_BOUND" { low } else { high };
         Operand::Number(Number::Integer(i128::from(bound)))
-    }
-
-    /// Operands in the type that all of them fit.
-    pub(super) fn alike(
-        &mut self,
-        values: &[&syntax::Expression],
-        hint: Option<&Type>,
-    ) -> Option<(Vec<Expression>, Type)> {
-        let mut hint = hint.cloned();
-        let mut operands = Vec::with_capacity(values.len());
-        let mut of: Option<Type> = None;
-        let mut is_whole_call = true;
-        for value in values {
-            let operand = self.operand(value, hint.as_ref());
-            match &operand {
-                Operand::Faulty => is_whole_call = false,
-                Operand::Typed(found) => {
-                    let joined = match &of {
-                        None => Some(found.of.clone()),
-                        Some(of) => self.joined(of, &found.of),
-                    };
-                    if joined.is_none() {
-                        let wanted = of.clone()?;
-                        let found = self.describe(&found.of);
-                        return self.mismatch(&found, &wanted, &value.span);
-                    }
-                    of = joined;
-                    if matches!(found.of, Type::Enumeration(..)) {
-                        hint = of.clone();
-                    }
-                }
-                Operand::Number(_) => {}
-            }
-            operands.push(operand);
-        }
-        if !is_whole_call {
-            return None;
-        }
-        let of = self.with_literals(of, &operands, hint.as_ref());
-        let mut lowered = Vec::with_capacity(values.len());
-        for (operand, value) in operands.into_iter().zip(values) {
-            lowered.push(match operand {
-                Operand::Typed(found) if found.of == of => found,
-                Operand::Typed(found) => match (of.elementary(), &of) {
-                    (Some(to), Type::Elementary(_)) => convert(found, to),
-                    _ => found,
-                },
-                other => self.coerce(other, &of, &value.span)?,
-            });
-        }
-        Some((lowered, of))
-    }
-
-    fn joined(&self, left: &Type, right: &Type) -> Option<Type> {
-        match (left, right) {
-            _ if left == right => Some(left.clone()),
-            (Type::Text(left), Type::Text(right)) => Some(Type::Text(*left.max(right))),
-            (Type::Enumeration(..), Type::Enumeration(..)) => None,
-            _ => {
-                let (left, right) = (left.elementary()?, right.elementary()?);
-                common(left, right).map(Type::Elementary)
-            }
-        }
-    }
-
-    /// The type of operands among which there are literals.
-    fn with_literals(&self, of: Option<Type>, operands: &[Operand], hint: Option<&Type>) -> Type {
-        let hinted = hint.and_then(Type::elementary).filter(|of| is_number(*of));
-        let mut of = of.and_then(|of| match of.elementary() {
-            Some(found) if is_number(found) && matches!(of, Type::Elementary(_)) => Some(Ok(found)),
-            _ => Some(Err(of)),
-        });
-        for operand in operands {
-            let Operand::Number(value) = operand else {
-                continue;
-            };
-            let settled = match (value, hinted) {
-                (Number::Real(..), Some(hinted)) if hinted.is_real() => hinted,
-                (Number::Integer(value), Some(hinted)) if of.is_none() => {
-                    let fits = hinted.is_real() || {
-                        let (least, most) = limits(hinted);
-                        least <= *value && *value <= most
-                    };
-                    if fits {
-                        hinted
-                    } else {
-                        Number::Integer(*value).default_type()
-                    }
-                }
-                _ => value.default_type(),
-            };
-            of = match (of, value) {
-                (None, _) => Some(Ok(settled)),
-                (Some(Ok(found)), _) if found.is_real() => Some(Ok(found)),
-                (Some(Ok(found)), Number::Integer(value)) => {
-                    let (least, most) = limits(found);
-                    if least <= *value && *value <= most {
-                        Some(Ok(found))
-                    } else {
-                        Some(Ok(common(found, settled).unwrap_or(found)))
-                    }
-                }
-                (Some(Ok(found)), Number::Real(..)) => Some(Ok(match hinted {
-                    Some(hinted) if hinted.is_real() => hinted,
-                    _ if found.bits() == 64 => Elementary::Lreal,
-                    _ if is_whole(found) => Elementary::Real,
-                    _ => found,
-                })),
-                (other, _) => other,
-            };
-        }
-        match of {
-            Some(Ok(of)) => Type::Elementary(of),
-            Some(Err(of)) => of,
-            None => Type::Elementary(Elementary::Int),
-        }
-    }
-}
-
-/// The names of a function's inputs, how many it needs, and whether it takes more.
-fn inputs(key: &str) -> (&'static [&'static str], usize, bool) {
-    match key {
-        _ if operator(key).is_some_and(|(_, extensible)| extensible) => (&["IN1", "IN2"], 1, true),
-        _ if operator(key).is_some() => (&["IN1", "IN2"], 2, false),
-        "NE" => (&["IN1", "IN2"], 2, false),
-        _ if comparison(key).is_some() => (&["IN1", "IN2"], 2, true),
-        "MAX" | "MIN" => (&["IN1", "IN2"], 1, true),
-        "CONCAT" => (&["IN1", "IN2"], 1, true),
-        "SHL" | "SHR" | "ROL" | "ROR" => (&["IN", "N"], 2, false),
-        "SEL" => (&["G", "IN0", "IN1"], 3, false),
-        "LIMIT" => (&["MN", "IN", "MX"], 3, false),
-        "MUX" => (&["K", "IN0", "IN1"], 2, true),
-        "LEFT" | "RIGHT" => (&["IN", "L"], 2, false),
-        "MID" | "DELETE" => (&["IN", "L", "P"], 3, false),
-        "INSERT" => (&["IN1", "IN2", "P"], 3, false),
-        "REPLACE" => (&["IN1", "IN2", "L", "P"], 4, false),
-        "FIND" => (&["IN1", "IN2"], 2, false),
-        "ATAN2" => (&["Y", "X"], 2, false),
-        "UPPER_BOUND" | "LOWER_BOUND" => (&["ARR", "DIM"], 2, false),
-        "CONCAT_DATE_TOD" | "CONCAT_DATE_LTOD" => (&["IN1", "IN2"], 2, false),
-        "TIME" | "LTIME" => (&[], 0, false),
-        _ => (&["IN"], 1, false),
-    }
-}
-
-/// The place of an input by its name.
-fn input(name: &str, names: &[&str], extensible: bool) -> Option<usize> {
-    if let Some(at) = names.iter().position(|known| *known == name) {
-        return Some(at);
-    }
-    if names == ["IN"] {
-        return (name == "IN1").then_some(0);
-    }
-    let number: usize = name.strip_prefix("IN")?.parse().ok()?;
-    match names.first() {
-        _ if !extensible => None,
-        Some(&"K") => number.checked_add(1),
-        _ => number.checked_sub(1),
     }
 }
 

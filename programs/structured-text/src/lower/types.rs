@@ -43,7 +43,6 @@ pub(super) struct StructureInfo {
     pub(super) fields: HashMap<String, usize>,
     /// The unit whose memory it is.
     pub(super) unit: Option<usize>,
-    pub(super) image: Image,
 }
 
 /// The elementary type of a name in capitals.
@@ -64,7 +63,9 @@ pub(super) fn elementary(key: &str) -> Option<Elementary> {
 impl<'a> Lowering<'a> {
     /// The type of a declaration; `None` where an error is reported.
     pub(super) fn resolve(&mut self, name: &TypeName) -> Option<Resolved> {
-        self.deeper(&name.span, |own| own.resolve_kind(name))
+        let before = self.blamed;
+        let found = self.deeper(&name.span, |own| own.resolve_kind(name));
+        self.accounted(before, found, &name.span)
     }
 
     fn resolve_kind(&mut self, name: &TypeName) -> Option<Resolved> {
@@ -100,7 +101,10 @@ impl<'a> Lowering<'a> {
         if let Some(state) = self.types.get_mut(&key) {
             match state {
                 TypeState::Done(resolved) => return Some(resolved.clone()),
-                TypeState::Faulty => return None,
+                TypeState::Faulty => {
+                    self.blamed += 1;
+                    return None;
+                }
                 TypeState::Busy => {
                     let message = format!("the type `{name}` contains itself");
                     self.error("U1047", message, name.span());
@@ -124,6 +128,9 @@ impl<'a> Lowering<'a> {
         if let Some(elementary) = elementary(&key) {
             return Some(Type::Elementary(elementary).into());
         }
+        if matches!(key.as_str(), "STRING" | "WSTRING") {
+            return Some(Type::Text(DEFAULT_CAPACITY).into());
+        }
         if let Some(&unit) = self.unit_names.get(&key) {
             let block = self.block_type(unit, name.span())?;
             return Some(block);
@@ -135,7 +142,6 @@ impl<'a> Lowering<'a> {
     fn unknown_type(&mut self, name: &Name) {
         let key = name.key();
         let unsupported = match key.as_str() {
-            "STRING" | "WSTRING" => return,
             "CHAR" | "WCHAR" => Some("use BYTE or STRING[1]"),
             "RTC" => Some("read the date and time from an input point"),
             "VARIANT" | "ANY" | "POINTER" | "REF_TO" => Some("use a type of constant size"),
@@ -310,7 +316,6 @@ impl<'a> Lowering<'a> {
             StructureInfo {
                 fields: known,
                 unit: None,
-                image: image.clone(),
             },
         );
         Some(Resolved {
@@ -346,7 +351,19 @@ impl<'a> Lowering<'a> {
         base: Option<&Name>,
     ) -> Option<Resolved> {
         let elementary = match base {
-            Some(base) => self.named_type(base)?.of.elementary()?,
+            Some(base) => {
+                let found = self.named_type(base)?.of.elementary();
+                match found.filter(|of| super::convert::is_whole(*of)) {
+                    Some(found) => found,
+                    None => {
+                        let message = format!(
+                            "an enumeration has values of an integer type; `{base}` is none"
+                        );
+                        self.error("U1043", message, base.span());
+                        return None;
+                    }
+                }
+            }
             None => Elementary::Int,
         };
         let id = EnumerationId(self.program.enumerations.len() as u32);

@@ -166,7 +166,7 @@ impl Parser<'_> {
     /// `Colour#red`
     fn qualified(&mut self) -> ExpressionKind {
         let span = self.span();
-        let written = &self.text[span.clone()];
+        let written = self.written();
         self.skip();
         let Some((of, name)) = written.split_once('#') else {
             return ExpressionKind::Faulty;

@@ -135,7 +135,7 @@ impl Parser<'_> {
         if self.placed().starts_line || self.at_end() {
             return word.to_owned();
         }
-        let can_open = BRACKETED.iter().any(|known| *known == word);
+        let can_open = BRACKETED.contains(&word);
         if can_open && self.take_sign("(") {
             if !self.placed().starts_line && !self.at_sign(")") {
                 operands.push(Argument::Placed(self.instruction_operand()));

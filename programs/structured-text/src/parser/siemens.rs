@@ -45,7 +45,8 @@ impl Parser<'_> {
             return None;
         }
         let span = self.span();
-        let written = self.text[span.clone()]
+        let written = self
+            .written()
             .trim_start_matches('#')
             .trim_matches('"');
         let mut name: String = written

@@ -185,7 +185,11 @@ fn duration(nanoseconds: i64) -> String {
         ("ns", 1),
     ];
     let mut rest = nanoseconds.unsigned_abs();
-    let word = if rest % 1_000_000 == 0 { "T" } else { "LTIME" };
+    let word = if rest.is_multiple_of(1_000_000) {
+        "T"
+    } else {
+        "LTIME"
+    };
     let sign = if nanoseconds < 0 { "-" } else { "" };
     let mut text = format!("{word}#{sign}");
     if rest == 0 {

@@ -1,4 +1,5 @@
 //! Programs as texts, executed by both engines, which must agree in every bit.
+#![allow(dead_code, reason = "each test uses a part of it")]
 
 use understudy_structured_text::{Lowered, Options, lower, parse};
 use understudy_text::{Diagnostic, Report, Severity};
@@ -59,6 +60,8 @@ pub(crate) struct Running {
 
 impl Running {
     pub(crate) fn new(program: Program) -> Self {
+        let violations = program.validate();
+        assert!(violations.is_ok(), "{violations:?}");
         let interpreter = Interpreter::new(&program);
         let machine = Machine::new(&program);
         Self {

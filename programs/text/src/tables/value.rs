@@ -195,6 +195,14 @@ impl<'a, 't> Value<'a, 't> {
         self.expect(self.value.get_ref().as_table(), wanted, diagnostics)
     }
 
+    /// A table; nothing, and no diagnostic, where it is another value.
+    pub fn as_table(self) -> Option<Placed<&'a DeTable<'t>>> {
+        self.value
+            .get_ref()
+            .as_table()
+            .map(|table| self.placed(table))
+    }
+
     /// The tables under `[[name]]`.
     pub fn tables(self, diagnostics: &mut Vec<Diagnostic>) -> Vec<Placed<&'a DeTable<'t>>> {
         let wanted = format!("tables, each under [[{}]]", self.name);

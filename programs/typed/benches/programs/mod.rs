@@ -72,7 +72,7 @@ fn program(state: u32, routines: Vec<Routine>) -> Program {
 }
 
 /// Operations of one PID loop as it is written below.
-pub(crate) const PID_OPERATIONS: usize = 15;
+pub(crate) const PID_OPERATIONS: usize = 16;
 
 /// `count` instances of a PID block on one measurement, each with its own state.
 ///

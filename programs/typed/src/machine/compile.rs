@@ -7,6 +7,7 @@
 mod call;
 mod condition;
 mod expression;
+mod fused;
 mod place;
 mod statement;
 mod text;

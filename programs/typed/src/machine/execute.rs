@@ -2,11 +2,11 @@
 
 use crate::fault::Cause;
 use crate::form::Program;
-use crate::machine::instruction::{
-    Code, Element, Instruction, Loop, RELATIVE, TextApplication, TextSource,
+use crate::machine::instruction::{Code, Instruction, RELATIVE};
+use crate::machine::working::{
+    apply_to_texts, extend, has_passed, load_text, mask, next, offset, store_text,
 };
 use crate::machine::{Scratch, Tables};
-use crate::operation::TextOperand;
 use crate::operation::real::Float;
 use crate::types::Elementary;
 
@@ -95,6 +95,22 @@ impl Run<'_> {
                             .pack()
                     )
                 };
+            }
+            macro_rules! fourth {
+                () => {{
+                    let operand = code[at].a;
+                    at += 1;
+                    operand
+                }};
+            }
+            macro_rules! with_product {
+                ($type:ty, $function:ident) => {{
+                    let product = <$type>::unpack(get!(b)).multiply(<$type>::unpack(get!(c)));
+                    set!(
+                        a,
+                        <$type>::unpack(get!(fourth!())).$function(product).pack()
+                    )
+                }};
             }
             macro_rules! one_real {
                 ($type:ty, $function:ident) => {
@@ -197,6 +213,16 @@ impl Run<'_> {
                 Code::And => set!(a, get!(b) & get!(c)),
                 Code::Or => set!(a, get!(b) | get!(c)),
                 Code::Xor => set!(a, get!(b) ^ get!(c)),
+                Code::AndNot => set!(a, get!(b) & !get!(c)),
+                Code::MultiplyAdd32 => {
+                    let product = (get!(b) as u32).wrapping_mul(get!(c) as u32);
+                    set!(a, u64::from((get!(fourth!()) as u32).wrapping_add(product)));
+                }
+                Code::MultiplyAddReal => with_product!(f32, add),
+                Code::MultiplyAddLreal => with_product!(f64, add),
+                Code::MultiplySubtractReal => with_product!(f32, subtract),
+                Code::MultiplySubtractLreal => with_product!(f64, subtract),
+                Code::Data => {}
                 Code::ShiftLeft => {
                     let by = get!(c);
                     let shifted = get!(b) << (by & 63) & mask(extra);
@@ -323,14 +349,13 @@ impl Run<'_> {
                     let element = &tables.elements[c as usize];
                     let offset = element!(element) + u64::from(element.bit);
                     let from = slot!(element.base) + (offset / 64) as usize;
-                    let mask = mask(element.bits as u16);
-                    set!(a, row[from] >> (offset % 64) & mask);
+                    set!(a, row[from] >> (offset % 64) & element.mask);
                 }
                 Code::StorePacked => {
                     let element = &tables.elements[c as usize];
                     let offset = element!(element) + u64::from(element.bit);
                     let to = slot!(element.base) + (offset / 64) as usize;
-                    let mask = mask(element.bits as u16);
+                    let mask = element.mask;
                     let value = get!(a) & mask;
                     let word = &mut row[to];
                     *word = *word & !(mask << (offset % 64)) | value << (offset % 64);
@@ -441,93 +466,6 @@ impl Run<'_> {
                     at = self.returns.pop().unwrap_or(0) as usize;
                 }
             }
-        }
-    }
-}
-
-/// As many ones as a value has bits.
-#[inline]
-fn mask(bits: u16) -> u64 {
-    u64::MAX >> (64 - u32::from(bits).clamp(1, 64))
-}
-
-/// A number whose high bits are unused.
-#[inline]
-fn extend(value: u64, unused: u32) -> i64 {
-    (value << (unused & 63)) as i64 >> (unused & 63)
-}
-
-/// Bits from the first element of an array to the one of an index.
-#[inline]
-fn offset(element: &Element, index: u64) -> Result<u64, Cause> {
-    let index = extend(index, element.extension);
-    if index < element.low || index > element.high {
-        let is_below = index < element.low;
-        return Err(Cause::IndexOutOfRange {
-            index,
-            bound: if is_below { element.low } else { element.high },
-        });
-    }
-    Ok((index.wrapping_sub(element.low) as u64).wrapping_mul(element.stride))
-}
-
-/// The counter behind a turn; `None` where it would leave its type.
-fn next(each: &Loop, counter: u64, by: u64) -> Option<u64> {
-    let next = each.of.signed(counter) + each.of.signed(by);
-    let stored = next as u64 & each.of.mask();
-    (each.of.signed(stored) == next).then_some(stored)
-}
-
-fn has_passed(each: &Loop, counter: u64, limit: u64, by: u64) -> bool {
-    let [counter, limit, by] = [counter, limit, by].map(|stored| each.of.signed(stored));
-    if by >= 0 {
-        counter > limit
-    } else {
-        counter < limit
-    }
-}
-
-fn load_text(slots: &[u64], capacity: usize, text: &mut Vec<u8>) {
-    let length = slots[0].min(capacity as u64) as usize;
-    text.clear();
-    for word in &slots[1..1 + length.div_ceil(8)] {
-        text.extend_from_slice(&word.to_le_bytes());
-    }
-    text.truncate(length);
-}
-
-fn store_text(slots: &mut [u64], capacity: usize, text: &[u8]) {
-    slots[0] = text.len() as u64;
-    let slots = &mut slots[1..1 + capacity.div_ceil(8)];
-    slots.fill(0);
-    for (slot, bytes) in slots.iter_mut().zip(text.chunks(8)) {
-        let mut word = [0; 8];
-        word[..bytes.len()].copy_from_slice(bytes);
-        *slot = u64::from_le_bytes(word);
-    }
-}
-
-/// Applies an operation on texts; `slot` reads a slot, and writes it before where a value is given.
-fn apply_to_texts(
-    application: &TextApplication,
-    texts: &mut [Vec<u8>],
-    slot: &mut dyn FnMut(u32, Option<u64>) -> u64,
-) {
-    let mut result = match application.target {
-        TextSource::Text(target) => std::mem::take(&mut texts[target as usize]),
-        TextSource::Number(_) => Vec::new(),
-    };
-    result.clear();
-    let operands = application.operands.iter().map(|operand| match *operand {
-        TextSource::Number(operand) => TextOperand::Number(slot(operand, None)),
-        TextSource::Text(text) => TextOperand::Text(&texts[text as usize]),
-    });
-    let operands: Vec<TextOperand<'_>> = operands.collect();
-    let number = application.operation.apply(&operands, &mut result);
-    match application.target {
-        TextSource::Text(target) => texts[target as usize] = result,
-        TextSource::Number(target) => {
-            slot(target, Some(number));
         }
     }
 }

@@ -56,6 +56,17 @@ pub(super) enum Code {
     And,
     Or,
     Xor,
+    /// a := b AND NOT c
+    AndNot,
+    /// a := d + b · c, where d is operand a of the [`Code::Data`] that follows; each operation is rounded.
+    MultiplyAdd32,
+    MultiplyAddReal,
+    MultiplyAddLreal,
+    /// a := d − b · c
+    MultiplySubtractReal,
+    MultiplySubtractLreal,
+    /// Belongs to the instruction before it.
+    Data,
     /// `extra` is the width.
     ShiftLeft,
     ShiftRight,
@@ -206,12 +217,12 @@ pub(super) struct Element {
     pub(super) bit: u32,
     /// First index.
     pub(super) low: i64,
-    /// Last index.
-    pub(super) high: i64,
+    /// From the first index to the last.
+    pub(super) span: u64,
     /// Bits from one element to the next.
     pub(super) stride: u64,
-    /// Bits of an element.
-    pub(super) bits: u32,
+    /// 1 for each bit of an element.
+    pub(super) mask: u64,
     /// Bits by which the index is to be sign-extended.
     pub(super) extension: u32,
 }

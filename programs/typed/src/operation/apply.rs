@@ -169,7 +169,7 @@ fn rotate(of: Elementary, value: u64, left: i64) -> u64 {
 
 fn convert(from: Elementary, to: Elementary, stored: u64) -> u64 {
     match (from, to) {
-        (Elementary::Real, _) => from_real(f32::unpack(stored), to, |value| f64::from(value)),
+        (Elementary::Real, _) => from_real(f32::unpack(stored), to, f64::from),
         (Elementary::Lreal, _) => from_real(f64::unpack(stored), to, |value| value),
         (_, Elementary::Real) => f32::from_integer(from.signed(stored)).pack(),
         (_, Elementary::Lreal) => f64::from_integer(from.signed(stored)).pack(),
@@ -219,7 +219,7 @@ fn from_bcd(from: Elementary, stored: u64) -> u64 {
 fn to_bcd(to: Elementary, mut number: u64) -> u64 {
     let mut digits = 0;
     for digit in 0..to.bits().div_ceil(4) {
-        digits |= number % 10 << (4 * digit);
+        digits |= (number % 10) << (4 * digit);
         number /= 10;
     }
     digits & to.mask()

@@ -3,20 +3,20 @@
 use std::sync::Arc;
 
 use understudy_typed::{
-    Argument, Branch, Call, Case, Elementary, Expression, ExpressionKind, For, Index, Operand,
-    Operation, Place, Root, Signature, Statement, StatementKind, TextOperation, Type,
+    Argument, Branch, Call, Case, Elementary, Expression, ExpressionKind, For, Operand, Operation,
+    Place, Root, Signature, Statement, StatementKind, TextOperation, Type,
 };
 
 use super::{Callable, Generator, Known, operations};
 
 /// A body that is written.
-struct Writer<'a> {
-    to: &'a mut Generator,
-    scope: Vec<Known>,
-    line: u32,
-    loops: usize,
+pub(super) struct Writer<'a> {
+    pub(super) to: &'a mut Generator,
+    pub(super) scope: Vec<Known>,
+    pub(super) line: u32,
+    pub(super) loops: usize,
     /// Indices within indices.
-    within: usize,
+    pub(super) within: usize,
 }
 
 pub(crate) fn body(to: &mut Generator, scope: &[Known], statements: usize) -> Vec<Statement> {
@@ -76,11 +76,11 @@ pub(crate) fn constant(of: Elementary, value: u64) -> Expression {
 }
 
 impl Writer<'_> {
-    fn below(&mut self, end: usize) -> usize {
+    pub(super) fn below(&mut self, end: usize) -> usize {
         self.to.random.below(end)
     }
 
-    fn percent(&mut self, share: usize) -> bool {
+    pub(super) fn percent(&mut self, share: usize) -> bool {
         self.to.random.percent(share)
     }
 
@@ -310,7 +310,7 @@ impl Writer<'_> {
         }
     }
 
-    fn number(&mut self, of: Elementary, depth: usize) -> Expression {
+    pub(super) fn number(&mut self, of: Elementary, depth: usize) -> Expression {
         let choice = if depth == 0 { 0 } else { self.below(10) };
         let kind = match choice {
             0..=2 => {
@@ -418,7 +418,8 @@ impl Writer<'_> {
         let wanted = |callable: &&Callable| {
             let found = callable.result.as_ref().map(|place| &place.of);
             let is_callable = callable.structure.is_none() || callable.is_method;
-            is_callable && result.is_none_or(|wanted| found.is_some_and(|of| is_like(of, wanted)))
+            is_callable
+                && result.is_none_or(|wanted| found.is_some_and(|of| of.is_stored_like(wanted)))
         };
         let callables: Vec<Callable> = self.to.callables.iter().filter(wanted).cloned().collect();
         let made = match callables.is_empty() {
@@ -474,146 +475,4 @@ impl Writer<'_> {
             })),
         })
     }
-
-    /// A variable of a type, or a part of one.
-    fn place(&mut self, of: &Type, is_written: bool) -> Option<Place> {
-        for _ in 0..12 {
-            let known = self.to.random.pick(&self.scope).clone();
-            if is_written && known.is_constant {
-                continue;
-            }
-            let place = Place::new(known.root, known.of);
-            if let Some(place) = self.part(place, of) {
-                return Some(place);
-            }
-        }
-        let all: Vec<Known> = self
-            .scope
-            .iter()
-            .filter(|known| is_like(&known.of, of))
-            .cloned()
-            .collect();
-        match all.is_empty() {
-            true => None,
-            false => {
-                let known = self.to.random.pick(&all).clone();
-                Some(Place::new(known.root, known.of))
-            }
-        }
-    }
-
-    /// A part of a type, found by descending at random.
-    fn part(&mut self, mut place: Place, of: &Type) -> Option<Place> {
-        loop {
-            if is_like(&place.of, of) {
-                return Some(place);
-            }
-            match place.of.clone() {
-                Type::Structure(id, _) => {
-                    let fields = &self.to.program.structures[id.0 as usize].fields;
-                    let field = self.to.random.pick(fields);
-                    if field.is_reference {
-                        return None;
-                    }
-                    place.offset += field.slot;
-                    place.of = field.of.clone();
-                }
-                Type::Array(array) => self.element(&mut place, &array),
-                _ => return None,
-            }
-        }
-    }
-
-    fn element(&mut self, place: &mut Place, array: &understudy_typed::Array) {
-        let mut stride = array.stride();
-        let mut bit = u64::from(place.bit);
-        for &(low, high) in array.ranges.iter().rev() {
-            if self.percent(50) {
-                bit += stride * self.below((high - low + 1) as usize) as u64;
-            } else {
-                self.within += 1;
-                let value = self.index(low, high);
-                self.within -= 1;
-                place.indices.insert(
-                    0,
-                    Index {
-                        value,
-                        low,
-                        high,
-                        stride,
-                    },
-                );
-            }
-            stride *= high.abs_diff(low) + 1;
-        }
-        place.offset += (bit / 64) as u32;
-        place.bit = (bit % 64) as u32;
-        place.is_packed = array.element.elementary().is_some();
-        place.of = array.element.clone();
-    }
-
-    /// An index, mostly within the bounds.
-    fn index(&mut self, low: i64, high: i64) -> Expression {
-        let lint = Elementary::Lint;
-        let length = (high - low + 1) as u64;
-        let choice = if self.within > 2 { 99 } else { self.below(100) };
-        match choice {
-            0..=1 => self.number(lint, 1),
-            2..=15 => {
-                let of =
-                    *self
-                        .to
-                        .random
-                        .pick(&[Elementary::Int, Elementary::Usint, Elementary::Dint]);
-                let rest = Expression {
-                    of: Type::Elementary(of),
-                    kind: ExpressionKind::Apply(
-                        Operation::Modulo(of),
-                        vec![self.number(of, 1), constant(of, length)],
-                    ),
-                };
-                // Negative where the dividend is, which the bounds may not have.
-                Expression {
-                    of: Type::Elementary(lint),
-                    kind: ExpressionKind::Apply(Operation::Convert(of, lint), vec![rest]),
-                }
-            }
-            16..=50 => {
-                let value = self.number(Elementary::Usint, 2);
-                let wide = |kind| Expression {
-                    of: Type::Elementary(lint),
-                    kind,
-                };
-                let convert = Operation::Convert(Elementary::Usint, lint);
-                let value = wide(ExpressionKind::Apply(convert, vec![value]));
-                let length = constant(lint, length);
-                let rest = wide(ExpressionKind::Apply(
-                    Operation::Modulo(lint),
-                    vec![value, length],
-                ));
-                let low = constant(lint, low as u64);
-                wide(ExpressionKind::Apply(Operation::Add(lint), vec![rest, low]))
-            }
-            _ => {
-                let at = low + self.below(length as usize) as i64;
-                constant(lint, at as u64)
-            }
-        }
-    }
-}
-
-/// Whether a value of the one can be stored as the other.
-fn is_like(one: &Type, other: &Type) -> bool {
-    match (one, other) {
-        (Type::Text(_), Type::Text(_)) => true,
-        _ => match (one.elementary(), other.elementary()) {
-            (Some(one), Some(other)) => one == other,
-            _ => one == other,
-        },
-    }
-}
-
-/// Roots of an instance, for tests that look at them.
-pub(crate) fn is_own(place: &Place) -> bool {
-    matches!(place.root, Root::Own(_))
 }

@@ -4,6 +4,7 @@
 
 mod code;
 mod operations;
+mod places;
 
 use std::sync::Arc;
 

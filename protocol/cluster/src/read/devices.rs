@@ -1,16 +1,17 @@
 //! Devices behind remote I/Os: their signals, bound to the inputs and outputs of the program.
 
-use std::collections::BTreeMap;
-use std::ops::Range;
+use std::collections::{BTreeMap, BTreeSet};
 
 use understudy_text::Diagnostic;
 use understudy_text::spelling::suggestion;
+use understudy_typed::{Elementary, Point, Points, Program as TypedProgram};
 
 use super::Member;
 use crate::cluster::RemoteIo;
-use crate::device::{FieldDevice, Point};
-use crate::fields::{MAXIMUM_MISFITS, Placed};
+use crate::device::{Binding, FieldDevice, Side};
+use crate::fields::{MAXIMUM_MISFITS, PlaceEntry, Placed};
 use crate::file::FieldSection;
+use crate::place::{BitPlace, Place, Registers};
 
 /// The device of a remote I/O; nothing where its section has errors.
 pub(super) fn device(
@@ -20,40 +21,46 @@ pub(super) fn device(
 ) -> Option<FieldDevice> {
     let (_, interface) = member.code.as_ref()?;
     let before = diagnostics.len();
-    let inputs: Vec<&str> = interface.inputs.names().collect();
-    let outputs: Vec<&str> = interface.outputs.names().collect();
-    let sensors = places(&section.inputs, &inputs, "input", member, diagnostics);
-    let actuators = places(&section.outputs, &outputs, "output", member, diagnostics);
-    let mut driven: BTreeMap<Point, &str> = BTreeMap::new();
-    for (name, place) in &section.outputs {
-        let Ok(point) = place.1.value.parse::<Point>() else {
-            continue;
-        };
-        if !point.is_writable() {
-            let message = format!("`{point}` can only be read, and `{name}` is an output");
-            diagnostics.push(
-                Diagnostic::error("U0222", message, place.1.span.clone())
-                    .with_help("an output goes to a coil or to a bit of a holding register"),
-            );
-        } else if let Some(first) = driven.insert(point, name) {
-            let message = format!("two outputs, `{first}` and `{name}`, go to `{point}`");
-            diagnostics.push(Diagnostic::error("U0222", message, place.1.span.clone()));
-        }
-    }
+    let inputs = side(
+        &section.inputs,
+        &interface.inputs,
+        "input",
+        member,
+        diagnostics,
+    );
+    let outputs = side(
+        &section.outputs,
+        &interface.outputs,
+        "output",
+        member,
+        diagnostics,
+    );
+    check_driven(&section.outputs, diagnostics);
     let mut warned = false;
-    for (names, places, side, code, effect) in [
-        (&inputs, &sensors, "input", "U0251", "it stays 0"),
-        (&outputs, &actuators, "output", "U0252", "it moves nothing"),
+    for (points, entries, side, code, effect) in [
+        (
+            &interface.inputs,
+            &section.inputs,
+            "input",
+            "U0251",
+            "it stays 0",
+        ),
+        (
+            &interface.outputs,
+            &section.outputs,
+            "output",
+            "U0252",
+            "it moves nothing",
+        ),
     ] {
-        let lacking: Vec<&str> = names
-            .iter()
-            .zip(places)
-            .filter(|(_, place)| place.is_none())
-            .map(|(name, _)| *name)
-            .collect();
+        // The points of a program fault are for the operator and need no wire.
+        let optional = [TypedProgram::RESET, TypedProgram::FAULT];
+        let lacking = points
+            .names()
+            .filter(|name| !entries.contains_key(*name) && !optional.contains(name));
         // Where names were misspelt, that was said.
         if diagnostics.len() == before || warned {
-            for name in lacking.into_iter().take(MAXIMUM_MISFITS) {
+            for name in lacking.take(MAXIMUM_MISFITS) {
                 let message = format!(
                     "the {side} `{name}` of `{}` has no place in the device: {effect}",
                     member.name
@@ -64,15 +71,60 @@ pub(super) fn device(
         }
     }
     let is_error = |found: &Diagnostic| found.severity == understudy_text::Severity::Error;
-    let address = section.address.as_ref()?.value;
+    let connection = section.connection.clone()?;
     (!diagnostics[before..].iter().any(is_error)).then_some(FieldDevice {
-        address,
+        connection,
         unit: section.unit,
         timeout: section.timeout,
         stale_after: section.stale_after,
-        inputs: sensors,
-        outputs: actuators,
+        inputs,
+        outputs,
     })
+}
+
+/// An output needs a place that can be written, and one of its own.
+fn check_driven(entries: &BTreeMap<String, PlaceEntry>, diagnostics: &mut Vec<Diagnostic>) {
+    // By table, address and bit; a number has all bits of its registers.
+    let mut driven: BTreeMap<(bool, u16, u8), (&str, String)> = BTreeMap::new();
+    for (name, entry) in entries {
+        let Some(place) = &entry.place else {
+            continue;
+        };
+        if !place.is_writable() {
+            let message = format!("`{place}` can only be read, and `{name}` is an output");
+            diagnostics.push(
+                Diagnostic::error("U0222", message, entry.span.clone())
+                    .with_help("an output goes to a coil, to a bit of a holding register or to whole holding registers"),
+            );
+            continue;
+        }
+        let bits: Vec<(bool, u16, u8)> = match place {
+            Place::Bit(BitPlace::Holding(register, bit)) => vec![(true, *register, *bit)],
+            Place::Bit(
+                BitPlace::Coil(address) | BitPlace::Discrete(address) | BitPlace::Input(address, _),
+            ) => vec![(false, *address, 0)],
+            Place::Number(registers) => {
+                let addresses = (0..registers.count()).map(|at| registers.address + at);
+                addresses
+                    .flat_map(|address| (0..16).map(move |bit| (true, address, bit)))
+                    .collect()
+            }
+        };
+        let taken = bits.iter().find_map(|bit| driven.get(bit));
+        if let Some((first, other)) = taken {
+            let message = if *other == place.to_string() {
+                format!("two outputs, `{first}` and `{name}`, go to `{place}`")
+            } else {
+                format!(
+                    "two outputs overlap: `{first}` goes to `{other}`, and `{name}` to `{place}`"
+                )
+            };
+            diagnostics.push(Diagnostic::error("U0222", message, entry.span.clone()));
+        } else {
+            let owner = (name.as_str(), place.to_string());
+            driven.extend(bits.into_iter().map(|bit| (bit, owner.clone())));
+        }
+    }
 }
 
 /// A plant is either equipment or simulated: two of them would both make u(i).
@@ -99,33 +151,133 @@ pub(super) fn check_simulated(
     }
 }
 
-/// The places of `names`, in their order.
-fn places(
-    entries: &BTreeMap<String, (Range<usize>, Placed<String>)>,
-    names: &[&str],
+/// The signals of one side that have a place, in order of declaration.
+fn side(
+    entries: &BTreeMap<String, PlaceEntry>,
+    points: &Points,
     side: &str,
     member: &Member,
     diagnostics: &mut Vec<Diagnostic>,
-) -> Vec<Option<Point>> {
-    let mut found = vec![None; names.len()];
-    for (name, (span, place)) in entries.iter().take(MAXIMUM_MISFITS * 10) {
-        let point = place.value.parse::<Point>();
-        if let Err(error) = &point {
+) -> Side {
+    let known: BTreeSet<&str> = points.names().collect();
+    for (name, entry) in entries.iter().take(MAXIMUM_MISFITS * 10) {
+        if !known.contains(name.as_str()) {
+            let message = format!("`{}` has no {side} `{name}`", member.name);
             diagnostics.push(
-                Diagnostic::error("U0222", error.to_string(), place.span.clone())
-                    .with_help(format!("write {}", Point::EXAMPLES)),
+                Diagnostic::error("U0209", message, entry.name.clone())
+                    .with_help(suggestion(name, points.names())),
             );
         }
-        match names.iter().position(|known| known == name) {
-            Some(index) => found[index] = point.ok(),
-            None => {
-                let message = format!("`{}` has no {side} `{name}`", member.name);
-                diagnostics.push(
-                    Diagnostic::error("U0209", message, span.clone())
-                        .with_help(suggestion(name, names.iter().copied())),
-                );
-            }
-        }
     }
-    found
+    let mut bindings = Vec::new();
+    for point in points {
+        let Some(PlaceEntry {
+            place: Some(place),
+            span,
+            ..
+        }) = entries.get(&point.name)
+        else {
+            continue;
+        };
+        if let Err((message, help)) = fit(point, place, side == "input") {
+            diagnostics.push(Diagnostic::error("U0222", message, span.clone()).with_help(help));
+        }
+        bindings.push(Binding {
+            name: point.name.clone(),
+            of: point.of,
+            bit: point.bit as usize,
+            place: *place,
+        });
+    }
+    Side {
+        width: points.width(),
+        bindings,
+    }
+}
+
+/// Whether values of a signal and of its place convert into each other.
+///
+/// # Errors
+/// Message and help.
+fn fit(point: &Point, place: &Place, is_input: bool) -> Result<(), (String, String)> {
+    let Point { name, of, .. } = point;
+    let misfit = |help: String| {
+        Err((
+            format!("`{name}` is {of}, and its place is `{place}`"),
+            help,
+        ))
+    };
+    let registers = match place {
+        Place::Bit(_) if *of == Elementary::Bool => return Ok(()),
+        Place::Bit(_) => {
+            let table = if is_input { "input" } else { "holding" };
+            let word = natural(*of).name().to_ascii_lowercase();
+            return misfit(format!(
+                "a number needs whole registers: write their first address and their type, such as \"{table}:10 {word}\""
+            ));
+        }
+        Place::Number(registers) => registers,
+    };
+    let Registers { table, address, .. } = registers;
+    if *of == Elementary::Bool {
+        return misfit(format!(
+            "a BOOL is one bit: write for example \"{table}:{address}.0\""
+        ));
+    }
+    if of.is_time() {
+        return misfit("registers have no times: declare a DINT, such as milliseconds, and convert it in the program".into());
+    }
+    if of.is_real() {
+        return Ok(());
+    }
+    let word = natural(*of).name().to_ascii_lowercase();
+    if registers.of.is_real() {
+        return misfit(format!(
+            "declare `{name} : {}`, or write \"{table}:{address} {word}\" where the device has whole numbers",
+            registers.of
+        ));
+    }
+    if registers.is_scaled() {
+        return match of.is_bit_string() {
+            true => misfit(format!(
+                "{of} is a bit string: leave `scale` and `offset` out"
+            )),
+            false => Ok(()),
+        };
+    }
+    let (source, target) = match is_input {
+        true => (registers.of, *of),
+        false => (*of, registers.of),
+    };
+    if registers.of == natural(*of) || contains(target, source) {
+        return Ok(());
+    }
+    misfit(format!(
+        "{target} does not have all values of {source}: write \"{table}:{address} {word}\", or declare `{name} : {}`",
+        registers.of
+    ))
+}
+
+/// The type of registers that suits a signal best; Modbus has no registers of 8 bits.
+fn natural(of: Elementary) -> Elementary {
+    match of {
+        Elementary::Sint | Elementary::Int => Elementary::Int,
+        Elementary::Byte | Elementary::Usint | Elementary::Word | Elementary::Uint => {
+            Elementary::Uint
+        }
+        Elementary::Dword | Elementary::Udint => Elementary::Udint,
+        Elementary::Lword | Elementary::Ulint => Elementary::Ulint,
+        Elementary::Bool | Elementary::Dint => Elementary::Dint,
+        other if other.is_time() => Elementary::Lint,
+        other => other,
+    }
+}
+
+/// Whether each number of the second type is one of the first.
+fn contains(wide: Elementary, narrow: Elementary) -> bool {
+    match (wide.is_signed(), narrow.is_signed()) {
+        (true, false) => wide.bits() > narrow.bits(),
+        (false, true) => false,
+        _ => wide.bits() >= narrow.bits(),
+    }
 }

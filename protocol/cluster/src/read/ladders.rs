@@ -76,7 +76,7 @@ impl<'a> Ladders<'a> {
         let mut program = program.clone();
         program.name = name.into();
         match program.lower(period) {
-            Ok(circuit) => Some(Code::Ladder(program, circuit)),
+            Ok(circuit) => Some(Code::Ladder(Box::new(program), circuit)),
             Err(error) => {
                 let message = format!("`{}`: {error}", file.value);
                 diagnostics.push(Diagnostic::error("U0212", message, file.span.clone()));
@@ -94,7 +94,7 @@ impl<'a> Ladders<'a> {
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Option<(Program, Circuit)> {
         match self.code(file, name, period, diagnostics)? {
-            Code::Ladder(program, circuit) => Some((program, circuit)),
+            Code::Ladder(program, circuit) => Some((*program, circuit)),
             Code::Typed(..) => {
                 let message = format!("`{}` has numbers, and a ladder is wanted", file.value);
                 diagnostics.push(Diagnostic::error("U0212", message, file.span.clone()));

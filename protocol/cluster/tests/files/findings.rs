@@ -357,6 +357,57 @@ model = "press"
     )));
 }
 
+/// A program with numbers behind a device.
+const LEVEL: &str = "PROGRAM p
+VAR_INPUT level : REAL; count : INT; run : BOOL; since : TIME; mask : WORD; END_VAR
+VAR_OUTPUT flow : REAL; step : UINT; open : BOOL; END_VAR
+flow := level; step := 1; open := run;
+END_PROGRAM
+";
+
+fn field(text: &str) -> String {
+    let cluster = format!(
+        "[cluster]\nname = \"cell\"\n[[controller]]\nname = \"tank\"\nladder = \"level.st\"\n\
+         [[remote_io]]\ncontroller = \"tank\"\n[remote_io.field]\n{text}"
+    );
+    findings(&load(&cluster, &[("level.st", LEVEL)]).reports)
+}
+
+#[test]
+fn numbers_and_their_registers() {
+    // The inputs and outputs of a program fault need no place.
+    let whole = field(
+        r#"modbus = "rtu:/dev/ttyUSB0"
+parity = "none"
+stop_bits = 2
+inputs = { level = "input:0 real cdab", count = { at = "input:2", as = "uint", scale = 0.5 }, run = "holding:10.0", mask = "input:3 uint" }
+[remote_io.field.outputs]
+flow = { at = "holding:4", as = "int", scale = 0.01, offset = -20.0, order = "badc" }
+step = "holding:5 udint"
+open = "coil:0"
+"#,
+    );
+    insta::assert_snapshot!(whole);
+    // Each signal at a place that does not suit it.
+    insta::assert_snapshot!(field(
+        r#"modbus = "127.0.0.1:502"
+inputs = { level = "input:0", count = "input:2 uint", run = "input:3 int", since = "input:4 dint", mask = { at = "input:8", as = "uint", offset = 1 } }
+outputs = { flow = "coil:1", step = "holding:5 real", open = "holding:6.3" }
+"#
+    ));
+    insta::assert_snapshot!(field(
+        r#"modbus = "127.0.0.1:502"
+baud = 9600
+inputs = { level = "input:65535 real", count = { at = "input:2.0", as = "it", scale = 0, ofset = 1 } }
+outputs = { flow = "holding:5 real", step = "holding:6 uint", open = "holding:5.0" }
+"#
+    ));
+    insta::assert_snapshot!(field("modbus = \"rtu:ttyUSB0\"\nbaud = 300\n"));
+    insta::assert_snapshot!(field(
+        "modbus = \"rtu:/dev/ttyUSB0\"\nbaud = 14400\nunit = 0\n"
+    ));
+}
+
 /// Each would be called, and nothing answers there.
 #[test]
 fn addresses_at_which_nothing_can_be_reached() {

@@ -126,7 +126,7 @@ impl Converter<'_> {
         if again {
             let coils = bits.distinct.iter().map(|(bit, _)| reset(bit)).collect();
             self.push(
-                &format!("{event} may occur after another event"),
+                &format!("{event} can occur after another event"),
                 Vec::new(),
                 coils,
             );
@@ -136,7 +136,7 @@ impl Converter<'_> {
         let again = if again { " after another event" } else { "" };
         self.push(&format!("{event} occurs{again}"), network, coils);
         if let Some((last, signal)) = last {
-            let title = format!("{signal} is remembered");
+            let title = format!("{signal}: value for the next scan");
             self.push(&title, vec![open(&signal)], vec![write(&last)]);
         }
     }
@@ -195,7 +195,7 @@ impl Converter<'_> {
         coils.extend(unlatch.iter().map(reset));
         coils.extend(latch.iter().map(set));
         coils.extend(self.commanded.iter().map(set));
-        self.push(&format!("{event} is generated"), network, coils);
+        self.push(&format!("{event}: command"), network, coils);
         self.transitions(label, &bits, false);
     }
 }

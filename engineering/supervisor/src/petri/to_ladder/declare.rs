@@ -17,12 +17,13 @@ impl<'a> Maker<'a> {
             name: Names::default().fresh(&[net.name()]),
             comments: vec![
                 format!(
-                    "Generated from the net {} ({} places, {} transitions) by token passing logic.",
+                    "Generated from the Petri net {} ({} places, {} transitions) by token passing logic.",
                     net.name(),
                     net.places().len(),
                     net.transitions().len()
                 ),
-                "Below each transition stand the supervisors' rungs for its event.".into(),
+                "The rungs of the supervisors for an event follow the transition of this event."
+                    .into(),
             ],
             ..Program::default()
         };

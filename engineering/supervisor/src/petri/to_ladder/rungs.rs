@@ -25,11 +25,7 @@ impl Maker<'_> {
         }
         if !self.left.is_empty() {
             let coils = self.left.iter().map(reset).collect();
-            self.push(
-                "events that moved no supervisor are gone",
-                Vec::new(),
-                coils,
-            );
+            self.push("reset events that moved no supervisor", Vec::new(), coils);
         }
         for (tokens, place) in self.tokens.iter().zip(self.net.places()) {
             self.program.rungs.extend(tokens.count(&place.name));
@@ -40,7 +36,7 @@ impl Maker<'_> {
         });
         let firsts: Vec<Coil> = firsts.map(|first| reset(&first)).collect();
         if !firsts.is_empty() {
-            self.push("the counters are loaded", Vec::new(), firsts);
+            self.push("load the counters", Vec::new(), firsts);
         }
         self.levels();
         let places = self.tokens.iter().map(|tokens| match tokens {
@@ -103,7 +99,7 @@ impl Maker<'_> {
             {
                 let moved = any([comes, goes]).into_iter().collect();
                 self.push(
-                    format!("{} has counted", place.name),
+                    format!("{}: counter updated", place.name),
                     moved,
                     vec![write(busy)],
                 );
@@ -111,7 +107,7 @@ impl Maker<'_> {
             }
         }
         if !coils.is_empty() {
-            self.push("a scan begins", Vec::new(), coils);
+            self.push("start of the scan", Vec::new(), coils);
         }
     }
 
@@ -128,7 +124,7 @@ impl Maker<'_> {
                 let last = self.memory(&[&signal, "last"], false);
                 let network = vec![open(&last), closed(&signal)];
                 self.push(format!("{signal} falls"), network, vec![write(&bit)]);
-                let title = format!("{signal} is remembered");
+                let title = format!("{signal}: value for the next scan");
                 self.push(title, vec![open(&signal)], vec![write(&last)]);
             }
         }

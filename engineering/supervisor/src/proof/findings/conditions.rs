@@ -59,43 +59,32 @@ impl ClosedLoop {
         findings.collect()
     }
 
-    /// The longest run of commands alone, and of events alone; `None` where there is no longest.
-    pub(super) fn longest(&self, controllable: bool) -> Result<usize, Vec<State>> {
-        let count = self.automaton.state_count();
-        let mut arriving = vec![0_usize; count];
-        for state in self.automaton.states() {
-            for (_, target) in self.edges(state, controllable) {
-                arriving[target.index()] += 1;
-            }
+    /// States in which a command is enabled after any number of commands, or that such states lead to by commands: what is left when
+    /// states without a command that leads to them are removed one after the other.
+    fn endless_commands(&self) -> Vec<State> {
+        let mut arriving = vec![0_usize; self.automaton.state_count()];
+        let targets = |state| self.edges(state, true).map(|(_, target)| target.index());
+        for target in self.automaton.states().flat_map(targets) {
+            arriving[target] += 1;
         }
-        let mut pending: Vec<State> = self
-            .automaton
-            .states()
+        let states = self.automaton.states();
+        let mut pending: Vec<State> = states
             .filter(|state| arriving[state.index()] == 0)
             .collect();
-        let mut length = vec![0_usize; count];
-        let mut ordered = 0;
         while let Some(state) = pending.pop() {
-            ordered += 1;
-            let longer = length[state.index()] + 1;
-            for (_, target) in self.edges(state, controllable) {
-                let longest = &mut length[target.index()];
-                *longest = (*longest).max(longer);
+            for (_, target) in self.edges(state, true) {
                 arriving[target.index()] -= 1;
                 if arriving[target.index()] == 0 {
                     pending.push(target);
                 }
             }
         }
-        if ordered == count {
-            return Ok(length.into_iter().max().unwrap_or(0));
-        }
         let states = self.automaton.states();
-        Err(states.filter(|state| arriving[state.index()] > 0).collect())
+        states.filter(|state| arriving[state.index()] > 0).collect()
     }
 
     pub(super) fn response(&self) -> Option<Finding> {
-        let states = self.longest(true).err()?;
+        let states = self.endless_commands();
         let first = *states.first()?;
         let events: Vec<Label> = self.edges(first, true).map(|(label, _)| label).collect();
         let message = format!(

@@ -3,16 +3,9 @@ use std::io::Write;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use understudy_journal::{Happening, RunEvent, Segments, WrongVersion, journal_header};
+use understudy_testing::Folder;
 
 use super::*;
-
-fn folder(name: &str) -> PathBuf {
-    let folder = std::env::temp_dir().join(format!("understudy-{name}-{}", std::process::id()));
-    // It is there only where a run before was killed.
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).expect("a folder");
-    folder
-}
 
 fn line(number: u64) -> Vec<u8> {
     let record = Record::of_run(number, RunEvent::Interrupted);
@@ -40,7 +33,7 @@ fn taken(follower: &mut Follower) -> Vec<Option<u64>> {
 /// Whatever is written between two looks, and however often segments are closed meanwhile, each record comes once and in order.
 #[test]
 fn a_journal_is_followed_through_its_segments() {
-    let folder = folder("follow");
+    let folder = Folder::new("follow");
     let path = folder.join("journal.jsonl");
     let mut follower = Follower::new(&path);
     assert_eq!(taken(&mut follower), []);
@@ -70,13 +63,12 @@ fn a_journal_is_followed_through_its_segments() {
     assert_eq!(seen.len(), expected.len());
     assert_eq!(seen, expected);
     assert!(closed_segments(&path).expect("readable").len() > 3);
-    fs::remove_dir_all(folder).expect("it goes");
 }
 
 /// Who comes too late is told that something is gone, once, and goes on with what is left.
 #[test]
 fn what_is_gone_is_said() {
-    let folder = folder("follow-late");
+    let folder = Folder::new("follow-late");
     let path = folder.join("journal.jsonl");
     let mut segments = Segments::create(&path, 0).expect("created");
     let write = |segments: &mut Segments, numbers: std::ops::Range<u64>| {
@@ -107,12 +99,11 @@ fn what_is_gone_is_said() {
         assert!(unbroken > 200, "{unbroken} of {first}");
         assert!(numbers.is_sorted());
     }
-    fs::remove_dir_all(folder).expect("it goes");
 }
 
 #[test]
 fn what_is_no_record_is_left_out() {
-    let folder = folder("follow-bad");
+    let folder = Folder::new("follow-bad");
     let path = folder.join("journal.jsonl");
     let mut bytes = [journal_header(), line(0)].concat();
     bytes.extend(b"{\"at_ns\":1}\n\n\xff\xfe\n");
@@ -123,19 +114,17 @@ fn what_is_no_record_is_left_out() {
     fs::write(&path, bytes).expect("written");
     let mut follower = Follower::new(&path);
     assert_eq!(taken(&mut follower), [Some(0), None, None, None, Some(1)]);
-    fs::remove_dir_all(folder).expect("it goes");
 }
 
 #[test]
 fn a_journal_of_another_version_is_refused_once() {
-    let folder = folder("follow-version");
+    let folder = Folder::new("follow-version");
     let path = folder.join("journal.jsonl");
     fs::write(&path, [line(0), line(1), line(2)].concat()).expect("written");
     let mut found = Vec::new();
     Follower::new(&path).poll(&mut |record| found.push(record));
     let wrong = WrongVersion { found: 1 };
     assert_eq!(found, [Err(Trouble::Version(wrong))]);
-    fs::remove_dir_all(folder).expect("it goes");
 }
 
 /// However a journal is cut and however often it is read, who is at the end has every record that was written before the poll, and who
@@ -144,7 +133,7 @@ fn a_journal_of_another_version_is_refused_once() {
 fn only_the_end_is_taken_for_the_end() {
     for seed in 0..40 {
         let mut random = Pcg64Mcg::seed_from_u64(seed);
-        let folder = folder(&format!("follow-end-{seed}"));
+        let folder = Folder::new(&format!("follow-end-{seed}"));
         let path = folder.join("journal.jsonl");
         let mut follower = Follower::new(&path);
         follower.piece = vec![0; random.random_range(1..2000)];
@@ -181,6 +170,5 @@ fn only_the_end_is_taken_for_the_end() {
             assert!(follower.progress().is_at_end(), "seed {seed}");
             assert_eq!(seen, written, "seed {seed}");
         }
-        fs::remove_dir_all(folder).expect("it goes");
     }
 }

@@ -22,9 +22,19 @@ const ELEMENTARY: [&str; 18] = [
 
 /// Reads a project as far as it can be understood, and says what cannot.
 pub(crate) fn read(root: Node<'_, '_>) -> (Project, Vec<Diagnostic>) {
+    read_parts(root, true)
+}
+
+/// The units of a project with their bodies alone.
+pub(crate) fn read_bodies(root: Node<'_, '_>) -> (Project, Vec<Diagnostic>) {
+    read_parts(root, false)
+}
+
+fn read_parts(root: Node<'_, '_>, has_variables: bool) -> (Project, Vec<Diagnostic>) {
     let mut reader = Reader {
         project: Project::default(),
         diagnostics: Vec::new(),
+        has_variables,
     };
     for part in elements(root) {
         match part.tag_name().name() {
@@ -46,7 +56,7 @@ pub(crate) fn read(root: Node<'_, '_>) -> (Project, Vec<Diagnostic>) {
                 reader.project.lacks_instances = true;
                 reader.pous(part);
             }
-            "instances" => reader.instances(part),
+            "instances" if has_variables => reader.instances(part),
             "addData" => reader.ignore("additional data of a tool", part),
             _ => {}
         }
@@ -58,6 +68,8 @@ pub(crate) fn read(root: Node<'_, '_>) -> (Project, Vec<Diagnostic>) {
 pub(super) struct Reader {
     pub(super) project: Project,
     pub(super) diagnostics: Vec<Diagnostic>,
+    /// Whether variables, with their types and initial values, are read.
+    has_variables: bool,
 }
 
 impl Reader {
@@ -134,7 +146,7 @@ impl Reader {
         };
         for part in elements(pou) {
             match part.tag_name().name() {
-                "interface" => self.interface(part, &mut unit),
+                "interface" if self.has_variables => self.interface(part, &mut unit),
                 "actions" => unit.actions = self.parts(part, "action"),
                 "transitions" => unit.transitions = self.parts(part, "transition"),
                 "body" if unit.body.is_some() => {

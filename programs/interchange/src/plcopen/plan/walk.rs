@@ -7,8 +7,10 @@ use std::collections::{HashMap, HashSet};
 use understudy_ladder::Name;
 use understudy_text::Diagnostic;
 
-use super::Plan;
+use super::{Plan, Rules};
 use super::links::{Links, Source};
+use finish::read;
+
 use crate::plcopen::document::{Condition, Graph, Kind, Language, Object};
 use crate::plcopen::power::Power;
 use crate::plcopen::standard::StandardBlock;
@@ -28,6 +30,8 @@ pub(super) struct Trace {
     pub(super) first: Vec<usize>,
     /// By object: its own step, where it has one.
     pub(super) step: Vec<Option<usize>>,
+    /// Objects that feed themselves, which are what they were in the last scan.
+    pub(super) fed_back: HashSet<usize>,
 }
 
 pub(super) struct Walk<'a> {
@@ -35,6 +39,7 @@ pub(super) struct Walk<'a> {
     links: &'a Links,
     /// Objects whose power is kept.
     keep: &'a HashSet<usize>,
+    rules: Rules,
     states: Vec<State>,
     /// What each object lets through; for a block, of which there are several outputs, unused.
     powers: Vec<Option<Power>>,
@@ -47,11 +52,17 @@ pub(super) struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
-    pub(super) fn new(graph: &'a Graph, links: &'a Links, keep: &'a HashSet<usize>) -> Self {
+    pub(super) fn new(
+        graph: &'a Graph,
+        links: &'a Links,
+        keep: &'a HashSet<usize>,
+        rules: Rules,
+    ) -> Self {
         Self {
             graph,
             links,
             keep,
+            rules,
             states: vec![State::New; graph.objects.len()],
             powers: vec![None; graph.objects.len()],
             guards: HashMap::new(),
@@ -60,6 +71,7 @@ impl<'a> Walk<'a> {
                 finished: Vec::new(),
                 first: vec![0; graph.objects.len()],
                 step: vec![None; graph.objects.len()],
+                fed_back: HashSet::new(),
             },
             last_coils: None,
         }
@@ -158,7 +170,10 @@ impl<'a> Walk<'a> {
             | Kind::Label(_)
             | Kind::Return => true,
             Kind::InOutVariable(..) => !self.graph.objects[place].inputs.is_empty(),
-            Kind::Block(_) => self.links.is_block[place],
+            Kind::Block(_) => {
+                let has_turn = self.rules == Rules::Numbers && self.graph.objects[place].order != 0;
+                self.links.is_block[place] || has_turn
+            }
             Kind::Transition(transition) => matches!(transition.condition, Condition::Wired),
             _ => false,
         }
@@ -191,6 +206,7 @@ impl<'a> Walk<'a> {
                     let span = self.graph.objects[next].span.clone();
                     self.plan.notes.push((message.to_owned(), span));
                 }
+                State::Open if self.rules == Rules::Numbers => self.feed_back(next),
                 State::Open => {
                     let ring: Vec<usize> = open.iter().map(|(place, _)| *place).collect();
                     diagnostics.push(self.cycle(next, place, &ring));
@@ -198,6 +214,19 @@ impl<'a> Walk<'a> {
                 }
             }
         }
+    }
+
+    /// What is asked of an object while what feeds it is still looked for.
+    fn feed_back(&mut self, place: usize) {
+        let last = match &self.graph.objects[place].kind {
+            // The variable itself is what it was.
+            Kind::InOutVariable(variable, _, from) => read(variable, *from, place),
+            _ => {
+                self.trace.fed_back.insert(place);
+                Power::Kept(place)
+            }
+        };
+        self.powers[place].get_or_insert(last);
     }
 
     fn enter(&mut self, place: usize) -> (usize, Vec<usize>) {
@@ -273,7 +302,7 @@ impl<'a> Walk<'a> {
         {
             self.enable(place).unwrap_or(Power::Constant(true))
         } else if self.links.is_block[place] {
-            let instance = instance(object);
+            let instance = self.instance(object);
             let standard = StandardBlock::of(&block.type_name);
             let pin = match (standard, pin) {
                 (Some(standard), Some(pin)) => {
@@ -288,6 +317,22 @@ impl<'a> Walk<'a> {
             self.powers[place].clone().unwrap_or(Power::Constant(false))
         };
         if modifier.negated { power.not() } else { power }
+    }
+
+    /// The instance of a block, or a name for it where the file gives none.
+    fn instance(&self, object: &Object) -> Name {
+        // With a dot it is no name that a person can write.
+        let joint = match self.rules {
+            Rules::Bits => '_',
+            Rules::Numbers => '.',
+        };
+        match &object.kind {
+            Kind::Block(block) => block.instance.clone().unwrap_or_else(|| {
+                let name = format!("{}{joint}{}", block.type_name, object.id);
+                Name::at(name, object.span.clone())
+            }),
+            _ => Name::default(),
+        }
     }
 
     /// The power at EN, where it is connected.
@@ -307,15 +352,3 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// The instance of a block, or a name for it where the file gives none.
-fn instance(object: &Object) -> Name {
-    match &object.kind {
-        Kind::Block(block) => block.instance.clone().unwrap_or_else(|| {
-            Name::at(
-                format!("{}_{}", block.type_name, object.id),
-                object.span.clone(),
-            )
-        }),
-        _ => Name::default(),
-    }
-}

@@ -8,17 +8,17 @@ use crate::plcopen::document::{Graph, Kind, Object, Pin};
 
 /// A chart.
 #[derive(Debug, Default)]
-pub(super) struct Structure {
-    pub(super) steps: Vec<usize>,
-    pub(super) transitions: Vec<usize>,
+pub(in crate::plcopen) struct Structure {
+    pub(in crate::plcopen) steps: Vec<usize>,
+    pub(in crate::plcopen) transitions: Vec<usize>,
     /// Objects with actions.
-    pub(super) actions: Vec<usize>,
+    pub(in crate::plcopen) actions: Vec<usize>,
     /// The steps that a transition leaves.
-    pub(super) from: HashMap<usize, Vec<usize>>,
+    pub(in crate::plcopen) from: HashMap<usize, Vec<usize>>,
     /// The steps that it enters.
-    pub(super) to: HashMap<usize, Vec<usize>>,
+    pub(in crate::plcopen) to: HashMap<usize, Vec<usize>>,
     /// The step that has the actions.
-    pub(super) step_of: HashMap<usize, usize>,
+    pub(in crate::plcopen) step_of: HashMap<usize, usize>,
 }
 
 /// The variable that the network of a chart writes for a transition.
@@ -29,7 +29,7 @@ pub(in crate::plcopen) fn wired(object: &Object) -> String {
 /// How many objects are looked through on one way.
 const MAXIMUM_WAY: usize = 10_000;
 
-pub(super) fn structure(graph: &Graph, diagnostics: &mut Vec<Diagnostic>) -> Structure {
+pub(in crate::plcopen) fn structure(graph: &Graph, diagnostics: &mut Vec<Diagnostic>) -> Structure {
     let places: HashMap<u64, usize> = graph
         .objects
         .iter()

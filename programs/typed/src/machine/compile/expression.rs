@@ -39,19 +39,27 @@ impl Compiler<'_> {
     }
 
     /// The same for one of several operands: it keeps its value while those behind it are evaluated.
-    pub(super) fn operand_before(&mut self, expression: &Expression, later: &[Expression]) -> u32 {
+    pub(super) fn operand_before<'e>(
+        &mut self,
+        expression: &Expression,
+        later: impl IntoIterator<Item = &'e Expression>,
+    ) -> u32 {
         let operand = self.operand(expression);
-        if later.iter().any(calls) {
+        if later.into_iter().any(calls) {
             self.kept(operand)
         } else {
             operand
         }
     }
 
-    fn operands(&mut self, operands: &[Expression]) -> Vec<u32> {
+    /// Several operands, each of which keeps its value.
+    pub(super) fn operands(&mut self, operands: &[&Expression]) -> Vec<u32> {
         let indices = 0..operands.len();
         indices
-            .map(|index| self.operand_before(&operands[index], &operands[index + 1..]))
+            .map(|index| {
+                let later = operands[index + 1..].iter().copied();
+                self.operand_before(operands[index], later)
+            })
             .collect()
     }
 
@@ -71,7 +79,11 @@ impl Compiler<'_> {
                 self.apply_to_texts(*operation, operands, TextSource::Number(to));
             }
             ExpressionKind::Apply(operation, operands) => {
-                let operands = self.operands(operands);
+                if self.apply_two(*operation, operands, to).is_some() {
+                    return;
+                }
+                let operands: Vec<&Expression> = operands.iter().collect();
+                let operands = self.operands(&operands);
                 self.apply(*operation, &operands, to);
             }
             ExpressionKind::Choose(parts) => {

@@ -38,9 +38,9 @@ impl Compiler<'_> {
                     base: slot,
                     bit: place.bit,
                     low: index.low,
-                    high: index.high,
+                    span: index.high.abs_diff(index.low),
                     stride: index.stride,
-                    bits: of.bits(),
+                    mask: of.mask(),
                     extension,
                 });
                 if is_part {
@@ -121,9 +121,9 @@ impl Compiler<'_> {
                     base: 0,
                     bit: 0,
                     low: index.low,
-                    high: index.high,
+                    span: index.high.abs_diff(index.low),
                     stride: index.stride,
-                    bits: 64,
+                    mask: u64::MAX,
                     extension,
                 });
                 compiler.emit(Code::Index, address, value, table);

@@ -3,7 +3,7 @@
 use understudy_ladder::Name;
 use understudy_text::Diagnostic;
 
-use super::{Walk, instance};
+use super::Walk;
 use crate::plcopen::document::{CONDITION, Kind, Modifier, Object, Pin};
 use crate::plcopen::plan::links::Source;
 use crate::plcopen::plan::{Action, Call, Input, Step};
@@ -208,7 +208,7 @@ impl Walk<'_> {
         };
         let call = Call {
             type_name: block.type_name.clone(),
-            instance: instance(object),
+            instance: self.instance(object),
             is_named: block.instance.is_some(),
             inputs: self.inputs(place),
             enable: self.enable(place),
@@ -253,7 +253,7 @@ fn function(name: &Name, inputs: Vec<(Name, Power)>) -> Power {
     }
 }
 
-fn read(text: &Name, modifier: Modifier, object: usize) -> Power {
+pub(super) fn read(text: &Name, modifier: Modifier, object: usize) -> Power {
     let read = Power::Read(Read {
         text: text.clone(),
         edge: modifier.edge,

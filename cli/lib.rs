@@ -1,0 +1,62 @@
+//! The command line: parses, calls one function per command, prints. [`main`] is the `understudy` command; the other items are what the
+//! benchmarks run clusters with.
+
+#![allow(
+    clippy::disallowed_methods,
+    reason = "the command line names runs by the time"
+)]
+
+mod answer;
+mod commands;
+mod console;
+mod deployment;
+mod excerpt;
+mod files;
+mod inspect;
+mod kind;
+mod member;
+mod overrides;
+mod programs;
+mod reliability;
+mod run;
+mod supervisors;
+mod tools;
+
+use std::process::ExitCode;
+
+use clap::error::ErrorKind;
+
+pub use answer::{Answer, Failure, Status};
+pub use console::Console;
+pub use files::{ladder, write as write_file};
+pub use member::{Arguments as MemberArguments, run_plant, run_remote_io, run_station};
+pub use overrides::OverrideArguments;
+pub use run::demo::PressCell;
+pub use run::lab::{Judged, NetworkArguments, RunArguments};
+
+/// Runs the command of this process's arguments.
+pub fn main() -> ExitCode {
+    let call = match commands::parse() {
+        Ok(call) => call,
+        Err(error) => return misused(&error),
+    };
+    let mut console = Console::new(call.json);
+    let name = call.name;
+    let answer = call.run(&mut console);
+    console.finish(name, answer)
+}
+
+/// The answer to invalid arguments: a code like that of any other failure, and a document under `--json`. Help and the version are no
+/// failures.
+pub fn misused(error: &clap::Error) -> ExitCode {
+    let json = std::env::args_os().any(|argument| argument == "--json");
+    let is_help = error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand;
+    if !error.use_stderr() || (is_help && !json) {
+        error.exit();
+    }
+    let text = error.render().to_string();
+    let message = text.strip_prefix("error: ").unwrap_or(&text).trim_end();
+    let command = std::env::args().nth(1).unwrap_or_default();
+    let answer = Answer::failed(Status::BadInput, "U0600", message);
+    Console::new(json).finish(&command, answer)
+}

@@ -1,0 +1,91 @@
+//! The `understudy-bench` command: benchmarks of speed and endurance on this machine.
+
+#![allow(
+    clippy::disallowed_methods,
+    reason = "a benchmark measures the time of this machine"
+)]
+
+mod exchange;
+mod failover;
+mod join;
+mod kills;
+mod memory;
+mod scan;
+mod simulate;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use understudy::{
+    Answer, Console, MemberArguments, misused, run_plant, run_remote_io, run_station,
+};
+
+/// Measure speed and endurance on this machine
+#[derive(Debug, Parser)]
+#[command(
+    name = "understudy-bench",
+    version,
+    after_help = "\
+Example:
+  understudy-bench exchange --cycles 2000
+  understudy-bench kills --count 100
+  understudy-bench failover --figure failover.svg
+  understudy-bench scan examples/press-cell/robot.ladder
+  understudy-bench join --trials 50 --loss 10%
+
+Exit status: 0 if the targets are met, 1 if not, 2 for invalid input."
+)]
+struct CommandLine {
+    /// Print one JSON document on standard output (docs/reference/json.md)
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    benchmark: Benchmark,
+}
+
+#[derive(Debug, Subcommand)]
+enum Benchmark {
+    Exchange(exchange::Arguments),
+    Simulate(simulate::Arguments),
+    Kills(Box<kills::Arguments>),
+    Join(Box<join::Arguments>),
+    Failover(Box<failover::Arguments>),
+    Memory(memory::Arguments),
+    Scan(scan::Arguments),
+    #[command(hide = true)]
+    Member(exchange::MemberArguments),
+    #[command(hide = true)]
+    Node(MemberArguments),
+    #[command(hide = true)]
+    RemoteIo(MemberArguments),
+    #[command(hide = true)]
+    Plant(MemberArguments),
+}
+
+impl Benchmark {
+    fn run(&self, console: &mut Console) -> (&'static str, Answer) {
+        match self {
+            Self::Exchange(arguments) => ("exchange", exchange::run(arguments).into()),
+            Self::Simulate(arguments) => ("simulate", simulate::run(arguments).into()),
+            Self::Kills(arguments) => ("kills", kills::run(arguments, console).into()),
+            Self::Join(arguments) => ("join", join::run(arguments, console).into()),
+            Self::Failover(arguments) => ("failover", failover::run(arguments, console).into()),
+            Self::Memory(arguments) => ("memory", memory::run(arguments).into()),
+            Self::Scan(arguments) => ("scan", scan::run(arguments).into()),
+            Self::Member(arguments) => ("member", exchange::run_member(arguments)),
+            Self::Node(arguments) => ("node", run_station(arguments).into()),
+            Self::RemoteIo(arguments) => ("remote-io", run_remote_io(arguments).into()),
+            Self::Plant(arguments) => ("plant", run_plant(arguments).into()),
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    let call = match CommandLine::try_parse() {
+        Ok(call) => call,
+        Err(error) => return misused(&error),
+    };
+    let mut console = Console::new(call.json);
+    let (name, answer) = call.benchmark.run(&mut console);
+    console.finish(name, answer)
+}

@@ -1,0 +1,206 @@
+//! A document as syntax, for programs with numbers: variables, types and configuration as they are declared, bodies in
+//! all languages as statements, lists and charts.
+
+mod account;
+mod chart;
+mod configuration;
+mod interface;
+mod make;
+mod network;
+mod values;
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use roxmltree::Node;
+use understudy_ladder::Name as Written;
+use understudy_structured_text::parser::{parse_instructions_at, parse_statements_at};
+use understudy_structured_text::syntax::{Body, File, Unit, UnitKind};
+use understudy_text::Diagnostic;
+
+use super::document::{self, Body as Drawn, Language, Part, Pou, PouKind};
+use super::xml::{self, attribute, child, elements, start_tag};
+use super::{NAMESPACES, within};
+use network::Network;
+
+/// The namespace of the first edition, whose elements are the same as far as they are read.
+const FIRST_EDITION: &str = "http://www.plcopen.org/xml/tc6.xsd";
+
+/// What is being read.
+struct Typed {
+    file: File,
+    diagnostics: Vec<Diagnostic>,
+}
+
+/// Reads a document, with everything that is wrong with it. Places are those of the document.
+pub fn read_typed(text: &str) -> (File, Vec<Diagnostic>) {
+    let document = match xml::parse(text) {
+        Ok(document) => document,
+        Err(error) => return (File::default(), vec![error]),
+    };
+    let root = document.root_element();
+    let namespace = root.tag_name().namespace().unwrap_or_default();
+    let is_known = NAMESPACES.contains(&namespace) || namespace == FIRST_EDITION;
+    if root.tag_name().name() != "project" || !is_known {
+        let message = format!(
+            "not a PLCopen XML file: its root is `{}` in the namespace {namespace:?}",
+            root.tag_name().name()
+        );
+        let error = Diagnostic::error("U1001", message, xml::start_tag(root));
+        let help = format!("it should be `project` in the namespace {:?}", NAMESPACES[0]);
+        return (File::default(), vec![error.with_help(help)]);
+    }
+    let mut typed = Typed {
+        file: File::default(),
+        diagnostics: Vec::new(),
+    };
+    account::check(root, &mut typed.diagnostics);
+    typed.project(root);
+    let mut diagnostics = typed.diagnostics;
+    for found in &mut diagnostics {
+        within(text, &mut found.span);
+        for related in &mut found.related {
+            within(text, &mut related.span);
+        }
+    }
+    diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
+    diagnostics.dedup();
+    (typed.file, diagnostics)
+}
+
+impl Typed {
+    fn error(&mut self, code: &'static str, message: String, span: Range<usize>) {
+        self.diagnostics.push(Diagnostic::error(code, message, span));
+    }
+
+    fn error_with(&mut self, code: &'static str, message: String, span: Range<usize>, help: &str) {
+        let error = Diagnostic::error(code, message, span);
+        self.diagnostics.push(error.with_help(help));
+    }
+
+    /// An attribute that the reader cannot do without.
+    fn needed(&mut self, node: Node<'_, '_>, name: &str) -> Option<Written> {
+        let found = attribute(node, name).filter(|value| !value.is_empty());
+        if found.is_none() {
+            let message = format!("`{}` lacks its `{name}`", node.tag_name().name());
+            self.error("U1002", message, start_tag(node));
+        }
+        found
+    }
+
+    /// Whether a name is that of a function block or a function.
+    fn is_block(&self, name: &str) -> bool {
+        let found = values::unit(&self.file, name);
+        found.is_some_and(|unit| unit.kind != UnitKind::Program)
+    }
+
+    fn project(&mut self, root: Node<'_, '_>) {
+        let (project, found) = document::read_bodies(root);
+        self.diagnostics.extend(found);
+        for types in elements(root).filter(|part| part.tag_name().name() == "types") {
+            for list in elements(types).filter(|list| list.tag_name().name() == "dataTypes") {
+                self.data_types(list);
+            }
+        }
+        let mut nodes: HashMap<String, Node<'_, '_>> = HashMap::new();
+        for node in root.descendants().filter(|node| node.tag_name().name() == "pou") {
+            if let Some(name) = attribute(node, "name") {
+                nodes.entry(name.to_uppercase()).or_insert(node);
+            }
+        }
+        // All are known before any body is read.
+        for pou in &project.pous {
+            let node = nodes.get(&pou.name.to_uppercase()).copied();
+            self.unit(pou, node);
+        }
+        for instances in elements(root).filter(|part| part.tag_name().name() == "instances") {
+            self.instances(instances);
+        }
+        for (at, pou) in project.pous.iter().enumerate() {
+            self.body(at, pou, project.lacks_instances);
+        }
+    }
+
+    /// A unit without its body.
+    fn unit(&mut self, pou: &Pou, node: Option<Node<'_, '_>>) {
+        let interface = node.and_then(|node| child(node, "interface"));
+        let (declarations, result) = interface.map_or((Vec::new(), None), |node| self.interface(node));
+        let kind = match pou.kind {
+            PouKind::Program => UnitKind::Program,
+            PouKind::FunctionBlock => UnitKind::FunctionBlock,
+            PouKind::Function => UnitKind::Function,
+        };
+        let mut comments = node.map(interface::comments).unwrap_or_default();
+        if comments.is_empty() {
+            comments = interface.map(interface::comments).unwrap_or_default();
+        }
+        self.file.units.push(Unit {
+            kind,
+            name: make::name(&pou.name),
+            comments,
+            result: result.filter(|_| kind == UnitKind::Function),
+            declarations,
+            body: Body::default(),
+            methods: Vec::new(),
+            extends: None,
+            implements: Vec::new(),
+            span: pou.name.span(),
+        });
+    }
+
+    /// Fills the body of the unit at that place.
+    fn body(&mut self, at: usize, pou: &Pou, lacks_instances: bool) {
+        let mut found = Vec::new();
+        let mut methods = Vec::new();
+        let declarations = self.file.units[at].declarations.clone();
+        let mut network = Network::new(&self.file, &declarations, lacks_instances, &mut found);
+        let mut is_chart = false;
+        let body = match &pou.body {
+            Some(Drawn::Graph(graph)) if graph.language == Language::Sequence => {
+                is_chart = true;
+                let charted = chart::chart(pou, graph, &mut network);
+                methods = charted.methods;
+                Body::Chart(charted.chart)
+            }
+            Some(Drawn::Graph(graph)) => Body::Statements(network.statements(graph)),
+            Some(Drawn::StructuredText(text)) => {
+                let (statements, errors) =
+                    parse_statements_at(text.as_str(), &|span| text.place(span));
+                network.diagnostics.extend(errors);
+                Body::Statements(statements)
+            }
+            Some(Drawn::InstructionList(text)) => {
+                let (list, errors) =
+                    parse_instructions_at(text.as_str(), &|span| text.place(span));
+                network.diagnostics.extend(errors);
+                Body::Instructions(list)
+            }
+            None => {
+                let message = format!("`{}` has no body", pou.name);
+                let error = Diagnostic::error("U1010", message, pou.name.span());
+                network.diagnostics.push(error);
+                Body::default()
+            }
+        };
+        let made = std::mem::take(&mut network.made);
+        if !is_chart {
+            for part in pou.actions.iter().chain(&pou.transitions) {
+                found.push(foreign(part, pou));
+            }
+        }
+        let unit = &mut self.file.units[at];
+        unit.declarations.extend(made);
+        unit.body = body;
+        unit.methods = methods;
+        self.diagnostics.append(&mut found);
+    }
+}
+
+/// The finding on an action or transition of a unit without a chart.
+fn foreign(part: &Part, pou: &Pou) -> Diagnostic {
+    let message = format!(
+        "`{}` is an action or transition of `{}`, which is not a chart",
+        part.name, pou.name
+    );
+    Diagnostic::error("U1010", message, part.name.span())
+}

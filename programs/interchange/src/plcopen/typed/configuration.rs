@@ -1,0 +1,117 @@
+//! What runs: configurations, resources, tasks, instances of programs, global variables.
+
+use roxmltree::Node;
+use understudy_structured_text::parser::{Places, parse_expression_at};
+use understudy_structured_text::syntax::{
+    Class, ExpressionKind, Literal, ProgramInstance, Task,
+};
+
+use super::Typed;
+use super::make::name;
+use crate::plcopen::xml::{attribute, children, elements, start_tag};
+
+impl Typed {
+    pub(super) fn instances(&mut self, node: Node<'_, '_>) {
+        for list in elements(node) {
+            for configuration in children(list, "configuration") {
+                self.globals(configuration);
+                for resource in children(configuration, "resource") {
+                    self.globals(resource);
+                    self.runs(resource);
+                    for task in children(resource, "task") {
+                        self.task(task);
+                    }
+                }
+            }
+        }
+    }
+
+    fn globals(&mut self, node: Node<'_, '_>) {
+        for list in children(node, "globalVars") {
+            let mut globals = Vec::new();
+            self.variables(list, Class::Global, &mut globals);
+            self.file.globals.extend(globals);
+        }
+    }
+
+    fn task(&mut self, node: Node<'_, '_>) {
+        let Some(called) = self.needed(node, "name") else {
+            return;
+        };
+        let given = |name: &str| attribute(node, name).filter(|value| !value.is_empty());
+        let interval = given("interval").and_then(|interval| {
+            let found = nanoseconds(&interval);
+            if found.is_none() {
+                let message = format!("the interval `{interval}` of the task is not a time");
+                self.error_with(
+                    "U1011",
+                    message,
+                    interval.span(),
+                    "write it as a literal such as T#20ms",
+                );
+            }
+            found
+        });
+        let single = given("single").map(|single| {
+            let start = single.span().start;
+            let places: Places<'_> = &|span| start + span.start..start + span.end;
+            let (value, found) = parse_expression_at(&single, places);
+            self.diagnostics.extend(found);
+            value
+        });
+        let priority = given("priority").and_then(|priority| priority.parse().ok());
+        self.file.tasks.push(Task {
+            name: name(&called),
+            interval,
+            priority,
+            single,
+        });
+        let before = self.file.instances.len();
+        self.runs(node);
+        for instance in &mut self.file.instances[before..] {
+            instance.task = Some(name(&called));
+        }
+    }
+
+    /// The instances of programs in a task or a resource.
+    fn runs(&mut self, node: Node<'_, '_>) {
+        for instance in children(node, "pouInstance") {
+            let Some(of) = self.needed(instance, "typeName") else {
+                continue;
+            };
+            let called = attribute(instance, "name").unwrap_or_else(|| of.clone());
+            if self.is_block(&of) {
+                let message = format!("the task runs `{of}`, which is not a program");
+                self.error("U1013", message, start_tag(instance));
+                continue;
+            }
+            self.file.instances.push(ProgramInstance {
+                name: name(&called),
+                task: None,
+                of: name(&of),
+                connections: Vec::new(),
+            });
+        }
+    }
+}
+
+/// `T#20ms`, or as 2.01 has it, `PT0.02S`; also plain seconds.
+fn nanoseconds(text: &str) -> Option<i64> {
+    if let Some(seconds) = text.strip_prefix("PT").and_then(|rest| rest.strip_suffix('S')) {
+        return seconds_of(seconds);
+    }
+    let (value, found) = parse_expression_at(text, &|span| span);
+    match value.kind {
+        ExpressionKind::Literal(Literal::Time { nanoseconds, .. }) if found.is_empty() => {
+            Some(nanoseconds)
+        }
+        ExpressionKind::Literal(Literal::Real { .. } | Literal::Integer { .. }) => seconds_of(text),
+        _ => None,
+    }
+}
+
+fn seconds_of(text: &str) -> Option<i64> {
+    let seconds: f64 = text.parse().ok()?;
+    let nanoseconds = (seconds * 1e9).round();
+    (nanoseconds > 0.0 && nanoseconds < 1e18).then_some(nanoseconds as i64)
+}

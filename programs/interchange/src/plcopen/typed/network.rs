@@ -1,0 +1,401 @@
+//! A network as statements, in the order of its plan.
+
+mod steps;
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use understudy_ladder::Name as Written;
+use understudy_structured_text::parser::parse_expression_at;
+use understudy_structured_text::syntax::{
+    Argument, Class, Declaration, Expression, ExpressionKind, File, Label, Name, Operator, Path,
+    Statement, StatementKind, UnitKind,
+};
+use understudy_text::Diagnostic;
+use understudy_typed::Comparison;
+
+use super::make;
+use super::values::{Values, unit};
+use crate::plcopen::document::{Edge, Graph};
+use crate::plcopen::plan::{Action, Plan, plan_numbers};
+use crate::plcopen::power::{Power, Read};
+use crate::plcopen::standard::StandardBlock;
+
+/// What is written for one unit: its networks share their names.
+pub(super) struct Network<'a> {
+    pub(super) file: &'a File,
+    /// Of the unit.
+    pub(super) declarations: &'a [Declaration],
+    /// Which were made for it. A name with a dot is none that a person can write.
+    pub(super) made: Vec<Declaration>,
+    /// Written by a tool that declares no instances of blocks.
+    pub(super) lacks_instances: bool,
+    pub(super) diagnostics: &'a mut Vec<Diagnostic>,
+    /// What an object of the graph has kept.
+    kept: HashMap<usize, String>,
+    triggers: HashMap<usize, String>,
+    /// What is connected to the in-out variables of calls, and where results of functions are, by call and pin in capitals.
+    results: HashMap<(String, String), Expression>,
+    /// The outputs of functions: of which call, the pin or nothing for the result, and the variable.
+    outputs: Vec<(String, String, String)>,
+    /// What transitions of a chart are called here.
+    pub(super) renamed: HashMap<String, String>,
+    /// Instances that nobody named, as they are called here.
+    instances: HashMap<String, String>,
+    parts: Vec<Vec<Statement>>,
+}
+
+/// Which part of a network with jumps is next.
+const NEXT: &str = "next";
+
+impl<'a> Network<'a> {
+    pub(super) fn new(
+        file: &'a File,
+        declarations: &'a [Declaration],
+        lacks_instances: bool,
+        diagnostics: &'a mut Vec<Diagnostic>,
+    ) -> Self {
+        Self {
+            file,
+            declarations,
+            made: Vec::new(),
+            lacks_instances,
+            diagnostics,
+            kept: HashMap::new(),
+            triggers: HashMap::new(),
+            results: HashMap::new(),
+            outputs: Vec::new(),
+            renamed: HashMap::new(),
+            instances: HashMap::new(),
+            parts: Vec::new(),
+        }
+    }
+
+    /// The statements of a graph of LD or FBD.
+    pub(super) fn statements(&mut self, graph: &Graph) -> Vec<Statement> {
+        let file = self.file;
+        let is_call = |name: &str| is_call(file, name);
+        let plan = plan_numbers(graph, &is_call, self.diagnostics);
+        self.planned(&plan)
+    }
+
+    pub(super) fn planned(&mut self, plan: &Plan) -> Vec<Statement> {
+        self.kept.clear();
+        self.triggers.clear();
+        self.results.clear();
+        self.instances.clear();
+        self.outputs.clear();
+        self.parts = vec![Vec::new()];
+        let labels = self.labels(plan);
+        // What goes round is asked for before it is kept.
+        for step in &plan.steps {
+            if let Action::Call(call) = &step.action {
+                self.declared(call, &step.span);
+            }
+        }
+        for step in &plan.steps {
+            self.keep_early(step, plan);
+        }
+        for step in &plan.steps {
+            self.step(step, labels.as_ref());
+        }
+        let parts = std::mem::take(&mut self.parts);
+        self.joined(parts)
+    }
+
+    fn error(&mut self, code: &'static str, message: String, span: Range<usize>) {
+        self.diagnostics.push(Diagnostic::error(code, message, span));
+    }
+
+    fn push(&mut self, statement: Statement) {
+        if let Some(part) = self.parts.last_mut() {
+            part.push(statement);
+        }
+    }
+
+    /// A new variable of the unit.
+    pub(super) fn declare(
+        &mut self,
+        what: &str,
+        of: understudy_structured_text::syntax::TypeName,
+    ) -> String {
+        let name = format!("{what}.{}", self.made.len());
+        let span = of.span.clone();
+        self.made.push(make::declare(&name, Class::Local, of, &span));
+        name
+    }
+
+    /// The parts between labels: one, or a loop over a CASE of them.
+    fn joined(&mut self, mut parts: Vec<Vec<Statement>>) -> Vec<Statement> {
+        if parts.len() == 1 {
+            return parts.pop().unwrap_or_default();
+        }
+        let first = parts.iter().flatten().next();
+        let span = first.map_or(0..0, |first| first.span.clone());
+        let count = parts.len() as i128;
+        let next = self.next();
+        let cases = parts.into_iter().enumerate().map(|(at, mut body)| {
+            let at = at as i128;
+            let behind = make::integer(at + 1, &span);
+            body.insert(0, make::assign(make::path(&next, None, &span), behind, &span));
+            let first = make::integer(at, &span);
+            (vec![Label { first, last: None }], body)
+        });
+        let body = StatementKind::Case(make::variable(&next, &span), cases.collect(), Vec::new());
+        let begin = make::path(&next, None, &span);
+        let is_inside = make::chain(
+            vec![make::variable(&next, &span), make::integer(count, &span)],
+            Operator::Compare(Comparison::Less),
+            &span,
+        );
+        let body = vec![make::statement(body, &span)];
+        vec![
+            make::assign(begin, make::integer(0, &span), &span),
+            make::statement(StatementKind::While(is_inside, body), &span),
+        ]
+    }
+
+    fn next(&self) -> String {
+        // One for each network that has jumps.
+        let made = self.made.iter().rev();
+        let mut made = made.filter(|made| made.name.as_str().starts_with(NEXT));
+        made.next().map_or(NEXT.to_owned(), |made| made.name.as_str().to_owned())
+    }
+
+    /// An expression as it is written in an object.
+    pub(super) fn parsed(&mut self, written: &Written) -> Expression {
+        if let Some(renamed) = self.renamed.get(&written.to_uppercase()) {
+            return make::variable(renamed, &written.span());
+        }
+        let start = written.span().start;
+        let (value, found) =
+            parse_expression_at(written, &|span| start + span.start..start + span.end);
+        self.diagnostics.extend(found);
+        value
+    }
+
+    /// A variable that is written.
+    fn target(&mut self, written: &Written) -> Option<Path> {
+        match self.parsed(written).kind {
+            ExpressionKind::Variable(path) => Some(path),
+            ExpressionKind::Faulty => None,
+            _ => {
+                let message = format!("`{written}` is written, and is not a variable");
+                self.error("U1010", message, written.span());
+                None
+            }
+        }
+    }
+
+    /// The value of a power.
+    pub(super) fn value(&mut self, power: &Power, span: &Range<usize>) -> Expression {
+        match power {
+            Power::Constant(value) => make::boolean(*value, span),
+            Power::Read(read) => self.reading(read),
+            Power::Not(inner) => make::not(self.value(inner, span)),
+            Power::All(parts) => self.all(parts, Operator::And, span),
+            Power::Any(parts) => self.all(parts, Operator::Or, span),
+            Power::Output(instance, pin) => self.output(instance, pin),
+            Power::Kept(object) => match self.kept.get(object) {
+                Some(name) => make::variable(name, span),
+                None => make::boolean(false, span),
+            },
+            Power::Function(name, inputs) => {
+                let inputs = inputs
+                    .iter()
+                    .map(|(pin, power)| (pin.clone(), self.value(power, span)));
+                let inputs = inputs.collect();
+                self.function(name, inputs, span)
+            }
+        }
+    }
+
+    fn all(&mut self, parts: &[Power], operator: Operator, span: &Range<usize>) -> Expression {
+        let values = parts.iter().map(|part| self.value(part, span)).collect();
+        make::chain(values, operator, span)
+    }
+
+    fn reading(&mut self, read: &Read) -> Expression {
+        match read.edge {
+            None => self.parsed(&read.text),
+            Some(_) => {
+                let span = read.text.span();
+                let trigger = self.triggers.get(&read.object).cloned().unwrap_or_default();
+                make::read(make::path(&trigger, Some("Q"), &span))
+            }
+        }
+    }
+
+    fn output(&mut self, instance: &Written, pin: &Written) -> Expression {
+        let key = (instance.to_uppercase(), pin.to_uppercase());
+        if let Some(known) = self.results.get(&key) {
+            return known.clone();
+        }
+        // The result of a function may be called OUT, or as the function, or not at all.
+        if let Some(known) = self.results.get(&(key.0, String::new())) {
+            return known.clone();
+        }
+        let mut path = self.instance(instance);
+        path.steps
+            .push(understudy_structured_text::syntax::Step::Field(make::name(pin)));
+        make::read(path)
+    }
+
+    /// The instance of a block, which may be a part of a variable.
+    fn instance(&mut self, instance: &Written) -> Path {
+        let span = instance.span();
+        if let Some(made) = self.instances.get(instance.as_str()) {
+            return make::path(made, None, &span);
+        }
+        match self.parsed(instance).kind {
+            ExpressionKind::Variable(path) => path,
+            _ => make::path(instance, None, &span),
+        }
+    }
+
+    fn function(
+        &mut self,
+        name: &Written,
+        inputs: Vec<(Written, Expression)>,
+        span: &Range<usize>,
+    ) -> Expression {
+        let own = unit(self.file, name).is_some();
+        let operator = operator(name).filter(|_| !own && inputs.len() > 1);
+        if let Some(operator) = operator
+            && (inputs.len() == 2 || !matches!(operator, Operator::Compare(_)))
+        {
+            let values = inputs.into_iter().map(|(_, value)| value).collect();
+            return make::chain(values, operator, span);
+        }
+        if !own && inputs.len() == 1 && ["MOVE", "ADD", "MUL", "XOR"].iter().any(|word| name.eq_ignore_ascii_case(word)) {
+            return inputs.into_iter().next().map_or(make::boolean(false, span), |(_, value)| value);
+        }
+        make::call(make::name(name), arguments(inputs, own), span)
+    }
+
+    fn type_of(&self, value: &Expression) -> understudy_structured_text::syntax::TypeName {
+        let values = Values {
+            file: self.file,
+            declarations: self.declarations,
+            made: &self.made,
+        };
+        values.of(value)
+    }
+
+    fn certain_type_of(
+        &self,
+        value: &Expression,
+    ) -> Option<understudy_structured_text::syntax::TypeName> {
+        let values = Values {
+            file: self.file,
+            declarations: self.declarations,
+            made: &self.made,
+        };
+        values.strong(value)
+    }
+
+    /// The power behind the sign of a coil or pin; an edge is that of a trigger of its own.
+    fn changed(
+        &mut self,
+        value: Expression,
+        negated: bool,
+        edge: Option<Edge>,
+        span: &Range<usize>,
+    ) -> Expression {
+        let value = if negated { make::not(value) } else { value };
+        let Some(edge) = edge else {
+            return value;
+        };
+        let trigger = self.trigger(edge, span);
+        self.call_trigger(&trigger, value, span);
+        make::read(make::path(&trigger, Some("Q"), span))
+    }
+
+    fn trigger(&mut self, edge: Edge, span: &Range<usize>) -> String {
+        let of = match edge {
+            Edge::Rising => "R_TRIG",
+            Edge::Falling => "F_TRIG",
+        };
+        self.declare("edge", make::named(of, span))
+    }
+
+    fn call_trigger(&mut self, trigger: &str, value: Expression, span: &Range<usize>) {
+        let clock = Argument::Given(Name::new("CLK", span.clone()), value);
+        let kind = StatementKind::Call(make::path(trigger, None, span), vec![clock]);
+        self.push(make::statement(kind, span));
+    }
+
+    /// Calls the triggers of the edges that a power reads for the first time.
+    fn prepare(&mut self, power: &Power, span: &Range<usize>) {
+        let mut edges = Vec::new();
+        power.visit(&mut |part| {
+            if let Power::Read(read) = part
+                && let Some(edge) = read.edge
+            {
+                edges.push((read, edge));
+            }
+        });
+        for (read, edge) in edges {
+            if self.triggers.contains_key(&read.object) {
+                continue;
+            }
+            let trigger = self.trigger(edge, span);
+            let value = self.parsed(&read.text);
+            self.call_trigger(&trigger, value, span);
+            self.triggers.insert(read.object, trigger);
+        }
+    }
+
+    /// The power, once its edges are known.
+    fn prepared(&mut self, power: &Power, span: &Range<usize>) -> Expression {
+        self.prepare(power, span);
+        self.value(power, span)
+    }
+}
+
+/// Whether a block acts of itself: one that keeps something, or a function that does more than answer.
+pub(in crate::plcopen::typed) fn is_call(file: &File, name: &str) -> bool {
+    if let Some(found) = unit(file, name) {
+        let does_more = |found: &Declaration| {
+            matches!(found.class, Class::Output | Class::InOut | Class::External)
+        };
+        return found.kind != UnitKind::Function || found.declarations.iter().any(does_more);
+    }
+    StandardBlock::of(name).is_some()
+}
+
+/// What a function is given: by the place where the names say no more than that.
+fn arguments(inputs: Vec<(Written, Expression)>, own: bool) -> Vec<Argument> {
+    let by_place = inputs.iter().enumerate().all(|(at, (pin, _))| {
+        let key = pin.to_ascii_uppercase();
+        key.is_empty() || key == "IN" && at == 0 || key == format!("IN{}", at + 1)
+    });
+    let given = |(pin, value): (Written, Expression)| {
+        if by_place && !own || pin.is_empty() {
+            Argument::Placed(value)
+        } else {
+            Argument::Given(make::name(&pin), value)
+        }
+    };
+    inputs.into_iter().map(given).collect()
+}
+
+fn operator(name: &str) -> Option<Operator> {
+    Some(match name.to_ascii_uppercase().as_str() {
+        "AND" => Operator::And,
+        "OR" => Operator::Or,
+        "XOR" => Operator::Xor,
+        "ADD" => Operator::Add,
+        "SUB" => Operator::Subtract,
+        "MUL" => Operator::Multiply,
+        "DIV" => Operator::Divide,
+        "MOD" => Operator::Modulo,
+        "EQ" => Operator::Compare(Comparison::Equal),
+        "NE" => Operator::Compare(Comparison::NotEqual),
+        "LT" => Operator::Compare(Comparison::Less),
+        "LE" => Operator::Compare(Comparison::LessOrEqual),
+        "GT" => Operator::Compare(Comparison::Greater),
+        "GE" => Operator::Compare(Comparison::GreaterOrEqual),
+        _ => return None,
+    })
+}

@@ -1,0 +1,303 @@
+//! The steps of a plan: writes, calls, what is kept, jumps.
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use understudy_ladder::Name as Written;
+use understudy_structured_text::syntax::{
+    Argument, Class, Declaration, Expression, Name, Statement, StatementKind, TypeName, Unit,
+    UnitKind,
+};
+use understudy_text::Diagnostic;
+
+use super::{NEXT, Network, arguments};
+use crate::plcopen::document::{Modifier, Storage};
+use crate::plcopen::plan::{Action, Call, Plan, Step};
+use crate::plcopen::power::Power;
+use crate::plcopen::standard::StandardBlock;
+use crate::plcopen::typed::make;
+use crate::plcopen::typed::values::unit;
+
+impl Network<'_> {
+    /// The parts of a plan by their labels; none where nothing jumps to one.
+    pub(super) fn labels(&mut self, plan: &Plan) -> Option<HashMap<String, usize>> {
+        let mut labels = HashMap::new();
+        let mut places: HashMap<String, Range<usize>> = HashMap::new();
+        for step in &plan.steps {
+            if let Action::Label(name) = &step.action {
+                let key = name.to_uppercase();
+                let part = labels.len() + 1;
+                labels.insert(key.clone(), part);
+                if let Some(first) = places.insert(key, step.span.clone()) {
+                    let message = format!("two labels are called `{name}`");
+                    let error = Diagnostic::error("U1016", message, step.span.clone());
+                    self.diagnostics.push(error.with_related(first, "the first"));
+                }
+            }
+        }
+        let mut jumps = false;
+        for step in &plan.steps {
+            if let Action::Jump {
+                label: Some(label), ..
+            } = &step.action
+            {
+                jumps = true;
+                if !labels.contains_key(&label.to_uppercase()) {
+                    let message = format!("a jump goes to `{label}`, and no label is called so");
+                    self.error("U1016", message, step.span.clone());
+                }
+            }
+        }
+        let span = plan.steps.first()?.span.clone();
+        if jumps {
+            self.declare(NEXT, make::named("DINT", &span));
+        }
+        jumps.then_some(labels)
+    }
+
+    /// Names a value that is asked for before its step.
+    pub(super) fn keep_early(&mut self, step: &Step, plan: &Plan) {
+        if let Action::Keep { object, power, .. } = &step.action {
+            let name = format!("kept.{}", self.made.len());
+            self.kept.insert(*object, name.clone());
+            // Its type is found when everything that it is made of has a name.
+            let mut silent = Vec::new();
+            std::mem::swap(self.diagnostics, &mut silent);
+            let value = self.value(power, &step.span);
+            let mut of = self.certain_type_of(&value);
+            let mut taken = plan.steps.iter().filter_map(|other| match &other.action {
+                Action::Write { targets, power, .. } if *power == Power::Kept(*object) => {
+                    targets.first()
+                }
+                _ => None,
+            });
+            // A number without a type has that of the variable which it goes to.
+            if of.is_none()
+                && let Some((target, _)) = taken.next()
+                && let Some(target) = self.target(target)
+            {
+                of = self.certain_type_of(&make::read(target));
+            }
+            std::mem::swap(self.diagnostics, &mut silent);
+            let of = of.unwrap_or_else(|| self.type_of(&value));
+            self.declare_named(&name, of);
+        }
+    }
+
+    fn declare_named(&mut self, name: &str, of: TypeName) {
+        let span = of.span.clone();
+        let made: Declaration = make::declare(name, Class::Local, of, &span);
+        self.made.push(made);
+    }
+
+    pub(super) fn step(&mut self, step: &Step, labels: Option<&HashMap<String, usize>>) {
+        let before = self.parts.last().map_or(0, Vec::len);
+        let span = &step.span;
+        match &step.action {
+            Action::Label(_) => {
+                if labels.is_some() {
+                    self.parts.push(Vec::new());
+                }
+            }
+            Action::Jump { label, power } => {
+                let condition = self.prepared(power, span);
+                let target = label.as_ref().and_then(|label| {
+                    labels.and_then(|labels| labels.get(&label.to_uppercase()))
+                });
+                let body = match (label, target) {
+                    (Some(_), Some(part)) => {
+                        let next = make::path(&self.next(), None, span);
+                        let part = make::integer(*part as i128, span);
+                        vec![
+                            make::assign(next, part, span),
+                            make::statement(StatementKind::Continue, span),
+                        ]
+                    }
+                    _ => vec![make::statement(StatementKind::Return, span)],
+                };
+                self.push(make::when(condition, body, span));
+            }
+            Action::Write {
+                targets,
+                power,
+                guard,
+            } => self.write(targets, power, guard.as_ref(), span),
+            Action::Keep {
+                object,
+                power,
+                guard,
+            } => {
+                let value = self.prepared(power, span);
+                let name = self.kept.get(object).cloned().unwrap_or_default();
+                let kept = make::assign(make::path(&name, None, span), value, span);
+                self.guarded(guard.as_ref(), vec![kept], span);
+            }
+            Action::Call(call) => self.call(call, span),
+        }
+        let first = self.parts.last_mut().and_then(|part| part.get_mut(before));
+        if let Some(first) = first {
+            first.comments.clone_from(&step.comments);
+        }
+    }
+
+    fn guarded(&mut self, guard: Option<&Power>, body: Vec<Statement>, span: &Range<usize>) {
+        match guard {
+            None => body.into_iter().for_each(|statement| self.push(statement)),
+            Some(guard) => {
+                let condition = self.prepared(guard, span);
+                self.push(make::when(condition, body, span));
+            }
+        }
+    }
+
+    fn write(
+        &mut self,
+        targets: &[(Written, Modifier)],
+        power: &Power,
+        guard: Option<&Power>,
+        span: &Range<usize>,
+    ) {
+        let mut value = self.prepared(power, span);
+        if targets.len() > 1 && power.measure().0 > 1 {
+            let shared = self.declare("power", make::named("BOOL", span));
+            self.push(make::assign(make::path(&shared, None, span), value, span));
+            value = make::variable(&shared, span);
+        }
+        for (written, modifier) in targets {
+            let value = self.changed(value.clone(), modifier.negated, modifier.edge, span);
+            let Some(target) = self.target(written) else {
+                continue;
+            };
+            let statement = match modifier.storage {
+                None => make::assign(target, value, span),
+                Some(storage) => {
+                    let stored = make::boolean(storage == Storage::Set, span);
+                    make::when(value, vec![make::assign(target, stored, span)], span)
+                }
+            };
+            self.guarded(guard, vec![statement], span);
+        }
+    }
+
+    fn call(&mut self, call: &Call, span: &Range<usize>) {
+        let mut inputs: Vec<(Written, Expression)> = Vec::new();
+        for input in &call.inputs {
+            let value = self.prepared(&input.power, span);
+            let value = self.changed(value, input.modifier.negated, input.modifier.edge, span);
+            let known = unit(self.file, &call.type_name);
+            let pin = StandardBlock::of(&call.type_name)
+                .and_then(|block| block.input(&input.pin))
+                .filter(|_| !known.is_some_and(|known| has(known, &input.pin)));
+            let pin = match pin {
+                Some(pin) => Written::at(pin, input.pin.span()),
+                None => input.pin.clone(),
+            };
+            inputs.push((pin, value));
+        }
+        let found = unit(self.file, &call.type_name);
+        if let Some(found) = found {
+            for (pin, value) in &inputs {
+                let in_out = found
+                    .declarations
+                    .iter()
+                    .any(|known| known.class == Class::InOut && known.name.is(pin));
+                if in_out {
+                    let key = (call.instance.to_uppercase(), pin.to_uppercase());
+                    self.results.insert(key, value.clone());
+                }
+            }
+        }
+        let statement = match found.filter(|found| found.kind == UnitKind::Function) {
+            Some(_) => self.function_call(call, inputs, span),
+            None => {
+                let inputs = inputs
+                    .into_iter()
+                    .map(|(pin, value)| Argument::Given(make::name(&pin), value));
+                let inputs = inputs.collect();
+                let path = self.instance(&call.instance);
+                make::statement(StatementKind::Call(path, inputs), span)
+            }
+        };
+        self.guarded(call.enable.as_ref(), vec![statement], span);
+    }
+
+    /// A function whose outputs are variables that were made for it.
+    fn function_call(
+        &mut self,
+        call: &Call,
+        inputs: Vec<(Written, Expression)>,
+        span: &Range<usize>,
+    ) -> Statement {
+        let mut arguments = arguments(inputs, true);
+        let instance = call.instance.to_uppercase();
+        let mut result = String::new();
+        for (of, pin, name) in &self.outputs {
+            if *of != instance {
+                continue;
+            }
+            let to = make::path(name, None, span);
+            match pin.is_empty() {
+                true => result.clone_from(name),
+                false => arguments.push(Argument::Taken {
+                    from: Name::new(pin, span.clone()),
+                    to,
+                    negated: false,
+                }),
+            }
+        }
+        let value = make::call(make::name(&call.type_name), arguments, span);
+        make::assign(make::path(&result, None, span), value, span)
+    }
+
+    /// What a call needs and nobody declared: its instance, or the variables of a function's outputs.
+    pub(super) fn declared(&mut self, call: &Call, span: &Range<usize>) {
+        let file = self.file;
+        if let Some(function) = unit(file, &call.type_name)
+            && function.kind == UnitKind::Function
+        {
+            let outputs = function.declarations.iter();
+            let outputs = outputs.filter(|output| output.class == Class::Output);
+            let outputs = outputs.map(|output| (output.name.key(), output.of.clone()));
+            let result = function.result.clone();
+            let result = result.unwrap_or_else(|| make::named("BOOL", span));
+            for (pin, of) in outputs.chain([(String::new(), result)]) {
+                let name = self.declare("output", of);
+                let instance = call.instance.to_uppercase();
+                let value = make::variable(&name, span);
+                self.results.insert((instance.clone(), pin.clone()), value);
+                self.outputs.push((instance, pin, name));
+            }
+            return;
+        }
+        let root = call.instance.split(['.', '[']).next().unwrap_or_default();
+        let own = self.declarations.iter().chain(&self.made);
+        let mut known = own.chain(&self.file.globals);
+        if call.is_named && known.any(|known| known.name.is(root)) {
+            return;
+        }
+        let of = make::named(&call.type_name, &call.type_name.span());
+        if !call.is_named {
+            let name = self.declare("block", of);
+            self.instances.insert(call.instance.to_string(), name);
+            return;
+        }
+        let span = call.instance.span();
+        let message = format!("the block `{}` is not declared", call.instance);
+        let help = format!(
+            "declare the variable `{}` of type {}",
+            call.instance, call.type_name
+        );
+        let found = if self.lacks_instances {
+            let message = format!("{message}; it is read as a separate {}", call.type_name);
+            Diagnostic::warning("U1012", message, span)
+        } else {
+            Diagnostic::error("U1012", message, span)
+        };
+        self.diagnostics.push(found.with_help(help));
+        self.declare_named(&call.instance, of);
+    }
+}
+
+fn has(unit: &Unit, pin: &str) -> bool {
+    unit.declarations.iter().any(|known| known.name.is(pin))
+}

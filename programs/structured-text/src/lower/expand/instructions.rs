@@ -1,0 +1,393 @@
+//! Instruction lists as statements: the result at hand is an expression, and what is stored, set or called is a statement.
+//!
+//! ```text
+//! LD   a          result: a
+//! AND( b          result: b, a waits
+//! ORN  c          result: b OR NOT c
+//! )               result: a AND (b OR NOT c)
+//! ST   y          y := a AND (b OR NOT c);
+//! ```
+//!
+//! A list with labels becomes a loop over a CASE whose cases are the parts between labels; the result is not known behind a label.
+
+use std::collections::HashMap;
+
+use understudy_text::Diagnostic;
+use understudy_typed::{Comparison, Elementary};
+
+use crate::syntax::{
+    Argument, Class, Declaration, Expression, ExpressionKind, Instruction, Label, Name, Operator,
+    Path, Span, Statement, StatementKind, Step, Unit,
+};
+
+use super::written::{
+    assign, boolean, declare, elementary, integer, join, not, path, statement, variable, when,
+};
+
+/// Brackets that may be open at once.
+const MAXIMUM_OPEN: usize = 32;
+
+/// The variable that says which part of the list is next.
+const NEXT: &str = "list.next";
+
+/// What waits for its bracket.
+struct Open {
+    before: Option<Expression>,
+    operator: Operator,
+    negated: bool,
+}
+
+struct Writer<'a> {
+    unit: &'a Unit,
+    labels: HashMap<String, i128>,
+    declarations: Vec<Declaration>,
+    /// The statements of each part.
+    parts: Vec<Vec<Statement>>,
+    result: Option<Expression>,
+    open: Vec<Open>,
+    diagnostics: &'a mut Vec<Diagnostic>,
+}
+
+/// The statements of a list, and the variables that they need.
+pub(super) fn statements(
+    list: &[Instruction],
+    unit: &Unit,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> (Vec<Declaration>, Vec<Statement>) {
+    let mut writer = Writer {
+        unit,
+        labels: HashMap::new(),
+        declarations: Vec::new(),
+        parts: vec![Vec::new()],
+        result: None,
+        open: Vec::new(),
+        diagnostics,
+    };
+    for label in list
+        .iter()
+        .filter_map(|instruction| instruction.label.as_ref())
+    {
+        let part = writer.labels.len() as i128 + 1;
+        if writer.labels.insert(label.key(), part).is_some() {
+            let message = format!("two labels are called `{label}`");
+            writer.error("U1016", message, label.span());
+        }
+    }
+    for instruction in list {
+        if instruction.label.is_some() {
+            writer.result = None;
+            writer.parts.push(Vec::new());
+        }
+        writer.instruction(instruction);
+    }
+    if !writer.open.is_empty() {
+        let message = "a bracket of the instruction list is not closed";
+        writer.error("U1017", message.to_owned(), unit.name.span());
+    }
+    writer.finish()
+}
+
+fn operator(word: &str) -> Option<Operator> {
+    Some(match word {
+        "AND" | "&" => Operator::And,
+        "OR" => Operator::Or,
+        "XOR" => Operator::Xor,
+        "ADD" => Operator::Add,
+        "SUB" => Operator::Subtract,
+        "MUL" => Operator::Multiply,
+        "DIV" => Operator::Divide,
+        "MOD" => Operator::Modulo,
+        "GT" => Operator::Compare(Comparison::Greater),
+        "GE" => Operator::Compare(Comparison::GreaterOrEqual),
+        "EQ" => Operator::Compare(Comparison::Equal),
+        "NE" => Operator::Compare(Comparison::NotEqual),
+        "LE" => Operator::Compare(Comparison::LessOrEqual),
+        "LT" => Operator::Compare(Comparison::Less),
+        _ => return None,
+    })
+}
+
+/// An operator with its negation and its bracket.
+fn operation(word: &str) -> Option<(Operator, bool, bool)> {
+    let (word, opens) = match word.strip_suffix('(') {
+        Some(word) => (word, true),
+        None => (word, false),
+    };
+    if let Some(operator) = operator(word) {
+        return Some((operator, false, opens));
+    }
+    operator(word.strip_suffix('N')?).map(|operator| (operator, true, opens))
+}
+
+impl Writer<'_> {
+    fn error(&mut self, code: &'static str, message: String, span: Span) {
+        self.diagnostics
+            .push(Diagnostic::error(code, message, span));
+    }
+
+    /// The parts as one row, or as a loop over a CASE.
+    fn finish(self) -> (Vec<Declaration>, Vec<Statement>) {
+        let mut declarations = self.declarations;
+        let mut parts = self.parts;
+        if parts.len() == 1 {
+            return (declarations, parts.pop().unwrap_or_default());
+        }
+        let span = self.unit.name.span();
+        let of = elementary(Elementary::Dint, &span);
+        declarations.push(declare(NEXT, Class::Temporary, of, None, &span));
+        let count = parts.len() as i128;
+        let cases = parts.into_iter().enumerate().map(|(at, mut body)| {
+            let next = integer(at as i128 + 1, &span);
+            body.insert(0, assign(path(NEXT, None, &span), next, &span));
+            let first = integer(at as i128, &span);
+            (vec![Label { first, last: None }], body)
+        });
+        let case = StatementKind::Case(variable(NEXT, &span), cases.collect(), Vec::new());
+        let more = join(
+            variable(NEXT, &span),
+            Operator::Compare(Comparison::Less),
+            integer(count, &span),
+        );
+        let body = vec![statement(case, &span)];
+        let start = assign(path(NEXT, None, &span), integer(0, &span), &span);
+        let whole = statement(StatementKind::While(more, body), &span);
+        (declarations, vec![start, whole])
+    }
+
+    fn push(&mut self, statement: Statement) {
+        if let Some(part) = self.parts.last_mut() {
+            part.push(statement);
+        }
+    }
+
+    /// The result, which must be known.
+    fn taken(&mut self, span: &Span) -> Option<Expression> {
+        if self.result.is_none() {
+            let message = "no result yet: an LD is missing before this instruction";
+            self.error("U1017", message.to_owned(), span.clone());
+        }
+        self.result.clone()
+    }
+
+    /// The result as a BOOL in a variable, so that what it is made of may change.
+    fn held(&mut self, span: &Span) -> Option<Expression> {
+        let value = self.taken(span)?;
+        if let ExpressionKind::Literal(_) = value.kind {
+            return Some(value);
+        }
+        let name = format!("list.{}", self.declarations.len());
+        let of = elementary(Elementary::Bool, span);
+        self.declarations
+            .push(declare(&name, Class::Temporary, of, None, span));
+        self.push(assign(path(&name, None, span), value, span));
+        self.result = Some(variable(&name, span));
+        self.result.clone()
+    }
+
+    fn instruction(&mut self, instruction: &Instruction) {
+        let span = &instruction.span;
+        let word = instruction.operator.as_str();
+        let first = instruction
+            .operands
+            .iter()
+            .find_map(|operand| match operand {
+                Argument::Placed(value) => Some(value.clone()),
+                _ => None,
+            });
+        match word {
+            "" => {}
+            ")" => self.close(span),
+            "NOT" => self.result = self.taken(span).map(not),
+            "CAL" | "CALC" | "CALCN" | "CALN" => self.call(word, instruction),
+            "RET" | "RETC" | "RETCN" | "RETN" => {
+                let condition = self.condition(word, "RET", span);
+                let kind = statement(StatementKind::Return, span);
+                self.conditional(condition, vec![kind], span);
+            }
+            "JMP" | "JMPC" | "JMPCN" | "JMPN" => self.jump(word, first, span),
+            _ if operation(word).is_some_and(|(_, _, opens)| opens) => {
+                self.operate(word, first, span)
+            }
+            _ => match first {
+                Some(first) => self.with_operand(word, first, instruction),
+                None if operation(word).is_some()
+                    || matches!(word, "LD" | "LDN" | "ST" | "STN" | "S" | "R") =>
+                {
+                    self.error("U1017", format!("{word} has no operand"), span.clone());
+                }
+                None => self.function(instruction),
+            },
+        }
+    }
+
+    fn with_operand(&mut self, word: &str, first: Expression, instruction: &Instruction) {
+        let span = &instruction.span;
+        match word {
+            "LD" => self.result = Some(first),
+            "LDN" => self.result = Some(not(first)),
+            "ST" | "STN" => {
+                let Some(to) = self.stored(&first) else {
+                    return;
+                };
+                let Some(value) = self.taken(span) else {
+                    return;
+                };
+                let value = if word == "STN" { not(value) } else { value };
+                self.push(assign(to, value, span));
+                self.result = Some(if word == "STN" { not(first) } else { first });
+            }
+            "S" | "R" => {
+                let Some(to) = self.stored(&first) else {
+                    return;
+                };
+                let Some(condition) = self.held(span) else {
+                    return;
+                };
+                let value = boolean(word == "S", span);
+                self.push(when(condition, vec![assign(to, value, span)], span));
+            }
+            // An input of a block: it is given the result, and the block is called.
+            "S1" | "R1" | "CLK" | "CU" | "CD" | "PV" | "IN" | "PT" => {
+                let Some(to) = self.stored(&first) else {
+                    return;
+                };
+                let Some(value) = self.taken(span) else {
+                    return;
+                };
+                let mut input = to.clone();
+                input.steps.push(Step::Field(Name::new(word, span.clone())));
+                self.push(assign(input, value, span));
+                if !matches!(word, "PV" | "PT") {
+                    self.push(statement(StatementKind::Call(to, Vec::new()), span));
+                }
+            }
+            _ if operation(word).is_some() => self.operate(word, Some(first), span),
+            _ => self.function(instruction),
+        }
+    }
+
+    fn stored(&mut self, target: &Expression) -> Option<Path> {
+        match &target.kind {
+            ExpressionKind::Variable(path) => Some(path.clone()),
+            _ => {
+                let message = "a variable is expected here".to_owned();
+                self.error("U1017", message, target.span.clone());
+                None
+            }
+        }
+    }
+
+    fn operate(&mut self, word: &str, first: Option<Expression>, span: &Span) {
+        let Some((operator, negated, opens)) = operation(word) else {
+            return;
+        };
+        let Some(before) = self.taken(span) else {
+            return;
+        };
+        if opens {
+            if self.open.len() >= MAXIMUM_OPEN {
+                let message = format!("more than {MAXIMUM_OPEN} brackets are open");
+                self.error("U1017", message, span.clone());
+                return;
+            }
+            self.open.push(Open {
+                before: Some(before),
+                operator,
+                negated,
+            });
+            self.result = first;
+            return;
+        }
+        if let Some(first) = first {
+            let right = if negated { not(first) } else { first };
+            self.result = Some(join(before, operator, right));
+        }
+    }
+
+    fn close(&mut self, span: &Span) {
+        let Some(open) = self.open.pop() else {
+            let message = "this bracket closes none".to_owned();
+            self.error("U1017", message, span.clone());
+            return;
+        };
+        let value = self.taken(span);
+        if let (Some(before), Some(value)) = (open.before, value) {
+            let value = if open.negated { not(value) } else { value };
+            self.result = Some(join(before, open.operator, value));
+        }
+    }
+
+    /// What a conditional instruction asks of the result; nothing for one that is always done.
+    fn condition(&mut self, word: &str, plain: &str, span: &Span) -> Option<Expression> {
+        match word.strip_prefix(plain) {
+            Some("C") => self.held(span),
+            Some("CN" | "N") => self.held(span).map(not),
+            _ => None,
+        }
+    }
+
+    fn conditional(&mut self, condition: Option<Expression>, body: Vec<Statement>, span: &Span) {
+        match condition {
+            Some(condition) => self.push(when(condition, body, span)),
+            None => {
+                for statement in body {
+                    self.push(statement);
+                }
+            }
+        }
+    }
+
+    fn jump(&mut self, word: &str, label: Option<Expression>, span: &Span) {
+        let name = match label.map(|label| label.kind) {
+            Some(ExpressionKind::Variable(path)) => path.root,
+            _ => {
+                let message = format!("{word} needs a label");
+                return self.error("U1017", message, span.clone());
+            }
+        };
+        let Some(&part) = self.labels.get(&name.key()) else {
+            let message = format!("no label is called `{name}`");
+            return self.error("U1016", message, name.span());
+        };
+        let condition = self.condition(word, "JMP", span);
+        let next = assign(path(NEXT, None, span), integer(part, span), span);
+        let go = statement(StatementKind::Continue, span);
+        self.conditional(condition, vec![next, go], span);
+    }
+
+    fn call(&mut self, word: &str, instruction: &Instruction) {
+        let span = &instruction.span;
+        let mut operands = instruction.operands.iter().cloned();
+        let instance = match operands.next() {
+            Some(Argument::Placed(instance)) => self.stored(&instance),
+            _ => {
+                let message = format!("{word} needs an instance of a block");
+                return self.error("U1017", message, span.clone());
+            }
+        };
+        let Some(instance) = instance else { return };
+        let condition = self.condition(word, "CAL", span);
+        let call = statement(StatementKind::Call(instance, operands.collect()), span);
+        self.conditional(condition, vec![call], span);
+    }
+
+    /// A function: the result at hand is its first input.
+    fn function(&mut self, instruction: &Instruction) {
+        let span = &instruction.span;
+        let named = |operand: &Argument| !matches!(operand, Argument::Placed(_));
+        let mut arguments = Vec::new();
+        if !instruction.operands.iter().any(named) {
+            let Some(value) = self.taken(span) else {
+                return;
+            };
+            arguments.push(Argument::Placed(value));
+        }
+        arguments.extend(instruction.operands.iter().cloned());
+        let name = path(&instruction.operator, None, span);
+        let value = Expression {
+            kind: ExpressionKind::Call(name, arguments),
+            span: span.clone(),
+        };
+        self.result = Some(value);
+    }
+}

@@ -1,0 +1,154 @@
+//! Syntax that is made here in the place of what a person wrote.
+
+use understudy_typed::{Comparison, Elementary};
+
+use crate::syntax::{
+    Argument, Class, Declaration, Expression, ExpressionKind, Initializer, Literal, Name, Operator,
+    Path, Span, Statement, StatementKind, Step, TypeKind, TypeName,
+};
+
+pub(super) fn path(name: &str, part: Option<&str>, span: &Span) -> Path {
+    let steps = part.map(|part| Step::Field(Name::new(part, span.clone())));
+    Path {
+        root: Name::new(name, span.clone()),
+        steps: steps.into_iter().collect(),
+        span: span.clone(),
+    }
+}
+
+pub(super) fn variable(name: &str, span: &Span) -> Expression {
+    of_path(path(name, None, span))
+}
+
+pub(super) fn part(name: &str, part: &str, span: &Span) -> Expression {
+    of_path(path(name, Some(part), span))
+}
+
+pub(super) fn of_path(path: Path) -> Expression {
+    Expression {
+        span: path.span.clone(),
+        kind: ExpressionKind::Variable(path),
+    }
+}
+
+pub(super) fn literal(literal: Literal, span: &Span) -> Expression {
+    Expression {
+        kind: ExpressionKind::Literal(literal),
+        span: span.clone(),
+    }
+}
+
+pub(super) fn boolean(value: bool, span: &Span) -> Expression {
+    literal(Literal::Boolean(value), span)
+}
+
+pub(super) fn integer(value: i128, span: &Span) -> Expression {
+    literal(Literal::Integer { value, of: None }, span)
+}
+
+pub(super) fn not(value: Expression) -> Expression {
+    Expression {
+        span: value.span.clone(),
+        kind: ExpressionKind::Not(Box::new(value)),
+    }
+}
+
+pub(super) fn join(left: Expression, operator: Operator, right: Expression) -> Expression {
+    let span = left.span.clone();
+    match left.kind {
+        // Operators of one kind stand in one chain, so the tree stays flat.
+        ExpressionKind::Chain(first, mut rest)
+            if rest.iter().all(|(found, _)| *found == operator) && is_chained(operator) =>
+        {
+            rest.push((operator, right));
+            Expression {
+                kind: ExpressionKind::Chain(first, rest),
+                span,
+            }
+        }
+        kind => Expression {
+            kind: ExpressionKind::Chain(
+                Box::new(Expression {
+                    kind,
+                    span: span.clone(),
+                }),
+                vec![(operator, right)],
+            ),
+            span,
+        },
+    }
+}
+
+fn is_chained(operator: Operator) -> bool {
+    matches!(
+        operator,
+        Operator::And | Operator::Or | Operator::AndThen | Operator::Add
+    )
+}
+
+pub(super) fn all(values: Vec<Expression>, operator: Operator, span: &Span) -> Expression {
+    let joined = values
+        .into_iter()
+        .reduce(|left, right| join(left, operator, right));
+    joined.unwrap_or_else(|| boolean(operator == Operator::And, span))
+}
+
+pub(super) fn at_least(left: Expression, right: Expression) -> Expression {
+    join(left, Operator::Compare(Comparison::GreaterOrEqual), right)
+}
+
+pub(super) fn call(name: &str, arguments: Vec<Expression>, span: &Span) -> Expression {
+    let arguments = arguments.into_iter().map(Argument::Placed).collect();
+    Expression {
+        kind: ExpressionKind::Call(path(name, None, span), arguments),
+        span: span.clone(),
+    }
+}
+
+/// TIME() - since
+pub(super) fn since(moment: Expression, span: &Span) -> Expression {
+    join(call("TIME", Vec::new(), span), Operator::Subtract, moment)
+}
+
+pub(super) fn statement(kind: StatementKind, span: &Span) -> Statement {
+    Statement {
+        kind,
+        span: span.clone(),
+        comments: Vec::new(),
+    }
+}
+
+pub(super) fn assign(to: Path, value: Expression, span: &Span) -> Statement {
+    statement(StatementKind::Assign(to, value), span)
+}
+
+pub(super) fn when(condition: Expression, body: Vec<Statement>, span: &Span) -> Statement {
+    statement(StatementKind::If(vec![(condition, body)], Vec::new()), span)
+}
+
+pub(super) fn elementary(of: Elementary, span: &Span) -> TypeName {
+    TypeName {
+        kind: TypeKind::Named(Name::new(of.name(), span.clone())),
+        span: span.clone(),
+    }
+}
+
+pub(super) fn declare(
+    name: &str,
+    class: Class,
+    of: TypeName,
+    initial: Option<Initializer>,
+    span: &Span,
+) -> Declaration {
+    Declaration {
+        name: Name::new(name, span.clone()),
+        class,
+        constant: false,
+        retained: false,
+        edge: None,
+        address: None,
+        of,
+        initial,
+        description: None,
+    }
+}

@@ -1,0 +1,54 @@
+//! Clusters of the press cell.
+
+use understudy_cluster::{Cluster, Overrides, press_cell as files, read_with_files};
+use understudy_cycle::Mode;
+
+/// The cell of section V.
+///
+/// # Panics
+/// Never: the files come with the program.
+pub fn press_cell(mode: Mode) -> Cluster {
+    cluster(files()[0].text, mode)
+}
+
+/// A robot, the press that it feeds, a robot, and so on: a number of controllers and of understudies.
+///
+/// # Panics
+/// If the protocol does not take these numbers.
+pub fn line(controllers: usize, understudies: usize, mode: Mode) -> Cluster {
+    let mut text = "[cluster]\nname = \"line\"\nperiod = \"10ms\"\n".to_owned();
+    let kinds = ["robot", "press"];
+    for place in 0..controllers {
+        let kind = kinds[place % 2];
+        text += &format!(
+            "[[controller]]\nname = \"c{place}\"\nladder = \"{kind}.ladder\"\n\
+             [[remote_io]]\nname = \"io{place}\"\ncontroller = \"c{place}\"\n\
+             [[plant]]\nname = \"p{place}\"\ncontroller = \"c{place}\"\nmodel = \"{kind}\"\n"
+        );
+        if place % 2 == 1 {
+            text += &format!("fed_by = \"p{}\"\n", place - 1);
+        }
+    }
+    if understudies == 0 {
+        text = text.replacen("[cluster]", "understudy = []\n[cluster]", 1);
+    }
+    for place in 0..understudies {
+        text += &format!("[[understudy]]\nname = \"u{place}\"\n");
+    }
+    cluster(&text, mode)
+}
+
+/// The cluster of a text that names the ladders of the press cell.
+///
+/// # Panics
+/// If the text has errors.
+pub fn cluster(text: &str, mode: Mode) -> Cluster {
+    let overrides = Overrides {
+        mode: Some(mode),
+        ..Overrides::default()
+    };
+    let loaded = read_with_files(text, files(), overrides);
+    loaded
+        .cluster
+        .unwrap_or_else(|| panic!("{:?}", loaded.reports))
+}
