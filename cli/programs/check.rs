@@ -159,10 +159,10 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
                 let file = read_source(&name, &text, wanted);
                 let mut diagnostics = file.diagnostics;
                 match &file.source {
-                    Some(Source::Ladder(program)) => {
-                        if looking.at_rungs(program, PERIOD, &mut diagnostics) {
-                            found.cut_short.push(name);
-                        }
+                    Some(Source::Ladder(program))
+                        if looking.at_rungs(program, PERIOD, &mut diagnostics) =>
+                    {
+                        found.cut_short.push(name);
                     }
                     Some(Source::Typed(program)) => {
                         found.sizes.push((name, Size::of(program)));
@@ -170,7 +170,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
                     Some(Source::Library(units)) => {
                         found.libraries.push((name, units.clone()));
                     }
-                    None => {}
+                    Some(Source::Ladder(_)) | None => {}
                 }
                 found.add_file(Kind::Ladder, path, text, diagnostics);
             }

@@ -183,7 +183,7 @@ fn lines(text: &str, inputs: &Points) -> std::result::Result<Vec<Vec<u64>>, Vec<
         }
         match values(line, start, &points) {
             Ok(values) => scans.push(values),
-            Err(diagnostic) => diagnostics.push(diagnostic),
+            Err(diagnostic) => diagnostics.push(*diagnostic),
         }
     }
     if has_errors(&diagnostics) {
@@ -196,7 +196,7 @@ fn values(
     line: &str,
     start: usize,
     points: &[&Point],
-) -> std::result::Result<Vec<u64>, Diagnostic> {
+) -> std::result::Result<Vec<u64>, Box<Diagnostic>> {
     // The lines of another tool may have the outputs behind an arrow.
     let inputs = line.split("->").next().unwrap_or_default();
     let words: Vec<&str> = inputs.split_whitespace().collect();
@@ -212,13 +212,16 @@ fn values(
             .map(|point| format!("{} : {}", point.name, point.of))
             .collect();
         let help = format!("in this order: {}", named.join(", "));
-        return Err(Diagnostic::error("U0439", message, start..start + line.len()).with_help(help));
+        let span = start..start + line.len();
+        let diagnostic = Diagnostic::error("U0439", message, span);
+        return Err(Box::new(diagnostic.with_help(help)));
     }
     let read = words.iter().zip(points).map(|(word, point)| {
         point.of.read(word).ok_or_else(|| {
             let at = start + (word.as_ptr() as usize - line.as_ptr() as usize);
             let message = format!("`{word}` is no {} for `{}`", point.of, point.name);
-            Diagnostic::error("U0439", message, at..at + word.len()).with_help(expected(point.of))
+            let diagnostic = Diagnostic::error("U0439", message, at..at + word.len());
+            Box::new(diagnostic.with_help(expected(point.of)))
         })
     });
     read.collect()

@@ -6,7 +6,8 @@
 Input registers 0 and 1 are the level in metres, a REAL. Holding register 0 is the opening of the inlet valve in
 hundredths of a per cent. Bit 0 of holding register 10 is the operator's switch, and coil 0 is the alarm lamp.
 
-With `rtu`, the device is on a serial line, a pair of pseudo terminals; it needs pyserial. It prints `line PATH`.
+With `rtu`, the device is on a serial line without parity, a pair of pseudo terminals; it needs pyserial. It prints
+`line PATH`.
 
 A word on standard input selects the behaviour: `nan` answers with a level that is not a number, `well` answers normally.
 `show` prints `level L inflow I`. The device ends at the end of standard input. It prints `ready` to standard output, and
@@ -78,7 +79,7 @@ async def main():
     tank = Tank()
     if sys.argv[1:] == ["rtu"]:
         own, line = serial_line(loop)
-        server = ModbusSerialServer(tank.device(), port=own, baudrate=19200, parity="E")
+        server = ModbusSerialServer(tank.device(), port=own, baudrate=19200, parity="N")
         print(f"line {line}", flush=True)
     else:
         port = int(sys.argv[1]) if len(sys.argv) > 1 else 5021

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use understudy_ladder::Program as Ladder;
 use understudy_structured_text::{Lowered, Options, lower, parse};
-use understudy_text::{Diagnostic, has_errors};
+use understudy_text::{Diagnostic, Severity, has_errors};
 use understudy_typed::Program as Typed;
 
 use crate::format::{Format, Reading, read, unknown_form};
@@ -74,7 +74,22 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
         Format::PlcOpen => plcopen::read_typed(text),
         _ => parse(text),
     };
-    typed(text, parsed, wanted, period)
+    let found = typed(text, parsed, wanted, period);
+    // Of two readings of a document that both have errors, the one with fewer is nearer to what was meant.
+    let errors = |found: &[Diagnostic]| {
+        let errors = found.iter();
+        errors.filter(|it| it.severity == Severity::Error).count()
+    };
+    if format == Format::PlcOpen
+        && found.source.is_none()
+        && errors(&diagnostics) <= errors(&found.diagnostics)
+    {
+        return SourceFile {
+            diagnostics,
+            ..found
+        };
+    }
+    found
 }
 
 fn typed(

@@ -129,3 +129,38 @@ impl RemoteIo {
         });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn force(signal: SignalPlace, value: ForcedValue) -> Force {
+        Force {
+            signal,
+            value,
+            seconds: 1,
+            owner: "anna".to_owned(),
+            reason: "a test".to_owned(),
+        }
+    }
+
+    #[test]
+    fn a_number_is_forced_with_all_its_bits_and_alone() {
+        let number = ForcedValue::Number {
+            width: 32,
+            stored: 0x4148_0000,
+        };
+        let place = SignalPlace::Output(32);
+        let mut forcing = Forcing::default();
+        forcing.put(SignalPlace::Output(0), true.into(), Time(1));
+        forcing.put(place, number, Time(1));
+        let driven = forcing.outputs(&Image::from_bits([true; 64]));
+        assert_eq!(driven.words(), [0x4148_0000_FFFF_FFFF]);
+        assert_eq!(forcing.inputs(&Image::zero(64)), Image::zero(64));
+        // A force of one of its bits ends it.
+        let bit = force(SignalPlace::Output(63), true.into());
+        assert_eq!(forcing.remove_overlapping(&bit), Some(place));
+        assert_eq!(forcing.remove_overlapping(&bit), None);
+        assert!(forcing.remove(SignalPlace::Output(0)));
+    }
+}

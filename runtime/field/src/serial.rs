@@ -2,24 +2,21 @@
 //!
 //! The line belongs to one process: a second one would answer for the first. What arrived before it was opened is discarded.
 
-use std::fs::{File, OpenOptions};
-use std::io::{self, Read, Write};
+use std::fs::OpenOptions;
+use std::io;
 use std::os::unix::fs::OpenOptionsExt;
-use std::pin::Pin;
-use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
 use nix::libc::{O_NOCTTY, O_NONBLOCK};
 use nix::sys::termios::{
     BaudRate, ControlFlags, FlushArg, SetArg, cfmakeraw, cfsetspeed, tcflush, tcgetattr, tcsetattr,
 };
-use tokio::io::unix::AsyncFd;
-use tokio::io::{AsyncRead, AsyncWrite, Interest, ReadBuf};
+use tokio::io::{Join, join};
+use tokio::net::unix::pipe::{Receiver, Sender};
 use understudy_cluster::{Parity, SerialLine};
 
-/// An open line.
-#[derive(Debug)]
-pub(crate) struct SerialPort(AsyncFd<File>);
+/// An open line, for reading and for writing.
+pub(crate) type SerialPort = Join<Receiver, Sender>;
 
 /// Opens the line of a device.
 ///
@@ -51,13 +48,9 @@ pub(crate) fn open(line: &SerialLine) -> io::Result<SerialPort> {
     settings.control_flags = flags;
     tcsetattr(&file, SetArg::TCSANOW, &settings)?;
     tcflush(&file, FlushArg::TCIOFLUSH)?;
-    let interest = Interest::READABLE | Interest::WRITABLE;
-    #[expect(
-        deprecated,
-        reason = "the file is owned and stays open; the other function is unsafe code"
-    )]
-    let file = AsyncFd::with_interest(file, interest)?;
-    Ok(SerialPort(file))
+    // A terminal device is read and written as a pipe is.
+    let writer = Sender::from_file_unchecked(file.try_clone()?)?;
+    Ok(join(Receiver::from_file_unchecked(file)?, writer))
 }
 
 /// The silence between two frames: 3.5 characters of 11 bits, and 1.75 ms above 19,200 bits per second.
@@ -86,45 +79,6 @@ fn rate(baud: u32) -> io::Result<BaudRate> {
             return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
         }
     })
-}
-
-impl AsyncRead for SerialPort {
-    fn poll_read(
-        self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-        buffer: &mut ReadBuf<'_>,
-    ) -> Poll<io::Result<()>> {
-        loop {
-            let mut guard = ready!(self.0.poll_read_ready(context))?;
-            let space = buffer.initialize_unfilled();
-            if let Ok(read) = guard.try_io(|port| port.get_ref().read(space)) {
-                return Poll::Ready(read.map(|count| buffer.advance(count)));
-            }
-        }
-    }
-}
-
-impl AsyncWrite for SerialPort {
-    fn poll_write(
-        self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-        bytes: &[u8],
-    ) -> Poll<io::Result<usize>> {
-        loop {
-            let mut guard = ready!(self.0.poll_write_ready(context))?;
-            if let Ok(written) = guard.try_io(|port| port.get_ref().write(bytes)) {
-                return Poll::Ready(written);
-            }
-        }
-    }
-
-    fn poll_flush(self: Pin<&mut Self>, _context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Poll::Ready(Ok(()))
-    }
-
-    fn poll_shutdown(self: Pin<&mut Self>, _context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Poll::Ready(Ok(()))
-    }
 }
 
 #[cfg(test)]

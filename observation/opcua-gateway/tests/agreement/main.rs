@@ -258,7 +258,7 @@ fn check_modbus(cluster: &Cluster, top: &Snapshot, snapshot: &Snapshot, context:
         let value = registers
             .iter()
             .fold(0, |value, next| value << 16 | u64::from(*next));
-        (value, place.meaning)
+        (value, place.meaning.clone())
     };
     let check = |name: &str, expected: u64| {
         assert_eq!(register(name).0, expected, "{name}, {context}");

@@ -1,4 +1,5 @@
 //! Programs as texts, executed by both engines, which must agree in every bit.
+#![allow(dead_code, reason = "each test uses a part of it")]
 
 use understudy_structured_text::{Lowered, Options, lower, parse};
 use understudy_text::{Diagnostic, Report, Severity};
