@@ -45,10 +45,7 @@ impl Parser<'_> {
             return None;
         }
         let span = self.span();
-        let written = self
-            .written()
-            .trim_start_matches('#')
-            .trim_matches('"');
+        let written = self.written().trim_start_matches('#').trim_matches('"');
         let mut name: String = written
             .chars()
             .map(|next| {
