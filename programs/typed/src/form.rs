@@ -26,7 +26,7 @@ pub struct Program {
     pub name: String,
     /// Nanoseconds from one scan to the next.
     pub period: i64,
-    /// Operations that the loops of one scan may take together; see [`crate::cost`].
+    /// Operations that the loops of one scan may take together; see `Cost`.
     pub budget: u64,
     /// Enumerated types.
     pub enumerations: Vec<Enumeration>,
@@ -51,7 +51,7 @@ pub struct Program {
 }
 
 impl Program {
-    /// Slots at the start of the state that no variable has: the fault (0 while the program runs; see [`crate::fault`]), two values that explain it,
+    /// Slots at the start of the state that no variable has: the fault (0 while the program runs; see `Fault`), two values that explain it,
     /// and the number of scans since the start.
     pub const HEADER: u32 = 4;
 
