@@ -294,6 +294,5 @@ fn both_readers_agree_scan_by_scan() {
             assert_eq!(shown, expected, "{} scan {scan}", path.display());
         }
     }
-    println!("{compared} documents compared");
     assert!(compared >= 1, "{compared} documents compared");
 }

@@ -226,7 +226,7 @@ fn weak(value: &Expression, span: &Span) -> Option<TypeName> {
         ExpressionKind::Minus(inner) | ExpressionKind::Not(inner) => weak(inner, span),
         ExpressionKind::Chain(first, rest) => {
             let values = std::iter::once(&**first).chain(rest.iter().map(|(_, value)| value));
-            values.filter_map(|value| weak(value, span)).last()
+            values.rev().find_map(|value| weak(value, span))
         }
         ExpressionKind::Call(_, arguments) => {
             let mut values = arguments.iter().filter_map(|argument| match argument {
