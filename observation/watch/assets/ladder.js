@@ -108,7 +108,7 @@ async function picture() {
   }
 }
 
-// A line for each line of the text; what was not executed is pale, and values stand beside the text.
+// A line for each line of the text; what was not executed is pale, and values are to the right of the text.
 function showText(lines) {
   if (shown !== "text" || !id("ladder-picture").querySelector("table.program-text")) {
     shown = "text";

@@ -82,7 +82,7 @@ async function refresh() {
   }
 }
 
-// Lanes of a signal with numbers are as high as so many of a BOOL.
+// Height of a lane of numbers, as a multiple of a lane of a BOOL.
 const HIGH = 4;
 
 // Each signal has a lane of its own, the first on top. A BOOL is at the bottom of it where it is 0 and above where it is 1; a number lies between its
@@ -113,7 +113,7 @@ function heightOf(lane, value) {
   return lane.base + 0.2 + share * (lane.height - 0.7);
 }
 
-// What stands beside a lane: the name, and the least and the greatest value.
+// Labels of a lane: the name, and the least and the greatest value.
 function labelsOf(lane) {
   if (!lane.isNumber) {
     return [[lane.base + 0.35, shorten(lane.name, 18)]];
