@@ -97,7 +97,8 @@ impl RevocationWatch {
         let thread = std::thread::Builder::new()
             .name("revocations".into())
             .spawn(move || {
-                let mut seen = changed(&path);
+                // The file may have changed since the keys were loaded: the first look always reads it.
+                let mut seen = None;
                 while matches!(
                     stopped.recv_timeout(LOOK_EVERY),
                     Err(RecvTimeoutError::Timeout)

@@ -14,7 +14,7 @@ use understudy_cluster::{Cluster, press_cell, read};
 use understudy_keys::{
     Authority, DEFAULT_OPERATOR, Date, KeysError, MemberKeys, OperatorKeys, Operators, Role,
 };
-use understudy_seal::Refusal;
+use understudy_seal::{Opener, Refusal};
 use understudy_wire::{Body, Frame, Header, Member, Moment, Topic, encode};
 
 const DAYS: u32 = 365;
@@ -219,6 +219,37 @@ fn a_life_never_comes_again() {
     }
 }
 
+/// A member that runs refuses the datagrams of a revoked one before long.
+fn learns_revocation(
+    listening: &mut Opener,
+    mut datagram: impl FnMut() -> Vec<u8>,
+    sender: Member,
+) {
+    let started = Instant::now();
+    while listening.open(&mut datagram()) != Err(Refusal::Revoked { sender }) {
+        assert!(
+            started.elapsed() < Duration::from_secs(30),
+            "it never learns it"
+        );
+        std::thread::yield_now();
+    }
+}
+
+#[test]
+fn a_revocation_between_loading_and_watching_is_learned() {
+    let (cluster, mut authority) = issued("revoked-before-watching");
+    let robot = cluster.member("robot").expect("it is in the cluster");
+    let press = cluster.member("press").expect("it is in the cluster");
+    let stolen = loaded(&authority, &cluster, robot);
+    let witness = loaded(&authority, &cluster, press);
+    let mut listening = witness.opener();
+    authority
+        .revoke(&["robot".to_owned()], now())
+        .expect("it was issued");
+    let _watch = witness.watch().expect("a thread");
+    learns_revocation(&mut listening, || datagram(&cluster, &stolen, robot), robot);
+}
+
 #[test]
 fn what_is_revoked_no_longer_counts_and_new_keys_do() {
     let (cluster, mut authority) = issued("revoked");
@@ -246,14 +277,7 @@ fn what_is_revoked_no_longer_counts_and_new_keys_do() {
     assert!(is_revoked(
         starting.open(&mut datagram(&cluster, &stolen, robot))
     ));
-    let started = Instant::now();
-    while !is_revoked(listening.open(&mut datagram(&cluster, &stolen, robot))) {
-        assert!(
-            started.elapsed() < Duration::from_secs(30),
-            "it never learns it"
-        );
-        std::thread::yield_now();
-    }
+    learns_revocation(&mut listening, || datagram(&cluster, &stolen, robot), robot);
     let again = authority.revoke(&["robot".into(), "nobody".into()], now());
     assert_eq!(
         codes(&again.expect_err("there is nothing to revoke")),
