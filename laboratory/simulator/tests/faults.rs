@@ -143,7 +143,10 @@ fn a_misconfigured_station_is_refused_with_both_hashes() {
         (150, 0.0, ROBOT, Action::Restart),
     ]);
     assert_eq!(untrue(&outcome), 0);
-    let (right, wrong) = (ConfigurationHash(2), ConfigurationHash(!2));
+    let right = press_cell::parts(Mode::Full, 1).stations[0]
+        .agreement
+        .configuration;
+    let wrong = ConfigurationHash(!right.0);
     let mut named: Vec<_> = MEMBERS[1..]
         .iter()
         .flat_map(|&other| [(other, ROBOT, wrong, right), (ROBOT, other, right, wrong)])
