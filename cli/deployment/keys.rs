@@ -8,9 +8,8 @@ use std::time::SystemTime;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 use understudy_cluster::{Cluster, Overrides};
-use understudy_keys::{
-    Authority, DEFAULT_OPERATOR, Date, Holder, Issued, KeysError, Operators, Role,
-};
+use understudy_keys::{Authority, DEFAULT_PERSON, Date, Holder, Issued, KeysError, People, Role};
+use understudy_wire::Role as Rights;
 
 use crate::answer::{Answer, Status};
 use crate::files;
@@ -51,12 +50,8 @@ enum What {
         /// Members
         #[arg(value_name = "NAME")]
         names: Vec<String>,
-        /// Operator who may command the members; repeatable
-        #[arg(long, value_name = "NAME")]
-        operator: Vec<String>,
-        /// Address at which members reach these operators, such as the router of a site
-        #[arg(long, value_name = "IP", requires = "operator")]
-        address: Option<IpAddr>,
+        #[command(flatten)]
+        people: PeopleArguments,
         #[command(flatten)]
         folder: FolderArgument,
         #[command(flatten)]
@@ -69,12 +64,43 @@ enum What {
     },
     /// Revoke keys; running members apply it when their revoked.toml is replaced
     Revoke {
-        /// Members or operators
+        /// Members or persons
         #[arg(value_name = "NAME", required = true)]
         names: Vec<String>,
         #[command(flatten)]
         folder: FolderArgument,
     },
+}
+
+#[derive(Debug, Args)]
+struct PeopleArguments {
+    /// Person or program that may read what the members report; repeatable
+    #[arg(long, value_name = "NAME")]
+    viewer: Vec<String>,
+    /// Person or program that may also write operator inputs; repeatable
+    #[arg(long, value_name = "NAME")]
+    operator: Vec<String>,
+    /// Person or program that may also force, release and stop; repeatable
+    #[arg(long, value_name = "NAME")]
+    engineer: Vec<String>,
+    /// Address at which members reach them, such as the router of a site
+    #[arg(long, value_name = "IP")]
+    address: Option<IpAddr>,
+}
+
+impl PeopleArguments {
+    fn holders(&self) -> Vec<(String, Rights)> {
+        let roles = [
+            (&self.viewer, Rights::Viewer),
+            (&self.operator, Rights::Operator),
+            (&self.engineer, Rights::Engineer),
+        ];
+        let holders = roles.into_iter().flat_map(|(names, role)| {
+            let names = names.iter().cloned();
+            names.map(move |name| (name, role))
+        });
+        holders.collect()
+    }
 }
 
 #[derive(Debug, Args)]
@@ -105,26 +131,26 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
             let names: Vec<String> = names.map(str::to_owned).collect();
             let mut authority =
                 Authority::init(&folder.folder, &cluster, now).map_err(|error| failed(&[error]))?;
-            let operators = [DEFAULT_OPERATOR.to_owned()];
-            let issued = authority.issue(&cluster, &names, operators[..].into(), days.days, now);
+            let people = [(DEFAULT_PERSON.to_owned(), Rights::Engineer)];
+            let issued = authority.issue(&cluster, &names, people[..].into(), days.days, now);
             let issued = issued.map_err(|errors| failed(&errors))?;
             (issued, without_address(&cluster, &names))
         }
         What::Issue {
             cluster,
             names,
-            operator,
-            address,
+            people,
             folder,
             days,
         } => {
             let cluster = read(cluster)?;
             let mut authority = open(folder)?;
-            let operators = Operators {
-                names: operator,
-                address: *address,
+            let holders = people.holders();
+            let people = People {
+                holders: &holders,
+                address: people.address,
             };
-            let issued = authority.issue(&cluster, names, operators, days.days, now);
+            let issued = authority.issue(&cluster, names, people, days.days, now);
             let issued = issued.map_err(|errors| failed(&errors))?;
             (issued, without_address(&cluster, names))
         }
@@ -240,10 +266,7 @@ fn table(holders: &[Holder], now: Date) -> String {
     );
     for holder in holders {
         let shown = shown(holder, now);
-        let role = match shown.role {
-            Role::Member => "member",
-            Role::Operator => "operator",
-        };
+        let role = shown.role.word();
         let state = match shown.revoked {
             Some(since) => format!("revoked {since}"),
             None if shown.state == "valid" => format!("valid, {} days left", shown.days_left),

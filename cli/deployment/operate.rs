@@ -9,12 +9,14 @@ use serde_json::json;
 use understudy_bus::{Call, Request};
 use understudy_cluster::{Cluster, Overrides, typed_value};
 use understudy_executable::Interface;
-use understudy_journal::{Command, OperatorAction, Refusal};
+use understudy_journal::{Command, Done, OperatorAction, Refusal, new_write};
 use understudy_keys::{Date, OperatorKeys};
 use understudy_member::tls_keys;
 use understudy_typed::Elementary;
 use understudy_view::{Run, find_running_of};
-use understudy_wire::{Cycle, Force, ForcedValue, Member, SignalPlace, StateChoice};
+use understudy_wire::{
+    Cycle, Force, Member, PointValue, Role, SignalPlace, StateChoice, Write, WriteAnswer,
+};
 
 use crate::answer::{Answer, Status};
 use crate::files;
@@ -25,12 +27,13 @@ use crate::files;
 Example:
   understudy operate runs/latest --name robot kill
   understudy operate runs/latest --name robot restart
-  understudy operate cell/cluster.toml --keys keys/members/operator --name robot-io status
-  understudy operate cell/cluster.toml --keys keys/members/operator --name robot-io release
-  understudy operate cell/cluster.toml --keys keys/members/operator --name robot-io accept-state --cycle 4711
-  understudy operate cell/cluster.toml --keys keys/members/operator --name robot journal --lines 100
+  understudy operate cell/cluster.toml --keys keys/members/engineer --name robot-io status
+  understudy operate cell/cluster.toml --keys keys/members/engineer --name robot-io release
+  understudy operate cell/cluster.toml --keys keys/members/engineer --name robot-io accept-state --cycle 4711
+  understudy operate cell/cluster.toml --keys keys/members/engineer --name robot journal --lines 100
   understudy operate runs/latest --name tank-io force inflow=12.5 --seconds 60 --reason \"valve test\"
   understudy operate runs/latest --name tank-io unforce inflow
+  understudy operate runs/latest --name tank-io write setpoint=42.5 --reason \"new batch\"
 
 Without --keys the member belongs to a laboratory on this machine: that of the given run, or the running one of the cluster below --out.")]
 pub(crate) struct Arguments {
@@ -46,8 +49,8 @@ pub(crate) struct Arguments {
     /// Command or query
     #[arg(value_enum)]
     what: What,
-    /// For force: signal and value, such as inflow=12.5 or lamp=true; for unforce: signal
-    #[arg(value_name = "SIGNAL[=VALUE]", required_if_eq_any([("what", "force"), ("what", "unforce")]))]
+    /// For force and write: signal and value, such as inflow=12.5 or lamp=true; for unforce: signal
+    #[arg(value_name = "SIGNAL[=VALUE]", required_if_eq_any([("what", "force"), ("what", "unforce"), ("what", "write")]))]
     signal: Option<String>,
     /// For force: duration
     #[arg(long, value_name = "N", default_value_t = 60)]
@@ -94,6 +97,8 @@ enum What {
     Force,
     /// End a force
     Unforce,
+    /// Write a value to an operator input, and wait until it is in effect
+    Write,
     /// Stop the member
     Stop,
     /// Print new journal records
@@ -123,6 +128,7 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
         What::Unforce => Command::Unforce {
             signal: place(arguments, written(arguments)?.cluster())?.0,
         },
+        What::Write => Command::Write(write(arguments, written(arguments)?.cluster())?),
         What::Kill => Command::Kill,
         What::Restart => Command::Restart,
         What::Release => Command::Release,
@@ -131,7 +137,7 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
         },
         What::Status | What::Configuration | What::Stop | What::Journal => {
             let message = format!(
-                "`{word}` requires a remote member: give the folder of the operator's keys by --keys; a laboratory accepts kill, restart, release, cold-start, accept-state, force and unforce"
+                "`{word}` requires a remote member: give the folder of the operator's keys by --keys; a laboratory accepts kill, restart, release, cold-start, accept-state, force, unforce and write"
             );
             return Err(Answer::failed(Status::BadInput, "U0621", message));
         }
@@ -144,9 +150,16 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
         reason: arguments.reason.clone(),
     };
     let done = run.commander().act_and_wait(&action);
-    done.map_err(|refusal| refused(&refusal))?;
-    let text = format!("{word} {}: done", arguments.name);
-    let result = json!({ "run": run.path(), "name": arguments.name, "done": word });
+    let done = done.map_err(|refusal| refused(&refusal))?;
+    let mut text = format!("{word} {}: done", arguments.name);
+    let mut result = json!({ "run": run.path(), "name": arguments.name, "done": word });
+    if let Some(cycle) = done.cycle {
+        text = format!(
+            "{word} {}: in effect since cycle {cycle} of the cluster",
+            arguments.name
+        );
+        result["cycle"] = json!(cycle);
+    }
     Ok(Answer::done(text, result).and_next(&[&"top", &run.path()]))
 }
 
@@ -192,13 +205,7 @@ fn force(arguments: &Arguments, cluster: &Cluster) -> Result<Force, Answer> {
         let message = format!("invalid value `{text}` of a {of}: {help}");
         Answer::failed(Status::BadInput, "U0556", message)
     })?;
-    let value = match of {
-        Elementary::Bool => ForcedValue::Bit(stored != 0),
-        _ => ForcedValue::Number {
-            width: of.bits() as u8,
-            stored,
-        },
-    };
+    let value = PointValue::new(of.bits(), stored);
     let force = Force {
         signal,
         value,
@@ -210,6 +217,25 @@ fn force(arguments: &Arguments, cluster: &Cluster) -> Result<Force, Answer> {
         .check()
         .map_err(|error| Answer::failed(Status::BadInput, "U0556", error.to_string()))?;
     Ok(force)
+}
+
+/// A write of an operator input, under the rights of whoever may reach the run.
+fn write(arguments: &Arguments, cluster: &Cluster) -> Result<Write, Answer> {
+    let text = arguments.signal.as_deref().unwrap_or_default();
+    let (input, value) = text.split_once('=').unwrap_or((text, ""));
+    let member = crate::member::find(cluster, &arguments.name)?;
+    let write = new_write(cluster, member, input.trim(), value);
+    let write = write
+        .map_err(|problem| Answer::failed(Status::BadInput, problem.code(), problem.to_string()))?;
+    let write = Write {
+        role: Role::Engineer,
+        owner: crate::inspect::top::owner(),
+        reason: arguments.reason.clone(),
+        ..write
+    };
+    let checked = write.check();
+    checked.map_err(|error| Answer::failed(Status::BadInput, "U0556", error.to_string()))?;
+    Ok(write)
 }
 
 /// The named run, or the newest running one of the cluster.
@@ -236,6 +262,20 @@ fn refused(refusal: &Refusal) -> Answer {
     Answer::failed(Status::Failed, &code, message)
 }
 
+/// The answer of a remote I/O to a write.
+fn outcome(arguments: &Arguments, text: &str) -> Result<Answer, Answer> {
+    let answer: WriteAnswer = serde_json::from_str(text)
+        .map_err(|_| refused(&Refusal::Said(format!("U0556: {text:.200}"))))?;
+    let done = Done::of_write(answer.outcome).map_err(|refusal| refused(&refusal))?;
+    let cycle = done.cycle.unwrap_or_default();
+    let text = format!(
+        "write {}: in effect since cycle {cycle} of the cluster",
+        arguments.name
+    );
+    let result = json!({ "name": arguments.name, "done": "write", "cycle": cycle });
+    Ok(Answer::done(text, result))
+}
+
 /// Sends the command to a remote member.
 fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
     let (cluster, _) = files::cluster(&arguments.target, Overrides::default())?;
@@ -249,6 +289,10 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
         What::ColdStart | What::AcceptState => Some(Request::Choose(arguments.choice())),
         What::Force => Some(Request::Force(force(arguments, &cluster)?)),
         What::Unforce => Some(Request::Unforce(place(arguments, &cluster)?.0)),
+        What::Write => Some(Request::Write(Write {
+            role: keys.role,
+            ..write(arguments, &cluster)?
+        })),
         What::Stop => Some(Request::Stop),
         What::Journal => None,
         What::Kill | What::Restart => {
@@ -275,6 +319,9 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
         return Ok(Answer::done("", json!(null)));
     };
     let text = call.ask(&request)?;
+    if let Request::Write(_) = request {
+        return outcome(arguments, &text);
+    }
     let result = serde_json::from_str(&text).unwrap_or_else(|_| json!({ "text": text }));
     Ok(Answer::done(text, result))
 }

@@ -25,7 +25,7 @@ Example:
   understudy top
   understudy top runs/latest --once
   understudy top examples/press-cell/cluster.toml
-  understudy top cell/cluster.toml --keys keys/members/operator
+  understudy top cell/cluster.toml --keys keys/members/engineer
 
 For a cluster file the newest run below --out is shown. Keys: q quit, space pause, tab events, alarms and remaining redundancy,
 a acknowledge, arrows scroll, h help. With --once or --json the current state is printed.")]

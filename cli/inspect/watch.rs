@@ -30,7 +30,7 @@ Example:
   understudy watch examples/press-cell/cluster.toml --allow-commands
   understudy watch runs/latest
   understudy watch runs/latest --address 0.0.0.0:7480 --logins logins.txt
-  understudy watch cell/cluster.toml --keys keys/members/operator
+  understudy watch cell/cluster.toml --keys keys/members/engineer
 
 If a laboratory of the cluster is already running below --out, the page shows that run. The page is read-only by default;
 --allow-commands enables commands. At an address that other machines can reach, the page is served over TLS to the users of the --logins

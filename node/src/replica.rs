@@ -187,6 +187,7 @@ impl Replica {
                 applied: sample.applied,
                 excluded: sample.excluded,
                 accounted_for: sample.gone,
+                writes: sample.writes.clone(),
                 inputs: inputs.clone(),
             };
             self.remembered = Remembered::Received(moment, recalled);

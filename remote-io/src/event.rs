@@ -7,7 +7,7 @@ use smallvec::SmallVec;
 use understudy_cycle::{Notice, Refusal};
 use understudy_wire::{
     ConfigurationHash, Force, Image, Lineage, Member, Moment, ProgramId, SignalPlace, Source,
-    StationId, StationSet,
+    StationId, StationSet, Write, WriteId, WriteRefusal,
 };
 
 use crate::settings::ValueFault;
@@ -142,6 +142,47 @@ pub enum Event {
         signal: SignalPlace,
         /// Whether its time was over; otherwise the operator has removed it.
         expired: bool,
+    },
+    /// An operator has written a value, which becomes part of the next sample.
+    Written {
+        /// Current cycle.
+        moment: Moment,
+        /// Identifier, input, value, operator and reason.
+        write: Write,
+    },
+    /// A written value is in effect: outputs of a sample with it were applied.
+    WriteInEffect {
+        /// Cycle of these outputs.
+        moment: Moment,
+        /// Identifier of the write.
+        id: WriteId,
+        /// Cycle of the first sample with the value.
+        since: Moment,
+    },
+    /// A write was refused and has no effect.
+    WriteRefused {
+        /// Current cycle.
+        moment: Moment,
+        /// The write.
+        write: Write,
+        /// Reason.
+        refusal: WriteRefusal,
+    },
+    /// All samples with a written value became void, and it is over: the write has no effect.
+    WriteVoid {
+        /// Current cycle.
+        moment: Moment,
+        /// Identifier of the write.
+        id: WriteId,
+    },
+    /// The value of a signal of another program has become valid, or too old.
+    SignalValidity {
+        /// Current cycle.
+        moment: Moment,
+        /// Input, by its first bit in u(i), counted from 0.
+        input: u16,
+        /// Whether it is valid; otherwise the default value is sampled from the next cycle on.
+        valid: bool,
     },
     /// After a restart: stations recall the ones that this remote I/O had excluded.
     RecalledExclusion {

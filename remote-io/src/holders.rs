@@ -3,7 +3,7 @@
 //! A station is living if a turn or a join of it was received in the last few cycles.
 
 use understudy_cycle::Agreement;
-use understudy_wire::{Holding, Image, ProgramId, Recalled, StationId, StationSet};
+use understudy_wire::{Holding, Image, ProgramId, Recalled, StationId, StationSet, WriteId};
 
 /// One entry for each station that can hold the program's state.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -161,6 +161,16 @@ impl Holders {
     pub(crate) fn inputs(&self, station: StationId) -> Option<&Image> {
         let entry = self.entries.iter().find(|entry| entry.station == station)?;
         entry.recalled.as_ref().map(|recalled| &recalled.inputs)
+    }
+
+    /// The newest write of each session, as `station` recalls it.
+    pub(crate) fn writes(&self, station: StationId) -> impl Iterator<Item = WriteId> + '_ {
+        let mut entries = self.entries.iter();
+        let entry = entries.find(|entry| entry.station == station);
+        let recalled = entry.and_then(|entry| entry.recalled.as_ref());
+        recalled
+            .into_iter()
+            .flat_map(|recalled| recalled.writes.iter().copied())
     }
 
     /// States that living stations hold.

@@ -12,6 +12,7 @@ mod holders;
 mod remote_io;
 mod selection;
 mod settings;
+mod source;
 mod trust;
 mod votes;
 
@@ -21,3 +22,7 @@ pub use event::{Event, Lacking, LackingReason, Missing};
 pub use foresight::Foreseen;
 pub use remote_io::RemoteIo;
 pub use settings::{Release, Settings, StaleState, StopPoints, ValueFault};
+pub use source::{
+    InputPlace, OperatorInput, OperatorInputKind, SignalInput, SignalSource, ValueMismatch,
+    in_order,
+};

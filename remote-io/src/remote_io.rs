@@ -26,8 +26,10 @@ mod knowledge;
 mod protection;
 mod recovery;
 mod sampling;
+mod signals;
 #[cfg(test)]
 mod states;
+mod writing;
 
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
@@ -48,6 +50,8 @@ use crate::trust::Trust;
 use forcing::Forcing;
 use knowledge::Knowledge;
 use protection::Protection;
+use signals::Signals;
+use writing::Writing;
 
 /// One remote I/O. See [`Machine`] for how it is driven.
 #[derive(Debug, Clone)]
@@ -70,6 +74,8 @@ pub struct RemoteIo {
     looked: Time,
     protection: Protection,
     forcing: Forcing,
+    writing: Writing,
+    signals: Signals,
     /// The turns of this cycle, by rank.
     turns: Vec<Option<Arc<Frame>>>,
     deadline: Deadline,
@@ -151,6 +157,8 @@ impl RemoteIo {
             looked: now,
             protection: Protection::default(),
             forcing: Forcing::default(),
+            writing: Writing::new(&settings.operator_inputs),
+            signals: Signals::new(&settings),
             turns: vec![None; stations],
             deadline: Deadline::Passed { idle: 0 },
             missed: 0,
@@ -184,8 +192,18 @@ impl RemoteIo {
     }
 
     fn receive(&mut self, now: Time, frame: &Arc<Frame>) {
-        let Member::Station(station) = frame.header.sender else {
-            return;
+        let station = match (frame.header.sender, &frame.body) {
+            (Member::Station(station), _) => station,
+            // Samples of other programs start no cycle here: they only prove signals.
+            (Member::RemoteIo(program), Body::Sample(sample)) => {
+                if self.member.admits(&frame.header) {
+                    let sources = &self.settings.signal_sources;
+                    let moment = frame.header.moment;
+                    self.signals.note(sources, program, moment, sample);
+                }
+                return;
+            }
+            _ => return,
         };
         match self.member.arrival(now, frame) {
             Arrival::Stale => return,
@@ -214,6 +232,7 @@ impl RemoteIo {
             RemoteIoInput::Release => self.release(),
             RemoteIoInput::Force(force) => self.force(now, force),
             RemoteIoInput::Unforce(signal) => self.unforce(signal),
+            RemoteIoInput::Write(write) => self.write(write),
         }
     }
 
@@ -268,6 +287,7 @@ impl RemoteIo {
     fn close_cycle(&mut self) {
         self.member.close_cycle();
         self.holders.close_cycle();
+        self.writing.close_cycle();
         if let Some(run) = self.knowledge.run_mut() {
             run.sampled = false;
         }
@@ -287,6 +307,7 @@ impl RemoteIo {
         let Deadline::Passed { idle } = self.deadline else {
             return self.decide(now);
         };
+        self.miss_signals();
         self.apply(Selection::Missing(Missing::NoCycle), None);
         self.note_idle();
         // One that was stopped for long does not make up for every deadline that it slept through.
@@ -316,6 +337,8 @@ impl Hash for RemoteIo {
             looked,
             protection,
             forcing,
+            writing,
+            signals,
             turns,
             deadline,
             missed,
@@ -327,6 +350,7 @@ impl Hash for RemoteIo {
         } = self;
         (member, holders, knowledge, question, authority).hash(hasher);
         (sensors, field, diagnosing, diagnosed, forcing).hash(hasher);
+        (writing, signals).hash(hasher);
         (looked, protection, turns, deadline, missed, applied).hash(hasher);
         (last_true, program, trust, differed).hash(hasher);
     }

@@ -8,6 +8,7 @@ use understudy_wire::{Image, ProgramHash, ProgramId};
 
 use crate::channel::Channel;
 use crate::diagnosis::Diagnosis;
+use crate::source::{OperatorInput, SignalInput, SignalSource};
 
 /// Configuration of one remote I/O.
 #[derive(Debug, Clone)]
@@ -20,6 +21,12 @@ pub struct Settings {
     pub hash: ProgramHash,
     /// Width of u(i) in bits.
     pub inputs: usize,
+    /// Inputs that operators write; no two share a bit with each other or with a signal.
+    pub operator_inputs: Vec<OperatorInput>,
+    /// Inputs that are outputs of other programs.
+    pub signals: Vec<SignalInput>,
+    /// The programs that compute them, each once.
+    pub signal_sources: Vec<SignalSource>,
     /// Inputs whose channels report their own failure.
     pub channels: Vec<Channel>,
     /// Where the program reports a program fault; `None` for a program that has none.

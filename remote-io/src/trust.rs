@@ -61,6 +61,11 @@ impl Trust {
         *self == Self::default()
     }
 
+    /// Whether stations are suspected and no majority has located the fault.
+    pub(crate) fn suspects(&self) -> bool {
+        !self.accused.is_empty()
+    }
+
     /// The operator releases all stations.
     pub(crate) fn release(&mut self) {
         *self = Self::default();

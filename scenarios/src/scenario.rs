@@ -6,11 +6,14 @@
 use std::collections::BTreeMap;
 use std::num::NonZeroU64;
 use std::ops::Range;
+use std::time::Duration;
 
 use serde::Serialize;
 use understudy_journal::Members;
 use understudy_simulator::{Action, Disturbance, Fault, Network};
-use understudy_wire::{ProgramId, Source};
+use understudy_text::duration;
+use understudy_typed::Elementary;
+use understudy_wire::{Member, PointValue, ProgramId, Source};
 
 /// A scenario whose names belong to a cluster.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -90,7 +93,7 @@ impl Scenario {
 }
 
 /// Every action as scenario files write it, in the order in which they are explained.
-pub const ACTIONS: [&str; 19] = [
+pub const ACTIONS: [&str; 20] = [
     "crash",
     "restart",
     "restart-misconfigured",
@@ -101,6 +104,7 @@ pub const ACTIONS: [&str; 19] = [
     "release",
     "cold-start",
     "accept-state",
+    "write",
     "cut",
     "heal",
     "delay",
@@ -118,9 +122,13 @@ pub fn action_word(action: Action) -> &'static str {
 }
 
 /// An action with its numbers and names, as tables write it.
-pub(crate) fn action_text(action: Action, members: &Members) -> String {
+pub(crate) fn action_text(member: Member, action: Action, members: &Members) -> String {
     let word = action_word(action);
     match action {
+        Action::Write { input, value } => match written(member, (input, value), members) {
+            Some((name, value)) => format!("{word} {name} := {value}"),
+            None => word.to_owned(),
+        },
         Action::Cut { to } | Action::Heal { to } => format!("{word} to {}", members.name(to)),
         Action::Delay { to, by } => format!("{word} to {} by {by:?}", members.name(to)),
         Action::RestartInEpoch { epoch } => format!("{word} {epoch}"),
@@ -133,6 +141,28 @@ pub(crate) fn action_text(action: Action, members: &Members) -> String {
         }
         _ => word.to_owned(),
     }
+}
+
+/// The input that an operator writes, and the value, as scenario files write them.
+pub(crate) fn written(
+    member: Member,
+    (input, value): (u16, PointValue),
+    members: &Members,
+) -> Option<(String, String)> {
+    let Member::RemoteIo(program) = member else {
+        return None;
+    };
+    let mut inputs = members.operator_inputs(program);
+    let named = inputs.find(|named| named.input.place.bit == input)?;
+    let (of, stored) = (named.input.place.of, value.stored());
+    let value = match of {
+        Elementary::Bool => (stored != 0).to_string(),
+        Elementary::Real => format!("{:?}", f64::from(f32::from_bits(stored as u32))),
+        Elementary::Lreal => format!("{:?}", f64::from_bits(stored)),
+        _ if of.is_time() => format!("\"{}\"", duration::text(Duration::from_nanos(stored))),
+        _ => of.signed(stored).to_string(),
+    };
+    Some((named.name.clone(), value))
 }
 
 /// What must come of a run. Counts are over all remote I/Os, from the origin to the last cycle.

@@ -232,7 +232,7 @@ impl Summary {
             })
         });
         let steps = account.steps.iter().map(|step| StepSummary {
-            action: action_text(step.action, members),
+            action: action_text(step.member, step.action, members),
             name: name(step.member),
             asked: step.asked,
             measured: step.measured,

@@ -8,7 +8,7 @@ use understudy_journal::{Members, source_word};
 use understudy_simulator::{Action, Disturbance, Fault, Network};
 use understudy_wire::{Member, StationId};
 
-use crate::scenario::{Expectation, Scenario, action_word};
+use crate::scenario::{Expectation, Scenario, action_word, written};
 
 /// The text; `members` are those of the scenario's cluster, and `remarks` stand above it for people.
 pub fn write(scenario: &Scenario, members: &Members, remarks: &[String]) -> String {
@@ -62,6 +62,10 @@ fn write_step(text: &mut String, step: &Fault, members: &Members) {
     let _ = writeln!(text, "action = {}", quoted(action_word(step.action)));
     let _ = writeln!(text, "station = {}", name(step.member));
     let _ = match step.action {
+        Action::Write { input, value } => match written(step.member, (input, value), members) {
+            Some((name, value)) => writeln!(text, "input = {}\nvalue = {value}", quoted(&name)),
+            None => Ok(()),
+        },
         Action::Cut { to } | Action::Heal { to } => writeln!(text, "to = {}", name(to)),
         Action::Delay { to, by } => {
             writeln!(text, "to = {}\nby = {}", name(to), time(by))

@@ -176,7 +176,7 @@ fn members_elsewhere_are_looked_at_with_an_operators_keys() {
     let runs = folder.join("runs");
     let running = deployed(&folder);
     let cluster = text(&running.cluster);
-    let operator = running.keys.join("members/operator");
+    let operator = running.keys.join("members/engineer");
 
     let top = |keys: &Path, cluster: &str| {
         let runs = text(&runs);
@@ -242,7 +242,7 @@ fn members_elsewhere_are_looked_at_with_an_operators_keys() {
     let strange = folder.join("strange");
     let (status, made, _) = answer(&["keys", "init", cluster, "--folder", text(&strange)]);
     assert_eq!(status, 0, "{made:#}");
-    let (status, document, _) = top(&strange.join("members/operator"), cluster);
+    let (status, document, _) = top(&strange.join("members/engineer"), cluster);
     assert_eq!(status, 1, "{document:#}");
     assert_eq!(document["failures"][0]["code"], "U0562", "{document:#}");
     let other = running.cluster.with_file_name("other.toml");

@@ -90,7 +90,7 @@ fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
         answer(&["keys", "init", cluster, "--folder", text(&theirs)]).0,
         0
     );
-    let stranger = theirs.join("members/operator");
+    let stranger = theirs.join("members/engineer");
     let refused = operate(text(&stranger), &["stop"]);
     assert_eq!((refused.0, codes(&refused.1)), (1, vec!["U0509"]));
 

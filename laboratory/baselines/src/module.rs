@@ -85,6 +85,8 @@ impl Module {
                 applied: None,
                 excluded: StationSet::EMPTY,
                 gone: StationSet::EMPTY,
+                drives: true,
+                writes: Default::default(),
             }),
         });
         self.copies.sent(now, &frame, &self.agreement.schedule);

@@ -237,6 +237,7 @@ impl Pairs {
                             account.two_masters += u64::from(standby && deadline.drivers > 1);
                             account.differing += u64::from(deadline.differ);
                         }
+                        Output::Answer(_) => {}
                     }
                 }
             }
@@ -253,7 +254,9 @@ impl Pairs {
                             self.account.false_take_overs += u64::from(works);
                             self.account.forgotten += forgotten;
                         }
-                        Output::Report(Event::SteppedDown) | Output::Drive(_) => {}
+                        Output::Report(Event::SteppedDown)
+                        | Output::Drive(_)
+                        | Output::Answer(_) => {}
                     }
                 }
             }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::SystemTime;
 
 use understudy_cluster::{Cluster, Security};
-use understudy_keys::{Authority, Date, KeysError, Operators};
+use understudy_keys::{Authority, Date, KeysError, People};
 
 /// A run is over by then.
 const DAYS: u32 = 30;
@@ -35,7 +35,7 @@ impl RunKeys {
         if let Some(folder) = &made.authority {
             let mut authority =
                 Authority::init(folder, cluster, now).map_err(|error| vec![error])?;
-            authority.issue(cluster, &names, Operators::default(), DAYS, now)?;
+            authority.issue(cluster, &names, People::default(), DAYS, now)?;
         }
         Ok(made)
     }

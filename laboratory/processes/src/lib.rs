@@ -25,8 +25,8 @@ use tokio::sync::mpsc::{Receiver, Sender, channel};
 use understudy_bus::{Cuts, LinkKind};
 use understudy_cluster::Cluster;
 use understudy_journal::{
-    Commands, Journal, JournalState, KEYS, Record, RunDirectory, RunEvent, RunSocket,
-    commands as queue_of_commands, keep_cluster, monotonic_ns,
+    Commands, Journal, JournalState, KEYS, PendingWrites, Record, RunDirectory, RunEvent,
+    RunSocket, commands as queue_of_commands, keep_cluster, monotonic_ns,
 };
 use understudy_simulator::Action;
 use understudy_wire::Member;
@@ -228,6 +228,7 @@ fn run(
         afterwards,
         judged: None,
         commanded: commands.is_some(),
+        writes: PendingWrites::default(),
         directory: directory.path().to_owned(),
         sender,
         watch,
@@ -247,6 +248,7 @@ fn refuse_what_is_simulated(scenario: &Scenario) -> Result<(), LaboratoryError> 
                 | Action::Continue
                 | Action::Release
                 | Action::Choose { .. }
+                | Action::Write { .. }
                 | Action::Cut { .. }
                 | Action::Heal { .. }
         )
@@ -283,6 +285,7 @@ struct Laboratory<'w> {
     judged: Option<Account>,
     /// Whether somebody gives commands, or said that he might.
     commanded: bool,
+    writes: PendingWrites,
     directory: PathBuf,
     sender: Sender<Said>,
     watch: &'w mut dyn FnMut(Progress),
@@ -390,6 +393,7 @@ impl Laboratory<'_> {
             journal.write(record);
         }
         self.account.observe(record);
+        self.writes.observe(record);
         self.conductor.hear(record, Instant::now());
         if let Some(moment) = self.account.origin().filter(|_| !had_origin) {
             self.note(RunEvent::Origin { moment, cycle: 0 });

@@ -1,6 +1,6 @@
 //! What the laboratory does when somebody commands.
 
-use understudy_journal::{Command, Commanded, OperatorAction, Refusal, RunEvent};
+use understudy_journal::{Command, Commanded, Done, OperatorAction, Refusal, RunEvent};
 use understudy_simulator::{Action, Fault};
 use understudy_wire::{Force, Member, ProgramId};
 
@@ -13,14 +13,25 @@ impl Laboratory<'_> {
             OperatorAction::Acknowledge(seen) => {
                 self.note(RunEvent::Acknowledged(seen));
                 self.show_journal();
-                Ok(())
+                Ok(Done::default())
             }
             OperatorAction::Command {
                 member,
                 command,
                 owner,
                 reason,
-            } => self.obey_command(member, command, owner, reason).await,
+            } => {
+                let write = match &command {
+                    Command::Write(write) => Some(write.id),
+                    _ => None,
+                };
+                let done = self.obey_command(member, command, owner, reason).await;
+                // Its outcome comes with the journal of the remote I/O.
+                if let (Some(id), Ok(_)) = (write, &done) {
+                    return self.writes.add(id, commanded);
+                }
+                done
+            }
         };
         commanded.answer(done);
     }
@@ -31,7 +42,7 @@ impl Laboratory<'_> {
         command: Command,
         owner: String,
         reason: String,
-    ) -> Result<(), Refusal> {
+    ) -> Result<Done, Refusal> {
         // Whoever commands may make everybody stand still for as long as he wants.
         self.commanded = true;
         let refusal = self.too_early().or_else(|| self.refusal(member, &command));
@@ -78,6 +89,7 @@ impl Laboratory<'_> {
             Command::Release
             | Command::Choose { .. }
             | Command::Force(_)
+            | Command::Write(_)
             | Command::Unforce { .. }
                 if !remote_io =>
             {
@@ -100,7 +112,7 @@ impl Laboratory<'_> {
         Refusal::of_force(&self.name(member), force, inputs, outputs)
     }
 
-    async fn command(&mut self, member: Member, command: &Command) -> Result<(), Refusal> {
+    async fn command(&mut self, member: Member, command: &Command) -> Result<Done, Refusal> {
         let line = |word: &str, value: Result<String, serde_json::Error>| {
             value.map(|value| format!("{word} {value}"))
         };
@@ -118,6 +130,11 @@ impl Laboratory<'_> {
                     .tell(member, line("force", serde_json::to_string(force)))
                     .await;
             }
+            Command::Write(write) => {
+                return self
+                    .tell(member, line("write", serde_json::to_string(write)))
+                    .await;
+            }
             Command::Unforce { signal } => {
                 return self
                     .tell(member, line("unforce", serde_json::to_string(signal)))
@@ -127,7 +144,7 @@ impl Laboratory<'_> {
         self.act(member, action).await
     }
 
-    async fn act(&mut self, member: Member, action: Action) -> Result<(), Refusal> {
+    async fn act(&mut self, member: Member, action: Action) -> Result<Done, Refusal> {
         let step = Fault {
             at_cycle: self.account.cycle().map_or(0, |cycle| cycle + 1),
             phase: 0.0,
@@ -135,10 +152,11 @@ impl Laboratory<'_> {
             action,
         };
         let done = self.do_step(&step).await;
+        let done = done.map(|()| Done::default());
         done.map_err(|error| self.system(member, error))
     }
 
-    async fn cut_all(&mut self, member: Member, cut: bool) -> Result<(), Refusal> {
+    async fn cut_all(&mut self, member: Member, cut: bool) -> Result<Done, Refusal> {
         let all: Vec<Member> = self.account.terms.members.iter().map(|(p, _)| p).collect();
         let stations_only = matches!(member, Member::RemoteIo(_));
         let others = all.into_iter().filter(|&other| match other {
@@ -156,19 +174,20 @@ impl Laboratory<'_> {
                 self.act(from, action).await?;
             }
         }
-        Ok(())
+        Ok(Done::default())
     }
 
     async fn tell(
         &mut self,
         member: Member,
         line: Result<String, serde_json::Error>,
-    ) -> Result<(), Refusal> {
+    ) -> Result<Done, Refusal> {
         let told = match (line, self.processes.get_mut(&member)) {
             (Ok(line), Some(process)) => process.command(&line).await,
             (Err(error), _) => Err(error.into()),
             (_, None) => Err(std::io::ErrorKind::NotFound.into()),
         };
+        let told = told.map(|()| Done::default());
         told.map_err(|error| self.system(member, error))
     }
 

@@ -168,6 +168,7 @@ impl Laboratory<'_> {
             | Action::Continue
             | Action::Release
             | Action::Choose { .. }
+            | Action::Write { .. }
                 if !running =>
             {
                 Some("it has ended")
@@ -190,6 +191,14 @@ impl Laboratory<'_> {
             (Action::Stop, Some(process)) => process.stop(),
             (Action::Continue, Some(process)) => process.go_on(),
             (Action::Release, Some(process)) => process.command("release").await,
+            (Action::Write { .. }, Some(process)) => {
+                let write = step
+                    .write()
+                    .and_then(|write| serde_json::to_string(&write).ok());
+                process
+                    .command(&format!("write {}", write.unwrap_or_default()))
+                    .await
+            }
             (Action::Choose { choice }, Some(process)) => {
                 let line = serde_json::to_string(&choice).map(|it| format!("choose {it}"));
                 process.command(&line.unwrap_or_default()).await

@@ -21,7 +21,7 @@ use understudy_journal::RunDirectory;
 use understudy_network::{Hosts, Impairment, NetworkError, Proxy, Route, Share, Transport};
 use understudy_scenarios::Scenario;
 use understudy_simulator::Network;
-use understudy_wire::{Member, ProgramId};
+use understudy_wire::Member;
 
 use crate::error::LaboratoryError;
 
@@ -128,8 +128,15 @@ impl Site {
             }
             None if impairment.is_none() => {}
             _ => {
-                let feeds = feeds(cluster);
-                site.route(cluster, &feeds, link, &peers, hosts.as_ref(), settings.seed)?;
+                let neighbours = cluster.neighbours();
+                site.route(
+                    cluster,
+                    &neighbours,
+                    link,
+                    &peers,
+                    hosts.as_ref(),
+                    settings.seed,
+                )?;
                 site.write_views(&peers, directory)
                     .map_err(system("to write the endpoints of each member"))?;
             }
@@ -194,7 +201,7 @@ impl Site {
     fn route(
         &mut self,
         cluster: &Cluster,
-        feeds: &[(ProgramId, ProgramId)],
+        neighbours: &[(Member, Member)],
         link: LinkKind,
         peers: &[Peer],
         hosts: Option<&Hosts>,
@@ -207,7 +214,7 @@ impl Site {
                 cluster.agreement().cluster,
                 first.member,
                 peers.to_vec(),
-                feeds.to_vec(),
+                neighbours.to_vec(),
             );
             let own = own.map_err(LaboratoryError::Endpoints)?;
             for second in peers {
@@ -353,13 +360,6 @@ fn namespace_addresses(
             let address = hosts.hosts().get(host)?.address();
             Some((address, *port - 1).into())
         })
-        .collect()
-}
-
-fn feeds(cluster: &Cluster) -> Vec<(ProgramId, ProgramId)> {
-    let plants = cluster.plants().iter().enumerate();
-    plants
-        .filter_map(|(fed, place)| Some((place.as_ref()?.fed_by?, ProgramId(fed as u8))))
         .collect()
 }
 

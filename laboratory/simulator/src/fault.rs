@@ -3,7 +3,9 @@
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
-use understudy_wire::{Member, ProgramId, StateChoice};
+use understudy_wire::{
+    Member, PointValue, ProgramHash, ProgramId, Role, StateChoice, Write, WriteId,
+};
 
 /// One thing done to one member.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -49,6 +51,13 @@ pub enum Action {
     Choose {
         /// Which.
         choice: StateChoice,
+    },
+    /// An operator writes a value to an input of the program of a remote I/O.
+    Write {
+        /// Input, by its first bit in u(i), counted from 0.
+        input: u16,
+        /// Value.
+        value: PointValue,
     },
     /// Its frames reach one other member no more. A full cut is one each way; a partition is one for each pair.
     Cut {
@@ -102,6 +111,27 @@ pub enum Action {
     },
 }
 
+impl Fault {
+    /// The request of a [`Action::Write`]: each step writes in a session of its own.
+    pub fn write(&self) -> Option<Write> {
+        let Action::Write { input, value } = self.action else {
+            return None;
+        };
+        let step = format!("{self:?}");
+        Some(Write {
+            id: WriteId {
+                session: ProgramHash::of(step.as_bytes()).0,
+                number: 1,
+            },
+            input,
+            value,
+            role: Role::Engineer,
+            owner: "scenario".to_owned(),
+            reason: format!("step at cycle {}", self.at_cycle),
+        })
+    }
+}
+
 impl Action {
     /// Its kind in one word, as journals and scenario files write it.
     pub fn word(self) -> &'static str {
@@ -118,6 +148,7 @@ impl Action {
                 choice: StateChoice::Cold,
             } => "cold-start",
             Self::Choose { .. } => "accept-state",
+            Self::Write { .. } => "write",
             Self::Cut { .. } => "cut",
             Self::Heal { .. } => "heal",
             Self::Delay { .. } => "delay",

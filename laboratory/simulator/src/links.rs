@@ -33,6 +33,8 @@ pub(crate) struct Links {
     queue: Queue,
     stations: StationSet,
     remote_ios: ProgramSet,
+    /// By program: those that read its signals.
+    readers: Vec<ProgramSet>,
     /// By place of the sender.
     senders: Vec<Sender>,
     /// By rank: what flips in the next samples that a station takes in.
@@ -88,8 +90,16 @@ impl Flips {
 }
 
 impl Links {
-    pub(crate) fn new(stations: usize, remote_ios: usize, network: Network, seed: u64) -> Self {
+    /// Links of so many stations, and of one remote I/O for each program with the programs that read its signals.
+    pub(crate) fn new(
+        stations: usize,
+        readers: Vec<ProgramSet>,
+        network: Network,
+        seed: u64,
+    ) -> Self {
+        let remote_ios = readers.len();
         Self {
+            readers,
             usual: network,
             disturbance: None,
             network,
@@ -308,7 +318,12 @@ impl Links {
             Member::Plant(_) => {}
         }
         match &frame.body {
-            Body::Sample(_) => remote_ios = ProgramSet::EMPTY,
+            Body::Sample(_) => {
+                remote_ios = match frame.header.sender {
+                    Member::RemoteIo(program) => remote_ios.and(self.readers[program.index()]),
+                    _ => ProgramSet::EMPTY,
+                };
+            }
             Body::Transfer(transfer) => {
                 stations = stations.and(StationSet::only(transfer.to));
                 remote_ios = ProgramSet::EMPTY;
@@ -376,6 +391,7 @@ impl Hash for Links {
             queue,
             stations: _,
             remote_ios: _,
+            readers: _,
             senders,
             intakes,
             late,

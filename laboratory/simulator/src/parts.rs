@@ -2,7 +2,7 @@
 
 use understudy_cluster::Cluster;
 use understudy_plant::{Followed, Plant};
-use understudy_wire::{Epoch, ProgramId, StationId};
+use understudy_wire::{Epoch, ProgramId, ProgramSet, StationId};
 
 /// The settings of every member. Remote I/Os and plants are indexed by program.
 #[derive(Debug, Clone)]
@@ -17,6 +17,20 @@ pub struct Parts {
     pub fed_by: Vec<Option<ProgramId>>,
     /// For each plant, what it follows.
     pub follows: Vec<Vec<Followed>>,
+}
+
+impl Parts {
+    /// For each program, the programs that read its signals.
+    pub(crate) fn readers(&self) -> Vec<ProgramSet> {
+        let programs = (0..self.remote_ios.len()).map(|index| ProgramId(index as u8));
+        let readers_of = |source: ProgramId| {
+            let readers = self.remote_ios.iter();
+            let readers =
+                readers.filter(|it| it.signals.iter().any(|signal| signal.from == source));
+            readers.map(|reader| reader.program).collect()
+        };
+        programs.map(readers_of).collect()
+    }
 }
 
 /// The members of a cluster; the simulation gives each station its own epoch.

@@ -110,7 +110,7 @@ impl Simulation {
         });
         let remote_ios = parts.remote_ios.iter();
         let mut simulation = Self {
-            links: Links::new(parts.stations.len(), remote_ios.len(), network, seed),
+            links: Links::new(parts.stations.len(), parts.readers(), network, seed),
             now,
             stations: stations.collect(),
             remote_ios: remote_ios
@@ -408,7 +408,7 @@ impl Simulation {
                 Output::Report(event) => {
                     observe(self.now, self.pace.cycle(), member, Record::Station(&event));
                 }
-                Output::Drive(_) => {}
+                Output::Drive(_) | Output::Answer(_) => {}
             }
         }
         self.stations[station.index()].settle();
@@ -440,6 +440,8 @@ impl Simulation {
                         Record::RemoteIo(&event),
                     );
                 }
+                // The event says the same.
+                Output::Answer(_) => {}
             }
         }
         self.remote_ios[program.index()].settle();

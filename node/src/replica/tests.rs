@@ -110,6 +110,8 @@ impl Truth {
                 applied: None,
                 excluded: StationSet::EMPTY,
                 gone: StationSet::EMPTY,
+                drives: true,
+                writes: Default::default(),
             }),
         })
     }

@@ -120,6 +120,8 @@ fn sent(what: Sent, cycle: u64, to: u8) -> Option<(Member, Body)> {
                 applied: None,
                 excluded: StationSet::EMPTY,
                 gone: StationSet::EMPTY,
+                drives: true,
+                writes: Default::default(),
             };
             (Member::RemoteIo(ProgramId(program)), Body::Sample(sample))
         }

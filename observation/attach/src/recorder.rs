@@ -10,11 +10,11 @@ use tokio::sync::mpsc::{Receiver, channel};
 use tokio::sync::oneshot;
 use understudy_bus::{DONE, Request};
 use understudy_journal::{
-    Command, Commanded, Commander, Commands, Happening, Journal, OperatorAction, Record, Refusal,
-    RunDirectory, RunEvent, RunSocket, commands, monotonic_ns,
+    Command, Commanded, Commander, Commands, Done, Happening, Journal, OperatorAction, Record,
+    Refusal, RunDirectory, RunEvent, RunSocket, commands, monotonic_ns,
 };
 use understudy_remote_io::Event as RemoteIoEvent;
-use understudy_wire::Member;
+use understudy_wire::{Member, Write, WriteAnswer};
 
 use crate::error::AttachError;
 use crate::follower::{Calls, Follower, Told};
@@ -198,11 +198,50 @@ impl Recorder {
         }
     }
 
+    /// Sends a write; its outcome takes cycles, in which the journal goes on.
+    fn write(&mut self, member: Member, write: Write, commanded: Commanded) {
+        let name = self.names.get(&member).cloned().unwrap_or_default();
+        let Some(call) = self.calls.to(member) else {
+            let reason = "it takes no call now".to_owned();
+            return commanded.answer(Err(Refusal::Elsewhere { name, reason }));
+        };
+        let asking = std::thread::Builder::new().spawn(move || {
+            let answer = call.ask(&Request::Write(write));
+            let answer =
+                answer.map(|text| serde_json::from_str::<WriteAnswer>(&text).map_err(|_| text));
+            commanded.answer(match answer {
+                Ok(Ok(answer)) => Done::of_write(answer.outcome),
+                Ok(Err(why)) => Err(Refusal::Force(why)),
+                Err(_) => Err(Refusal::Undecided),
+            });
+        });
+        // Without a thread the caller is told that the run takes no command now.
+        drop(asking);
+    }
+
     async fn obey(&mut self, commanded: Commanded) {
+        if let OperatorAction::Command {
+            member,
+            command: command @ Command::Write(write),
+            owner,
+            reason,
+        } = &commanded.action
+        {
+            self.own(RunEvent::Commanded {
+                member: *member,
+                command: command.clone(),
+                owner: owner.clone(),
+                reason: reason.clone(),
+                refused: None,
+            });
+            self.journal.flush();
+            let (member, write) = (*member, write.clone());
+            return self.write(member, write, commanded);
+        }
         let done = match commanded.action.clone() {
             OperatorAction::Acknowledge(seen) => {
                 self.own(RunEvent::Acknowledged(seen));
-                Ok(())
+                Ok(Done::default())
             }
             OperatorAction::Command {
                 member,
@@ -225,7 +264,7 @@ impl Recorder {
         commanded.answer(done);
     }
 
-    async fn command(&self, member: Member, command: &Command) -> Result<(), Refusal> {
+    async fn command(&self, member: Member, command: &Command) -> Result<Done, Refusal> {
         let name = self.names.get(&member).cloned().unwrap_or_default();
         let elsewhere = |reason: &str| Refusal::Elsewhere {
             name: name.clone(),
@@ -235,6 +274,8 @@ impl Recorder {
             Command::Release => Request::Release,
             Command::Choose { choice } => Request::Choose(*choice),
             Command::Force(force) => Request::Force(force.clone()),
+            // Handled before, because its outcome takes cycles.
+            Command::Write(_) => return Err(Refusal::Busy),
             Command::Unforce { signal } => Request::Unforce(*signal),
             Command::Isolate | Command::Rejoin => return Err(elsewhere(LINKS)),
             Command::Kill | Command::Restart | Command::Stop | Command::Continue => {
@@ -268,7 +309,7 @@ impl Recorder {
         };
         asking.map_err(|error| system(error.to_string()))?;
         match told.await {
-            Ok(Ok(answer)) if answer == DONE => Ok(()),
+            Ok(Ok(answer)) if answer == DONE => Ok(Done::default()),
             Ok(Ok(why)) => Err(Refusal::Force(why)),
             Ok(Err(error)) => Err(system(error.to_string())),
             Err(_) => Err(Refusal::Busy),

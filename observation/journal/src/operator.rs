@@ -9,6 +9,7 @@
 //! what reason, also one that was refused.
 
 mod acknowledgement;
+mod new_write;
 mod socket;
 
 use std::path::{Path, PathBuf};
@@ -16,9 +17,17 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use tokio::sync::{mpsc, oneshot};
-use understudy_wire::{Force, Member, SignalPlace, StateChoice};
+use understudy_wire::{
+    Force, Member, SignalPlace, StateChoice, Write, WriteAnswer, WriteId, WriteOutcome,
+    WriteRefusal,
+};
+
+use understudy_remote_io::Event as RemoteIoEvent;
+
+use crate::record::{Happening, Record};
 
 pub use acknowledgement::Acknowledgement;
+pub use new_write::{WriteProblem, new_write};
 pub use socket::RunSocket;
 pub(crate) use socket::SOCKET;
 
@@ -50,6 +59,8 @@ pub enum Command {
     Rejoin,
     /// Put a value in the place of a signal of a remote I/O.
     Force(Force),
+    /// Write a value to an operator input of a remote I/O.
+    Write(Write),
     /// Take it back.
     Unforce {
         /// Which signal.
@@ -107,6 +118,17 @@ pub enum Refusal {
         /// What can be done there in its place.
         reason: String,
     },
+    /// The remote I/O refuses a write.
+    #[error("{code}: {refusal}", code = .refusal.code())]
+    Write {
+        /// Reason.
+        refusal: WriteRefusal,
+    },
+    /// The outcome of a write is not known yet.
+    #[error(
+        "U0648: the remote I/O has taken the value, and no output with it was applied in time: check the state of the program"
+    )]
+    Undecided,
     /// Another process writes the run, and says why.
     #[error("{0}")]
     Said(String),
@@ -146,17 +168,83 @@ pub enum OperatorAction {
     Acknowledge(Acknowledgement),
 }
 
+/// What an action came to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Done {
+    /// Cycle of the cluster from which a written value is in effect.
+    pub cycle: Option<u64>,
+}
+
+impl Done {
+    /// The outcome of a write.
+    ///
+    /// # Errors
+    /// [`Refusal::Write`].
+    pub fn of_write(outcome: WriteOutcome) -> Result<Self, Refusal> {
+        match outcome {
+            WriteOutcome::InEffect { since } => Ok(Self {
+                cycle: Some(since.cycle.0),
+            }),
+            WriteOutcome::Refused { refusal } => Err(Refusal::Write { refusal }),
+        }
+    }
+}
+
+/// Writes that were sent to their remote I/Os, until their outcomes are in the journal.
+#[derive(Debug, Default)]
+pub struct PendingWrites(Vec<(WriteId, Commanded)>);
+
+impl PendingWrites {
+    /// Waits for the outcome of a write.
+    pub fn add(&mut self, id: WriteId, commanded: Commanded) {
+        // Callers that have given up do not come back.
+        self.0.retain(|(_, waiting)| !waiting.answer.is_closed());
+        self.0.push((id, commanded));
+    }
+
+    /// Answers the callers whose writes are decided by a record.
+    pub fn observe(&mut self, record: &Record) {
+        let Some(answer) = write_answer(record).filter(|_| !self.0.is_empty()) else {
+            return;
+        };
+        for (id, commanded) in std::mem::take(&mut self.0) {
+            if id == answer.id {
+                commanded.answer(Done::of_write(answer.outcome));
+            } else {
+                self.0.push((id, commanded));
+            }
+        }
+    }
+}
+
+/// The outcome of a write that a record tells.
+pub fn write_answer(record: &Record) -> Option<WriteAnswer> {
+    let Happening::RemoteIo(event) = &record.event else {
+        return None;
+    };
+    let refused = |refusal: WriteRefusal| WriteOutcome::Refused { refusal };
+    let (id, outcome) = match event {
+        RemoteIoEvent::WriteInEffect { id, since, .. } => {
+            (*id, WriteOutcome::InEffect { since: *since })
+        }
+        RemoteIoEvent::WriteRefused { write, refusal, .. } => (write.id, refused(*refusal)),
+        RemoteIoEvent::WriteVoid { id, .. } => (*id, refused(WriteRefusal::Void)),
+        _ => return None,
+    };
+    Some(WriteAnswer { id, outcome })
+}
+
 /// An action that waits for its answer.
 #[derive(Debug)]
 pub struct Commanded {
     /// What.
     pub action: OperatorAction,
-    answer: oneshot::Sender<Result<(), Refusal>>,
+    answer: oneshot::Sender<Result<Done, Refusal>>,
 }
 
 impl Commanded {
     /// Says how it went.
-    pub fn answer(self, done: Result<(), Refusal>) {
+    pub fn answer(self, done: Result<Done, Refusal>) {
         // Nobody waits for it where the page was closed.
         let _ = self.answer.send(done);
     }
@@ -207,7 +295,7 @@ impl Commander {
         command: Command,
         owner: String,
         reason: String,
-    ) -> Result<(), Refusal> {
+    ) -> Result<Done, Refusal> {
         self.act(OperatorAction::Command {
             member,
             command,
@@ -221,7 +309,7 @@ impl Commander {
     ///
     /// # Errors
     /// [`Refusal`].
-    pub async fn acknowledge(&self, acknowledgement: Acknowledgement) -> Result<(), Refusal> {
+    pub async fn acknowledge(&self, acknowledgement: Acknowledgement) -> Result<Done, Refusal> {
         self.act(OperatorAction::Acknowledge(acknowledgement)).await
     }
 
@@ -229,7 +317,7 @@ impl Commander {
     ///
     /// # Errors
     /// [`Refusal`].
-    pub fn acknowledge_and_wait(&self, acknowledgement: Acknowledgement) -> Result<(), Refusal> {
+    pub fn acknowledge_and_wait(&self, acknowledgement: Acknowledgement) -> Result<Done, Refusal> {
         self.act_and_wait(&OperatorAction::Acknowledge(acknowledgement))
     }
 
@@ -237,7 +325,7 @@ impl Commander {
     ///
     /// # Errors
     /// [`Refusal`].
-    pub fn act_and_wait(&self, action: &OperatorAction) -> Result<(), Refusal> {
+    pub fn act_and_wait(&self, action: &OperatorAction) -> Result<Done, Refusal> {
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build();
@@ -248,7 +336,7 @@ impl Commander {
         runtime.block_on(self.act(action.clone()))
     }
 
-    async fn act(&self, action: OperatorAction) -> Result<(), Refusal> {
+    async fn act(&self, action: OperatorAction) -> Result<Done, Refusal> {
         match &self.0 {
             Way::Run(run) => socket::ask(run, &action).await,
             Way::Queue(queue) => {

@@ -178,6 +178,11 @@ pub fn moment(event: &Happening) -> Option<Moment> {
             | RemoteIo::Released { moment }
             | RemoteIo::Forced { moment, .. }
             | RemoteIo::Unforced { moment, .. }
+            | RemoteIo::Written { moment, .. }
+            | RemoteIo::WriteInEffect { moment, .. }
+            | RemoteIo::WriteRefused { moment, .. }
+            | RemoteIo::WriteVoid { moment, .. }
+            | RemoteIo::SignalValidity { moment, .. }
             | RemoteIo::Flagged { moment, .. }
             | RemoteIo::Cleared { moment, .. }
             | RemoteIo::Syndrome { moment, .. }

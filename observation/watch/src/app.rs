@@ -10,7 +10,9 @@ use understudy_view::{Alarm, Reading, Run};
 use crate::api::not_remembered;
 use crate::error::Problem;
 use crate::follower::Newest;
-use crate::login::{Logins, Person, Role};
+use understudy_wire::Role;
+
+use crate::login::{Logins, Person};
 use crate::model::{Known, Model};
 
 /// Viewers at once that follow the newest state.
@@ -73,12 +75,19 @@ impl App {
     /// Reason why a person may not give commands, if there is one.
     pub(crate) fn why_not(&self, person: &Person) -> Option<&str> {
         let forbidden = self.commanding.forbidden.as_deref();
+        let role = (person.role < Role::Engineer).then_some("only an engineer may give commands");
+        forbidden.or(role)
+    }
+
+    /// Reason why a person may not write operator inputs, if there is one.
+    pub(crate) fn why_not_write(&self, person: &Person) -> Option<&str> {
+        let forbidden = self.commanding.forbidden.as_deref();
         forbidden.or_else(|| Self::why_not_act(person))
     }
 
     /// Reason why a person may change nothing, if there is one.
     pub(crate) fn why_not_act(person: &Person) -> Option<&'static str> {
-        (person.role == Role::Viewer).then_some("a viewer may not give commands")
+        (person.role < Role::Operator).then_some("a viewer may not change anything")
     }
 
     /// The run up to a cycle that is not remembered any more, from its journal. It blocks the thread.

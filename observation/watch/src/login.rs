@@ -1,6 +1,6 @@
 //! Who may look, and who may command: a file of tokens, and the sessions of those who showed one.
 //!
-//! A line of the file is `viewer NAME TOKEN` or `operator NAME TOKEN`. A token is a secret of 32 characters or more, made by chance, so
+//! A line of the file is a role (`viewer`, `operator` or `engineer`), a name and a token. A token is a secret of 32 characters or more, made by chance, so
 //! it needs no slow hash; what is kept in memory of tokens and sessions are their hashes, compared in constant time.
 
 use std::collections::HashMap;
@@ -15,6 +15,7 @@ use axum::http::HeaderMap;
 use axum::http::header::COOKIE;
 use blake3::Hash;
 use ring::rand::{SecureRandom, SystemRandom};
+use understudy_wire::Role;
 
 use crate::error::WatchError;
 
@@ -34,13 +35,6 @@ const FAILURE_PAUSE: Duration = Duration::from_millis(300);
 
 const COOKIE_NAME: &str = "understudy_session";
 
-/// Role of a person.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Role {
-    Viewer,
-    Operator,
-}
-
 /// A person who is logged in.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Person {
@@ -57,7 +51,7 @@ pub struct Logins {
 }
 
 impl Logins {
-    /// Reads the file of logins; makes one with an operator if there is none.
+    /// Reads the file of logins; makes one with an engineer if there is none.
     ///
     /// # Errors
     /// [`WatchError::Logins`] where it cannot be read or made, is readable by others, or has an invalid line.
@@ -154,7 +148,7 @@ fn make_file(path: &Path) -> Result<(), String> {
         .mode(0o600)
         .open(path)
         .map_err(|error| error.to_string())?;
-    writeln!(file, "operator operator {secret}").map_err(|error| error.to_string())
+    writeln!(file, "engineer engineer {secret}").map_err(|error| error.to_string())
 }
 
 fn read_tokens(text: &str) -> Result<Vec<(Hash, Person)>, String> {
@@ -167,6 +161,7 @@ fn read_tokens(text: &str) -> Result<Vec<(Hash, Person)>, String> {
         let role = match words.first() {
             Some(&"viewer") => Some(Role::Viewer),
             Some(&"operator") => Some(Role::Operator),
+            Some(&"engineer") => Some(Role::Engineer),
             _ => None,
         };
         match (role, words.as_slice()) {
@@ -182,7 +177,7 @@ fn read_tokens(text: &str) -> Result<Vec<(Hash, Person)>, String> {
                 number + 1
             )),
             _ => wrong.push(format!(
-                "line {}: expected `viewer NAME TOKEN` or `operator NAME TOKEN`",
+                "line {}: expected `viewer NAME TOKEN`, `operator NAME TOKEN` or `engineer NAME TOKEN`",
                 number + 1
             )),
         }
@@ -225,11 +220,12 @@ mod tests {
         let line = |role: &str| format!("# who\n\n{role} anna {TOKEN}\n");
         check(&line("viewer"), Ok(&[("anna", Role::Viewer)]));
         check(&line("operator"), Ok(&[("anna", Role::Operator)]));
+        check(&line("engineer"), Ok(&[("anna", Role::Engineer)]));
         check("", Err("it contains no login"));
         check(
             "viewer anna secret\nanna\n",
             Err(
-                "line 1: a token has at least 32 characters; line 2: expected `viewer NAME TOKEN` or `operator NAME TOKEN`",
+                "line 1: a token has at least 32 characters; line 2: expected `viewer NAME TOKEN`, `operator NAME TOKEN` or `engineer NAME TOKEN`",
             ),
         );
     }

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::time::Instant;
 
+use understudy_cluster::Cluster;
 use understudy_journal::Record;
 use understudy_view::{Bounds, Model as RunModel, Progress, Reading, Run, Source, Trouble};
 use understudy_wire::Member;
@@ -73,6 +74,11 @@ impl Model {
         if let Some(known) = &mut self.known {
             known.ended = true;
         }
+    }
+
+    /// The cluster of the run, where it is known.
+    pub(crate) fn cluster(&self) -> Option<&Cluster> {
+        Some(self.known.as_ref()?.run.cluster())
     }
 
     pub(crate) fn member(&self, name: &str) -> Option<Member> {

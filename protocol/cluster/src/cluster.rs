@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use crate::code::Code;
 use crate::device::FieldDevice;
+use crate::source::{InputSource, OperatorDeclaration, SignalDeclaration};
 use serde::{Deserialize, Serialize};
 use understudy_cycle::{Agreement, Mode};
 use understudy_executable::Interface;
@@ -14,7 +15,7 @@ use understudy_logic::Circuit;
 use understudy_node::Program;
 use understudy_parity::ParityController;
 use understudy_plant::{Followed, Plant};
-use understudy_remote_io::{Diagnosis, Release, StaleState, StopPoints, ValueFault};
+use understudy_remote_io::{Diagnosis, Release, SignalSource, StaleState, StopPoints, ValueFault};
 use understudy_typed::Program as TypedProgram;
 use understudy_wire::{Epoch, Image, Member, ProgramHash, ProgramId, StationId};
 
@@ -121,6 +122,8 @@ pub struct RemoteIo {
     pub fail_safe: Image,
     /// Who releases the outputs after a cold start.
     pub release: Release,
+    /// Its inputs that do not come from the field.
+    pub inputs: Vec<InputSource>,
     /// The equipment behind it; without one its plant is simulated, or absent.
     pub field: Option<FieldDevice>,
     /// What is driven while nobody can say which of two stations is right.
@@ -131,6 +134,18 @@ pub struct RemoteIo {
     pub diagnosis: Option<DiagnosisPlace>,
     /// Where it listens, if the file says so.
     pub address: Option<SocketAddr>,
+}
+
+impl RemoteIo {
+    /// Declarations of the inputs that operators write.
+    pub fn operator_inputs(&self) -> impl Iterator<Item = &OperatorDeclaration> {
+        self.inputs.iter().filter_map(InputSource::operator)
+    }
+
+    /// Declarations of the inputs that are outputs of other programs.
+    pub fn signals(&self) -> impl Iterator<Item = &SignalDeclaration> {
+        self.inputs.iter().filter_map(InputSource::signal)
+    }
 }
 
 /// A simulated plant behind a remote I/O.
@@ -217,18 +232,30 @@ impl Cluster {
         &self.plants
     }
 
-    /// Pairs (i, j) where plant j takes the parts of plant i or follows what it shows.
-    pub fn neighbours(&self) -> Vec<(ProgramId, ProgramId)> {
+    /// Pairs (i, j) of members where plant j takes the parts of plant i or follows its sensors, or remote I/O j reads a
+    /// signal of program i: j receives from i.
+    pub fn neighbours(&self) -> Vec<(Member, Member)> {
         let plants = self.plants.iter().enumerate();
         let pairs = plants.flat_map(|(listener, place)| {
             let place = place.iter();
             place.flat_map(move |place| {
                 let followed = place.follows.iter().map(|followed| followed.from);
                 let speakers = place.fed_by.into_iter().chain(followed);
-                speakers.map(move |speaker| (speaker, ProgramId(listener as u8)))
+                speakers.map(move |speaker| {
+                    let listener = Member::Plant(ProgramId(listener as u8));
+                    (Member::Plant(speaker), listener)
+                })
             })
         });
-        let pairs: BTreeSet<_> = pairs.collect();
+        let readers = self.remote_ios.iter().enumerate();
+        let signals = readers.flat_map(|(reader, remote_io)| {
+            let sources = remote_io.signals().map(|signal| signal.input.from);
+            sources.map(move |source| {
+                let reader = Member::RemoteIo(ProgramId(reader as u8));
+                (Member::RemoteIo(source), reader)
+            })
+        });
+        let pairs: BTreeSet<_> = pairs.chain(signals).collect();
         pairs.into_iter().collect()
     }
 
@@ -326,6 +353,9 @@ impl Cluster {
             agreement: Arc::clone(&self.agreement),
             hash: controller.hash,
             inputs: controller.interface.inputs.width(),
+            operator_inputs: remote_io.operator_inputs().map(|it| it.input).collect(),
+            signals: remote_io.signals().map(|signal| signal.input).collect(),
+            signal_sources: self.signal_sources(remote_io),
             channels: understudy_remote_io::Channel::of_inputs(
                 &controller.interface.inputs.bit_names(),
             ),
@@ -340,6 +370,23 @@ impl Cluster {
             value_fault: remote_io.value_fault,
             stale_state: remote_io.stale_state,
         })
+    }
+
+    /// The programs whose signals a remote I/O reads.
+    fn signal_sources(&self, remote_io: &RemoteIo) -> Vec<SignalSource> {
+        let programs: BTreeSet<ProgramId> = remote_io
+            .signals()
+            .map(|signal| signal.input.from)
+            .collect();
+        let sources = programs.into_iter().map(|program| {
+            let controller = &self.controllers[program.index()];
+            SignalSource {
+                program,
+                outputs: controller.interface.outputs.width(),
+                stopped: controller.stop_points().map(|points| points.stopped),
+            }
+        });
+        sources.collect()
     }
 
     /// What a plant is told when it starts; nothing where the program has no simulated plant.

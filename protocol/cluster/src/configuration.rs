@@ -11,6 +11,7 @@ use understudy_wire::ProgramId;
 use crate::canonical::circuit_text;
 use crate::cluster::Cluster;
 use crate::code::Code;
+use crate::source::{InputSource, InputSourceKind};
 
 /// Raised when equal texts would mean something else than before.
 const VERSION: u32 = 1;
@@ -47,6 +48,9 @@ pub(crate) fn configuration_text(cluster: &Cluster, plants: &[String]) -> String
         line(format_args!("  release {:?}", remote_io.release));
         line(format_args!("  value fault {:?}", remote_io.value_fault));
         line(format_args!("  stale state {:?}", remote_io.stale_state));
+        for source in &remote_io.inputs {
+            line(format_args!("  input {}", source_text(source)));
+        }
         if let Some(diagnosis) = &remote_io.diagnosis {
             line(format_args!("diagnosis"));
             let text = circuit_text(&diagnosis.circuit);
@@ -62,6 +66,14 @@ pub(crate) fn configuration_text(cluster: &Cluster, plants: &[String]) -> String
         line(format_args!("understudy {}", understudy.name));
     }
     text
+}
+
+/// Source of an input; texts for people are not in it.
+fn source_text(source: &InputSource) -> String {
+    match &source.kind {
+        InputSourceKind::Operator(declaration) => format!("{:?}", declaration.input),
+        InputSourceKind::Signal(declaration) => format!("{:?}", declaration.input),
+    }
 }
 
 /// A plant's model, its signals, its feeder, and what it follows by terminal.

@@ -13,7 +13,7 @@ use understudy_text::Diagnostic;
 pub(crate) use understudy_text::tables::Placed;
 use understudy_text::tables::{Codes, Constant, Value, unknown_key};
 
-use crate::format::{Key, Kind, POINT, Section};
+use crate::format::{Key, Kind, OPERATOR_INPUT, POINT, SIGNAL_INPUT, Section};
 use crate::place::{ByteOrder, Place, Registers, register};
 
 /// The longest name of a member, in characters.
@@ -62,6 +62,45 @@ pub(crate) struct PlaceEntry {
     pub(crate) span: Range<usize>,
     /// Nothing where it has errors.
     pub(crate) place: Option<Place>,
+}
+
+/// An input with its source, as it is written.
+#[derive(Debug)]
+pub(crate) struct SourceEntry {
+    pub(crate) name: Placed<String>,
+    pub(crate) source: SourceText,
+}
+
+/// Source of an input, as it is written.
+#[derive(Debug)]
+pub(crate) enum SourceText {
+    /// Operators write it.
+    Operator(OperatorText),
+    /// It is an output of another program.
+    Signal {
+        from: Option<Placed<String>>,
+        default: Option<Placed<Constant>>,
+        stale_after: u32,
+    },
+}
+
+/// An input that operators write, as it is written.
+#[derive(Debug)]
+pub(crate) struct OperatorText {
+    pub(crate) span: Range<usize>,
+    /// Index into [`crate::format::OPERATOR_INPUTS`]; nothing where it is absent.
+    pub(crate) kind: Option<usize>,
+    pub(crate) title: Option<String>,
+    /// Index into [`crate::format::ROLES`].
+    pub(crate) role: usize,
+    pub(crate) confirm: bool,
+    pub(crate) duration: Duration,
+    pub(crate) low: Option<Placed<Constant>>,
+    pub(crate) high: Option<Placed<Constant>>,
+    pub(crate) unit: Option<String>,
+    pub(crate) initial: Option<Placed<Constant>>,
+    /// Keys that only some kinds have, with their places.
+    pub(crate) special: Vec<Placed<&'static str>>,
 }
 
 /// How a device is reached, as it is written.
@@ -283,6 +322,41 @@ impl<'a, 't> Fields<'a, 't> {
         word.map_or(0, |word| word.value)
     }
 
+    /// The value of a signal.
+    pub(crate) fn constant(
+        &self,
+        name: &'static str,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Option<Placed<Constant>> {
+        self.get(name).1?.constant(diagnostics)
+    }
+
+    /// `true` or `false`; `false` where absent or wrong.
+    pub(crate) fn flag(&self, name: &'static str, diagnostics: &mut Vec<Diagnostic>) -> bool {
+        let value = self.get(name).1;
+        let flag = value.and_then(|value| value.flag(diagnostics));
+        flag.is_some_and(|flag| flag.value)
+    }
+
+    /// A table from inputs to their sources, in the order of its places.
+    pub(crate) fn sources(
+        &self,
+        name: &'static str,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Vec<SourceEntry> {
+        let entries = self.entries(name, diagnostics).into_iter();
+        let mut sources: Vec<SourceEntry> = entries
+            .filter_map(|(name, value)| {
+                let wanted = "a table, such as { operator = \"level\" }";
+                let table = value.table(wanted, diagnostics)?;
+                let source = source(table, diagnostics);
+                Some(SourceEntry { name, source })
+            })
+            .collect();
+        sources.sort_by_key(|entry| entry.name.span.start);
+        sources
+    }
+
     /// A table from names to values, in the order of its places.
     pub(crate) fn values(
         &self,
@@ -343,6 +417,41 @@ impl<'a, 't> Fields<'a, 't> {
         };
         Fields::new(section, table.unwrap_or(empty), diagnostics)
     }
+}
+
+/// A source of an input.
+fn source(table: Placed<&DeTable<'_>>, diagnostics: &mut Vec<Diagnostic>) -> SourceText {
+    if table.value.contains_key("from") {
+        let fields = Fields::new(&SIGNAL_INPUT, table, diagnostics);
+        return SourceText::Signal {
+            from: fields.text("from", diagnostics),
+            default: fields.constant("default", diagnostics),
+            stale_after: fields.count("stale_after", diagnostics),
+        };
+    }
+    let fields = Fields::new(&OPERATOR_INPUT, table, diagnostics);
+    let before = diagnostics.len();
+    let kind = fields.word("operator", diagnostics);
+    let is_known = fields.has("operator") && diagnostics.len() == before;
+    let text = |text: Option<Placed<String>>| text.map(|text| text.value);
+    let special = ["duration", "low", "high", "unit"].into_iter();
+    let special = special.filter_map(|value| {
+        let span = fields.place_of(value)?;
+        Some(Placed { value, span })
+    });
+    SourceText::Operator(OperatorText {
+        kind: is_known.then_some(kind),
+        title: text(fields.text("title", diagnostics)),
+        role: fields.word("role", diagnostics),
+        confirm: fields.flag("confirm", diagnostics),
+        duration: fields.time("duration", diagnostics),
+        low: fields.constant("low", diagnostics),
+        high: fields.constant("high", diagnostics),
+        unit: text(fields.text("unit", diagnostics)),
+        initial: fields.constant("initial", diagnostics),
+        special: special.collect(),
+        span: fields.span.clone(),
+    })
 }
 
 /// A place of a device, in the short or in the long form.

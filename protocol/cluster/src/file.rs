@@ -12,7 +12,7 @@ use understudy_text::tables::Constant;
 use understudy_text::tables::{Value, unknown_key};
 
 use crate::device::{BAUD_RATES, Connection, Parity, SerialLine};
-use crate::fields::{CODES, ConnectionText, Fields, PlaceEntry, Placed};
+use crate::fields::{CODES, ConnectionText, Fields, PlaceEntry, Placed, SourceEntry};
 use crate::format::{
     CLUSTER, CONTROLLER, FIELD, LADDER_PARAMETERS, MODELS, PLANT, PRESS_PARAMETERS, REMOTE_IO,
     ROBOT_PARAMETERS, SECTIONS, Section, UNDERSTUDY,
@@ -74,6 +74,7 @@ pub(crate) struct RemoteIoSection {
     /// Index into [`crate::format::STALE_STATES`].
     pub(crate) stale_state: usize,
     pub(crate) diagnosis: Option<Placed<String>>,
+    pub(crate) inputs: Vec<SourceEntry>,
     pub(crate) field: Option<FieldSection>,
     pub(crate) address: Option<Placed<SocketAddr>>,
 }
@@ -157,6 +158,7 @@ pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
             value_fault: fields.word("value_fault", diagnostics),
             stale_state: fields.word("stale_state", diagnostics),
             diagnosis: fields.text("diagnosis", diagnostics),
+            inputs: fields.sources("inputs", diagnostics),
             field: field(fields, &empty, diagnostics),
             address: fields.address("address", diagnostics),
         })

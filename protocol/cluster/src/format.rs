@@ -68,6 +68,12 @@ pub(crate) enum Kind {
     Device,
     /// A table from signals to places in a device.
     Points,
+    /// A table from inputs to their sources.
+    Sources,
+    /// A value of a signal.
+    Value,
+    /// `true` or `false`; `false` where absent.
+    Flag,
     /// `input:N` or `holding:N`.
     Register,
 }
@@ -127,6 +133,8 @@ pub(crate) const SECURITIES: [&str; 2] = ["keys", "off"];
 pub(crate) const RELEASES: [&str; 2] = ["automatic", "operator"];
 pub(crate) const VALUE_FAULTS: [&str; 3] = ["hold", "alarm", "fail-safe"];
 pub(crate) const STALE_STATES: [&str; 2] = ["operator", "cold"];
+pub(crate) const OPERATOR_INPUTS: [&str; 3] = ["level", "pulse", "setpoint"];
+pub(crate) const ROLES: [&str; 2] = ["operator", "engineer"];
 pub(crate) const PARITIES: [&str; 3] = ["even", "odd", "none"];
 pub(crate) const MODELS: [&str; 2] = ["robot", "press"];
 
@@ -182,6 +190,7 @@ pub(crate) static REMOTE_IO: Section = Section {
         key value_fault: word(&VALUE_FAULTS), "the applied outputs while two stations publish different outputs of one history and there is no majority: `hold`, the last proven outputs and then the fail-safe ones, until the stations agree or the operator releases them; `alarm`, the outputs of the controller itself; `fail-safe`, the fail-safe outputs at once, until the operator releases them";
         key stale_state: word(&STALE_STATES), "reaction when living stations hold only states that are older than the newest applied output: `operator`, the outputs are held, then fail-safe, until the operator chooses the older state or a cold start; `cold`, the program starts from its initial state";
         key diagnosis: Kind::Text, "the file of a ladder that detects failed input channels, relative to the cluster file, see [reconfiguration](reconfiguration.md)";
+        key inputs: Kind::Sources, "inputs that do not come from the field: operators write them, or another program computes them, see below";
         key field: Kind::Device, "real equipment behind it, see below; without it its plant is simulated";
         key address: Kind::Address, "as for a controller";
     },
@@ -214,6 +223,34 @@ pub(crate) static POINT: Section = Section {
         key order: word(&ByteOrder::WORDS), "order of the bytes, `a` is the most significant one: `abcd`, as Modbus prescribes; `cdab`, least significant register first; `badc`, bytes of each register exchanged; `dcba`, both";
         key scale: Kind::Number { most: 1e12, default: 1.0 }, "units of the signal for each unit of the number; not 0";
         key offset: Kind::Number { most: 1e12, default: 0.0 }, "value of the signal where the number is 0";
+    },
+};
+
+pub(crate) static OPERATOR_INPUT: Section = Section {
+    name: "remote_io.inputs.NAME",
+    repeated: false,
+    meaning: "an input that operators write",
+    keys: keys! {
+        required operator: Kind::Word { words: &OPERATOR_INPUTS, default: false }, "behaviour of the value: `level`, a BOOL that is kept until the next write; `pulse`, a BOOL that is TRUE for `duration`; `setpoint`, a number that is kept until the next write";
+        key title: Kind::Text, "text on the page; the name of the input where absent";
+        key role: word(&ROLES), "the lowest role that may write it";
+        key confirm: Kind::Flag, "whether the page asks before it writes";
+        key duration: time(Duration::from_micros(200), Duration::from_secs(60), Duration::from_millis(200)), "time for which a pulse is TRUE, rounded up to whole cycles";
+        key low: Kind::Value, "lowest value of a setpoint; required there";
+        key high: Kind::Value, "highest value of a setpoint; required there";
+        key unit: Kind::Text, "unit of a setpoint, such as `mm/s`";
+        key initial: Kind::Value, "value before the first write; `false`, or the lowest value of a setpoint where absent";
+    },
+};
+
+pub(crate) static SIGNAL_INPUT: Section = Section {
+    name: "remote_io.inputs.NAME",
+    repeated: false,
+    meaning: "an input that is an output of another program, one cycle later",
+    keys: keys! {
+        required from: Kind::Text, "controller and output, such as `press.done`";
+        required default: Kind::Value, "value while the signal is not valid";
+        key stale_after: count(0, MANY_CYCLES, 3), "cycles for which the last value is held when no new one can be proved; then the default value is sampled";
     },
 };
 
@@ -326,6 +363,11 @@ impl Kind {
             Self::Points => {
                 "a table from signals to places, such as { start = \"discrete:0\", level = \"input:10 real\" }".into()
             }
+            Self::Sources => {
+                "a table from inputs to sources, such as { start = { operator = \"pulse\" }, ready = { from = \"press.done\", default = false } }".into()
+            }
+            Self::Value => "a value of the signal, such as `true`, 12.5 or \"1.5 s\"".into(),
+            Self::Flag => "`true` or `false`".into(),
             Self::Register => "a register in quotes, such as \"holding:4\"".into(),
         }
     }
@@ -340,6 +382,7 @@ impl Kind {
                 words,
                 default: true,
             } => Some(format!("\"{}\"", words[0])),
+            Self::Flag => Some("false".into()),
             _ => None,
         }
     }
@@ -353,7 +396,14 @@ mod tests {
     #[test]
     fn the_documentation_has_every_key_with_its_bounds() {
         let page = include_str!("../../../docs/reference/cluster-file.md");
-        let parameters = [&ROBOT_PARAMETERS, &PRESS_PARAMETERS, &FIELD, &POINT];
+        let parameters = [
+            &ROBOT_PARAMETERS,
+            &PRESS_PARAMETERS,
+            &FIELD,
+            &POINT,
+            &OPERATOR_INPUT,
+            &SIGNAL_INPUT,
+        ];
         for section in SECTIONS.into_iter().chain(parameters) {
             assert!(page.contains(&section.header()), "{}", section.header());
             for key in section.keys {

@@ -19,6 +19,7 @@ mod format;
 mod place;
 mod read;
 mod schema;
+mod source;
 mod template;
 mod value;
 
@@ -30,5 +31,6 @@ pub use fields::{MAXIMUM_NAME_LENGTH, is_name, why_unreachable};
 pub use place::{BitPlace, ByteOrder, Place, PlaceError, RegisterTable, Registers};
 pub use read::{Loaded, MAXIMUM_TEXT_BYTES, Overrides, read, read_with};
 pub use schema::schema;
+pub use source::{InputSource, InputSourceKind, OperatorDeclaration, SignalDeclaration};
 pub use template::{TemplateFile, minimal, modbus_cell, press_cell, read_with_files, template};
-pub use value::typed_value;
+pub use value::{stored_value, typed_value};

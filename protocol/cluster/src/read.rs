@@ -22,6 +22,8 @@
 //! | U0221 | a remote I/O with both a device and a simulated plant |
 //! | U0222 | a place that no device has, or that an output cannot go to |
 //! | U0223 | a diagnosing ladder that does not fit its program |
+//! | U0224 | an input with two sources |
+//! | U0225 | a source of an input that does not fit its type |
 //! | U0251 | warning: an input that no sensor drives |
 //! | U0252 | warning: an output that moves nothing |
 //! | U0253 | warning: not one understudy where the mode wants one |
@@ -31,6 +33,7 @@
 mod devices;
 mod diagnosis;
 mod follows;
+mod inputs;
 mod ladders;
 mod limits;
 mod marks;
@@ -59,7 +62,7 @@ use crate::code::Code;
 use crate::configuration::configuration_text;
 use crate::fields::MAXIMUM_MISFITS;
 use crate::file::{self, ClusterFile, ControllerSection};
-use crate::value::stored;
+use crate::value::stored_value;
 
 /// The longest cluster file in bytes.
 pub const MAXIMUM_TEXT_BYTES: usize = 1 << 20;
@@ -185,7 +188,7 @@ fn build(
         &mut names,
         diagnostics,
     );
-    limits::check(&members, cluster.history, diagnostics);
+    limits::check(&members, &remote_ios, cluster.history, diagnostics);
     let mode = overrides
         .mode
         .unwrap_or([Mode::Full, Mode::Paper][cluster.mode]);
@@ -363,10 +366,18 @@ fn remote_ios(
             hold_cycles: section.hold_cycles,
             fail_safe,
             release: [Release::Automatic, Release::Operator][section.release],
+            inputs: inputs::resolve(
+                &section.inputs,
+                index,
+                members,
+                section.field.as_ref(),
+                period,
+                diagnostics,
+            ),
             field: section
                 .field
                 .as_ref()
-                .and_then(|field| devices::device(field, member, diagnostics)),
+                .and_then(|field| devices::device(field, &section.inputs, member, diagnostics)),
             value_fault: [ValueFault::Hold, ValueFault::Alarm, ValueFault::FailSafe]
                 [section.value_fault],
             stale_state: [StaleState::Operator, StaleState::Cold][section.stale_state],
@@ -393,6 +404,7 @@ fn remote_ios(
                 hold_cycles: crate::format::REMOTE_IO.default_count("hold_cycles"),
                 fail_safe: fail_safe(member, &[], diagnostics),
                 release: Release::default(),
+                inputs: Vec::new(),
                 field: None,
                 value_fault: ValueFault::default(),
                 stale_state: StaleState::default(),
@@ -422,7 +434,7 @@ fn fail_safe(
     let mut misfits = 0;
     for (name, value) in entries {
         if let Some(output) = outputs.find(&name.value) {
-            match stored(value, output.of) {
+            match stored_value(value, output.of) {
                 Ok(stored) => output.set(image.words_mut(), stored),
                 Err(expected) => {
                     let message = format!("`{}` is {}: {expected}", output.name, output.of);

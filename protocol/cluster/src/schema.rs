@@ -6,8 +6,8 @@ use understudy_text::duration;
 
 use crate::fields::MAXIMUM_NAME_LENGTH;
 use crate::format::{
-    CLUSTER, CONTROLLER, FIELD, Key, Kind, POINT, PRESS_PARAMETERS, ROBOT_PARAMETERS, SECTIONS,
-    Section,
+    CLUSTER, CONTROLLER, FIELD, Key, Kind, OPERATOR_INPUT, POINT, PRESS_PARAMETERS,
+    ROBOT_PARAMETERS, SECTIONS, SIGNAL_INPUT, Section,
 };
 use crate::place::{ByteOrder, Registers};
 
@@ -93,6 +93,12 @@ fn property(key: &Key) -> Value {
                 "anyOf": [{ "type": "string", "pattern": place_pattern() }, table(&POINT)],
             },
         }),
+        Kind::Sources => json!({
+            "type": "object",
+            "additionalProperties": { "anyOf": [table(&OPERATOR_INPUT), table(&SIGNAL_INPUT)] },
+        }),
+        Kind::Value => json!({ "type": ["boolean", "number", "string"] }),
+        Kind::Flag => json!({ "type": "boolean", "default": false }),
         Kind::Register => json!({ "type": "string", "pattern": "^(input|holding):[0-9]{1,5}$" }),
         Kind::Number { most, default } => {
             json!({ "type": "number", "minimum": -most, "maximum": most, "default": default })

@@ -18,14 +18,14 @@ pub fn typed_value(text: &str, of: Elementary) -> Result<u64, String> {
             _ => Constant::Text(text.to_owned()),
         },
     };
-    stored(&value, of)
+    stored_value(&value, of)
 }
 
 /// The value as a signal of that type stores it.
 ///
 /// # Errors
 /// What is written instead for that type.
-pub(crate) fn stored(value: &Constant, of: Elementary) -> Result<u64, String> {
+pub fn stored_value(value: &Constant, of: Elementary) -> Result<u64, String> {
     let whole = |number: i64| {
         let stored = number as u64 & of.mask();
         (of.signed(stored) == i128::from(number)).then_some(stored)

@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use understudy_wire::{Force, Frame, Image, SignalPlace, StateChoice, Time};
+use understudy_wire::{Force, Frame, Image, SignalPlace, StateChoice, Time, Write, WriteAnswer};
 
 /// An input of a member.
 #[derive(Debug, Clone, Copy)]
@@ -34,6 +34,8 @@ pub enum RemoteIoInput<'a> {
     Force(&'a Force),
     /// The operator removes a force.
     Unforce(SignalPlace),
+    /// An operator writes a value.
+    Write(&'a Write),
 }
 
 /// An output of a member.
@@ -45,6 +47,8 @@ pub enum Output<Event> {
     Drive(Image),
     /// An event for the journal.
     Report(Event),
+    /// The answer to a write.
+    Answer(WriteAnswer),
 }
 
 /// A member.

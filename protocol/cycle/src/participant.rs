@@ -165,6 +165,11 @@ impl<Event: From<Refusal> + From<Notice>> Participant<Event> {
         self.clock.moment().unwrap_or_default()
     }
 
+    /// Whether a frame with this header counts; reports the first of a member with another configuration.
+    pub fn admits(&mut self, header: &Header) -> bool {
+        self.endpoint.admits(header)
+    }
+
     /// The cycle of a frame that comes at `now`; a frame that is not admitted is stale.
     pub fn arrival(&mut self, now: Time, frame: &Frame) -> Arrival {
         if !self.endpoint.admits(&frame.header) {

@@ -17,25 +17,25 @@ use crate::member::{Heard, KeysFile, Shared};
 use crate::register::{Holder, Register, Revoked, Role, common_name};
 use crate::revoked::RevokedFile;
 
-/// The operator that every authority issues keys for.
-pub const DEFAULT_OPERATOR: &str = "operator";
+/// The person that every authority issues keys for, with the role of the same name.
+pub const DEFAULT_PERSON: &str = "engineer";
 
 /// The authority's own certificate outlives all that it issues.
 const AUTHORITY_DAYS: u32 = 20 * 365;
 
-/// Operators that are issued keys.
+/// Persons, and programs that act for them, that are issued keys.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Operators<'a> {
-    /// Their names.
-    pub names: &'a [String],
+pub struct People<'a> {
+    /// Their names and rights.
+    pub holders: &'a [(String, understudy_wire::Role)],
     /// Where they are called, if they are: the router of a site is, a person is not.
     pub address: Option<IpAddr>,
 }
 
-impl<'a> From<&'a [String]> for Operators<'a> {
-    fn from(names: &'a [String]) -> Self {
+impl<'a> From<&'a [(String, understudy_wire::Role)]> for People<'a> {
+    fn from(holders: &'a [(String, understudy_wire::Role)]) -> Self {
         Self {
-            names,
+            holders,
             address: None,
         }
     }
@@ -158,7 +158,7 @@ impl Authority {
         self.folder.join("members").join(name)
     }
 
-    /// Makes new keys for each of `names`, members of the cluster, and of `operators`. Their earlier ones no longer count as soon
+    /// Makes new keys for each of `names`, members of the cluster, and of `people`. Their earlier ones no longer count as soon
     /// as the others have their changed folders.
     ///
     /// # Errors
@@ -168,19 +168,19 @@ impl Authority {
         &mut self,
         cluster: &Cluster,
         names: &[String],
-        operators: Operators<'_>,
+        people: People<'_>,
         days: u32,
         now: Date,
     ) -> Result<Issued, Vec<KeysError>> {
-        self.check(cluster, names, operators.names)?;
+        self.check(cluster, names, people)?;
         let address = |name: &String| {
             let member = cluster.member(name);
             let address = member.and_then(|member| cluster.address(member));
             address.map(|address| address.ip())
         };
         let all = names.iter().map(|name| (name, Role::Member, address(name)));
-        let operator = |name| (name, Role::Operator, operators.address);
-        let all = all.chain(operators.names.iter().map(operator));
+        let persons = people.holders.iter();
+        let all = all.chain(persons.map(|(name, role)| (name, Role::from(*role), people.address)));
         let mut renewed = BTreeSet::new();
         for (name, role, address) in all {
             if renewed.insert(name.clone()) {
@@ -246,7 +246,7 @@ impl Authority {
         &self,
         cluster: &Cluster,
         names: &[String],
-        operators: &[String],
+        people: People<'_>,
     ) -> Result<(), Vec<KeysError>> {
         let mut errors = Vec::new();
         if self.register.cluster != cluster.name() {
@@ -273,10 +273,15 @@ impl Authority {
                 && name.chars().all(plain)
                 && !members.contains(&name)
         };
-        let illegal = operators.iter().filter(|name| !legal(name));
-        errors.extend(illegal.map(|name| KeysError::NoHolder {
-            name: name.clone(),
-            known: "an operator's name has letters, digits, `-` and `_`, and is no member's".into(),
+        let mut persons = people.holders.iter().map(|(name, _)| name);
+        let illegal = persons.by_ref().filter(|name| !legal(name));
+        errors.extend(illegal.map(|name| {
+            KeysError::NoHolder {
+                name: name.clone(),
+                known:
+                    "the name of a person has letters, digits, `-` and `_`, and is not a member's"
+                        .into(),
+            }
         }));
         if errors.is_empty() {
             Ok(())
@@ -365,14 +370,18 @@ impl Authority {
             expires: holder.expires,
             own: String::new(),
             members: Vec::new(),
+            viewers: Vec::new(),
             operators: Vec::new(),
+            engineers: Vec::new(),
             heard: Vec::new(),
             shared: Vec::new(),
         };
         for other in &self.register.holders {
             match other.role {
                 Role::Member => file.members.push(other.common_name()),
+                Role::Viewer => file.viewers.push(other.common_name()),
                 Role::Operator => file.operators.push(other.common_name()),
+                Role::Engineer => file.engineers.push(other.common_name()),
             }
         }
         let Some(own) = own else {

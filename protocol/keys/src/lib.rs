@@ -46,7 +46,7 @@ mod member;
 mod register;
 mod revoked;
 
-pub use authority::{Authority, DEFAULT_OPERATOR, Issued, Operators};
+pub use authority::{Authority, DEFAULT_PERSON, Issued, People};
 pub use date::Date;
 pub use error::KeysError;
 pub use member::{MemberKeys, OperatorKeys, TlsFiles};

@@ -28,12 +28,18 @@ pub(crate) struct KeysFile {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) issued: Option<Date>,
     pub(crate) expires: Date,
-    /// Its frame key, hexadecimal; empty for an operator.
+    /// Its frame key, hexadecimal; empty for a person.
     pub(crate) own: String,
     /// Common names of all members.
     pub(crate) members: Vec<String>,
+    /// Common names of all viewers.
+    #[serde(default)]
+    pub(crate) viewers: Vec<String>,
     /// Common names of all operators.
     pub(crate) operators: Vec<String>,
+    /// Common names of all engineers.
+    #[serde(default)]
+    pub(crate) engineers: Vec<String>,
     #[serde(default)]
     pub(crate) heard: Vec<Heard>,
     #[serde(default)]
@@ -69,8 +75,12 @@ pub struct TlsFiles {
     pub private_key: PathBuf,
     /// Common names of the members whose certificates hold.
     pub members: Vec<String>,
+    /// Common names of the viewers whose certificates hold.
+    pub viewers: Vec<String>,
     /// Common names of the operators whose certificates hold.
     pub operators: Vec<String>,
+    /// Common names of the engineers whose certificates hold.
+    pub engineers: Vec<String>,
 }
 
 /// The keys of a member, read and found good.
@@ -89,9 +99,11 @@ pub struct MemberKeys {
     tls: TlsFiles,
 }
 
-/// The keys of an operator, read and found good.
+/// The keys of a person, read and found good.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OperatorKeys {
+    /// Rights.
+    pub role: understudy_wire::Role,
     /// Until when its certificate holds.
     pub expires: Date,
     /// Its certificate.
@@ -111,7 +123,7 @@ impl MemberKeys {
         now: Date,
     ) -> Result<Self, Vec<KeysError>> {
         let name = cluster.member_name(own).unwrap_or_default();
-        let (file, revoked) = read(folder, cluster, name, Role::Member, now)?;
+        let (file, revoked) = read(folder, cluster, Some(name), now)?;
         let mut errors = Vec::new();
         let neighbours = cluster.neighbours();
         let damaged = |whose: &str| KeysError::Damaged {
@@ -187,14 +199,18 @@ impl MemberKeys {
         &self.tls
     }
 
-    /// The common names of the operators and of the members whose certificates hold now, by the list of revoked keys as it is now;
-    /// by the one of the start where that cannot be read.
-    pub fn admitted(&self) -> (Vec<String>, Vec<String>) {
-        let TlsFiles {
-            operators, members, ..
-        } = &self.tls;
+    /// The files of its channel with the common names whose certificates hold now, by the list of revoked keys as it is
+    /// now; by the one of the start where that cannot be read.
+    pub fn admitted(&self) -> TlsFiles {
         let gone = RevokedFile::read(&self.folder.join("revoked.toml")).unwrap_or_default();
-        (gone.without(operators), gone.without(members))
+        let tls = &self.tls;
+        TlsFiles {
+            members: gone.without(&tls.members),
+            viewers: gone.without(&tls.viewers),
+            operators: gone.without(&tls.operators),
+            engineers: gone.without(&tls.engineers),
+            ..tls.clone()
+        }
     }
 
     /// What opens the frames of others.
@@ -249,25 +265,25 @@ impl OperatorKeys {
     /// # Errors
     /// As [`MemberKeys::load`].
     pub fn load(folder: &Path, cluster: &Cluster, now: Date) -> Result<Self, Vec<KeysError>> {
-        let (file, revoked) = read(folder, cluster, "", Role::Operator, now)?;
+        let (file, revoked) = read(folder, cluster, None, now)?;
         Ok(Self {
+            role: file.role.of_person().unwrap_or_default(),
             expires: file.expires,
             tls: tls(folder, &file, &revoked),
         })
     }
 }
 
-/// What holds for members and operators alike; an operator may have any name.
+/// What holds for members and persons alike; a person may have any name.
 fn read(
     folder: &Path,
     cluster: &Cluster,
-    name: &str,
-    role: Role,
+    member: Option<&str>,
     now: Date,
 ) -> Result<(KeysFile, RevokedFile), Vec<KeysError>> {
     // Without the folder nothing else needs to be said.
     if !folder.exists() {
-        let reason = "there is no such folder; `understudy keys` makes one for each member and each operator, members/NAME";
+        let reason = "there is no such folder; `understudy keys` makes one for each member and each person, members/NAME";
         return Err(vec![KeysError::Read {
             path: folder.to_owned(),
             source: io::Error::new(io::ErrorKind::NotFound, reason),
@@ -303,11 +319,9 @@ fn read(
             let found = format!("the cluster {}", file.cluster);
             errors.push(others(found, format!("the cluster {}", cluster.name())));
         }
-        if file.role != role || (role == Role::Member && file.name != name) {
-            let wanted = match role {
-                Role::Member => name.to_owned(),
-                Role::Operator => "an operator".to_owned(),
-            };
+        let is_member = file.role == Role::Member;
+        if is_member != member.is_some() || member.is_some_and(|name| file.name != name) {
+            let wanted = member.unwrap_or("a person").to_owned();
             errors.push(others(file.name.clone(), wanted));
         }
         let begins = file.issued.map(certificate::begins);
@@ -344,6 +358,8 @@ fn tls(folder: &Path, file: &KeysFile, revoked: &RevokedFile) -> TlsFiles {
         certificate: folder.join("certificate.pem"),
         private_key: folder.join("private-key.pem"),
         members: revoked.without(&file.members),
+        viewers: revoked.without(&file.viewers),
         operators: revoked.without(&file.operators),
+        engineers: revoked.without(&file.engineers),
     }
 }

@@ -49,14 +49,46 @@ pub struct Revoked {
     pub since: Date,
 }
 
-/// What a holder may do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// Rights of a holder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
     /// Be a member of the cluster.
     Member,
-    /// Command the members, and read what they say of themselves.
+    /// Read what the members report.
+    Viewer,
+    /// Also write operator inputs.
     Operator,
+    /// Also force signals, release outputs, choose states and stop members.
+    Engineer,
+}
+
+impl From<understudy_wire::Role> for Role {
+    fn from(role: understudy_wire::Role) -> Self {
+        match role {
+            understudy_wire::Role::Viewer => Self::Viewer,
+            understudy_wire::Role::Operator => Self::Operator,
+            understudy_wire::Role::Engineer => Self::Engineer,
+        }
+    }
+}
+
+impl Role {
+    /// Its name.
+    pub fn word(self) -> &'static str {
+        self.of_person()
+            .map_or("member", understudy_wire::Role::word)
+    }
+
+    /// The rights of a person; `None` for a member.
+    pub fn of_person(self) -> Option<understudy_wire::Role> {
+        match self {
+            Self::Member => None,
+            Self::Viewer => Some(understudy_wire::Role::Viewer),
+            Self::Operator => Some(understudy_wire::Role::Operator),
+            Self::Engineer => Some(understudy_wire::Role::Engineer),
+        }
+    }
 }
 
 impl Holder {

@@ -7,12 +7,12 @@
 //! |---|---|---|
 //! | cycle | stations | all other stations and all remote I/Os; a Transfer only by the station that asked, where the
 //! link can choose |
-//! | cycle | remote I/Os | all stations |
+//! | cycle | remote I/Os | all stations, and the remote I/Os of programs that read a signal of theirs |
 //! | field | plant i | remote I/O i, and the plants that it feeds or that follow it |
 //! | actuation | remote I/O i | plant i |
 
 use crate::frame::Body;
-use crate::identifier::{Member, ProgramId};
+use crate::identifier::Member;
 
 /// Topic of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -40,19 +40,20 @@ impl Topic {
         }
     }
 
-    /// Topic on which `receiver` receives from `sender`, if any; a pair (i, j) in `neighbours` means that plant j
-    /// receives from plant i.
+    /// Topic on which `receiver` receives from `sender`, if any; a pair (i, j) in `neighbours` means that plant or
+    /// remote I/O j also receives from plant or remote I/O i.
     pub fn between(
         sender: Member,
         receiver: Member,
-        neighbours: &[(ProgramId, ProgramId)],
+        neighbours: &[(Member, Member)],
     ) -> Option<Self> {
         if sender == receiver {
             return None;
         }
+        let is_neighbour = || neighbours.contains(&(sender, receiver));
         match (sender, receiver) {
-            // A sample of a remote I/O concerns no other remote I/O.
-            (Member::RemoteIo(_), Member::RemoteIo(_)) => None,
+            // Its sample names the lineage that proves the signals of its program.
+            (Member::RemoteIo(_), Member::RemoteIo(_)) => is_neighbour().then_some(Self::Cycle),
             (
                 Member::Station(_) | Member::RemoteIo(_),
                 Member::Station(_) | Member::RemoteIo(_),
@@ -63,9 +64,7 @@ impl Topic {
             (Member::Plant(plant), Member::RemoteIo(program)) => {
                 (program == plant).then_some(Self::Field)
             }
-            (Member::Plant(sender), Member::Plant(receiver)) => neighbours
-                .contains(&(sender, receiver))
-                .then_some(Self::Field),
+            (Member::Plant(_), Member::Plant(_)) => is_neighbour().then_some(Self::Field),
             (Member::Station(_), Member::Plant(_)) | (Member::Plant(_), Member::Station(_)) => None,
         }
     }

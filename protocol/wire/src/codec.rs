@@ -3,7 +3,7 @@
 //! ```text
 //! offset  size  what
 //!      0     4  magic "UNDR"
-//!      4     1  version of this layout, 4
+//!      4     1  version of this layout, 5
 //!      5     n  header and body, bincode 2 "standard": little-endian, integers as varints, enums by their index
 //!    5+n     4  CRC-32 (IEEE) of everything before it, little-endian
 //! ```
@@ -16,12 +16,13 @@ use bincode::config::{Configuration, Limit};
 use crate::frame::{Body, Frame, Holding, MAXIMUM_HISTORY, Recalled, Relayed, Sample, Word};
 use crate::identifier::{MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, Member};
 use crate::set::ProgramSet;
+use crate::write::{MAXIMUM_SESSIONS, WriteId};
 
 /// Maximum length of a frame; one UDP datagram can carry it.
 pub const MAXIMUM_FRAME_BYTES: usize = 32 * 1024;
 
 const MAGIC: [u8; 4] = *b"UNDR";
-const VERSION: u8 = 4;
+const VERSION: u8 = 5;
 const PREFIX_BYTES: usize = 5;
 const CHECKSUM_BYTES: usize = 4;
 /// Maximum number of positions that a plant shows.
@@ -206,6 +207,7 @@ fn kept_sample(sample: &Sample) -> Result<(), FrameError> {
     if !(1..=MAXIMUM_HISTORY).contains(&sample.history.len()) {
         return Err(FrameError::Promise("a sample carries 1 to 32 cycles"));
     }
+    kept_writes(&sample.writes)?;
     let width = sample.history[0].width();
     if sample.history.iter().all(|image| image.width() == width) {
         Ok(())
@@ -226,7 +228,21 @@ fn kept_relayed(relayed: &[Relayed]) -> Result<(), FrameError> {
     relayed.iter().try_for_each(|one| kept_sample(&one.sample))
 }
 
+fn kept_writes(writes: &[WriteId]) -> Result<(), FrameError> {
+    let ascending = writes.is_sorted_by(|one, next| one.session < next.session);
+    if writes.len() <= MAXIMUM_SESSIONS && ascending {
+        Ok(())
+    } else {
+        Err(FrameError::Promise(
+            "at most 16 writes are remembered, one for each session, in the order of sessions",
+        ))
+    }
+}
+
 fn kept_recalled(recalled: &[Recalled]) -> Result<(), FrameError> {
+    recalled
+        .iter()
+        .try_for_each(|one| kept_writes(&one.writes))?;
     let programs: ProgramSet = recalled.iter().map(|one| one.program).collect();
     if programs.len() == recalled.len() {
         Ok(())

@@ -26,12 +26,12 @@ pub enum SignalPlace {
     Output(u16),
 }
 
-/// Value of a force.
+/// Value of a point, as it is forced or written.
 ///
 /// As JSON `true` or `false` for a BOOL, and `{"width":32,"stored":1095237632}` for a number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(untagged)]
-pub enum ForcedValue {
+pub enum PointValue {
     /// Of a BOOL.
     Bit(bool),
     /// Of a number: all its bits at once.
@@ -43,13 +43,24 @@ pub enum ForcedValue {
     },
 }
 
-impl From<bool> for ForcedValue {
+impl From<bool> for PointValue {
     fn from(bit: bool) -> Self {
         Self::Bit(bit)
     }
 }
 
-impl ForcedValue {
+impl PointValue {
+    /// A value of `width` bits, 1 for a BOOL.
+    pub fn new(width: u32, stored: u64) -> Self {
+        match width {
+            1 => Self::Bit(stored & 1 == 1),
+            _ => Self::Number {
+                width: u8::try_from(width).unwrap_or(u8::MAX),
+                stored,
+            },
+        }
+    }
+
     /// Its bits, the lowest first.
     pub fn bits(self) -> impl Iterator<Item = bool> {
         let (width, stored) = (self.width(), self.stored());
@@ -97,7 +108,7 @@ pub struct Force {
     /// Signal that is forced.
     pub signal: SignalPlace,
     /// Forced value.
-    pub value: ForcedValue,
+    pub value: PointValue,
     /// Duration in seconds, 1 to [`MAXIMUM_FORCE_SECONDS`].
     pub seconds: u32,
     /// Operator who forces it.
@@ -116,10 +127,10 @@ pub enum ForceError {
     #[error("a forced number has 8, 16, 32 or 64 bits, at a multiple of its width")]
     Value,
     /// Its operator is missing, too long or not readable.
-    #[error("who forces is 1 to {MAXIMUM_OWNER_LENGTH} readable characters")]
+    #[error("the operator's name has 1 to {MAXIMUM_OWNER_LENGTH} readable characters")]
     Owner,
     /// Its reason is missing, too long or not readable.
-    #[error("the reason is 1 to {MAXIMUM_REASON_LENGTH} readable characters")]
+    #[error("the reason has 1 to {MAXIMUM_REASON_LENGTH} readable characters")]
     Reason,
 }
 
@@ -146,12 +157,6 @@ impl Force {
     /// # Errors
     /// The first of them that is invalid.
     pub fn check(&self) -> Result<(), ForceError> {
-        let readable = |text: &str, most: usize| {
-            let length = text.chars().count();
-            (1..=most).contains(&length)
-                && !text.trim().is_empty()
-                && !text.chars().any(char::is_control)
-        };
         if !(1..=MAXIMUM_FORCE_SECONDS).contains(&self.seconds) {
             return Err(ForceError::Seconds(self.seconds));
         }
@@ -159,14 +164,25 @@ impl Force {
         if !self.value.is_valid() || !is_aligned() {
             return Err(ForceError::Value);
         }
-        if !readable(&self.owner, MAXIMUM_OWNER_LENGTH) {
-            return Err(ForceError::Owner);
-        }
-        if !readable(&self.reason, MAXIMUM_REASON_LENGTH) {
-            return Err(ForceError::Reason);
-        }
-        Ok(())
+        check_owner_and_reason(&self.owner, &self.reason)
     }
+}
+
+/// Checks who intervenes and why.
+pub(crate) fn check_owner_and_reason(owner: &str, reason: &str) -> Result<(), ForceError> {
+    let readable = |text: &str, most: usize| {
+        let length = text.chars().count();
+        (1..=most).contains(&length)
+            && !text.trim().is_empty()
+            && !text.chars().any(char::is_control)
+    };
+    if !readable(owner, MAXIMUM_OWNER_LENGTH) {
+        return Err(ForceError::Owner);
+    }
+    if !readable(reason, MAXIMUM_REASON_LENGTH) {
+        return Err(ForceError::Reason);
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -233,7 +249,7 @@ mod tests {
             owner: "anna".to_owned(),
             reason: "why".to_owned(),
         };
-        let number = ForcedValue::Number {
+        let number = PointValue::Number {
             width: 32,
             stored: 0,
         };

@@ -18,6 +18,7 @@ use crate::identifier::{
 use crate::image::Image;
 use crate::lineage::{Digest, Lineage};
 use crate::set::{ProgramSet, StationSet};
+use crate::write::WriteId;
 
 /// Samples that one [`Sample`] may carry, this cycle's included.
 pub const MAXIMUM_HISTORY: usize = 32;
@@ -88,6 +89,10 @@ pub struct Sample {
     /// Stations that can hold this program and that were not received for so long that none of them can come back
     /// without a state from another one.
     pub gone: StationSet,
+    /// Whether this remote I/O drives the outputs that it can prove: they are released, and no station is suspected.
+    pub drives: bool,
+    /// The newest write of each session that has written lately; the values are in `history`.
+    pub writes: SmallVec<[WriteId; 1]>,
 }
 
 /// Source of an applied output.
@@ -183,7 +188,9 @@ pub struct Recalled {
     /// Stations that cannot have proved an output of a newer sample: gone, as in a [`Sample`], or received after the
     /// remote I/O had become silent, with a state that is no newer.
     pub accounted_for: StationSet,
-    /// u(i), with the channels that were failed and the values that they kept.
+    /// As in a [`Sample`].
+    pub writes: SmallVec<[WriteId; 1]>,
+    /// u(i), with the channels that were failed and the values that they kept, and the values that operators wrote.
     pub inputs: Image,
 }
 

@@ -13,12 +13,13 @@ mod lineage;
 mod set;
 mod state_choice;
 mod time;
+mod write;
 
 pub use audience::Topic;
 pub use codec::{FrameError, MAXIMUM_FRAME_BYTES, decode, encode};
 pub use force::{
-    Force, ForceError, ForcedValue, MAXIMUM_FORCE_SECONDS, MAXIMUM_OWNER_LENGTH,
-    MAXIMUM_REASON_LENGTH, SignalPlace,
+    Force, ForceError, MAXIMUM_FORCE_SECONDS, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH,
+    PointValue, SignalPlace,
 };
 pub use frame::{
     Actuation, Body, Field, Frame, Header, Holding, Join, MAXIMUM_HISTORY, Recalled, Relayed,
@@ -33,3 +34,4 @@ pub use lineage::{Digest, Lineage};
 pub use set::{Element, ProgramSet, Set, StationSet};
 pub use state_choice::StateChoice;
 pub use time::Time;
+pub use write::{MAXIMUM_SESSIONS, Role, Write, WriteAnswer, WriteId, WriteOutcome, WriteRefusal};

@@ -43,6 +43,10 @@ fn holding(program: u8) -> Holding {
     }
 }
 
+fn write(session: u64, number: u32) -> WriteId {
+    WriteId { session, number }
+}
+
 fn recalled(program: u8) -> Recalled {
     Recalled {
         program: ProgramId(program),
@@ -50,6 +54,7 @@ fn recalled(program: u8) -> Recalled {
         applied: Some(moment(3, 3)),
         excluded: StationSet::from_bits(0b100),
         accounted_for: StationSet::from_bits(0b1),
+        writes: smallvec![write(7, 1)],
         inputs: image(4, 0b1010),
     }
 }
@@ -68,6 +73,8 @@ fn every_kind() -> Vec<(&'static str, Frame)> {
         applied: Some(moment(3, 3)),
         excluded: StationSet::from_bits(0b10),
         gone: StationSet::from_bits(0b100),
+        drives: true,
+        writes: smallvec![write(7, 1), write(9, 4)],
     };
     let relayed = Relayed {
         program: ProgramId(1),
@@ -192,8 +199,21 @@ fn a_frame_that_breaks_a_promise_never_leaves() {
         applied: None,
         excluded: StationSet::EMPTY,
         gone: StationSet::EMPTY,
+        drives: true,
+        writes: smallvec![],
     };
     check_refused(remote_io, Body::Sample(empty.clone()));
+    for writes in [
+        vec![write(1, 1), write(1, 2)],
+        (0..17).map(|session| write(session, 1)).collect(),
+    ] {
+        let sample = Sample {
+            history: smallvec![image(1, 0)],
+            writes: writes.into(),
+            ..empty.clone()
+        };
+        check_refused(remote_io, Body::Sample(sample));
+    }
     let uneven = Sample {
         history: smallvec![image(1, 0), image(2, 0)],
         ..empty.clone()

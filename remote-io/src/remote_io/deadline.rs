@@ -62,6 +62,12 @@ impl RemoteIo {
             self.authority = Authority::Operator;
             self.last_true = None;
         }
+        // What remote I/Os of other programs would discard as well.
+        if late {
+            self.miss_signals();
+        } else {
+            self.take_signals();
+        }
         self.apply(selection, sampled);
         self.watch_protection();
     }
@@ -83,7 +89,7 @@ impl RemoteIo {
         Selection::Missing(Missing::ProgramFault)
     }
 
-    fn received(&self) -> Received<'_> {
+    pub(super) fn received(&self) -> Received<'_> {
         Received {
             turns: &self.turns,
             controllers: self.settings.agreement.schedule.controllers(),
@@ -160,6 +166,7 @@ impl RemoteIo {
             self.missed = 0;
             self.last_true = Some(outputs.clone());
             self.knowledge.applied(moment);
+            self.report_in_effect(moment);
         }
         self.applied = Some(Applied {
             source,

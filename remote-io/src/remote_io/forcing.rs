@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use understudy_wire::{Force, ForcedValue, Image, SignalPlace, Time};
+use understudy_wire::{Force, Image, PointValue, SignalPlace, Time};
 
 use super::RemoteIo;
 use crate::event::Event;
@@ -18,12 +18,12 @@ pub(super) struct Forcing {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 struct Active {
     signal: SignalPlace,
-    value: ForcedValue,
+    value: PointValue,
     until: Time,
 }
 
 impl Forcing {
-    fn put(&mut self, signal: SignalPlace, value: ForcedValue, until: Time) {
+    fn put(&mut self, signal: SignalPlace, value: PointValue, until: Time) {
         self.remove(signal);
         self.active.push(Active {
             signal,
@@ -134,7 +134,7 @@ impl RemoteIo {
 mod tests {
     use super::*;
 
-    fn force(signal: SignalPlace, value: ForcedValue) -> Force {
+    fn force(signal: SignalPlace, value: PointValue) -> Force {
         Force {
             signal,
             value,
@@ -146,7 +146,7 @@ mod tests {
 
     #[test]
     fn a_number_is_forced_with_all_its_bits_and_alone() {
-        let number = ForcedValue::Number {
+        let number = PointValue::Number {
             width: 32,
             stored: 0x4148_0000,
         };

@@ -185,6 +185,10 @@ impl RemoteIo {
         if self.knowledge.floor().is_none() {
             self.remember(moment, state.map(|(station, _)| station));
         }
+        let void = self
+            .writing
+            .history_replaced(&self.settings.operator_inputs, moment);
+        self.report_void(&void);
         self.question = None;
         let adopted = state.map(|(_, holding)| Floor {
             moment: holding.stepped,
@@ -199,6 +203,10 @@ impl RemoteIo {
         if let Some(inputs) = from.and_then(|station| self.holders.inputs(station)) {
             self.diagnosing.recall(inputs);
             self.field = inputs.clone();
+            let writes = from.map(|station| self.holders.writes(station));
+            let operator_inputs = &self.settings.operator_inputs;
+            self.writing
+                .recall(operator_inputs, inputs, writes.into_iter().flatten());
         }
         let stations = self.holders.excluded();
         if !self.knowledge.pardons() && !stations.is_empty() {

@@ -2,7 +2,7 @@
 
 use understudy_wire::{Body, Image, Moment, Sample, Source, Time};
 
-use super::{Execution, RemoteIo};
+use super::{Authority, Execution, RemoteIo};
 use crate::channel;
 use crate::diagnosis::Observation;
 use crate::event::Event;
@@ -48,7 +48,11 @@ impl RemoteIo {
         };
         let moment = self.moment();
         self.see(moment, &sensors);
-        let mut inputs = self.forcing.inputs(&self.field);
+        let mut inputs = self.field.clone();
+        let operator_inputs = &self.settings.operator_inputs;
+        self.writing.put(operator_inputs, &mut inputs);
+        self.signals.put(&self.settings.signals, &mut inputs);
+        let mut inputs = self.forcing.inputs(&inputs);
         if let Some(stop) = self.settings.stop
             && self.program == Execution::Restarting
         {
@@ -68,8 +72,12 @@ impl RemoteIo {
             let (oldest, newest) = range.unwrap_or((place, place));
             Some((oldest.min(place), newest.max(place)))
         });
+        let before = self.writing.in_history(history);
         let void = history.push(&inputs, living, floor.map(|floor| floor.lineage));
         run.sampled = true;
+        let void_writes = self
+            .writing
+            .sampled(operator_inputs, moment, history, &before);
         let base = history.base();
         let (born, before) = (history.born(), history.before());
         let body = Body::Sample(Sample {
@@ -81,6 +89,10 @@ impl RemoteIo {
             applied: floor.map(|floor| floor.moment),
             excluded: self.trust.excluded(),
             gone: self.holders.gone(),
+            drives: self.authority == Authority::Proof
+                && !self.trust.suspects()
+                && self.program == Execution::Running,
+            writes: self.writing.ids(),
         });
         if void > 0 {
             self.report(Event::Voided {
@@ -95,6 +107,7 @@ impl RemoteIo {
             born,
             before,
         });
+        self.report_void(&void_writes);
         self.member.send_cyclic(now, body);
     }
 }

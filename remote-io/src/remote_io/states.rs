@@ -90,6 +90,9 @@ impl Bench {
             agreement: Arc::new(agreement),
             hash: ProgramHash(1),
             inputs: 1,
+            operator_inputs: Vec::new(),
+            signals: Vec::new(),
+            signal_sources: Vec::new(),
             channels: Vec::new(),
             stop: None,
             diagnosis: None,
@@ -195,6 +198,7 @@ impl Bench {
             applied: Some(moment(50)),
             excluded: StationSet::EMPTY,
             accounted_for: StationSet::EMPTY,
+            writes: Default::default(),
             inputs: Image::zero(1),
         };
         Body::Join(Join {

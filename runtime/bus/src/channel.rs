@@ -3,13 +3,14 @@
 //! Every member with keys listens on the TCP port of its own address. There, by the common name of the certificate that a caller
 //! shows, and denied to everybody else (Zenoh's access control, default deny):
 //!
-//! | key, under `understudy/<cluster>/<member>/` | what | operators | members |
+//! | key, under `understudy/<cluster>/<member>/` | what | people | members |
 //! |---|---|---|---|
-//! | `configuration` | asked: the canonical text of the configuration | yes | yes |
-//! | `status` | asked: what it said when it was ready | yes | yes |
-//! | `command/release`, `command/stop` | asked: done | yes | no |
-//! | `command/force`, `command/unforce` | asked with a force or a signal as JSON: done, or why not | yes | no |
-//! | `journal` | told: the lines of its journal, those of a moment at once | yes | no |
+//! | `configuration` | asked: the canonical text of the configuration | all | yes |
+//! | `status` | asked: what it said when it was ready | all | yes |
+//! | `command/release`, `command/stop` | asked: done | engineers | no |
+//! | `write/operator`, `write/engineer` | asked with a write as JSON: its outcome | operators; engineers | no |
+//! | `command/force`, `command/unforce` | asked with a force or a signal as JSON: done, or why not | engineers | no |
+//! | `journal` | told: the lines of its journal, those of a moment at once | all | no |
 //!
 //! and under `understudy/cluster/<member>`, for callers whose cluster file may be another one: asked, the hash of the configuration.
 //!
@@ -26,7 +27,9 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, channel};
 use std::time::Duration;
 
 use serde_json::json;
-use understudy_wire::{ConfigurationHash, Time};
+use understudy_wire::{
+    ConfigurationHash, Role, Time, Write, WriteAnswer, WriteOutcome, WriteRefusal,
+};
 use zenoh::Wait;
 use zenoh::pubsub::Publisher;
 use zenoh::qos::CongestionControl;
@@ -40,10 +43,11 @@ use crate::error::{BusError, reason};
 use crate::journal::{EventSink, HostEvent, JournalSender, Noted};
 use crate::orders::{Control, Order};
 use crate::rights::run_in_background;
+use crate::writes::{self, Callers};
 
 pub(crate) use followed::{Telemetry, followed};
 pub use tls::{Admitted, TlsKeys};
-pub(crate) use tls::{hash_key, insert, prefix, tls_config};
+pub(crate) use tls::{WRITE_KEYS, hash_key, insert, prefix, tls_config};
 
 use tls::access_control;
 
@@ -123,6 +127,7 @@ pub(crate) struct Channel<E> {
     /// What it said when it was ready.
     status: String,
     control: Control,
+    callers: Callers,
     telemetry: Telemetry,
     sink: JournalSender<E>,
     clock: Clock,
@@ -155,6 +160,23 @@ impl<E: Send + 'static> Channel<E> {
         let stop = Arc::new(AtomicBool::new(false));
         let wake = telemetry.wake.clone();
         let (closing, closed) = channel();
+        let callers = Callers::default();
+        if let Some(answers) = control.take_answers() {
+            let callers = callers.clone();
+            std::thread::Builder::new()
+                .name("answers".into())
+                .spawn(move || {
+                    run_in_background();
+                    // Ends with the member.
+                    answers
+                        .into_iter()
+                        .for_each(|answer| callers.answer(answer));
+                })
+                .map_err(|source| BusError::System {
+                    what: "a thread for answers to writes",
+                    source,
+                })?;
+        }
         let member = Self {
             settings,
             prefix: prefix(endpoints.cluster(), &own.name),
@@ -162,6 +184,7 @@ impl<E: Send + 'static> Channel<E> {
             address: own.address,
             status,
             control,
+            callers,
             telemetry,
             sink,
             clock,
@@ -267,7 +290,7 @@ impl<E: Send + 'static> Channel<E> {
             Ok(opened) => {
                 let event = HostEvent::ChannelOpened {
                     address: self.address,
-                    operators: admitted.operators.clone(),
+                    operators: admitted.people().cloned().collect(),
                 };
                 self.sink.record(self.clock.now(), Noted::Host(event));
                 return Some(opened);
@@ -327,7 +350,7 @@ impl<E: Send + 'static> Channel<E> {
         answers.push(answer(&session, key, stop)?);
         for word in ["force", "unforce", "choose"] {
             let control = self.control.clone();
-            let force = move |query: &Query| match forcing(word, query) {
+            let force = move |query: &Query| match with_value(word, query) {
                 Ok(order) => {
                     control.give(order);
                     DONE.to_owned()
@@ -336,6 +359,9 @@ impl<E: Send + 'static> Channel<E> {
             };
             let key = format!("{}/command/{word}", self.prefix);
             answers.push(answer(&session, key, force)?);
+        }
+        for (role, key) in WRITE_KEYS {
+            answers.push(self.answer_writes(&session, role, key)?);
         }
         let relay = Relay::start(listener, self.connections.clone(), PATIENCE, inner)?;
         Ok(Opened {
@@ -347,8 +373,46 @@ impl<E: Send + 'static> Channel<E> {
     }
 }
 
+impl<E> Channel<E> {
+    /// Takes writes under the key of a role; the answer follows when the member knows the outcome.
+    fn answer_writes(
+        &self,
+        session: &zenoh::Session,
+        role: Role,
+        key: &str,
+    ) -> zenoh::Result<Queryable<()>> {
+        let key = format!("{}/{key}", self.prefix);
+        let (control, callers, clock) = (self.control.clone(), self.callers.clone(), self.clock);
+        let declared = key.clone();
+        session
+            .declare_queryable(declared)
+            .callback(move |query: Query| {
+                let refused = match with_value("write", &query) {
+                    Ok(Order::Write(write)) => {
+                        let write = Write { role, ..write };
+                        let id = write.id;
+                        let is_taken = callers.wait(&write, &query, &key, clock.now())
+                            && control.give(Order::Write(write));
+                        if is_taken {
+                            return;
+                        }
+                        let refusal = WriteRefusal::Busy;
+                        let outcome = WriteOutcome::Refused { refusal };
+                        writes::text(&WriteAnswer { id, outcome })
+                    }
+                    Ok(_) => return,
+                    Err(reason) => reason,
+                };
+                if let Err(error) = query.reply(key.clone(), refused).wait() {
+                    tracing::debug!(%error, "an answer was not sent");
+                }
+            })
+            .wait()
+    }
+}
+
 /// A command that comes with a value.
-fn forcing(word: &str, query: &Query) -> Result<Order, String> {
+fn with_value(word: &str, query: &Query) -> Result<Order, String> {
     let bytes = query.payload().map(|payload| payload.to_bytes());
     let bytes = bytes.unwrap_or_default();
     let line = format!("{word} {}", String::from_utf8_lossy(&bytes));

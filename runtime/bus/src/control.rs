@@ -7,12 +7,12 @@ use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::signal::{SigSet, Signal};
 use nix::sys::signalfd::{SfdFlags, SignalFd};
-use understudy_wire::Force;
+use understudy_wire::{Force, Write};
 
 use crate::error::BusError;
 use crate::orders::{Control, Cuts, Order};
 
-/// Whether commands are read, one a line: `stop`, `release`, `force {...}` and `unforce {...}` with a [`Force`] and a [`SignalPlace`](understudy_wire::SignalPlace) as JSON.
+/// Whether commands are read, one a line: `stop`, `release`, `force {...}`, `unforce {...}` and `write {...}` with a [`Force`], a [`SignalPlace`](understudy_wire::SignalPlace) and a [`Write`] as JSON.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Commands {
     /// None: standard input is left alone.
@@ -125,7 +125,10 @@ pub(crate) fn watch(
                             _ => order(&line),
                         };
                         match order {
-                            Some(order) => control.give(order),
+                            // One that is not taken is counted there.
+                            Some(order) => {
+                                control.give(order);
+                            }
                             None if line.is_empty() => {}
                             None => unknown(line),
                         }
@@ -148,6 +151,10 @@ pub(crate) fn order(line: &str) -> Option<Order> {
             force.check().is_ok().then_some(Order::Force(force))
         }
         ("choose", choice) => serde_json::from_str(choice).ok().map(Order::Choose),
+        ("write", write) => {
+            let write: Write = serde_json::from_str(write).ok()?;
+            write.check().is_ok().then_some(Order::Write(write))
+        }
         ("unforce", signal) => serde_json::from_str(signal).ok().map(Order::Unforce),
         _ => None,
     }

@@ -73,12 +73,14 @@ impl<T> Shared<T> {
 }
 
 impl<T> Outbox<T> {
-    /// Waits for nothing but another's `put` or `take`.
-    pub(crate) fn put(&self, item: T) {
-        if !self.0.push(item) {
+    /// Waits for nothing but another's `put` or `take`; false where the item was dropped.
+    pub(crate) fn put(&self, item: T) -> bool {
+        let fits = self.0.push(item);
+        if !fits {
             self.0.dropped.fetch_add(1, Ordering::Relaxed);
         }
         self.0.ring();
+        fits
     }
 }
 
@@ -172,7 +174,7 @@ mod tests {
         const ITEMS: u32 = 20_000;
         let (outbox, inbox) = doorbell(ITEMS as usize).expect("an eventfd");
         std::thread::scope(|scope| {
-            scope.spawn(|| (0..ITEMS).for_each(|item| outbox.put(item)));
+            scope.spawn(|| (0..ITEMS).for_each(|item| assert!(outbox.put(item))));
             let mut expected = 0;
             while expected < ITEMS {
                 match inbox.take() {

@@ -3,7 +3,7 @@
 use std::net::SocketAddr;
 
 use serde::{Deserialize, Serialize};
-use understudy_wire::{ClusterHash, Member, ProgramId, Topic};
+use understudy_wire::{ClusterHash, Member, Topic};
 
 use crate::error::BusError;
 
@@ -24,12 +24,12 @@ pub struct Endpoints {
     cluster: ClusterHash,
     own: Peer,
     others: Vec<Peer>,
-    neighbours: Vec<(ProgramId, ProgramId)>,
+    neighbours: Vec<(Member, Member)>,
 }
 
 impl Endpoints {
-    /// `members` are all of the cluster, `own` among them; a pair (i, j) in `neighbours` says that plant j hears
-    /// plant i.
+    /// `members` are all of the cluster, `own` among them; a pair (i, j) in `neighbours` is as for
+    /// [`Topic::between`].
     ///
     /// # Errors
     /// [`BusError::NoAddress`] where `own` is not among the members; [`BusError::SharedAddress`] where two have one address.
@@ -37,7 +37,7 @@ impl Endpoints {
         cluster: ClusterHash,
         own: Member,
         members: Vec<Peer>,
-        neighbours: Vec<(ProgramId, ProgramId)>,
+        neighbours: Vec<(Member, Member)>,
     ) -> Result<Self, BusError> {
         for (place, first) in members.iter().enumerate() {
             let same = |second: &&Peer| second.address == first.address;

@@ -166,6 +166,7 @@ impl<M: Machine> Host<'_, M> {
                 Order::Choose(choice) => Input::RemoteIo(RemoteIoInput::Choose(*choice)),
                 Order::Force(force) => Input::RemoteIo(RemoteIoInput::Force(force)),
                 Order::Unforce(signal) => Input::RemoteIo(RemoteIoInput::Unforce(*signal)),
+                Order::Write(write) => Input::RemoteIo(RemoteIoInput::Write(write)),
             };
             let now = self.clock.now();
             self.machine.handle_input(now, input);
@@ -268,6 +269,7 @@ impl<M: Machine> Host<'_, M> {
                     }
                 }
                 Output::Report(event) => self.sink.record(now, Noted::Member(event)),
+                Output::Answer(answer) => self.orders.answer(answer),
             }
         }
     }
@@ -332,6 +334,12 @@ impl<M: Machine> Host<'_, M> {
         }
         if now.since(round.reported) < period {
             return;
+        }
+        let writes = self.orders.take_refused_writes();
+        if writes > 0 {
+            round.reported = now;
+            self.sink
+                .record(now, Noted::Host(HostEvent::RefusedWrites { writes }));
         }
         let unsendable = round.unsendable.take();
         if !round.refused.is_empty() || unsendable.is_some() {

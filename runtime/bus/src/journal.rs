@@ -130,6 +130,11 @@ pub enum HostEvent {
         /// Where the last one came from.
         address: IpAddr,
     },
+    /// Writes of operators were refused at once since the last such record: more came in a second than this member takes.
+    RefusedWrites {
+        /// Their number.
+        writes: u64,
+    },
     /// The member said frames that break a bound of the wire, since the last such record: a mistake in this program.
     UnsendableFrames {
         /// How many.

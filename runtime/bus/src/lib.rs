@@ -29,6 +29,7 @@ mod udp;
 mod unreceived;
 mod wakefulness;
 mod watchdog;
+mod writes;
 mod zenoh_link;
 
 pub use announcer::Announcer;

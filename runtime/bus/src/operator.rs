@@ -4,10 +4,10 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 use serde_json::json;
-use understudy_wire::{ClusterHash, Force, SignalPlace, StateChoice};
+use understudy_wire::{ClusterHash, Force, Role, SignalPlace, StateChoice, Write};
 use zenoh::Wait;
 
-use crate::channel::{TlsKeys, hash_key, insert, prefix, tls_config};
+use crate::channel::{TlsKeys, WRITE_KEYS, hash_key, insert, prefix, tls_config};
 use crate::error::{BusError, reason};
 
 /// Longer than it takes a member on a network that works.
@@ -33,6 +33,8 @@ pub enum Request {
     Force(Force),
     /// To take it back.
     Unforce(SignalPlace),
+    /// To write a value; the caller asks under its own role.
+    Write(Write),
     /// To end.
     Stop,
 }
@@ -47,6 +49,8 @@ impl Request {
             Self::Choose(_) => "command/choose",
             Self::Force(_) => "command/force",
             Self::Unforce(_) => "command/unforce",
+            Self::Write(write) if write.role >= Role::Engineer => WRITE_KEYS[1].1,
+            Self::Write(_) => WRITE_KEYS[0].1,
             Self::Stop => "command/stop",
         }
     }
@@ -57,6 +61,7 @@ impl Request {
             Self::Choose(choice) => serde_json::to_string(choice),
             Self::Force(force) => serde_json::to_string(force),
             Self::Unforce(signal) => serde_json::to_string(signal),
+            Self::Write(write) => serde_json::to_string(write),
             _ => return String::new(),
         };
         text.unwrap_or_default()

@@ -1,14 +1,18 @@
 //! What is wanted of a running member.
 
 use std::os::fd::BorrowedFd;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::Receiver;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
-use understudy_wire::{Force, Member, ProgramSet, SignalPlace, StateChoice, StationSet};
+use understudy_wire::{
+    Force, Member, ProgramSet, SignalPlace, StateChoice, StationSet, Write, WriteAnswer,
+};
 
 use crate::doorbell::{Inbox, Outbox, doorbell};
 use crate::error::BusError;
+use crate::writes::{Answers, Limiter, answers};
 
 /// Orders that wait, at most; what comes on top of them is dropped. To stop and to cut are never dropped.
 const BOUND: usize = 16;
@@ -26,6 +30,8 @@ pub enum Order {
     Force(Force),
     /// The operator takes it back.
     Unforce(SignalPlace),
+    /// An operator writes a value.
+    Write(Write),
     /// The laboratory cuts the links from these members, and heals those from all others.
     Cut(Cuts),
 }
@@ -71,6 +77,8 @@ struct Standing {
 pub struct Orders {
     inbox: Inbox<Order>,
     standing: Arc<Standing>,
+    limiter: Arc<Limiter>,
+    answers: Answers,
 }
 
 /// The end of whoever gives orders; may be cloned, and used from any thread.
@@ -78,6 +86,8 @@ pub struct Orders {
 pub struct Control {
     outbox: Outbox<Order>,
     standing: Arc<Standing>,
+    limiter: Arc<Limiter>,
+    answers: Arc<Mutex<Option<Receiver<WriteAnswer>>>>,
 }
 
 /// Both ends.
@@ -87,17 +97,28 @@ pub struct Control {
 pub fn orders() -> Result<(Control, Orders), BusError> {
     let (outbox, inbox) = doorbell(BOUND).map_err(BusError::system("an eventfd for orders"))?;
     let standing = Arc::new(Standing::default());
+    let limiter = Arc::new(Limiter::new());
+    let (answers, given) = answers();
     let control = Control {
         outbox,
         standing: Arc::clone(&standing),
+        limiter: Arc::clone(&limiter),
+        answers: Arc::new(Mutex::new(Some(given))),
     };
-    Ok((control, Orders { inbox, standing }))
+    let orders = Orders {
+        inbox,
+        standing,
+        limiter,
+        answers,
+    };
+    Ok((control, orders))
 }
 
 impl Control {
-    /// Gives an order; never blocks.
-    pub fn give(&self, order: Order) {
+    /// Gives an order; never blocks. False where it was not taken, because too many wait or too many writes came.
+    pub fn give(&self, order: Order) -> bool {
         match &order {
+            Order::Write(_) if !self.limiter.admits() => return false,
             Order::Stop => self.standing.stopping.store(true, Ordering::SeqCst),
             Order::Cut(cuts) => {
                 let standing = &self.standing;
@@ -107,11 +128,17 @@ impl Control {
                 standing
                     .cut_remote_ios
                     .store(cuts.remote_ios.bits(), Ordering::Relaxed);
-                return;
+                return true;
             }
             _ => {}
         }
-        self.outbox.put(order);
+        self.outbox.put(order)
+    }
+
+    /// The answers to writes; once.
+    pub(crate) fn take_answers(&self) -> Option<Receiver<WriteAnswer>> {
+        let mut answers = self.answers.lock().unwrap_or_else(PoisonError::into_inner);
+        answers.take()
     }
 }
 
@@ -121,6 +148,16 @@ impl Orders {
             return Some(Order::Stop);
         }
         self.inbox.take()
+    }
+
+    /// Answers a write; never blocks.
+    pub(crate) fn answer(&self, answer: WriteAnswer) {
+        self.answers.give(answer);
+    }
+
+    /// Writes that were not taken since this was last asked.
+    pub(crate) fn take_refused_writes(&self) -> u64 {
+        self.limiter.take_refused()
     }
 
     /// Whether the link from a member is cut.

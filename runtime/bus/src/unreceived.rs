@@ -95,6 +95,8 @@ mod tests {
                 applied: None,
                 excluded: StationSet::EMPTY,
                 gone,
+                drives: true,
+                writes: smallvec![],
             }),
         }
     }

@@ -69,8 +69,13 @@ fn channel(keys: Arc<MemberKeys>, cluster: &Cluster) -> ChannelSettings {
     ChannelSettings {
         keys: tls_keys(&tls),
         admitted: Box::new(move || {
-            let (operators, members) = keys.admitted();
-            Admitted { operators, members }
+            let admitted = keys.admitted();
+            Admitted {
+                engineers: admitted.engineers,
+                operators: admitted.operators,
+                viewers: admitted.viewers,
+                members: admitted.members,
+            }
         }),
         configuration: cluster.canonical_text().to_owned(),
     }

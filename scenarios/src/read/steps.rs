@@ -4,11 +4,13 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::time::Duration;
 
+use understudy_cluster::stored_value;
+use understudy_remote_io::ValueMismatch;
 use understudy_simulator::{Action, Fault};
 use understudy_text::Diagnostic;
 use understudy_text::spelling::suggestion;
 use understudy_text::tables::{Fields, Placed};
-use understudy_wire::{Member, ProgramId, StateChoice};
+use understudy_wire::{Member, PointValue, ProgramId, StateChoice};
 
 use super::{MAXIMUM_STEPS, Reader};
 use crate::format::{STEP, action_keys};
@@ -108,15 +110,17 @@ impl Reader<'_> {
         let of_station = |member: Member| matches!(member, Member::Station(_));
         let (fits, wanted): (fn(Member) -> bool, &str) = match word {
             "crash" | "restart" | "stop" | "continue" => (any, ""),
-            "release" | "cold-start" | "accept-state" => (of_remote_io, "names a remote I/O"),
+            "release" | "cold-start" | "accept-state" | "write" => {
+                (of_remote_io, "names a remote I/O")
+            }
             "flip-state" | "flip-word" => (of_station, "names a controller or an understudy"),
             _ => (in_cluster, "names a station or a remote I/O, and no plant"),
         };
         if let Some(member) = member.filter(|&member| !fits(member)) {
             let name = station.value;
             let message = match (word, member) {
-                ("release" | "cold-start" | "accept-state", _) => {
-                    format!("`{name}` is not a remote I/O: `{word}` concerns its outputs")
+                ("release" | "cold-start" | "accept-state" | "write", _) => {
+                    format!("`{name}` is not a remote I/O, and `{word}` concerns one")
                 }
                 _ => format!("`{name}` cannot be the target of `{word}`"),
             };
@@ -145,6 +149,7 @@ impl Reader<'_> {
             "accept-state" => one(Action::Choose {
                 choice: StateChoice::Newest { cycle: None },
             }),
+            "write" => one(self.written(fields, member)?),
             "slow" => one(Action::Slow {
                 by: self.slowness(fields)?,
             }),
@@ -183,6 +188,46 @@ impl Reader<'_> {
                 })
             }
         }
+    }
+
+    /// An input that operators write, and its value.
+    fn written(&mut self, fields: &mut Fields<'_, '_>, member: Option<Member>) -> Option<Action> {
+        fields.require(&["input", "value"], &mut self.diagnostics);
+        let name = fields.text("input", &mut self.diagnostics);
+        let value = fields.get("value");
+        let value = value.and_then(|value| value.constant(&mut self.diagnostics));
+        let (name, value) = (name?, value?);
+        let Some(Member::RemoteIo(program)) = member else {
+            return None;
+        };
+        let mut inputs = self.members?.operator_inputs(program);
+        let Some(named) = inputs.find(|input| input.name == name.value) else {
+            let known = self.members?.operator_inputs(program);
+            let help = suggestion(name.value, known.map(|input| input.name.as_str()));
+            let message = format!("operators write no input `{}` there", name.value);
+            self.diagnostics
+                .push(Diagnostic::error("U0309", message, name.span).with_help(help));
+            return None;
+        };
+        let place = named.input.place;
+        let problem = match stored_value(&value.value, place.of) {
+            Ok(stored) => {
+                let value = PointValue::new(place.of.bits(), stored);
+                match named.input.check(value) {
+                    Ok(()) => {
+                        let input = place.bit;
+                        return Some(Action::Write { input, value });
+                    }
+                    Err(ValueMismatch::Limits) => "the value is outside the limits".to_owned(),
+                    Err(ValueMismatch::Type) => "the value has another type".to_owned(),
+                }
+            }
+            Err(expected) => expected,
+        };
+        let message = format!("`{}` is {}: {problem}", named.name, place.of);
+        self.diagnostics
+            .push(Diagnostic::error("U0304", message, value.span));
+        None
     }
 
     /// A small number; its least value where the step does not say.

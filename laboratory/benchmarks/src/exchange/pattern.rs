@@ -182,6 +182,8 @@ fn sample() -> Body {
         applied: None,
         excluded: StationSet::EMPTY,
         gone: StationSet::EMPTY,
+        drives: true,
+        writes: Default::default(),
     })
 }
 

@@ -48,6 +48,15 @@ impl Simulation {
                     observe,
                 );
             }
+            (Member::RemoteIo(_), Action::Write { .. }) => {
+                if let Some(write) = fault.write() {
+                    self.give(
+                        member,
+                        Input::RemoteIo(RemoteIoInput::Write(&write)),
+                        observe,
+                    );
+                }
+            }
             (Member::Station(station), _) => {
                 let waiting = disturb(&mut self.stations[station.index()], action);
                 self.catch_up(member, waiting, observe);

@@ -16,7 +16,7 @@ use tokio::net::{UnixListener, UnixStream};
 use tokio::sync::Semaphore;
 use tokio::task::JoinHandle;
 
-use super::{Commander, OperatorAction, Refusal, acknowledgement};
+use super::{Commander, Done, OperatorAction, Refusal, acknowledgement};
 
 /// In the directory of a run.
 pub(crate) const SOCKET: &str = "operator.sock";
@@ -34,6 +34,9 @@ const PATIENCE: Duration = Duration::from_secs(10);
 struct Answer {
     /// Why it was not done.
     refused: Option<String>,
+    /// Cycle from which a written value is in effect.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    cycle: Option<u64>,
 }
 
 /// A socket that takes actions; gone when it is dropped.
@@ -98,6 +101,7 @@ async fn take(mut stream: UnixStream, commander: &Commander) -> io::Result<()> {
         Err(error) => Err(Refusal::Said(format!("U0557: this is no command: {error}"))),
     };
     let answer = Answer {
+        cycle: done.as_ref().ok().and_then(|done| done.cycle),
         refused: done.err().map(|refusal| refusal.to_string()),
     };
     let mut line = serde_json::to_vec(&answer)?;
@@ -106,7 +110,7 @@ async fn take(mut stream: UnixStream, commander: &Commander) -> io::Result<()> {
 }
 
 /// Asks whoever writes the run. An acknowledgement goes to the end of a journal that nobody writes any more.
-pub(super) async fn ask(run: &Path, action: &OperatorAction) -> Result<(), Refusal> {
+pub(super) async fn ask(run: &Path, action: &OperatorAction) -> Result<Done, Refusal> {
     let connecting = in_folder(run, |path| {
         std::os::unix::net::UnixStream::connect(path).and_then(|stream| {
             stream.set_nonblocking(true)?;
@@ -118,7 +122,7 @@ pub(super) async fn ask(run: &Path, action: &OperatorAction) -> Result<(), Refus
         (Err(_), OperatorAction::Acknowledge(seen)) => {
             let appended = acknowledgement::append(run, seen);
             return match appended {
-                Ok(true) => Ok(()),
+                Ok(true) => Ok(Done::default()),
                 Ok(false) => Err(Refusal::Busy),
                 Err(error) => Err(Refusal::System {
                     name: "the journal".to_owned(),
@@ -129,8 +133,13 @@ pub(super) async fn ask(run: &Path, action: &OperatorAction) -> Result<(), Refus
         (Err(_), OperatorAction::Command { .. }) => return Err(Refusal::Busy),
     };
     match told {
-        Ok(Ok(Answer { refused: None })) => Ok(()),
-        Ok(Ok(Answer { refused: Some(why) })) => Err(Refusal::Said(why)),
+        Ok(Ok(Answer {
+            refused: None,
+            cycle,
+        })) => Ok(Done { cycle }),
+        Ok(Ok(Answer {
+            refused: Some(why), ..
+        })) => Err(Refusal::Said(why)),
         Ok(Err(_)) | Err(_) => Err(Refusal::Busy),
     }
 }

@@ -5,7 +5,7 @@ use understudy_node::Event as StationEvent;
 use understudy_plant::Event as PlantEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason, ValueFault};
 use understudy_wire::{
-    ForcedValue, Member, Moment, ProgramSet, SignalPlace, StationId, StationSet, Word,
+    Member, Moment, PointValue, ProgramSet, SignalPlace, StationId, StationSet, Word,
 };
 
 use super::{Words, list, program_name, programs, source_text, stations};
@@ -94,6 +94,24 @@ descriptions! { remote_io: RemoteIoEvent, members;
         let (signal, value) = (place(force.signal), forced_text(force.value));
         format!("{signal} is forced to {value} for {} s by {}: {}", force.seconds, force.owner, force.reason)
     };
+    Written { write, .. } => "written" Notice format!(
+        "{} writes {} to {}: {}",
+        write.owner, forced_text(write.value), place(SignalPlace::Input(write.input)), write.reason
+    );
+    WriteInEffect { since, .. } => "write-in-effect" Info
+        format!("the written value is in effect since cycle {}", since.cycle.0);
+    WriteRefused { write, refusal, .. } => "write-refused" Warning format!(
+        "refuses what {} writes to {}: {refusal}",
+        write.owner, place(SignalPlace::Input(write.input))
+    );
+    WriteVoid { .. } => "write-void" Warning
+        "a written value has no effect: no station received it while it lasted";
+    SignalValidity { input, valid: true, .. } => "signal-valid" Notice
+        format!("the signal of another program at {} is valid", place(SignalPlace::Input(*input)));
+    SignalValidity { input, valid: false, .. } => "signal-stale" Warning format!(
+        "the signal of another program at {} is too old: the default value is sampled",
+        place(SignalPlace::Input(*input))
+    );
     Unforced { signal, expired: true, .. } => "unforced" Notice
         format!("{} is no longer forced: its time has elapsed", place(*signal));
     Unforced { signal, expired: false, .. } => "unforced" Notice
@@ -167,10 +185,10 @@ fn place(signal: SignalPlace) -> String {
 }
 
 /// A number as its bits: the event does not know its type.
-fn forced_text(value: ForcedValue) -> String {
+fn forced_text(value: PointValue) -> String {
     match value {
-        ForcedValue::Bit(bit) => u8::from(bit).to_string(),
-        ForcedValue::Number { width, stored } => {
+        PointValue::Bit(bit) => u8::from(bit).to_string(),
+        PointValue::Number { width, stored } => {
             let digits = usize::from(width) / 4;
             format!("16#{stored:0digits$X}")
         }

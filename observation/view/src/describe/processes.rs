@@ -22,6 +22,8 @@ descriptions! { host: HostEvent, members;
         format!("is not received by the others and continues in a new life, {life}");
     NoNewLife { reason } => "no-new-life" Warning
         format!("is not received by the others and cannot start a new life: {reason}");
+    RefusedWrites { writes } => "refused-writes" Warning
+        format!("{writes} writes were refused at once: more came in a second than it takes");
     RefusedConnections { connections, address } => "refused-connections" Warning format!(
         "{connections} connections to the operators' port were refused because of the limit, the last from {address}"
     );
@@ -80,6 +82,7 @@ pub(crate) fn fault_text(action: Action, member: Member, members: &Members) -> S
         Action::Heal { to } => format!("{name} is connected to {} again", members.name(to)),
         Action::Delay { to, by } => format!("{} receives {name} {by:?} later", members.name(to)),
         Action::Release => format!("{name} is released"),
+        Action::Write { .. } => format!("a value is written to {name}"),
         Action::Choose {
             choice: StateChoice::Cold,
         } => format!("the operator starts the program of {name} cold"),

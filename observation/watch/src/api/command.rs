@@ -7,9 +7,9 @@ use axum::extract::rejection::JsonRejection;
 use axum::extract::{Extension, State};
 use serde::Deserialize;
 use serde_json::{Value, json};
-use understudy_journal::Command;
+use understudy_journal::{Command, new_write};
 use understudy_wire::{
-    Force, ForcedValue, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH, SignalPlace, StateChoice,
+    Force, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH, PointValue, SignalPlace, StateChoice, Write,
 };
 
 use super::Answered;
@@ -43,11 +43,16 @@ enum AskedCommand {
     Rejoin,
     Force {
         signal: SignalPlace,
-        value: ForcedValue,
+        value: PointValue,
         seconds: u32,
     },
     Unforce {
         signal: SignalPlace,
+    },
+    /// A value for an operator input, both as a person types them.
+    Write {
+        input: String,
+        value: String,
     },
 }
 
@@ -57,7 +62,13 @@ pub(super) async fn command(
     body: Result<Json<Asked>, JsonRejection>,
 ) -> Answered<Json<Value>> {
     let Json(asked) = body?;
-    if let Some(why) = app.why_not(&person) {
+    let is_write = matches!(asked.command, AskedCommand::Write { .. });
+    let why = if is_write {
+        app.why_not_write(&person)
+    } else {
+        app.why_not(&person)
+    };
+    if let Some(why) = why {
         return Err(Problem::forbidden(why));
     }
     let owner = named(&person, asked.owner)?;
@@ -76,6 +87,19 @@ pub(super) async fn command(
         AskedCommand::Isolate => Command::Isolate,
         AskedCommand::Rejoin => Command::Rejoin,
         AskedCommand::Unforce { signal } => Command::Unforce { signal },
+        AskedCommand::Write { input, value } => {
+            let model = app.model();
+            let unknown = || Problem::unknown("the run has not started".to_owned());
+            let cluster = model.cluster().ok_or_else(unknown)?;
+            let write = new_write(cluster, member, &input, &value);
+            let write = write.map_err(|problem| Problem::bad(problem.to_string()))?;
+            Command::Write(Write {
+                role: person.role,
+                owner: owner.clone(),
+                reason: reason.clone(),
+                ..write
+            })
+        }
         AskedCommand::Force {
             signal,
             value,
@@ -90,8 +114,11 @@ pub(super) async fn command(
     };
     let commander = &app.commanding.commander;
     let done = commander.give(member, command, owner, reason).await;
-    done.map_err(|refusal| Problem::refused(&refusal.to_string()))?;
-    Ok(Json(json!({})))
+    let done = done.map_err(|refusal| Problem::refused(&refusal.to_string()))?;
+    Ok(Json(match done.cycle {
+        Some(cycle) => json!({ "cycle": cycle }),
+        None => json!({}),
+    }))
 }
 
 /// The person who is logged in; otherwise the name in the request.

@@ -7,15 +7,17 @@ use understudy_text::spelling::suggestion;
 use understudy_typed::{Elementary, Point, Points, Program as TypedProgram};
 
 use super::Member;
+use super::inputs::VALID;
 use crate::cluster::RemoteIo;
 use crate::device::{Binding, FieldDevice, Side};
-use crate::fields::{MAXIMUM_MISFITS, PlaceEntry, Placed};
+use crate::fields::{MAXIMUM_MISFITS, PlaceEntry, Placed, SourceEntry};
 use crate::file::FieldSection;
 use crate::place::{BitPlace, Place, Registers};
 
 /// The device of a remote I/O; nothing where its section has errors.
 pub(super) fn device(
     section: &FieldSection,
+    sources: &[SourceEntry],
     member: &Member,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<FieldDevice> {
@@ -57,7 +59,8 @@ pub(super) fn device(
         let optional = [TypedProgram::RESET, TypedProgram::FAULT];
         let lacking = points
             .names()
-            .filter(|name| !entries.contains_key(*name) && !optional.contains(name));
+            .filter(|name| !entries.contains_key(*name) && !optional.contains(name))
+            .filter(|name| !is_sourced(sources, name));
         // Where names were misspelt, that was said.
         if diagnostics.len() == before || warned {
             for name in lacking.take(MAXIMUM_MISFITS) {
@@ -80,6 +83,12 @@ pub(super) fn device(
         inputs,
         outputs,
     })
+}
+
+/// Whether an input has a source that is not the field, or says whether that source is valid.
+pub(super) fn is_sourced(sources: &[SourceEntry], input: &str) -> bool {
+    let mut names = sources.iter().map(|source| source.name.value.as_str());
+    names.any(|name| name == input || input.strip_suffix(VALID) == Some(name))
 }
 
 /// An output needs a place that can be written, and one of its own.

@@ -3,9 +3,10 @@
 //! The bounds are those of the layout at its longest: an integer takes at most 9 bytes, and a frame has a header besides.
 
 use understudy_text::Diagnostic;
-use understudy_wire::{MAXIMUM_FRAME_BYTES, MAXIMUM_IMAGE_BITS};
+use understudy_wire::{MAXIMUM_FRAME_BYTES, MAXIMUM_IMAGE_BITS, MAXIMUM_SESSIONS};
 
 use super::Member;
+use crate::cluster::RemoteIo;
 use crate::code::Code;
 
 /// Of an integer as it travels.
@@ -15,14 +16,17 @@ const FRAME_BYTES: usize = 256;
 /// One state that a turn speaks of.
 const HOLDING_BYTES: usize = 8 * INTEGER_BYTES;
 
+/// The newest write of each session, in the samples of a program with operator inputs.
+const WRITES_BYTES: usize = MAXIMUM_SESSIONS * (INTEGER_BYTES + 5);
+
 /// At most so many bytes of an image, with the members of a word besides.
 fn image_bytes(bits: usize) -> usize {
     (bits.div_ceil(64) + 3) * INTEGER_BYTES
 }
 
 /// A sample: the inputs of each cycle of its history.
-fn sample_bytes(inputs: usize, history: usize) -> usize {
-    FRAME_BYTES + history * image_bytes(inputs)
+fn sample_bytes(inputs: usize, history: usize, has_operator_inputs: bool) -> usize {
+    FRAME_BYTES + history * image_bytes(inputs) + usize::from(has_operator_inputs) * WRITES_BYTES
 }
 
 /// A transfer: one state.
@@ -31,18 +35,37 @@ fn transfer_bytes(registers: usize) -> usize {
 }
 
 /// The turn of an understudy: a word for each program that is silent, one for the rest, all that it holds, and the last inputs of
-/// each program where every remote I/O is silent.
-fn turn_bytes(programs: usize, widest_inputs: usize, widest_outputs: usize) -> usize {
+/// each program where every remote I/O is silent; `written` programs have operator inputs.
+fn turn_bytes(
+    programs: usize,
+    written: usize,
+    widest_inputs: usize,
+    widest_outputs: usize,
+) -> usize {
     let recalled = image_bytes(widest_inputs) + 6 * INTEGER_BYTES;
     FRAME_BYTES
         + (programs + 1) * image_bytes(widest_outputs)
         + programs * (HOLDING_BYTES + recalled)
+        + written * WRITES_BYTES
 }
 
 /// Reports every program whose samples, state or turn could be longer than a frame.
-pub(crate) fn check(members: &[Member], history: u32, diagnostics: &mut Vec<Diagnostic>) {
+pub(crate) fn check(
+    members: &[Member],
+    remote_ios: &[RemoteIo],
+    history: u32,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let has_operator_inputs = |index: usize| {
+        remote_ios
+            .get(index)
+            .is_some_and(|it| it.operator_inputs().next().is_some())
+    };
+    let written = (0..members.len())
+        .filter(|&index| has_operator_inputs(index))
+        .count();
     let (mut widest, mut widest_inputs) = (0, 0);
-    for member in members {
+    for (index, member) in members.iter().enumerate() {
         let Some((code, interface)) = &member.code else {
             continue;
         };
@@ -68,7 +91,7 @@ pub(crate) fn check(members: &[Member], history: u32, diagnostics: &mut Vec<Diag
         };
         report(
             format!("{inputs} inputs, sent {history} times"),
-            sample_bytes(inputs, history as usize),
+            sample_bytes(inputs, history as usize, has_operator_inputs(index)),
             "a smaller `history` makes samples shorter",
         );
         report(
@@ -77,7 +100,7 @@ pub(crate) fn check(members: &[Member], history: u32, diagnostics: &mut Vec<Diag
             "divide the program: memory, timers and counters are state bits",
         );
     }
-    let bytes = turn_bytes(members.len(), widest_inputs, widest);
+    let bytes = turn_bytes(members.len(), written, widest_inputs, widest);
     if bytes > MAXIMUM_FRAME_BYTES {
         let message = format!(
             "{} programs of up to {widest_inputs} inputs and {widest} outputs: a turn of the understudy takes up to {bytes} bytes, and a frame {MAXIMUM_FRAME_BYTES}",
@@ -104,10 +127,11 @@ pub(crate) fn too_wide(name: &str, code: &Code) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use smallvec::SmallVec;
     use understudy_wire::{
         Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
         Lineage, MAXIMUM_HISTORY, Member, Moment, ProgramHash, ProgramId, ProgramSet, Recalled,
-        Sample, StationId, StationSet, Transfer, Turn, Word, encode,
+        Sample, StationId, StationSet, Transfer, Turn, Word, WriteId, encode,
     };
 
     use super::*;
@@ -135,6 +159,15 @@ mod tests {
         assert!(bytes.len() <= bound, "{} of {bound} bytes", bytes.len());
     }
 
+    fn all_writes() -> SmallVec<[WriteId; 1]> {
+        let sessions = (0..MAXIMUM_SESSIONS as u64).rev();
+        let write = |below| WriteId {
+            session: u64::MAX - below,
+            number: u32::MAX,
+        };
+        sessions.map(write).collect()
+    }
+
     #[test]
     fn no_frame_is_longer_than_its_bound() {
         for bits in [0, 1, 64, 65, 1000] {
@@ -148,8 +181,10 @@ mod tests {
                     applied: Some(LATE),
                     excluded: StationSet::from_bits(u64::MAX),
                     gone: StationSet::from_bits(u64::MAX),
+                    drives: true,
+                    writes: all_writes(),
                 };
-                let bound = sample_bytes(bits, history);
+                let bound = sample_bytes(bits, history, true);
                 check_body(Member::RemoteIo(ProgramId(63)), Body::Sample(sample), bound);
             }
             let transfer = Transfer {
@@ -178,6 +213,7 @@ mod tests {
                     applied: Some(LATE),
                     excluded: StationSet::from_bits(u64::MAX),
                     accounted_for: StationSet::from_bits(u64::MAX),
+                    writes: all_writes(),
                     inputs: ones(bits),
                 };
                 let word = Word {
@@ -192,7 +228,11 @@ mod tests {
                     lacks: ProgramSet::first(64),
                     relayed: Vec::new(),
                 };
-                check_body(station, Body::Turn(turn), turn_bytes(programs, bits, bits));
+                check_body(
+                    station,
+                    Body::Turn(turn),
+                    turn_bytes(programs, programs, bits, bits),
+                );
             }
         }
         let widest = MAXIMUM_IMAGE_BITS;

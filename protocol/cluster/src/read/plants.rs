@@ -14,6 +14,7 @@ use understudy_wire::ProgramId;
 
 use super::Member;
 use super::follows;
+use super::inputs::VALID;
 use super::ladders::Ladders;
 use super::limits::too_wide;
 use super::names::{Names, find_controller};
@@ -150,6 +151,23 @@ fn bound(
     let signals = signals(section);
     let (plant, mut problems) =
         Plant::following(kind, interface, &signals, &terminals, fed_by.is_some());
+    let stays_zero = |problem: &BindingProblem, name: &str| matches!(problem, BindingProblem::InputStaysZero { input } if input == name);
+    for source in &remote_io.inputs {
+        let is_driven = !problems
+            .iter()
+            .any(|problem| stays_zero(problem, &source.name));
+        if is_driven && plant.is_some() {
+            let message = format!(
+                "the plant `{}` drives the input `{}`, which has another source",
+                draft.name, source.name
+            );
+            let help = "remove the sensor from the plant, or the input from [remote_io.inputs]";
+            diagnostics
+                .push(Diagnostic::error("U0224", message, section.span.clone()).with_help(help));
+        }
+        let valid = format!("{}{VALID}", source.name);
+        problems.retain(|it| !stays_zero(it, &source.name) && !stays_zero(it, &valid));
+    }
     if let Some(diagnosis) = &remote_io.diagnosis {
         problems.retain(|problem| match problem {
             BindingProblem::InputStaysZero { input } => !diagnosis.drives(input),

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use serde_json::json;
-use understudy_wire::ClusterHash;
+use understudy_wire::{ClusterHash, Role};
 
 /// Where a holder's TLS files lie.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -19,11 +19,29 @@ pub struct TlsKeys {
 /// Whose calls are answered, by the common names of their certificates.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Admitted {
-    /// May command.
+    /// May also command.
+    pub engineers: Vec<String>,
+    /// May also write operator inputs.
     pub operators: Vec<String>,
+    /// May also follow the journal.
+    pub viewers: Vec<String>,
     /// May ask.
     pub members: Vec<String>,
 }
+
+impl Admitted {
+    /// All but the members.
+    pub(crate) fn people(&self) -> impl Iterator<Item = &String> {
+        let people = self.engineers.iter().chain(&self.operators);
+        people.chain(&self.viewers)
+    }
+}
+
+/// Where a member takes writes, by the role that may ask there.
+pub(crate) const WRITE_KEYS: [(Role, &str); 2] = [
+    (Role::Operator, "write/operator"),
+    (Role::Engineer, "write/engineer"),
+];
 
 /// Where a member's keys begin.
 pub(crate) fn prefix(cluster: ClusterHash, name: &str) -> String {
@@ -75,6 +93,7 @@ pub(super) fn access_control(prefix: &str, hash: &str, admitted: &Admitted) -> s
     let asked = ["configuration", "status"].map(|what| format!("{prefix}/{what}"));
     let asked: Vec<String> = asked.into_iter().chain([hash.to_owned()]).collect();
     let commands = vec![format!("{prefix}/command/*")];
+    let writes = WRITE_KEYS.map(|(_, key)| vec![format!("{prefix}/{key}")]);
     let journal = vec![format!("{prefix}/journal")];
     let rule = |id: &str, messages: &[&str], flow: &str, keys: &[String]| {
         json!({
@@ -85,28 +104,26 @@ pub(super) fn access_control(prefix: &str, hash: &str, admitted: &Admitted) -> s
             "key_exprs": keys,
         })
     };
+    let answers = ["reply", "declare_queryable"];
     let rules = [
         rule("ask", &["query"], "ingress", &asked),
-        rule(
-            "ask-answer",
-            &["reply", "declare_queryable"],
-            "egress",
-            &asked,
-        ),
-        rule("command", &["query"], "ingress", &commands),
-        rule(
-            "command-answer",
-            &["reply", "declare_queryable"],
-            "egress",
-            &commands,
-        ),
+        rule("ask-answer", &answers, "egress", &asked),
         rule("follow", &["declare_subscriber"], "ingress", &journal),
         rule("follow-lines", &["put"], "egress", &journal),
+        rule("write", &["query"], "ingress", &writes[0]),
+        rule("write-answer", &answers, "egress", &writes[0]),
+        rule("engineer-write", &["query"], "ingress", &writes[1]),
+        rule("engineer-write-answer", &answers, "egress", &writes[1]),
+        rule("command", &["query"], "ingress", &commands),
+        rule("command-answer", &answers, "egress", &commands),
     ];
     let all: Vec<&serde_json::Value> = rules.iter().map(|rule| &rule["id"]).collect();
+    // Each may do what the one before it may.
     let groups = [
-        ("operators", &admitted.operators, &all[..]),
         ("members", &admitted.members, &all[..2]),
+        ("viewers", &admitted.viewers, &all[..4]),
+        ("operators", &admitted.operators, &all[..6]),
+        ("engineers", &admitted.engineers, &all[..]),
     ];
     // A group of nobody would be one of everybody: Zenoh takes a missing list for a wildcard, and refuses an empty one.
     let groups = groups.iter().filter(|(_, names, _)| !names.is_empty());
@@ -149,11 +166,16 @@ mod tests {
         assert_eq!(rules["subjects"], json!([]));
         assert_eq!(rules["policies"], json!([]));
         let admitted = Admitted {
+            engineers: vec!["engineer.1".into()],
             operators: vec!["operator.1".into()],
             members: vec!["press.1".into()],
+            ..Admitted::default()
         };
         let rules = access_control("understudy/1/robot", &hash_key("robot"), &admitted);
-        assert_eq!(rules["policies"][1]["rules"], json!(["ask", "ask-answer"]));
+        assert_eq!(rules["policies"][0]["rules"], json!(["ask", "ask-answer"]));
+        let of_operators = rules["policies"][1]["rules"].to_string();
+        assert!(of_operators.contains("\"write\"") && !of_operators.contains("engineer-write"));
+        assert!(!of_operators.contains("command"));
         zenoh::Config::default()
             .insert_json5("access_control", &rules.to_string())
             .expect("Zenoh knows such rules");

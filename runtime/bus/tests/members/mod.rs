@@ -128,6 +128,8 @@ fn sample() -> Sample {
         applied: None,
         excluded: StationSet::EMPTY,
         gone: StationSet::EMPTY,
+        drives: true,
+        writes: Default::default(),
     }
 }
 
@@ -191,7 +193,7 @@ pub(crate) fn key(member: Member) -> FrameKey {
 /// The keys of one member in one of its lives.
 #[allow(dead_code, reason = "some tests have no keys")]
 pub(crate) fn guard(own: Member, life: u64, peers: &[Peer]) -> Guard {
-    let feeds = [(ProgramId(0), ProgramId(1))];
+    let feeds = [(Member::Plant(ProgramId(0)), Member::Plant(ProgramId(1)))];
     let heard = peers.iter().map(|peer| peer.member);
     let heard = heard.filter(|&member| Topic::between(member, own, &feeds).is_some());
     Guard::with_keys(
@@ -206,6 +208,6 @@ pub(crate) fn guard(own: Member, life: u64, peers: &[Peer]) -> Guard {
 }
 
 pub(crate) fn endpoints(own: Member, peers: &[Peer]) -> Endpoints {
-    let feeds = vec![(ProgramId(0), ProgramId(1))];
+    let feeds = vec![(Member::Plant(ProgramId(0)), Member::Plant(ProgramId(1)))];
     Endpoints::new(agreement().cluster, own, peers.to_vec(), feeds).expect("own is among them")
 }

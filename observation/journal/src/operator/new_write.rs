@@ -1,0 +1,118 @@
+//! A write as a person asks for it: by the name of the input and the text of the value.
+
+use std::collections::hash_map::RandomState;
+use std::hash::{BuildHasher, Hasher};
+
+use understudy_cluster::{Cluster, InputSource, typed_value};
+use understudy_remote_io::{OperatorInput, OperatorInputKind, ValueMismatch};
+use understudy_text::spelling::suggestion;
+use understudy_wire::{Member, PointValue, Role, Write, WriteId, WriteRefusal};
+
+/// Reason why a text is not a write.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum WriteProblem {
+    /// The program has no operator input of that name.
+    #[error("U0640: `{member}` has no operator input `{input}`; {help}")]
+    NoInput {
+        /// Name of the remote I/O.
+        member: String,
+        /// Name in the request.
+        input: String,
+        /// The names that there are.
+        help: String,
+    },
+    /// The text is not a value of the type of the input.
+    #[error("U0641: invalid value `{text}` of the input `{input}`: {help}")]
+    Value {
+        /// Name of the input.
+        input: String,
+        /// Text in the request.
+        text: String,
+        /// What is written instead.
+        help: String,
+    },
+    /// The value is outside the limits of the setpoint.
+    #[error("U0642: the value `{text}` is outside the limits of the setpoint `{input}`: {help}")]
+    Limits {
+        /// Name of the input.
+        input: String,
+        /// Text in the request.
+        text: String,
+        /// The limits.
+        help: String,
+    },
+}
+
+impl WriteProblem {
+    /// Its code in the documentation of errors.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::NoInput { .. } => WriteRefusal::NotWritable.code(),
+            Self::Value { .. } => WriteRefusal::Type.code(),
+            Self::Limits { .. } => WriteRefusal::Limits.code(),
+        }
+    }
+}
+
+/// A write in a session of its own, without role, owner and reason.
+///
+/// # Errors
+/// [`WriteProblem`].
+pub fn new_write(
+    cluster: &Cluster,
+    member: Member,
+    input: &str,
+    text: &str,
+) -> Result<Write, WriteProblem> {
+    let remote_io = match member {
+        Member::RemoteIo(program) => cluster.remote_ios().get(program.index()),
+        Member::Station(_) | Member::Plant(_) => None,
+    };
+    let sources = remote_io.map_or(&[][..], |remote_io| &remote_io.inputs);
+    let operator = |source: &InputSource| Some(source.operator()?.input);
+    let found = sources.iter().find(|source| source.name == input);
+    let Some(declared) = found.and_then(operator) else {
+        let names = sources.iter().filter(|source| operator(source).is_some());
+        return Err(WriteProblem::NoInput {
+            member: cluster.member_name(member).unwrap_or_default().to_owned(),
+            input: input.chars().take(60).collect(),
+            help: suggestion(input, names.map(|source| source.name.as_str())),
+        });
+    };
+    let of = declared.place.of;
+    let invalid = |help: String| WriteProblem::Value {
+        input: input.to_owned(),
+        text: text.chars().take(60).collect(),
+        help,
+    };
+    let stored = typed_value(text.trim(), of).map_err(invalid)?;
+    let value = PointValue::new(of.bits(), stored);
+    declared.check(value).map_err(|mismatch| match mismatch {
+        ValueMismatch::Type => invalid(format!("the input is {of}")),
+        ValueMismatch::Limits => WriteProblem::Limits {
+            input: input.to_owned(),
+            text: text.chars().take(60).collect(),
+            help: limits(&declared),
+        },
+    })?;
+    // Different in each call of each process; it need not be secret.
+    let session = RandomState::new().build_hasher().finish();
+    Ok(Write {
+        id: WriteId { session, number: 1 },
+        input: declared.place.bit,
+        value,
+        role: Role::default(),
+        owner: String::new(),
+        reason: String::new(),
+    })
+}
+
+fn limits(input: &OperatorInput) -> String {
+    match input.kind {
+        OperatorInputKind::Setpoint { low, high } => {
+            let text = |stored| input.place.of.write(stored);
+            format!("from {} to {}", text(low), text(high))
+        }
+        _ => String::new(),
+    }
+}

@@ -1,0 +1,302 @@
+//! Inputs that do not come from the field: their declarations, bound to the inputs and outputs of the programs.
+
+use std::collections::BTreeSet;
+use std::ops::Range;
+use std::time::Duration;
+
+use understudy_executable::Interface;
+use understudy_remote_io::{InputPlace, OperatorInput, OperatorInputKind, SignalInput, in_order};
+use understudy_text::Diagnostic;
+use understudy_text::spelling::suggestion;
+use understudy_text::tables::Constant;
+use understudy_typed::{Elementary, Point};
+use understudy_wire::{ProgramId, Role};
+
+use super::Member;
+use crate::fields::{MAXIMUM_MISFITS, OperatorText, Placed, SourceEntry, SourceText};
+use crate::file::FieldSection;
+use crate::format::OPERATOR_INPUTS;
+use crate::source::{InputSource, InputSourceKind, OperatorDeclaration, SignalDeclaration};
+use crate::value::stored_value;
+
+/// The suffix of the input that says whether a signal is valid.
+pub(super) const VALID: &str = ".valid";
+
+/// The sources of the inputs of `members[index]`, those without errors.
+pub(super) fn resolve(
+    entries: &[SourceEntry],
+    index: usize,
+    members: &[Member],
+    field: Option<&FieldSection>,
+    period: Duration,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Vec<InputSource> {
+    let member = &members[index];
+    let Some((_, Interface { inputs, .. })) = &member.code else {
+        return Vec::new();
+    };
+    let mut sources = Vec::new();
+    let mut taken = BTreeSet::new();
+    for (place, SourceEntry { name, source }) in entries.iter().enumerate() {
+        if place == MAXIMUM_MISFITS * 10 {
+            break;
+        }
+        let Some(point) = inputs.find(&name.value) else {
+            let message = format!("`{}` has no input `{}`", member.name, name.value);
+            diagnostics.push(
+                Diagnostic::error("U0209", message, name.span.clone())
+                    .with_help(suggestion(&name.value, inputs.names())),
+            );
+            continue;
+        };
+        let valid = format!("{}{VALID}", point.name);
+        let valid = inputs
+            .find(&valid)
+            .filter(|_| matches!(source, SourceText::Signal { .. }));
+        for name in [Some(point), valid]
+            .into_iter()
+            .flatten()
+            .map(|point| &point.name)
+        {
+            let has_place = field.is_some_and(|field| field.inputs.contains_key(name));
+            if !taken.insert(name.clone()) || has_place {
+                let message = format!("two sources of the input `{name}` of `{}`", member.name);
+                diagnostics.push(
+                    Diagnostic::error("U0224", message, entries[place].name.span.clone())
+                        .with_help("keep one: a place in the field, an operator or a signal"),
+                );
+            }
+        }
+        let kind = match source {
+            SourceText::Operator(text) => operator(text, point, period, diagnostics),
+            SourceText::Signal {
+                from,
+                default,
+                stale_after,
+            } => {
+                let signal = Signal {
+                    from: from.as_ref(),
+                    default: default.as_ref(),
+                    stale_after: *stale_after,
+                };
+                signal.resolve(point, valid, index, members, diagnostics)
+            }
+        };
+        sources.extend(kind.map(|kind| InputSource {
+            name: point.name.clone(),
+            kind,
+        }));
+    }
+    sources
+}
+
+fn place(point: &Point) -> InputPlace {
+    InputPlace {
+        // Images are at most 64 Kbit wide, which is checked elsewhere.
+        bit: u16::try_from(point.bit).unwrap_or(u16::MAX),
+        of: point.of,
+    }
+}
+
+fn misfit(message: String, span: Range<usize>, help: &str) -> Diagnostic {
+    Diagnostic::error("U0225", message, span).with_help(help.to_owned())
+}
+
+/// The stored form of a value in the file.
+fn value(
+    key: &str,
+    value: &Placed<Constant>,
+    of: Elementary,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<u64> {
+    match stored_value(&value.value, of) {
+        Ok(stored) => Some(stored),
+        Err(expected) => {
+            let message = format!("`{key}` of a {of}: {expected}");
+            diagnostics.push(Diagnostic::error("U0204", message, value.span.clone()));
+            None
+        }
+    }
+}
+
+fn operator(
+    text: &OperatorText,
+    point: &Point,
+    period: Duration,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<InputSourceKind> {
+    let before = diagnostics.len();
+    let word = OPERATOR_INPUTS[text.kind?];
+    for key in &text.special {
+        let fits = matches!(
+            (word, key.value),
+            ("pulse", "duration") | ("setpoint", "low" | "high" | "unit")
+        );
+        if !fits {
+            let message = format!("`{}` does not belong to a {word}", key.value);
+            diagnostics.push(
+                Diagnostic::error("U0202", message, key.span.clone()).with_help(
+                    "`duration` belongs to a pulse; `low`, `high` and `unit` belong to a setpoint",
+                ),
+            );
+        }
+    }
+    let is_number = point.of != Elementary::Bool;
+    if is_number != (word == "setpoint") {
+        let message = format!(
+            "a {word} for the input `{}`, which is {}",
+            point.name, point.of
+        );
+        let help = "a level and a pulse are for a BOOL, a setpoint is for a number or a TIME";
+        diagnostics.push(misfit(message, text.span.clone(), help));
+        return None;
+    }
+    let mut optional = |key: &str, found: Option<&Placed<Constant>>| {
+        found.and_then(|found| value(key, found, point.of, diagnostics))
+    };
+    let (low, high) = (
+        optional("low", text.low.as_ref()),
+        optional("high", text.high.as_ref()),
+    );
+    let initial = optional("initial", text.initial.as_ref());
+    let kind = match word {
+        "level" => OperatorInputKind::Level,
+        "pulse" => {
+            let samples = text.duration.as_nanos().div_ceil(period.as_nanos().max(1));
+            OperatorInputKind::Pulse(u32::try_from(samples).unwrap_or(u32::MAX).max(1))
+        }
+        _ => {
+            for (key, found) in [("low", &text.low), ("high", &text.high)] {
+                if found.is_none() {
+                    let message = format!("the setpoint `{}` has no `{key}`", point.name);
+                    diagnostics.push(
+                        Diagnostic::error("U0203", message, text.span.clone()).with_help(format!(
+                            "add `{key} = …`, the limit of what an operator may write"
+                        )),
+                    );
+                }
+            }
+            let (low, high) = (low?, high?);
+            if !in_order(point.of, low, high) {
+                let message = format!("`low` of the setpoint `{}` is above `high`", point.name);
+                diagnostics.push(Diagnostic::error("U0205", message, text.span.clone()));
+            }
+            OperatorInputKind::Setpoint { low, high }
+        }
+    };
+    let input = OperatorInput {
+        place: place(point),
+        kind,
+        initial: initial.or(low).unwrap_or(0),
+        role: [Role::Operator, Role::Engineer][text.role],
+    };
+    if let OperatorInputKind::Setpoint { low, high } = kind
+        && in_order(point.of, low, high)
+        && !(in_order(point.of, low, input.initial) && in_order(point.of, input.initial, high))
+    {
+        let message = format!(
+            "`initial` of the setpoint `{}` is outside its limits",
+            point.name
+        );
+        let span = text
+            .initial
+            .as_ref()
+            .map_or(text.span.clone(), |it| it.span.clone());
+        diagnostics.push(Diagnostic::error("U0205", message, span));
+    }
+    (diagnostics.len() == before).then(|| {
+        InputSourceKind::Operator(OperatorDeclaration {
+            input,
+            title: text.title.clone(),
+            unit: text.unit.clone(),
+            confirm: text.confirm,
+        })
+    })
+}
+
+/// A signal as it is declared.
+struct Signal<'a> {
+    from: Option<&'a Placed<String>>,
+    default: Option<&'a Placed<Constant>>,
+    stale_after: u32,
+}
+
+impl Signal<'_> {
+    fn resolve(
+        &self,
+        point: &Point,
+        valid: Option<&Point>,
+        index: usize,
+        members: &[Member],
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Option<InputSourceKind> {
+        let default = self
+            .default
+            .and_then(|default| value("default", default, point.of, diagnostics));
+        let Placed { value: from, span } = self.from?;
+        let unknown = |message: String, help: String| {
+            Diagnostic::error("U0209", message, span.clone()).with_help(help)
+        };
+        let Some((controller, output)) = from.split_once('.') else {
+            let message = format!("`{from}` names no output of a controller");
+            let help = "write controller and output with a dot between, such as \"press.done\"";
+            diagnostics.push(unknown(message, help.to_owned()));
+            return None;
+        };
+        let Some(source) = members.iter().position(|member| member.name == controller) else {
+            let known = members.iter().map(|member| member.name.as_str());
+            let help = suggestion(controller, known);
+            diagnostics.push(unknown(
+                format!("there is no controller `{controller}`"),
+                help,
+            ));
+            return None;
+        };
+        if source == index {
+            let message = format!("`{controller}` reads its own output `{output}`");
+            let help =
+                "a program knows its own outputs: read the output or a variable in the program";
+            diagnostics.push(misfit(message, span.clone(), help));
+            return None;
+        }
+        let (_, Interface { outputs, .. }) = members[source].code.as_ref()?;
+        let Some(found) = outputs.find(output) else {
+            let help = suggestion(output, outputs.names());
+            diagnostics.push(unknown(
+                format!("`{controller}` has no output `{output}`"),
+                help,
+            ));
+            return None;
+        };
+        if found.of != point.of {
+            let message = format!(
+                "`{from}` is {}, and the input `{}` is {}",
+                found.of, point.name, point.of
+            );
+            diagnostics.push(misfit(
+                message,
+                span.clone(),
+                "declare both with the same type",
+            ));
+            return None;
+        }
+        if let Some(valid) = valid.filter(|valid| valid.of != Elementary::Bool) {
+            let message = format!("`{}` is {}", valid.name, valid.of);
+            let help = "the input that says whether a signal is valid is a BOOL";
+            diagnostics.push(misfit(message, span.clone(), help));
+            return None;
+        }
+        let signal = SignalInput {
+            from: ProgramId(source as u8),
+            output: place(found).bit,
+            place: place(point),
+            valid: valid.map(|valid| place(valid).bit),
+            default: default?,
+            stale_after: self.stale_after,
+        };
+        Some(InputSourceKind::Signal(SignalDeclaration {
+            input: signal,
+            output: found.name.clone(),
+        }))
+    }
+}

@@ -1,0 +1,191 @@
+//! Values that an operator writes to inputs of a program.
+//!
+//! A write goes to the remote I/O of the program, becomes part of its next sample, and so of the lineage: a replica
+//! that has missed it cannot publish. Invariant *One effect*: the newest write of each session is in the sample
+//! together with its value, so that a remote I/O that restarts knows both or neither, and a repeated write is answered
+//! and not taken again.
+
+use serde::{Deserialize, Serialize};
+
+use crate::force::{ForceError, PointValue, check_owner_and_reason};
+use crate::identifier::Moment;
+
+/// Sessions whose newest write a remote I/O remembers, and that a sample carries.
+pub const MAXIMUM_SESSIONS: usize = 16;
+
+/// Identifier of a write: the caller's session, and the number of the write in it.
+///
+/// A caller draws a session at random, counts its writes from 1, and repeats a write under its identifier until it has
+/// an answer.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default, Serialize, Deserialize,
+)]
+pub struct WriteId {
+    /// Session, drawn at random by the caller.
+    pub session: u64,
+    /// Number of the write in its session, from 1.
+    pub number: u32,
+}
+
+/// Rights of the person or program that writes, in ascending order.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default, Serialize, Deserialize,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Role {
+    /// Reads only.
+    #[default]
+    Viewer,
+    /// Writes operator inputs.
+    Operator,
+    /// Also forces signals, releases outputs, and writes the inputs of engineers.
+    Engineer,
+}
+
+impl Role {
+    /// Its name in files and messages.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Viewer => "viewer",
+            Self::Operator => "operator",
+            Self::Engineer => "engineer",
+        }
+    }
+}
+
+/// A value for an operator input.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Write {
+    /// Identifier.
+    pub id: WriteId,
+    /// Input, by its first bit in u(i), counted from 0.
+    pub input: u16,
+    /// Value.
+    pub value: PointValue,
+    /// Rights of the writer, as the receiver of the request has found them.
+    #[serde(default)]
+    pub role: Role,
+    /// Person or program that writes.
+    pub owner: String,
+    /// Reason.
+    pub reason: String,
+}
+
+impl Write {
+    /// Checks operator and reason.
+    ///
+    /// # Errors
+    /// The first of them that is invalid.
+    pub fn check(&self) -> Result<(), ForceError> {
+        check_owner_and_reason(&self.owner, &self.reason)
+    }
+}
+
+/// Answer to a write.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct WriteAnswer {
+    /// The write.
+    pub id: WriteId,
+    /// Outcome.
+    #[serde(flatten)]
+    pub outcome: WriteOutcome,
+}
+
+/// Outcome of a write.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(tag = "outcome", rename_all = "kebab-case")]
+pub enum WriteOutcome {
+    /// The program has the value, and outputs computed from it were applied: no failure takes it back.
+    InEffect {
+        /// Cycle of the first sample with the value.
+        since: Moment,
+    },
+    /// The write has no effect.
+    Refused {
+        /// Reason.
+        refusal: WriteRefusal,
+    },
+}
+
+/// Reason why a write has no effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, thiserror::Error)]
+#[serde(tag = "reason", rename_all = "kebab-case")]
+pub enum WriteRefusal {
+    /// The program has no operator input there.
+    #[error("the input is not declared as an operator input in the cluster file")]
+    NotWritable,
+    /// The value has another type than the input.
+    #[error("the value has another type than the input")]
+    Type,
+    /// The value is outside the limits of the setpoint.
+    #[error("the value is outside the limits of the setpoint")]
+    Limits,
+    /// The role of the writer is lower than the one that the input requires.
+    #[error("the input requires the role `{}`", required.word())]
+    Role {
+        /// Role that the input requires.
+        required: Role,
+    },
+    /// The number does not follow the one before it in its session.
+    #[error("the write is replayed or out of order: the next number of its session is {expected}")]
+    Order {
+        /// The next number of the session; 1 for a session that is not known.
+        expected: u32,
+    },
+    /// More sessions than [`MAXIMUM_SESSIONS`] write at the same time.
+    #[error("too many sessions write at the same time (at most {MAXIMUM_SESSIONS})")]
+    Busy,
+    /// The program does not run: its state is not known yet, is lost, or its sensors are unknown.
+    #[error("the program does not run")]
+    NotRunning,
+    /// All samples with the pulse became void before any station's outputs of them were applied.
+    #[error("no station received the pulse while it lasted")]
+    Void,
+}
+
+impl WriteRefusal {
+    /// Its code in the documentation of errors.
+    pub fn code(self) -> &'static str {
+        match self {
+            Self::NotWritable => "U0640",
+            Self::Type => "U0641",
+            Self::Limits => "U0642",
+            Self::Role { .. } => "U0643",
+            Self::Order { .. } => "U0644",
+            Self::Busy => "U0645",
+            Self::NotRunning => "U0646",
+            Self::Void => "U0647",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_answer_is_flat_json() {
+        let id = WriteId {
+            session: 7,
+            number: 1,
+        };
+        let check = |outcome, expected: &str| {
+            let answer = WriteAnswer { id, outcome };
+            let text = serde_json::to_string(&answer).expect("JSON");
+            assert_eq!(text, expected);
+            let read: WriteAnswer = serde_json::from_str(&text).expect("the same");
+            assert_eq!(read, answer);
+        };
+        let since = Moment::default().plus(3);
+        check(
+            WriteOutcome::InEffect { since },
+            r#"{"id":{"session":7,"number":1},"outcome":"in-effect","since":{"epoch":0,"cycle":3}}"#,
+        );
+        let required = Role::Engineer;
+        let refusal = WriteRefusal::Role { required };
+        check(
+            WriteOutcome::Refused { refusal },
+            r#"{"id":{"session":7,"number":1},"outcome":"refused","refusal":{"reason":"role","required":"engineer"}}"#,
+        );
+    }
+}

@@ -1,0 +1,436 @@
+//! Values that operators write, from the request to the answer.
+//!
+//! ```text
+//!   request ──► checked ──► part of the next sample ──► an output with it is applied ──► in effect
+//!                  │                   └── its samples become void, and it is over ──► no effect
+//!                  └── refused
+//! ```
+//!
+//! Invariant *One effect*: values and identifiers travel in the same samples, so that stations recall both or neither;
+//! a write that is repeated under its identifier is answered, and not taken again.
+
+use std::time::Duration;
+
+use smallvec::SmallVec;
+use understudy_cycle::Output;
+use understudy_wire::{
+    Image, Lineage, MAXIMUM_SESSIONS, Moment, PointValue, Write, WriteAnswer, WriteId,
+    WriteOutcome, WriteRefusal,
+};
+
+use super::RemoteIo;
+use crate::event::Event;
+use crate::history::History;
+use crate::source::{OperatorInput, OperatorInputKind, ValueMismatch};
+
+/// Time after which a session that does not write is forgotten.
+const REMEMBERED_FOR: Duration = Duration::from_secs(60);
+
+/// Time after which such a session may be forgotten earlier, to make room for another one.
+const REMEMBERED_AT_LEAST: Duration = Duration::from_secs(10);
+
+/// Operator inputs with their values, and the writes that they come from.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(super) struct Writing {
+    /// One for each operator input of the settings.
+    values: Vec<Written>,
+    /// In the order of sessions.
+    sessions: Vec<Session>,
+}
+
+/// Value of an operator input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+struct Written {
+    stored: u64,
+    /// Samples of a pulse that are still to be taken, the one that ends it included.
+    left: u32,
+    /// The write that it comes from.
+    by: WriteId,
+    /// Whether a sample has the value.
+    is_sampled: bool,
+}
+
+/// The newest write of a session.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+struct Session {
+    id: WriteId,
+    /// Index of its operator input; `None` where only stations recall the write.
+    input: Option<usize>,
+    value: Option<PointValue>,
+    progress: Progress,
+    /// Cycles since the write.
+    idle: u32,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Progress {
+    /// Taken, and not sampled yet.
+    Taken,
+    /// In a sample of which no output was applied yet.
+    Sampled {
+        /// First sample with the value.
+        first: Moment,
+        /// Lineage after it.
+        after: Lineage,
+    },
+    /// An output with it was applied.
+    InEffect {
+        /// First sample with the value.
+        since: Moment,
+    },
+}
+
+/// What became of a write.
+enum Taking {
+    /// It becomes part of the next sample.
+    New,
+    /// It was taken before, and its outcome is not known yet.
+    Pending,
+    /// It was taken before, and is in effect.
+    InEffect(Moment),
+}
+
+impl Writing {
+    pub(super) fn new(inputs: &[OperatorInput]) -> Self {
+        let values = inputs.iter().map(|input| Written {
+            stored: input.initial,
+            left: 0,
+            by: WriteId::default(),
+            is_sampled: true,
+        });
+        Self {
+            values: values.collect(),
+            sessions: Vec::new(),
+        }
+    }
+
+    /// Checks a write and takes it.
+    fn take(
+        &mut self,
+        inputs: &[OperatorInput],
+        write: &Write,
+        (forgets_after, keeps_for): (u32, u32),
+    ) -> Result<Taking, WriteRefusal> {
+        self.sessions
+            .retain(|session| session.idle < forgets_after || !session.is_decided());
+        let id = write.id;
+        let place = self
+            .sessions
+            .binary_search_by_key(&id.session, |it| it.id.session);
+        let last = place.map_or(0, |place| self.sessions[place].id.number);
+        if let Ok(place) = place
+            && id.number == last
+        {
+            let session = &self.sessions[place];
+            let is_same = session.value.is_none_or(|value| value == write.value)
+                && session
+                    .input
+                    .is_none_or(|input| inputs[input].place.bit == write.input);
+            return match session.progress {
+                _ if !is_same => Err(WriteRefusal::Order { expected: last + 1 }),
+                Progress::InEffect { since } => Ok(Taking::InEffect(since)),
+                Progress::Taken | Progress::Sampled { .. } => Ok(Taking::Pending),
+            };
+        }
+        let at = inputs
+            .iter()
+            .position(|input| input.place.bit == write.input);
+        let at = at.ok_or(WriteRefusal::NotWritable)?;
+        let input = &inputs[at];
+        input
+            .check(write.value)
+            .map_err(|mismatch| match mismatch {
+                ValueMismatch::Type => WriteRefusal::Type,
+                ValueMismatch::Limits => WriteRefusal::Limits,
+            })?;
+        if write.role < input.role {
+            let required = input.role;
+            return Err(WriteRefusal::Role { required });
+        }
+        if last.checked_add(1) != Some(id.number) {
+            let expected = last.saturating_add(1);
+            return Err(WriteRefusal::Order { expected });
+        }
+        let is_undecided = place.is_ok_and(|place| !self.sessions[place].is_decided());
+        if is_undecided || !self.values[at].is_sampled || self.values[at].left > 0 {
+            return Err(WriteRefusal::Busy);
+        }
+        let session = Session {
+            id,
+            input: Some(at),
+            value: Some(write.value),
+            progress: Progress::Taken,
+            idle: 0,
+        };
+        match place {
+            Ok(place) => self.sessions[place] = session,
+            Err(_) => self.add(session, keeps_for)?,
+        }
+        let stored = write.value.stored();
+        self.values[at] = Written {
+            stored,
+            left: input.samples(stored),
+            by: id,
+            is_sampled: false,
+        };
+        Ok(Taking::New)
+    }
+
+    fn add(&mut self, session: Session, keeps_for: u32) -> Result<(), WriteRefusal> {
+        if self.sessions.len() == MAXIMUM_SESSIONS {
+            let old = self.sessions.iter().enumerate();
+            let old = old.filter(|(_, it)| it.idle >= keeps_for && it.is_decided());
+            let (oldest, _) = old
+                .max_by_key(|(_, it)| it.idle)
+                .ok_or(WriteRefusal::Busy)?;
+            self.sessions.remove(oldest);
+        }
+        let place = self
+            .sessions
+            .partition_point(|it| it.id.session < session.id.session);
+        self.sessions.insert(place, session);
+        Ok(())
+    }
+
+    /// Puts the values into u(i).
+    pub(super) fn put(&self, inputs: &[OperatorInput], image: &mut Image) {
+        for (input, written) in inputs.iter().zip(&self.values) {
+            input.place.set(image, written.stored);
+        }
+    }
+
+    /// The newest write of each session.
+    pub(super) fn ids(&self) -> SmallVec<[WriteId; 1]> {
+        self.sessions.iter().map(|session| session.id).collect()
+    }
+
+    /// Writes in samples of `history`: those that become void can be found afterwards.
+    pub(super) fn in_history(&self, history: &History) -> SmallVec<[WriteId; 1]> {
+        let sampled = self
+            .sessions
+            .iter()
+            .filter(|session| match session.progress {
+                Progress::Sampled { after, .. } => history.place(after).is_some(),
+                Progress::Taken | Progress::InEffect { .. } => false,
+            });
+        sampled.map(|session| session.id).collect()
+    }
+
+    /// The sample of `moment` has the values; writes `before` it that are no longer in the history became void. Pulses
+    /// advance. Answers with the writes that have no effect.
+    pub(super) fn sampled(
+        &mut self,
+        inputs: &[OperatorInput],
+        moment: Moment,
+        history: &History,
+        before: &[WriteId],
+    ) -> SmallVec<[WriteId; 1]> {
+        let after = history.head();
+        let now = Progress::Sampled {
+            first: moment,
+            after,
+        };
+        let mut void = SmallVec::new();
+        for session in &mut self.sessions {
+            let is_void = match session.progress {
+                Progress::Taken => {
+                    session.progress = now;
+                    false
+                }
+                Progress::Sampled { after, .. } => {
+                    before.contains(&session.id) && history.place(after).is_none()
+                }
+                Progress::InEffect { .. } => false,
+            };
+            if !is_void {
+                continue;
+            }
+            // A value that still holds is in this sample.
+            let still = session.input.is_none_or(|input| {
+                let is_over = matches!(inputs[input].kind, OperatorInputKind::Pulse(_))
+                    && self.values[input].stored == 0;
+                self.values[input].by == session.id && !is_over
+            });
+            if still {
+                session.progress = now;
+            } else {
+                void.push(session.id);
+            }
+        }
+        self.drop_void(&void, moment);
+        for written in &mut self.values {
+            written.is_sampled = true;
+            if written.left > 0 {
+                written.left -= 1;
+                // The last sample of a pulse is FALSE, so that the next one is seen.
+                if written.left <= 1 {
+                    written.stored = 0;
+                }
+            }
+        }
+        void
+    }
+
+    /// The program continues from another history: values that hold are sampled again. Answers with the writes that have
+    /// no effect.
+    pub(super) fn history_replaced(
+        &mut self,
+        inputs: &[OperatorInput],
+        moment: Moment,
+    ) -> SmallVec<[WriteId; 1]> {
+        let mut void = SmallVec::new();
+        for session in &mut self.sessions {
+            if !matches!(session.progress, Progress::Sampled { .. }) {
+                continue;
+            }
+            session.progress = Progress::Taken;
+            let is_over = session.input.is_some_and(|input| {
+                let written = &self.values[input];
+                let is_pulse = matches!(inputs[input].kind, OperatorInputKind::Pulse(_));
+                written.by != session.id || (is_pulse && written.stored == 0)
+            });
+            if is_over {
+                void.push(session.id);
+            }
+        }
+        self.drop_void(&void, moment);
+        void
+    }
+
+    /// The number of a write without an effect is free again.
+    fn drop_void(&mut self, void: &[WriteId], moment: Moment) {
+        self.sessions.retain_mut(|session| {
+            if void.contains(&session.id) {
+                session.id.number -= 1;
+                session.value = None;
+                session.input = None;
+                // The one before it was decided.
+                session.progress = Progress::InEffect { since: moment };
+            }
+            session.id.number > 0
+        });
+    }
+
+    /// Outputs of the sample of `moment` were applied. Answers with the writes that are in effect by it, and since when.
+    pub(super) fn applied(&mut self, moment: Moment) -> SmallVec<[(WriteId, Moment); 1]> {
+        let mut effective = SmallVec::new();
+        for session in &mut self.sessions {
+            if let Progress::Sampled { first, .. } = session.progress
+                && first <= moment
+            {
+                session.progress = Progress::InEffect { since: first };
+                effective.push((session.id, first));
+            }
+        }
+        effective
+    }
+
+    /// Ends a cycle.
+    pub(super) fn close_cycle(&mut self) {
+        for session in &mut self.sessions {
+            session.idle = session.idle.saturating_add(1);
+        }
+    }
+
+    /// After a restart: values and writes as stations recall them. A pulse lasts its whole time from now on, so that the
+    /// program sees one pulse.
+    pub(super) fn recall(
+        &mut self,
+        inputs: &[OperatorInput],
+        image: &Image,
+        writes: impl IntoIterator<Item = WriteId>,
+    ) {
+        for (input, written) in inputs.iter().zip(&mut self.values) {
+            let stored = input.place.get(image);
+            *written = Written {
+                stored,
+                left: input.samples(stored),
+                by: WriteId::default(),
+                is_sampled: true,
+            };
+        }
+        let sessions = writes.into_iter().map(|id| Session {
+            id,
+            input: None,
+            value: None,
+            progress: Progress::Taken,
+            idle: 0,
+        });
+        self.sessions = sessions.take(MAXIMUM_SESSIONS).collect();
+    }
+}
+
+impl Session {
+    fn is_decided(&self) -> bool {
+        matches!(self.progress, Progress::InEffect { .. })
+    }
+}
+
+impl OperatorInput {
+    /// Samples until the input may be written again: those of a pulse, and the FALSE after it.
+    fn samples(&self, stored: u64) -> u32 {
+        match self.kind {
+            OperatorInputKind::Pulse(samples) if stored != 0 => samples.saturating_add(1),
+            _ => 0,
+        }
+    }
+}
+
+impl RemoteIo {
+    /// Takes a write, or answers it.
+    pub(super) fn write(&mut self, write: &Write) {
+        let moment = self.moment();
+        let period = self.settings.agreement.schedule.period().as_nanos().max(1);
+        let cycles =
+            |time: Duration| u32::try_from(time.as_nanos().div_ceil(period)).unwrap_or(u32::MAX);
+        let memory = (cycles(REMEMBERED_FOR), cycles(REMEMBERED_AT_LEAST));
+        let runs =
+            self.knowledge.run().is_some() && self.sensors.is_some() && self.question.is_none();
+        let taken = if runs {
+            self.writing
+                .take(&self.settings.operator_inputs, write, memory)
+        } else {
+            Err(WriteRefusal::NotRunning)
+        };
+        match taken {
+            Ok(Taking::New) => self.report(Event::Written {
+                moment,
+                write: write.clone(),
+            }),
+            Ok(Taking::Pending) => {}
+            Ok(Taking::InEffect(since)) => {
+                self.answer(write.id, WriteOutcome::InEffect { since });
+            }
+            Err(refusal) => {
+                self.report(Event::WriteRefused {
+                    moment,
+                    write: write.clone(),
+                    refusal,
+                });
+                self.answer(write.id, WriteOutcome::Refused { refusal });
+            }
+        }
+    }
+
+    /// Answers writes whose samples became void.
+    pub(super) fn report_void(&mut self, writes: &[WriteId]) {
+        let moment = self.moment();
+        for &id in writes {
+            let refusal = WriteRefusal::Void;
+            self.report(Event::WriteVoid { moment, id });
+            self.answer(id, WriteOutcome::Refused { refusal });
+        }
+    }
+
+    /// Answers writes of which outputs were applied.
+    pub(super) fn report_in_effect(&mut self, moment: Moment) {
+        for (id, since) in self.writing.applied(moment) {
+            self.report(Event::WriteInEffect { moment, id, since });
+            self.answer(id, WriteOutcome::InEffect { since });
+        }
+    }
+
+    fn answer(&mut self, id: WriteId, outcome: WriteOutcome) {
+        self.member.put(Output::Answer(WriteAnswer { id, outcome }));
+    }
+}

@@ -1,0 +1,145 @@
+//! Inputs of a program that do not come from its field: operators write them, or another program computes them.
+
+use understudy_typed::Elementary;
+use understudy_wire::{Image, PointValue, ProgramId, Role};
+
+/// Value in the process image of inputs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct InputPlace {
+    /// First bit in u(i), counted from 0.
+    pub bit: u16,
+    /// Type.
+    pub of: Elementary,
+}
+
+impl InputPlace {
+    /// Stores a value.
+    pub(crate) fn set(self, inputs: &mut Image, stored: u64) {
+        for bit in 0..self.of.bits() {
+            inputs.set(usize::from(self.bit) + bit as usize, stored >> bit & 1 == 1);
+        }
+    }
+
+    /// The stored value.
+    pub(crate) fn get(self, inputs: &Image) -> u64 {
+        read(inputs, self.bit, self.of)
+    }
+}
+
+/// Value of `of` in an image from `bit` on.
+pub(crate) fn read(image: &Image, bit: u16, of: Elementary) -> u64 {
+    let bits = (0..of.bits()).map(|at| image.get(usize::from(bit) + at as usize));
+    bits.rev().fold(0, |value, bit| value << 1 | u64::from(bit))
+}
+
+/// Input that operators write.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct OperatorInput {
+    /// Place in u(i).
+    pub place: InputPlace,
+    /// Behaviour of the written value.
+    pub kind: OperatorInputKind,
+    /// Stored value before the first write.
+    pub initial: u64,
+    /// Lowest role that may write it.
+    pub role: Role,
+}
+
+/// Behaviour of a value that an operator writes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum OperatorInputKind {
+    /// A BOOL that keeps its value until the next write.
+    Level,
+    /// A BOOL that is TRUE for this number of samples, at least 1, after `TRUE` is written.
+    Pulse(u32),
+    /// A number between two stored values, both included, that keeps its value until the next write.
+    Setpoint {
+        /// Lowest value.
+        low: u64,
+        /// Highest value.
+        high: u64,
+    },
+}
+
+/// Reason why an operator input cannot take a value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ValueMismatch {
+    /// The value has another type, or is not a number.
+    Type,
+    /// The value is outside the limits.
+    Limits,
+}
+
+impl OperatorInput {
+    /// Checks a value against type and limits.
+    ///
+    /// # Errors
+    /// [`ValueMismatch`].
+    pub fn check(&self, value: PointValue) -> Result<(), ValueMismatch> {
+        let of = self.place.of;
+        if u32::from(value.width()) != of.bits() {
+            return Err(ValueMismatch::Type);
+        }
+        let stored = value.stored();
+        match self.kind {
+            OperatorInputKind::Level | OperatorInputKind::Pulse(_) => Ok(()),
+            OperatorInputKind::Setpoint { .. } if !is_number(of, stored) => {
+                Err(ValueMismatch::Type)
+            }
+            OperatorInputKind::Setpoint { low, high } => {
+                let is_inside = in_order(of, low, stored) && in_order(of, stored, high);
+                is_inside.then_some(()).ok_or(ValueMismatch::Limits)
+            }
+        }
+    }
+}
+
+/// The number that a stored REAL or LREAL stands for.
+fn real(of: Elementary, stored: u64) -> f64 {
+    if of == Elementary::Real {
+        f32::from_bits(stored as u32).into()
+    } else {
+        f64::from_bits(stored)
+    }
+}
+
+fn is_number(of: Elementary, stored: u64) -> bool {
+    !of.is_real() || real(of, stored).is_finite()
+}
+
+/// Whether one value is at most the other.
+pub fn in_order(of: Elementary, one: u64, other: u64) -> bool {
+    if of.is_real() {
+        real(of, one) <= real(of, other)
+    } else {
+        of.signed(one) <= of.signed(other)
+    }
+}
+
+/// Input whose value is an output of another program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct SignalInput {
+    /// Program that computes the value.
+    pub from: ProgramId,
+    /// First bit of the value in the outputs of that program.
+    pub output: u16,
+    /// Place in u(i), of the type of the output.
+    pub place: InputPlace,
+    /// Bit of u(i) that is TRUE while the value is at most `stale_after` cycles older than usual.
+    pub valid: Option<u16>,
+    /// Stored value while it is not.
+    pub default: u64,
+    /// Cycles for which a value that is missing is held.
+    pub stale_after: u32,
+}
+
+/// Program of which this one reads signals.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct SignalSource {
+    /// The program.
+    pub program: ProgramId,
+    /// Width of its outputs in bits.
+    pub outputs: usize,
+    /// Bit of its outputs by which it reports a program fault; `None` for a program that has none.
+    pub stopped: Option<usize>,
+}
