@@ -372,6 +372,8 @@ fn write_list(path: &Path, peers: &[Peer]) -> io::Result<()> {
 mod tests {
     use understudy_wire::StationId;
 
+    use understudy_wire::ProgramId;
+
     use super::*;
 
     #[test]

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use understudy_cluster::{Cluster, press_cell, read};
 use understudy_keys::{
-    Authority, DEFAULT_OPERATOR, Date, KeysError, MemberKeys, OperatorKeys, Operators, Role,
+    Authority, DEFAULT_PERSON, Date, KeysError, MemberKeys, OperatorKeys, People, Role,
 };
 use understudy_seal::{Opener, Refusal};
 use understudy_wire::{Body, Frame, Header, Member, Moment, Topic, encode};
@@ -52,15 +52,9 @@ fn names(cluster: &Cluster) -> Vec<String> {
 fn issued(name: &str) -> (Cluster, Authority) {
     let cluster = cluster();
     let mut authority = Authority::init(&empty(name), &cluster, now()).expect("an empty folder");
-    let operators = [DEFAULT_OPERATOR.to_owned()];
+    let people = [(DEFAULT_PERSON.to_owned(), understudy_wire::Role::Engineer)];
     authority
-        .issue(
-            &cluster,
-            &names(&cluster),
-            operators[..].into(),
-            DAYS,
-            now(),
-        )
+        .issue(&cluster, &names(&cluster), people[..].into(), DAYS, now())
         .expect("names of the cluster");
     (cluster, authority)
 }
@@ -288,7 +282,7 @@ fn what_is_revoked_no_longer_counts_and_new_keys_do() {
         .issue(
             &cluster,
             &["robot".to_owned()],
-            Operators::default(),
+            People::default(),
             DAYS,
             now(),
         )
@@ -310,7 +304,7 @@ fn what_is_revoked_no_longer_counts_and_new_keys_do() {
         behind.open(&mut datagram(&cluster, &stolen, robot)),
         Err(Refusal::Revoked { sender: robot })
     );
-    assert!(!witness.admitted().1.contains(&"robot.1".to_owned()));
+    assert!(!witness.admitted().members.contains(&"robot.1".to_owned()));
     let members = &loaded(&authority, &cluster, press).tls().members.clone();
     assert!(members.contains(&"robot.2".to_owned()) && !members.contains(&"robot.1".to_owned()));
 }
@@ -335,10 +329,10 @@ fn the_book_is_kept() {
             .iter()
             .all(|holder| holder.expires == now().plus_days(DAYS))
     );
-    let operators = holders
+    let engineers = holders
         .iter()
-        .filter(|holder| holder.role == Role::Operator);
-    assert_eq!(operators.count(), 1);
+        .filter(|holder| holder.role == Role::Engineer);
+    assert_eq!(engineers.count(), 1);
     let made = Authority::init(root, &cluster, now());
     assert_eq!(made.err().map(|error| error.code()), Some("U0904"));
     let nowhere = Authority::open(&empty("nowhere"));
@@ -362,7 +356,7 @@ fn everything_that_is_wrong_is_said_at_once() {
     assert_eq!(codes(&refused), ["U0910"]);
     let refused = OperatorKeys::load(&folder, &cluster, now()).expect_err("a member's");
     assert_eq!(codes(&refused), ["U0910"]);
-    let operator = authority.folder_of(DEFAULT_OPERATOR);
+    let operator = authority.folder_of(DEFAULT_PERSON);
     OperatorKeys::load(&operator, &cluster, now()).expect("they were just issued");
 
     // Clocks may differ by a day; one that is further behind cannot take part in TLS.
@@ -393,7 +387,7 @@ fn everything_that_is_wrong_is_said_at_once() {
     );
 
     let nobody = ["robot".to_owned(), "nobody".into(), "no one".into()];
-    let refused = authority.issue(&cluster, &nobody, ["press".into()][..].into(), DAYS, now());
+    let refused = authority.issue(&cluster, &nobody, [("press".into(), understudy_wire::Role::Operator)][..].into(), DAYS, now());
     assert_eq!(codes(&refused.expect_err("no such names")), ["U0907"; 3]);
     let generation = authority.register().holders[0].generation;
     assert_eq!(generation, 1, "nothing was issued to the one who is known");

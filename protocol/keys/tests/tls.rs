@@ -9,7 +9,7 @@ use rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName};
 use rustls::server::WebPkiClientVerifier;
 use rustls::{ClientConfig, ClientConnection, RootCertStore, ServerConfig, ServerConnection};
 use understudy_cluster::{Cluster, press_cell, read};
-use understudy_keys::{Authority, DEFAULT_OPERATOR, Date};
+use understudy_keys::{Authority, DEFAULT_PERSON, Date};
 
 fn cluster() -> Cluster {
     let files = press_cell();
@@ -32,19 +32,13 @@ fn issued(name: &str) -> (PathBuf, PathBuf) {
     let now = Date::of(std::time::SystemTime::now());
     let cluster = cluster();
     let mut authority = Authority::init(&folder, &cluster, now).expect("an empty folder");
-    let operators = [DEFAULT_OPERATOR.to_owned()];
+    let people = [(DEFAULT_PERSON.to_owned(), understudy_wire::Role::Engineer)];
     authority
-        .issue(
-            &cluster,
-            &["robot".to_owned()],
-            operators[..].into(),
-            1,
-            now,
-        )
+        .issue(&cluster, &["robot".to_owned()], people[..].into(), 1, now)
         .expect("a name of the cluster");
     (
         authority.folder_of("robot"),
-        authority.folder_of(DEFAULT_OPERATOR),
+        authority.folder_of(DEFAULT_PERSON),
     )
 }
 

@@ -6,7 +6,7 @@ use understudy_wire::{
     Actuation, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Field, Frame,
     FrameError, Header, Holding, Image, Join, Lineage, MAXIMUM_FRAME_BYTES, Member, Moment,
     ProgramHash, ProgramId, ProgramSet, Recalled, Relayed, Sample, StationId, StationSet, Transfer,
-    Turn, Word, decode, encode,
+    Turn, Word, WriteId, decode, encode,
 };
 
 fn moment(epoch: u64, cycle: u64) -> Moment {

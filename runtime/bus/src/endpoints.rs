@@ -114,7 +114,7 @@ impl Endpoints {
 
 #[cfg(test)]
 mod tests {
-    use understudy_wire::StationId;
+    use understudy_wire::{ProgramId, StationId};
 
     use super::*;
 
@@ -135,7 +135,7 @@ mod tests {
     }
 
     fn endpoints(own: Member) -> Endpoints {
-        let feeds = vec![(ProgramId(0), ProgramId(1))];
+        let feeds = vec![(Member::Plant(ProgramId(0)), Member::Plant(ProgramId(1)))];
         Endpoints::new(ClusterHash(1), own, cell(), feeds).expect("own is among the members")
     }
 

@@ -22,9 +22,9 @@ use understudy_bus::{
     NoField, Request, TlsKeys, run_member,
 };
 use understudy_cycle::Mode;
-use understudy_keys::{Authority, Date, Operators};
+use understudy_keys::{Authority, Date, People};
 use understudy_testing::press_cell;
-use understudy_wire::{ConfigurationHash, Force, SignalPlace};
+use understudy_wire::{ConfigurationHash, Force, Role, SignalPlace};
 use zenoh::Wait;
 
 const DEADLINE: Duration = Duration::from_secs(60);
@@ -38,13 +38,17 @@ fn issued() -> PathBuf {
     let now = Date::of(SystemTime::now());
     let cluster = press_cell(Mode::Full);
     let mut authority = Authority::init(&folder, &cluster, now).expect("an empty folder");
-    let names = ["site-router", "control-room", "shift-leader", "passer-by"].map(str::to_owned);
-    let operators = Operators {
-        names: &names,
-        address: None,
-    };
+    let people = [
+        ("site-router", Role::Engineer),
+        ("control-room", Role::Viewer),
+        ("shift-leader", Role::Engineer),
+        ("line-operator", Role::Operator),
+        ("passer-by", Role::Viewer),
+    ];
+    let people = people.map(|(name, role)| (name.to_owned(), role));
+    let people = People::from(&people[..]);
     authority
-        .issue(&cluster, &["robot".to_owned()], operators, 1, now)
+        .issue(&cluster, &["robot".to_owned()], people, 1, now)
         .expect("names of the cluster");
     folder.join("members")
 }
@@ -112,7 +116,9 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
     let own = keys(&folder, "robot");
     let running = spawn(move || {
         let admitted = || Admitted {
-            operators: vec!["site-router.1".into(), "shift-leader.1".into()],
+            engineers: vec!["site-router.1".into(), "shift-leader.1".into()],
+            operators: vec!["line-operator.1".into()],
+            viewers: Vec::new(),
             members: vec!["robot.1".into()],
         };
         let settings = MemberSettings {
@@ -156,6 +162,13 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
     let unforce = Request::Unforce(SignalPlace::Output(0));
     let taken = asked(member, "shift-leader", unforce.clone());
     assert_eq!(taken.ok().as_deref(), Some(DONE));
+    let status = asked(member, "line-operator", Request::Status);
+    assert!(status.is_ok(), "{status:?}");
+    let denied = asked(member, "line-operator", unforce.clone());
+    assert!(
+        matches!(denied, Err(BusError::Unanswered { .. })),
+        "an operator does not force: {denied:?}"
+    );
     let denied = asked(member, "passer-by", unforce);
     assert!(
         matches!(denied, Err(BusError::Unanswered { .. })),

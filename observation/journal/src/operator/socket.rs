@@ -212,7 +212,7 @@ mod tests {
             loop {
                 let commanded = commands.next().await;
                 let done = match commanded.action {
-                    OperatorAction::Acknowledge(_) => Ok(()),
+                    OperatorAction::Acknowledge(_) => Ok(Done::default()),
                     OperatorAction::Command { .. } => Err(Refusal::Down("robot".to_owned())),
                 };
                 commanded.answer(done);
@@ -236,7 +236,7 @@ mod tests {
             (there.acknowledge(seen()).await, cut)
         });
         let refused = Refusal::Said(Refusal::Down("robot".to_owned()).to_string());
-        assert_eq!(asked, (Ok(()), Err(refused)));
+        assert_eq!(asked, (Ok(Done::default()), Err(refused)));
         drop(socket);
         assert!(!run.join(SOCKET).exists());
     }
@@ -252,8 +252,8 @@ mod tests {
         let writer = WriterLock::take(&run).expect("a file");
         assert_eq!(there.acknowledge_and_wait(seen()), Err(Refusal::Busy));
         drop(writer);
-        assert_eq!(there.acknowledge_and_wait(seen()), Ok(()));
-        assert_eq!(there.acknowledge_and_wait(seen()), Ok(()));
+        assert_eq!(there.acknowledge_and_wait(seen()), Ok(Done::default()));
+        assert_eq!(there.acknowledge_and_wait(seen()), Ok(Done::default()));
         let read = records_of(&journal).expect("readable");
         let events: Vec<_> = read.flatten().map(|record| record.event).collect();
         let expected = Happening::Run(RunEvent::Acknowledged(seen()));
