@@ -16,6 +16,7 @@ use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
 use understudy_wire::{
     Epoch, Field, Frame, Member, ProgramId, ProgramSet, StateChoice, StationId, StationSet, Time,
+    Write,
 };
 
 use crate::fault::{Action, Fault};
@@ -152,6 +153,12 @@ impl Simulation {
     /// From here on all chance comes from `seed`. A run on a quiet network has drawn nothing until its first fault.
     pub fn reseed(&mut self, seed: u64) {
         self.links.reseed(seed);
+    }
+
+    /// A request of an operator reaches the remote I/O of a program now; without effect while that is down.
+    pub fn write(&mut self, program: ProgramId, write: &Write, observe: &mut Observe<'_>) {
+        let input = Input::RemoteIo(RemoteIoInput::Write(write));
+        self.give(Member::RemoteIo(program), input, observe);
     }
 
     /// The network is another one while `disturbance` lasts; a later one takes its place.

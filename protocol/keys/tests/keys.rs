@@ -387,7 +387,13 @@ fn everything_that_is_wrong_is_said_at_once() {
     );
 
     let nobody = ["robot".to_owned(), "nobody".into(), "no one".into()];
-    let refused = authority.issue(&cluster, &nobody, [("press".into(), understudy_wire::Role::Operator)][..].into(), DAYS, now());
+    let refused = authority.issue(
+        &cluster,
+        &nobody,
+        [("press".into(), understudy_wire::Role::Operator)][..].into(),
+        DAYS,
+        now(),
+    );
     assert_eq!(codes(&refused.expect_err("no such names")), ["U0907"; 3]);
     let generation = authority.register().holders[0].generation;
     assert_eq!(generation, 1, "nothing was issued to the one who is known");

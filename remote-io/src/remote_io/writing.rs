@@ -399,7 +399,9 @@ impl RemoteIo {
             }),
             Ok(Taking::Pending) => {}
             Ok(Taking::InEffect(since)) => {
-                self.answer(write.id, WriteOutcome::InEffect { since });
+                let id = write.id;
+                self.report(Event::WriteInEffect { moment, id, since });
+                self.answer(id, WriteOutcome::InEffect { since });
             }
             Err(refusal) => {
                 self.report(Event::WriteRefused {

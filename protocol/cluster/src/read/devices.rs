@@ -61,7 +61,7 @@ pub(super) fn device(
             .names()
             .filter(|name| !entries.contains_key(*name) && !optional.contains(name))
             .filter(|name| !is_sourced(sources, name));
-        // Where names were misspelt, that was said.
+        // Where names were misspelt, that was said. Whether another program reads an output is not known here.
         if diagnostics.len() == before || warned {
             for name in lacking.take(MAXIMUM_MISFITS) {
                 let message = format!(

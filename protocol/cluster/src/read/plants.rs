@@ -122,7 +122,7 @@ pub(crate) fn place(
             interface,
             fed_by,
             follows,
-            &remote_ios[draft.program],
+            remote_ios,
             diagnostics,
         );
     }
@@ -143,10 +143,11 @@ fn bound(
     interface: &Interface,
     fed_by: Option<ProgramId>,
     follows: Vec<(String, Followed)>,
-    remote_io: &RemoteIo,
+    remote_ios: &[RemoteIo],
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<PlantPlace> {
     let section = &draft.section;
+    let remote_io = &remote_ios[draft.program];
     let (terminals, follows): (Vec<_>, Vec<_>) = follows.into_iter().unzip();
     let signals = signals(section);
     let (plant, mut problems) =
@@ -168,6 +169,14 @@ fn bound(
         let valid = format!("{}{VALID}", source.name);
         problems.retain(|it| !stays_zero(it, &source.name) && !stays_zero(it, &valid));
     }
+    let is_read = |output: &str| {
+        let mut readers = remote_ios.iter().flat_map(RemoteIo::signals);
+        readers.any(|signal| signal.input.from.index() == draft.program && signal.output == output)
+    };
+    problems.retain(|problem| match problem {
+        BindingProblem::OutputHasNoEffect { output } => !is_read(output),
+        _ => true,
+    });
     if let Some(diagnosis) = &remote_io.diagnosis {
         problems.retain(|problem| match problem {
             BindingProblem::InputStaysZero { input } => !diagnosis.drives(input),

@@ -1,0 +1,376 @@
+//! Writes of operators while members are killed, cut off and restarted: each has exactly one effect, or an answer that it had none.
+
+use std::collections::BTreeMap;
+
+use proptest::prelude::*;
+use understudy_cluster::read;
+use understudy_remote_io::Event;
+use understudy_simulator::{Action, Fault, Network, Parts, Record, Simulation, parts};
+use understudy_wire::{
+    Image, Member, PointValue, ProgramId, Role, StationId, Write, WriteId, WriteOutcome,
+    WriteRefusal,
+};
+
+const CLUSTER: &str = r#"
+[cluster]
+name = "writes"
+
+[[controller]]
+name = "counter"
+ladder = "counter.st"
+
+[[controller]]
+name = "reader"
+ladder = "reader.st"
+
+[[remote_io]]
+controller = "counter"
+
+[remote_io.inputs]
+press = { operator = "pulse", duration = "30ms" }
+value = { operator = "setpoint", low = -5.0, high = 30000.0, initial = 7.0 }
+service = { operator = "level", role = "engineer" }
+
+[[remote_io]]
+controller = "reader"
+
+[remote_io.inputs]
+count = { from = "counter.count", default = -1.0, stale_after = 2 }
+"#;
+
+const COUNTER: &str = "
+PROGRAM counter
+  VAR_INPUT press : BOOL; value : REAL; service : BOOL; END_VAR
+  VAR_OUTPUT count : REAL; echo : REAL; END_VAR
+  VAR edge : R_TRIG; END_VAR
+  edge(CLK := press);
+  IF edge.Q THEN count := count + 1.0; END_IF;
+  echo := value;
+END_PROGRAM";
+
+const READER: &str = "
+PROGRAM reader
+  VAR_INPUT count : REAL; END_VAR
+  VAR_OUTPUT seen : REAL; END_VAR
+  seen := count;
+END_PROGRAM";
+
+const PROGRAM: ProgramId = ProgramId(0);
+/// First bits of the inputs.
+const PRESS: u16 = 0;
+const VALUE: u16 = 32;
+const SERVICE: u16 = 64;
+/// Cycles after which a caller asks again.
+const PATIENCE: u64 = 12;
+
+fn cluster() -> Parts {
+    let loaded = read("cluster.toml", CLUSTER, &mut |name| match name {
+        "counter.st" => Ok(COUNTER.to_owned()),
+        _ => Ok(READER.to_owned()),
+    });
+    let cluster = loaded
+        .cluster
+        .unwrap_or_else(|| panic!("{:?}", loaded.reports));
+    parts(&cluster)
+}
+
+fn write(session: u64, number: u32, input: u16, value: PointValue) -> Write {
+    Write {
+        id: WriteId { session, number },
+        input,
+        value,
+        role: Role::Operator,
+        owner: "anna".to_owned(),
+        reason: "a test".to_owned(),
+    }
+}
+
+fn real(value: f32) -> PointValue {
+    PointValue::new(32, u64::from(value.to_bits()))
+}
+
+/// A REAL in an image.
+fn real_at(image: &Image, bit: usize) -> f32 {
+    let bits = (0..32).map(|at| u32::from(image.get(bit + at)) << at);
+    f32::from_bits(bits.sum::<u32>())
+}
+
+/// What is seen of a run.
+#[derive(Default)]
+struct Seen {
+    /// The newest outcome of each write.
+    outcomes: BTreeMap<WriteId, WriteOutcome>,
+    /// y of the newest applied true output, by program.
+    outputs: [Option<Image>; 2],
+    cold_starts: u32,
+}
+
+impl Seen {
+    fn observe(&mut self, member: Member, record: Record<'_>) {
+        let (Member::RemoteIo(program), Record::RemoteIo(event)) = (member, record) else {
+            return;
+        };
+        let refused = |refusal| WriteOutcome::Refused { refusal };
+        match event {
+            Event::WriteInEffect { id, since, .. } => {
+                let outcome = WriteOutcome::InEffect { since: *since };
+                self.outcomes.insert(*id, outcome);
+            }
+            Event::WriteRefused { write, refusal, .. } => {
+                self.outcomes.insert(write.id, refused(*refusal));
+            }
+            Event::WriteVoid { id, .. } => {
+                self.outcomes.insert(*id, refused(WriteRefusal::Void));
+            }
+            Event::Applied {
+                outputs,
+                missing: None,
+                ..
+            } => self.outputs[program.index()] = Some(outputs.clone()),
+            Event::StartedCold { .. } => self.cold_starts += 1,
+            _ => {}
+        }
+    }
+}
+
+struct Bench {
+    simulation: Simulation,
+    seen: Seen,
+    cycle: u64,
+}
+
+impl Bench {
+    fn new(network: Network, seed: u64) -> Self {
+        let mut seen = Seen::default();
+        let mut simulation = Simulation::new(cluster(), network, seed);
+        let mut observe = |_, _, member, record: Record<'_>| seen.observe(member, record);
+        simulation.run(3, 200, &mut observe).expect("it gets ready");
+        Self {
+            simulation,
+            seen,
+            cycle: 3,
+        }
+    }
+
+    fn pass(&mut self, cycles: u64) {
+        let seen = &mut self.seen;
+        let mut observe = |_, _, member, record: Record<'_>| seen.observe(member, record);
+        self.cycle += cycles;
+        self.simulation
+            .go_on(self.cycle, &mut observe, &mut || false);
+    }
+
+    fn write(&mut self, write: &Write) {
+        let seen = &mut self.seen;
+        let mut observe = |_, _, member, record: Record<'_>| seen.observe(member, record);
+        self.simulation.write(PROGRAM, write, &mut observe);
+    }
+
+    fn outcome(&self, write: &Write) -> Option<WriteOutcome> {
+        self.seen.outcomes.get(&write.id).copied()
+    }
+
+    fn count(&self) -> f32 {
+        real_at(self.seen.outputs[0].as_ref().expect("applied"), 0)
+    }
+
+    fn echo(&self) -> f32 {
+        real_at(self.seen.outputs[0].as_ref().expect("applied"), 32)
+    }
+
+    fn fault(&mut self, member: Member, action: Action) {
+        self.simulation.schedule(Fault {
+            at_cycle: 0,
+            phase: 0.0,
+            member,
+            action,
+        });
+    }
+}
+
+#[test]
+fn a_write_is_in_effect_and_read_by_another_program() {
+    let mut bench = Bench::new(Network::default(), 1);
+    let press = write(1, 1, PRESS, true.into());
+    bench.write(&press);
+    bench.write(&write(2, 1, VALUE, real(-3.0)));
+    bench.pass(2);
+    let in_effect = |outcome| matches!(outcome, Some(WriteOutcome::InEffect { .. }));
+    assert!(
+        in_effect(bench.outcome(&press)),
+        "{:?}",
+        bench.seen.outcomes
+    );
+    assert_eq!((bench.count(), bench.echo()), (1.0, -3.0));
+    bench.pass(2);
+    let seen = bench.seen.outputs[1].as_ref().expect("applied");
+    assert_eq!(real_at(seen, 0), 1.0, "the other program, a cycle later");
+    // The same write again is answered, and has no second effect.
+    bench.seen.outcomes.clear();
+    bench.write(&press);
+    bench.pass(8);
+    assert!(in_effect(bench.outcome(&press)));
+    assert_eq!(bench.count(), 1.0);
+    // A pulse ends, and the next one counts.
+    bench.write(&write(1, 2, PRESS, true.into()));
+    bench.pass(8);
+    assert_eq!(bench.count(), 2.0);
+}
+
+#[test]
+fn what_is_wrong_is_refused_and_has_no_effect() {
+    let mut bench = Bench::new(Network::default(), 1);
+    let mut check = |write: Write, expected: WriteRefusal| {
+        bench.write(&write);
+        let refused = WriteOutcome::Refused { refusal: expected };
+        assert_eq!(bench.outcome(&write), Some(refused), "{write:?}");
+        bench.seen.outcomes.clear();
+    };
+    check(write(1, 1, VALUE, real(-6.0)), WriteRefusal::Limits);
+    check(write(1, 1, VALUE, real(30_001.0)), WriteRefusal::Limits);
+    check(write(1, 1, VALUE, true.into()), WriteRefusal::Type);
+    check(write(1, 1, PRESS, real(1.0)), WriteRefusal::Type);
+    check(write(1, 1, VALUE + 1, real(1.0)), WriteRefusal::NotWritable);
+    let required = Role::Engineer;
+    check(
+        write(1, 1, SERVICE, true.into()),
+        WriteRefusal::Role { required },
+    );
+    check(
+        write(1, 2, VALUE, real(1.0)),
+        WriteRefusal::Order { expected: 1 },
+    );
+    bench.write(&write(1, 1, VALUE, real(1.0)));
+    let mut check = |write: Write, expected: WriteRefusal| {
+        bench.write(&write);
+        let refused = WriteOutcome::Refused { refusal: expected };
+        assert_eq!(bench.outcome(&write), Some(refused), "{write:?}");
+    };
+    // One write of an input at a time, and none before the one before it is decided.
+    check(write(2, 1, VALUE, real(2.0)), WriteRefusal::Busy);
+    check(write(1, 2, PRESS, true.into()), WriteRefusal::Busy);
+    check(
+        write(1, 1, VALUE, real(2.0)),
+        WriteRefusal::Order { expected: 2 },
+    );
+    bench.pass(2);
+    assert_eq!((bench.count(), bench.echo()), (0.0, 1.0));
+}
+
+#[test]
+fn a_flood_of_sessions_is_bounded() {
+    let mut bench = Bench::new(Network::default(), 1);
+    for session in 0..100 {
+        bench.write(&write(session, 1, VALUE, real(session as f32)));
+        bench.pass(1);
+    }
+    let outcomes = bench.seen.outcomes.values();
+    let taken = outcomes.filter(|outcome| matches!(outcome, WriteOutcome::InEffect { .. }));
+    assert_eq!(taken.count(), understudy_wire::MAXIMUM_SESSIONS);
+    // Ten seconds later there is room again.
+    bench.pass(1000);
+    bench.write(&write(1000, 1, VALUE, real(99.0)));
+    bench.pass(2);
+    assert_eq!(bench.echo(), 99.0);
+}
+
+/// A fault and its repair, with the cycles between.
+fn arbitrary_fault() -> impl Strategy<Value = (Member, Action, Action, u64)> {
+    let station = (0..4_u8).prop_filter_map("no third controller", |rank| {
+        (rank < 3).then_some(Member::Station(StationId(rank)))
+    });
+    let remote_io = Just(Member::RemoteIo(PROGRAM));
+    let killed = prop_oneof![station.clone(), remote_io]
+        .prop_map(|member| (member, Action::Crash, Action::Restart));
+    let suspended = prop_oneof![station.clone(), Just(Member::RemoteIo(PROGRAM))]
+        .prop_map(|member| (member, Action::Stop, Action::Continue));
+    let deaf = station.prop_map(|member| {
+        let to = Member::RemoteIo(PROGRAM);
+        (member, Action::Cut { to }, Action::Heal { to })
+    });
+    let cut = (0..3_u8).prop_map(|rank| {
+        let to = Member::Station(StationId(rank));
+        let (from, cut, heal) = (
+            Member::RemoteIo(PROGRAM),
+            Action::Cut { to },
+            Action::Heal { to },
+        );
+        (from, cut, heal)
+    });
+    (prop_oneof![killed, suspended, deaf, cut], 1..40_u64)
+        .prop_map(|((member, fault, repair), cycles)| (member, fault, repair, cycles))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 192, ..ProptestConfig::default() })]
+
+    /// A caller presses a button again and again, and asks under the same identifier until it has an answer, while faults
+    /// come one after the other. The program counts exactly the presses that were answered to be in effect.
+    #[test]
+    fn each_write_has_one_effect_or_none(
+        faults in prop::collection::vec((arbitrary_fault(), 5..60_u64), 1..8),
+        loss in prop_oneof![Just(0.0), Just(0.1)],
+        seed in any::<u64>(),
+    ) {
+        let mut bench = Bench::new(Network { loss, ..Network::default() }, seed);
+        let (mut session, mut number) = (1, 1);
+        let (mut effects, mut undecided) = (0, 0_u32);
+        let mut asked: Option<(Write, u64)> = None;
+        let mut plan = faults.iter();
+        let mut repair: Option<(u64, Member, Action)> = None;
+        let mut next = 5;
+        let mut quiet = 0;
+        while quiet < 400 {
+            bench.pass(1);
+            match (repair, plan.as_slice().first()) {
+                (Some((at, member, action)), _) if bench.cycle >= at => {
+                    bench.fault(member, action);
+                    repair = None;
+                    next = bench.cycle + plan.next().map_or(0, |(_, pause)| *pause);
+                }
+                (None, Some(((member, fault, back, cycles), _))) if bench.cycle >= next => {
+                    bench.fault(*member, *fault);
+                    repair = Some((bench.cycle + cycles, *member, *back));
+                }
+                (None, None) => quiet += 1,
+                _ => {}
+            }
+            let outcome = asked.as_ref().and_then(|(write, _)| bench.outcome(write));
+            match (&asked, outcome) {
+                (Some(_), Some(WriteOutcome::InEffect { .. })) => {
+                    effects += 1;
+                    number += 1;
+                    asked = None;
+                }
+                (Some(_), Some(WriteOutcome::Refused { refusal })) => {
+                    bench.seen.outcomes.clear();
+                    if let WriteRefusal::Order { .. } = refusal {
+                        // The remote I/O does not know this session any more.
+                        undecided += 1;
+                        (session, number) = (session + 1, 1);
+                    }
+                    asked = None;
+                }
+                (Some((write, since)), None) if bench.cycle - since >= PATIENCE => {
+                    let write = write.clone();
+                    bench.write(&write);
+                    asked = Some((write, bench.cycle));
+                }
+                (None, _) if quiet < 300 => {
+                    let press = write(session, number, PRESS, true.into());
+                    bench.write(&press);
+                    asked = Some((press, bench.cycle));
+                }
+                _ => {}
+            }
+        }
+        prop_assert_eq!(bench.simulation.violations().first(), None);
+        prop_assert!(effects > 20 || bench.seen.cold_starts > 0, "{} effects", effects);
+        // A history that was lost takes its count with it; it is announced by a cold start.
+        if bench.seen.cold_starts == 0 {
+            prop_assert!(asked.is_none(), "the last one has no answer: {:?}", asked);
+            prop_assert_eq!(undecided, 0, "a session was forgotten");
+            prop_assert_eq!(bench.count() as i32, effects);
+        }
+    }
+}
