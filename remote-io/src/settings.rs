@@ -45,6 +45,20 @@ pub struct Settings {
     pub stale_state: StaleState,
 }
 
+impl Settings {
+    /// Bits of u(i) that do not come from the field.
+    pub fn sourced_bits(&self) -> impl Iterator<Item = usize> + '_ {
+        let operators = self.operator_inputs.iter().map(|input| input.place);
+        let signals = self.signals.iter().map(|signal| signal.place);
+        let places = operators.chain(signals).flat_map(|place| {
+            let first = usize::from(place.bit);
+            first..first + place.of.bits() as usize
+        });
+        let valid = self.signals.iter().filter_map(|signal| signal.valid);
+        places.chain(valid.map(usize::from))
+    }
+}
+
 /// The points by which a program with numbers reports a program fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct StopPoints {

@@ -22,6 +22,8 @@ pub struct Signals {
     pub input_points: Points,
     /// y, point by point.
     pub output_points: Points,
+    /// Whether some inputs do not come from the field, so that u is what the remote I/O samples.
+    pub sourced: bool,
     /// Moving parts of its simulated plant, in order.
     pub positions: Vec<String>,
 }
@@ -211,6 +213,9 @@ fn panels(account: &Account, summary: &Summary) -> Vec<Panel> {
         if let Some(signals) = terms.signals.get(program.index()) {
             if !signals.positions.is_empty() {
                 shown = "positions and sensors";
+            }
+            if signals.sourced {
+                shown = "inputs";
             }
             lanes.extend(position_lanes(&trace.positions, &signals.positions));
             lanes.extend(point_lanes(&trace.sensors, &signals.input_points));

@@ -24,6 +24,7 @@ impl Terms {
                 .plant_settings(ProgramId(index as u8))
                 .map(|settings| settings.plant.position_names().to_vec())
                 .unwrap_or_default(),
+            sourced: !cluster.remote_ios()[index].inputs.is_empty(),
             inputs: controller.interface.inputs.bit_names(),
             outputs: controller.interface.outputs.bit_names(),
             input_points: controller.interface.inputs.clone(),

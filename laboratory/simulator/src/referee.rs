@@ -65,6 +65,8 @@ pub struct Referee {
     blind: bool,
     /// What the plant showed last: any of these may have been sampled.
     seen: VecDeque<Image>,
+    /// Bits of u(i) that do not come from the plant, as of the newest sample.
+    sourced: Vec<(usize, bool)>,
     /// Samples for which the program may go on from a state that the operator has chosen.
     choice: u32,
     cold_starts: u64,
@@ -187,6 +189,7 @@ impl Referee {
             held: 0,
             blind: false,
             seen: VecDeque::new(),
+            sourced: settings.sourced_bits().map(|bit| (bit, false)).collect(),
             choice: 0,
             cold_starts: 0,
             applied: false,
@@ -198,13 +201,17 @@ impl Referee {
     /// A remote I/O that is killed may take the record of its last samples with it. The lineage that a station then has proves
     /// which inputs they were, if only they are among those that the plant has shown.
     pub fn saw(&mut self, sensors: &Image) {
-        if self.seen.contains(sensors) {
+        let mut inputs = sensors.clone();
+        for &(place, bit) in &self.sourced {
+            inputs.set(place, bit);
+        }
+        if self.seen.contains(&inputs) {
             return;
         }
         if self.seen.len() == SEEN {
             self.seen.pop_front();
         }
-        self.seen.push_back(sensors.clone());
+        self.seen.push_back(inputs);
     }
 
     /// Records of the remote I/O are missing here: nothing that it applies is judged until its program starts, or goes on from a state that is
@@ -271,6 +278,9 @@ impl Referee {
                 born,
                 before,
             } => {
+                for (place, bit) in &mut self.sourced {
+                    *bit = inputs.get(*place);
+                }
                 let continued = self.continue_from(*moment, *born, *before);
                 self.step(*moment, inputs);
                 continued

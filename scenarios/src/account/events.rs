@@ -4,7 +4,9 @@ use understudy_journal::RunEvent;
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_simulator::Action;
-use understudy_wire::{Member, ProgramId, ProgramSet, Source, StationId, StationSet};
+use understudy_wire::{
+    Image, Member, Moment, ProgramId, ProgramSet, Source, StationId, StationSet,
+};
 
 use super::service::Outcome;
 use super::{Account, Death, DoneStep, LAG_CYCLES, MAXIMUM_DEATHS};
@@ -52,6 +54,9 @@ impl Account {
             .referees
             .get_mut(program.index())
             .and_then(|referee| referee.observe(event).err());
+        if let RemoteIoEvent::Sampled { moment, inputs, .. } = event {
+            self.sampled(program, *moment, inputs);
+        }
         let RemoteIoEvent::Applied {
             moment,
             source,
@@ -99,6 +104,21 @@ impl Account {
         }
     }
 
+    /// u(i) of a program with inputs that do not come from the field.
+    fn sampled(&mut self, program: ProgramId, moment: Moment, inputs: &Image) {
+        let at = self
+            .numbering
+            .of(moment)
+            .and_then(|number| self.since_origin(number));
+        let signals = self.terms.signals.get(program.index());
+        if let Some(at) = at.filter(|at| *at < self.cycles)
+            && signals.is_some_and(|signals| signals.sourced)
+            && let Some(trace) = self.traces.plants.get_mut(program.index())
+        {
+            trace.sensors.push(at, inputs);
+        }
+    }
+
     pub(super) fn plant(&mut self, program: ProgramId, event: &understudy_plant::Event) {
         let understudy_plant::Event::Stepped { moment, field, .. } = event else {
             return;
@@ -120,7 +140,10 @@ impl Account {
         if let (Some(at), Some(trace)) = (at, self.traces.plants.get_mut(program.index()))
             && within
         {
-            trace.push(at, field);
+            trace.positions.push(at, &field.positions.to_vec());
+            if !self.terms.signals[program.index()].sourced {
+                trace.sensors.push(at, &field.sensors);
+            }
         }
     }
 

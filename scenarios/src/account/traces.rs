@@ -1,6 +1,6 @@
 //! What the figure shows: signals over cycles, as lists of changes.
 
-use understudy_wire::{Field, Image};
+use understudy_wire::Image;
 
 /// Cycles that are kept for the figure.
 pub(crate) const TRACED_CYCLES: u64 = 5_000;
@@ -72,15 +72,9 @@ pub(crate) struct Traces {
 /// Of one plant.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PlantTrace {
+    /// Sensors; u(i) where the program has other inputs as well.
     pub(crate) sensors: Trace<Image>,
     pub(crate) positions: Trace<Vec<u16>>,
-}
-
-impl PlantTrace {
-    pub(crate) fn push(&mut self, at: u64, field: &Field) {
-        self.sensors.push(at, &field.sensors);
-        self.positions.push(at, &field.positions.to_vec());
-    }
 }
 
 #[cfg(test)]
