@@ -219,7 +219,7 @@ fn force(arguments: &Arguments, cluster: &Cluster) -> Result<Force, Answer> {
     Ok(force)
 }
 
-/// A write of an operator input, under the rights of whoever may reach the run.
+/// A write of an operator input.
 fn write(arguments: &Arguments, cluster: &Cluster) -> Result<Write, Answer> {
     let text = arguments.signal.as_deref().unwrap_or_default();
     let (input, value) = text.split_once('=').unwrap_or((text, ""));

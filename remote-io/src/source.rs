@@ -21,13 +21,13 @@ impl InputPlace {
     }
 
     /// The stored value.
-    pub(crate) fn get(self, inputs: &Image) -> u64 {
+    pub fn get(self, inputs: &Image) -> u64 {
         read(inputs, self.bit, self.of)
     }
 }
 
 /// Value of `of` in an image from `bit` on.
-pub(crate) fn read(image: &Image, bit: u16, of: Elementary) -> u64 {
+fn read(image: &Image, bit: u16, of: Elementary) -> u64 {
     let bits = (0..of.bits()).map(|at| image.get(usize::from(bit) + at as usize));
     bits.rev().fold(0, |value, bit| value << 1 | u64::from(bit))
 }
@@ -131,6 +131,13 @@ pub struct SignalInput {
     pub default: u64,
     /// Cycles for which a value that is missing is held.
     pub stale_after: u32,
+}
+
+impl SignalInput {
+    /// The stored value in the outputs of the program that computes it.
+    pub fn value_in(&self, outputs: &Image) -> u64 {
+        read(outputs, self.output, self.place.of)
+    }
 }
 
 /// Program of which this one reads signals.

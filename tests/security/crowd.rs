@@ -226,7 +226,7 @@ fn connections_of_strangers_take_no_plant_out_of_service() {
     let process = remote_io.0.id();
     device.wait_for_answers(20);
     let operate = || {
-        let own = keys_of("operator");
+        let own = keys_of("engineer");
         let call = ["operate", &cluster, "--name", "valve-io", "--keys", &own];
         answer(&[&call[..], &["status"]].concat()).0
     };

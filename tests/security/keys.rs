@@ -77,7 +77,7 @@ fn a_member_without_its_own_keys_does_not_start() {
         (2, vec!["U0910".to_owned()])
     );
     assert_eq!(
-        node(&["--keys", &of("operator")]),
+        node(&["--keys", &of("engineer")]),
         (2, vec!["U0910".to_owned()])
     );
     let secret = format!("{}/keys.toml", of("robot"));

@@ -56,7 +56,7 @@ fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
         let call = ["operate", cluster, "--name", "robot-io", "--keys", keys];
         answer(&[&call[..], what].concat())
     };
-    let operator = of("operator");
+    let operator = of("engineer");
     let started = Instant::now();
     let status = loop {
         let (status, document, _) = operate(&operator, &["status"]);

@@ -24,7 +24,6 @@ use rand::RngExt;
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 use understudy_cluster::Cluster;
-use understudy_cycle::Schedule;
 use understudy_simulator::NotReady;
 
 pub use coverage::CoverageRow;
@@ -36,7 +35,7 @@ pub use property::Property;
 pub use shard::{NoShard, Shard};
 
 use coverage::Coverage;
-use draw::draw;
+use draw::{Target, draw};
 use faultload::Faultload;
 use minimise::{Violating, minimise};
 use property::RECOVERY_CYCLES;
@@ -82,11 +81,12 @@ impl InjectionPlan {
     }
 
     /// The faultload and the seed of a run.
-    fn draw(&self, schedule: &Schedule, run: u64) -> (Faultload, u64) {
+    fn draw(&self, target: &Target<'_>, run: u64) -> (Faultload, u64) {
         // A stream of its own for each run.
         let mut random = Pcg64::new(u128::from(self.seed), u128::from(run));
         let seed = random.random::<u64>() >> (u64::BITS - SEED_BITS);
-        let faultload = draw(&mut random, schedule, &self.kinds, &self.window());
+        let kinds = target.kinds(&self.kinds);
+        let faultload = draw(&mut random, target, &kinds, &self.window());
         (faultload, seed)
     }
 }
@@ -113,13 +113,13 @@ pub fn inject(
     watch: &(dyn Fn() -> bool + Sync),
 ) -> Result<Findings, NotReady> {
     let bench = Bench::new(cluster)?;
-    let schedule = &cluster.agreement().schedule;
+    let target = Target::of(cluster);
     let next = AtomicU64::new(0);
     let total = Mutex::new(Count::new(plan));
     std::thread::scope(|scope| {
         for _ in 0..threads.max(1) {
             scope.spawn(|| {
-                let count = count_runs(&bench, schedule, plan, &next, watch);
+                let count = count_runs(&bench, &target, plan, &next, watch);
                 if let Ok(mut total) = total.lock() {
                     total.add(count);
                 }
@@ -133,7 +133,7 @@ pub fn inject(
 
 fn count_runs(
     bench: &Bench,
-    schedule: &Schedule,
+    target: &Target<'_>,
     plan: &InjectionPlan,
     next: &AtomicU64,
     watch: &(dyn Fn() -> bool + Sync),
@@ -145,10 +145,10 @@ fn count_runs(
         let Some(run) = plan.shard.run(place, plan.runs) else {
             return count;
         };
-        let (faultload, seed) = plan.draw(schedule, run);
+        let (faultload, seed) = plan.draw(target, run);
         let outcome = bench.run(&faultload, plan.cycles, seed, plan.property);
         count.runs += 1;
-        count.coverage.count(&faultload, schedule);
+        count.coverage.count(&faultload, target.schedule);
         for tally in &outcome.tallies {
             count.deadlines.count(tally);
         }
@@ -224,8 +224,9 @@ fn small(
     run: u64,
     symptom: &Symptom,
 ) -> Failure {
-    let schedule = &cluster.agreement().schedule;
-    let (faultload, seed) = plan.draw(schedule, run);
+    let target = Target::of(cluster);
+    let schedule = target.schedule;
+    let (faultload, seed) = plan.draw(&target, run);
     let drawn = faultload.size().0;
     let found = Violating {
         faultload,

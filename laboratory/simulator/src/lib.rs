@@ -12,6 +12,7 @@ mod pace;
 mod parts;
 mod queue;
 mod referee;
+mod signals;
 mod simulation;
 mod slot;
 mod stranger;

@@ -141,6 +141,18 @@ pub enum Violation {
         /// The station.
         station: StationId,
     },
+    /// A signal of another program was sampled with a value that the other program did not compute.
+    #[error(
+        "in cycle {moment} the signal at input bit {input} was sampled as {value:#x}, which the other program did not compute"
+    )]
+    WrongSignal {
+        /// In this cycle.
+        moment: Moment,
+        /// First bit in u(i), counted from 0.
+        input: u16,
+        /// The stored value.
+        value: u64,
+    },
     /// The program goes on from a state that none of its samples led to.
     #[error(
         "in cycle {moment} the program continued from lineage {lineage}, which none of its samples led to"

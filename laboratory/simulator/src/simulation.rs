@@ -27,6 +27,7 @@ use crate::pace::Pace;
 use crate::parts::Parts;
 use crate::queue::Delivery;
 use crate::referee::{Referee, Violation};
+use crate::signals::SignalReferee;
 use crate::slot::Slot;
 use crate::tally::Tally;
 
@@ -71,6 +72,7 @@ pub struct Simulation {
     remote_ios: Vec<Slot<RemoteIo>>,
     plants: Plants,
     referees: Vec<Referee>,
+    signals: SignalReferee,
     tallies: Vec<Tally>,
     /// For each remote I/O, whether its last deadline was direct and everybody published.
     ready: ProgramSet,
@@ -119,6 +121,7 @@ impl Simulation {
                 .collect(),
             plants: Plants::new(&parts),
             referees,
+            signals: SignalReferee::new(parts.remote_ios.len()),
             tallies: vec![Tally::default(); parts.remote_ios.len()],
             ready: ProgramSet::EMPTY,
             arrived: vec![[StationSet::EMPTY; 3]; parts.remote_ios.len()],
@@ -490,6 +493,8 @@ impl Hash for Simulation {
             remote_ios,
             plants,
             referees,
+            // It only judges.
+            signals: _,
             tallies: _,
             ready,
             arrived,

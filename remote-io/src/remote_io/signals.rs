@@ -15,7 +15,7 @@ use super::RemoteIo;
 use crate::event::Event;
 use crate::selection::{Received, Selection};
 use crate::settings::{Settings, ValueFault};
-use crate::source::{SignalInput, SignalSource, read};
+use crate::source::{SignalInput, SignalSource};
 use crate::trust::Trust;
 
 /// Values of signals, and what proves the next ones.
@@ -160,7 +160,7 @@ impl RemoteIo {
             match outputs(signal.from, &self.settings.signal_sources) {
                 Some(outputs) => {
                     *taken = Taken {
-                        stored: read(outputs, signal.output, signal.place.of),
+                        stored: signal.value_in(outputs),
                         age: Some(0),
                     };
                 }

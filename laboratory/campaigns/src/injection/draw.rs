@@ -9,9 +9,11 @@ use std::time::Duration;
 
 use rand::RngExt;
 use rand_pcg::Pcg64;
+use understudy_cluster::Cluster;
 use understudy_cycle::Schedule;
+use understudy_remote_io::{OperatorInput, OperatorInputKind};
 use understudy_simulator::{Action, Disturbance, Fault, Network};
-use understudy_wire::{Member, ProgramId, StationId};
+use understudy_wire::{Member, PointValue, ProgramId, StationId};
 
 use super::faultload::{Faultload, Injection};
 use super::kind::{Kind, Role};
@@ -25,16 +27,46 @@ const LONGEST_OUTAGE: f64 = 10_000.0;
 /// Restarts of one storm, at most.
 const MAXIMUM_RESTARTS: u64 = 6;
 
+/// What faults are drawn for.
+pub(super) struct Target<'a> {
+    pub(super) schedule: &'a Schedule,
+    /// Inputs that operators write.
+    inputs: Vec<(ProgramId, OperatorInput)>,
+}
+
+impl<'a> Target<'a> {
+    pub(super) fn of(cluster: &'a Cluster) -> Self {
+        let programs = (0..).map(ProgramId).zip(cluster.remote_ios());
+        let inputs = programs.flat_map(|(program, remote_io)| {
+            let inputs = remote_io.operator_inputs();
+            inputs.map(move |declared| (program, declared.input))
+        });
+        Self {
+            schedule: &cluster.agreement().schedule,
+            inputs: inputs.collect(),
+        }
+    }
+
+    /// The kinds that can be drawn: a cluster without operator inputs has no writes.
+    pub(super) fn kinds(&self, kinds: &[Kind]) -> Vec<Kind> {
+        let kinds = kinds.iter().copied();
+        kinds
+            .filter(|kind| *kind != Kind::Write || !self.inputs.is_empty())
+            .collect()
+    }
+}
+
 /// Draws what happens in `cycles`, a range of the run's cycles that is not empty.
 pub(super) fn draw(
     random: &mut Pcg64,
-    schedule: &Schedule,
+    target: &Target<'_>,
     kinds: &[Kind],
     cycles: &Range<u64>,
 ) -> Faultload {
     let mut drawn = Draw {
         random,
-        schedule,
+        schedule: target.schedule,
+        inputs: &target.inputs,
         cycles: cycles.clone(),
     };
     let mut faultload = Faultload::default();
@@ -72,6 +104,7 @@ pub(super) fn draw(
 struct Draw<'a> {
     random: &'a mut Pcg64,
     schedule: &'a Schedule,
+    inputs: &'a [(ProgramId, OperatorInput)],
     cycles: Range<u64>,
 }
 
@@ -108,6 +141,13 @@ impl Draw<'_> {
         let (from, to) = (span.start, span.end);
         let lasting = |begins, ends| vec![step(from, begins), step(to, ends)];
         let steps = match kind {
+            Kind::Write => {
+                let Member::RemoteIo(program) = member else {
+                    return None;
+                };
+                let (input, value) = self.written(program)?;
+                vec![step(from, Action::Write { input, value })]
+            }
             Kind::Crash => lasting(Action::Crash, Action::Restart),
             Kind::Stop => lasting(Action::Stop, Action::Continue),
             Kind::RestartStorm => {
@@ -189,6 +229,23 @@ impl Draw<'_> {
             Kind::Loss | Kind::Duplication | Kind::Jitter | Kind::Corruption => return None,
         };
         Some(Injection { kind, role, steps })
+    }
+
+    /// An input that operators write, with a value for it: of a setpoint its limits and its initial value.
+    fn written(&mut self, program: ProgramId) -> Option<(u16, PointValue)> {
+        let inputs = self.inputs.iter().filter(|(of, _)| *of == program);
+        let inputs: Vec<OperatorInput> = inputs.map(|(_, input)| *input).collect();
+        if inputs.is_empty() {
+            return None;
+        }
+        let input = self.one_of(&inputs);
+        let of = input.place.of;
+        let stored = match input.kind {
+            OperatorInputKind::Pulse(_) => 1,
+            OperatorInputKind::Level => self.random.random_range(0..2),
+            OperatorInputKind::Setpoint { low, high } => self.one_of(&[low, input.initial, high]),
+        };
+        Some((input.place.bit, PointValue::new(of.bits(), stored)))
     }
 
     /// From `from` on `to` does not receive `member`, then a station crashes, and the link is whole again about that time: short

@@ -11,6 +11,8 @@ use understudy_wire::{Member, StationId};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
+    /// An operator writes a value: not a fault, but to be right beside all of them.
+    Write,
     /// A member is gone, and restarted later.
     Crash,
     /// It crashes and restarts several times in a row.
@@ -57,7 +59,8 @@ pub enum Kind {
 
 impl Kind {
     /// In the order in which they are explained.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 22] = [
+        Self::Write,
         Self::Crash,
         Self::RestartStorm,
         Self::ClockJump,
@@ -84,6 +87,7 @@ impl Kind {
     /// As tables and the command line write it.
     pub fn word(self) -> &'static str {
         match self {
+            Self::Write => "write",
             Self::Crash => "crash",
             Self::RestartStorm => "restart-storm",
             Self::ClockJump => "clock-jump",
@@ -115,6 +119,7 @@ impl Kind {
                 &[Role::Controller, Role::Understudy]
             }
             Self::Loss | Self::Duplication | Self::Jitter | Self::Corruption => &[Role::Network],
+            Self::Write => &[Role::RemoteIo],
             _ => &[Role::Controller, Role::Understudy, Role::RemoteIo],
         }
     }

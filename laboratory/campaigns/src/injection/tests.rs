@@ -152,7 +152,7 @@ fn a_station_that_stays_away_is_one_crash() {
     let plan = plan(1, Property::Unprotected, &[Kind::Crash, Kind::Stop]);
     let schedule = &cell.agreement().schedule;
     let (mut faultload, seed) = (0..)
-        .map(|run| plan.draw(schedule, run))
+        .map(|run| plan.draw(&Target::of(&cell), run))
         .find(|(faultload, _)| faultload.injections.len() > 3)
         .expect("some run has many faults");
     // One more, after all others, that never ends.
@@ -193,7 +193,7 @@ fn scenarios_are_written_as_they_are_read() {
     let plan = plan(300, Property::Wrong, &Kind::ALL);
     let members = Members::of(&cell);
     for run in 0..plan.runs {
-        let (faultload, seed) = plan.draw(&cell.agreement().schedule, run);
+        let (faultload, seed) = plan.draw(&Target::of(&cell), run);
         let title = format!("Run \"{run}\" \\ of\tall");
         let expect = plan.property.expectation();
         let drawn = faultload.scenario(title, plan.cycles, seed, expect);

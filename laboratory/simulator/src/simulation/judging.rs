@@ -30,6 +30,13 @@ impl Simulation {
         {
             found = Some(Violation::NeedlessColdStart { moment, station });
         }
+        if let Event::Sampled { moment, inputs, .. } = event {
+            let settings = &self.parts.remote_ios[program.index()];
+            let wrong = self.signals.judge(settings, *moment, inputs);
+            found = found.or(wrong);
+            let referee = &self.referees[program.index()];
+            self.signals.note(program, referee.truth());
+        }
         if let Some(violation) = found {
             let member = Member::RemoteIo(program);
             observe(
