@@ -114,6 +114,10 @@ pub fn inject(
 ) -> Result<Findings, NotReady> {
     let bench = Bench::new(cluster)?;
     let target = Target::of(cluster);
+    let plan = &InjectionPlan {
+        kinds: target.kinds(&plan.kinds),
+        ..plan.clone()
+    };
     let next = AtomicU64::new(0);
     let total = Mutex::new(Count::new(plan));
     std::thread::scope(|scope| {
