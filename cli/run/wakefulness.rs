@@ -10,6 +10,8 @@ use crate::run::lab::RunArguments;
 
 /// Measuring time of `demo`.
 const LONG: Duration = Duration::from_secs(1);
+/// Longest period of a demonstration.
+const LONGEST: Duration = Duration::from_millis(200);
 /// Measuring time of `lab` and `watch`.
 const SHORT: Duration = Duration::from_millis(300);
 
@@ -28,6 +30,21 @@ pub(crate) fn with_period(arguments: &RunArguments, console: &mut Console) -> Ru
     ));
     RunArguments {
         overrides: arguments.overrides.with_period(period),
+        ..arguments.clone()
+    }
+}
+
+/// The arguments with twice the period, after a run for which this host was too slow.
+pub(crate) fn with_longer_period(arguments: &RunArguments, console: &mut Console) -> RunArguments {
+    let period = arguments.overrides.overrides().period.unwrap_or(SHORT);
+    let longer = (period * 2).min(LONGEST);
+    console.note(&format!(
+        "this host was too slow for a period of {} ms: repeated at {} ms",
+        period.as_millis(),
+        longer.as_millis()
+    ));
+    RunArguments {
+        overrides: arguments.overrides.with_period(longer),
         ..arguments.clone()
     }
 }
