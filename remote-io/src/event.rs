@@ -181,7 +181,7 @@ pub enum Event {
         moment: Moment,
         /// Input, by its first bit in u(i), counted from 0.
         input: u16,
-        /// Whether it is valid; otherwise the default value is sampled from the next cycle on.
+        /// Whether it is valid; otherwise the default value is sampled.
         valid: bool,
     },
     /// After a restart: stations recall the ones that this remote I/O had excluded.

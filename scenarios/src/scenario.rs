@@ -6,13 +6,11 @@
 use std::collections::BTreeMap;
 use std::num::NonZeroU64;
 use std::ops::Range;
-use std::time::Duration;
 
 use serde::Serialize;
+use understudy_cluster::value_text;
 use understudy_journal::Members;
 use understudy_simulator::{Action, Disturbance, Fault, Network};
-use understudy_text::duration;
-use understudy_typed::Elementary;
 use understudy_wire::{Member, PointValue, ProgramId, Source};
 
 /// A scenario whose names belong to a cluster.
@@ -155,14 +153,7 @@ pub(crate) fn written(
     let mut inputs = members.operator_inputs(program);
     let named = inputs.find(|named| named.input.place.bit == input)?;
     let (of, stored) = (named.input.place.of, value.stored());
-    let value = match of {
-        Elementary::Bool => (stored != 0).to_string(),
-        Elementary::Real => format!("{:?}", f64::from(f32::from_bits(stored as u32))),
-        Elementary::Lreal => format!("{:?}", f64::from_bits(stored)),
-        _ if of.is_time() => format!("\"{}\"", duration::text(Duration::from_nanos(stored))),
-        _ => of.signed(stored).to_string(),
-    };
-    Some((named.name.clone(), value))
+    Some((named.name.clone(), value_text(of, stored)))
 }
 
 /// What must come of a run. Counts are over all remote I/Os, from the origin to the last cycle.

@@ -33,4 +33,4 @@ pub use read::{Loaded, MAXIMUM_TEXT_BYTES, Overrides, read, read_with};
 pub use schema::schema;
 pub use source::{InputSource, InputSourceKind, OperatorDeclaration, SignalDeclaration};
 pub use template::{TemplateFile, minimal, modbus_cell, press_cell, read_with_files, template};
-pub use value::{stored_value, typed_value};
+pub use value::{stored_value, typed_value, value_text};

@@ -1,5 +1,8 @@
 //! Values that a cluster file gives to signals.
 
+use std::time::Duration;
+
+use understudy_text::duration;
 use understudy_text::tables::Constant;
 use understudy_typed::Elementary;
 
@@ -19,6 +22,17 @@ pub fn typed_value(text: &str, of: Elementary) -> Result<u64, String> {
         },
     };
     stored_value(&value, of)
+}
+
+/// A stored value as a file writes it, the inverse of [`stored_value`].
+pub fn value_text(of: Elementary, stored: u64) -> String {
+    match of {
+        Elementary::Bool => (stored != 0).to_string(),
+        Elementary::Real => format!("{:?}", f32::from_bits(stored as u32)),
+        Elementary::Lreal => format!("{:?}", f64::from_bits(stored)),
+        _ if of.is_time() => format!("\"{}\"", duration::text(Duration::from_nanos(stored))),
+        _ => of.signed(stored).to_string(),
+    }
 }
 
 /// The value as a signal of that type stores it.

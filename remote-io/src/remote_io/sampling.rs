@@ -51,7 +51,9 @@ impl RemoteIo {
         let mut inputs = self.field.clone();
         let operator_inputs = &self.settings.operator_inputs;
         self.writing.put(operator_inputs, &mut inputs);
-        self.signals.put(&self.settings.signals, &mut inputs);
+        let validity = self
+            .signals
+            .put(&self.settings.signals, moment, &mut inputs);
         let mut inputs = self.forcing.inputs(&inputs);
         if let Some(stop) = self.settings.stop
             && self.program == Execution::Restarting
@@ -108,6 +110,7 @@ impl RemoteIo {
             before,
         });
         self.report_void(&void_writes);
+        self.report_validity(&validity);
         self.member.send_cyclic(now, body);
     }
 }

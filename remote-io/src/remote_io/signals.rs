@@ -9,6 +9,7 @@
 //! itself follows, and only while remote I/O j drives what it can prove. Replicas never read each other: they read the
 //! sample.
 
+use smallvec::SmallVec;
 use understudy_wire::{Image, Lineage, Moment, ProgramId, Sample, StationSet};
 
 use super::RemoteIo;
@@ -42,15 +43,21 @@ struct Proof {
 struct Taken {
     /// Newest proved value.
     stored: u64,
-    /// Deadlines since it was proved; `None` before the first value.
-    age: Option<u32>,
+    /// Cycle of that value; `None` before the first one.
+    of: Option<Moment>,
+    /// Deadlines since it was proved: cycles may also be late, or not be started at all.
+    age: u32,
+    /// Whether the last sample had it.
+    is_valid: bool,
 }
 
 impl Signals {
     pub(super) fn new(settings: &Settings) -> Self {
         let taken = settings.signals.iter().map(|signal| Taken {
             stored: signal.default,
-            age: None,
+            of: None,
+            age: 0,
+            is_valid: false,
         });
         Self {
             proofs: vec![None; settings.signal_sources.len()],
@@ -103,10 +110,19 @@ impl Signals {
         (!is_stopped).then_some(outputs)
     }
 
-    /// Puts the values into u(i).
-    pub(super) fn put(&self, signals: &[SignalInput], image: &mut Image) {
-        for (signal, taken) in signals.iter().zip(&self.taken) {
-            let is_valid = taken.is_valid(signal);
+    /// Puts the values into u(i) of the cycle `moment`. Answers with the inputs whose validity changes.
+    pub(super) fn put(
+        &mut self,
+        signals: &[SignalInput],
+        moment: Moment,
+        image: &mut Image,
+    ) -> SmallVec<[(u16, bool); 1]> {
+        let mut changed = SmallVec::new();
+        for (signal, taken) in signals.iter().zip(&mut self.taken) {
+            let is_valid = taken.is_recent(signal, moment);
+            if is_valid != std::mem::replace(&mut taken.is_valid, is_valid) {
+                changed.push((signal.place.bit, is_valid));
+            }
             let stored = if is_valid {
                 taken.stored
             } else {
@@ -117,12 +133,17 @@ impl Signals {
                 image.set(usize::from(valid), is_valid);
             }
         }
+        changed
     }
 }
 
 impl Taken {
-    fn is_valid(&self, signal: &SignalInput) -> bool {
-        self.age.is_some_and(|age| age <= signal.stale_after)
+    /// Whether the value is of the cycle before `moment`, or of one that is not too old. Cycles count, and deadlines: after a
+    /// partition the numbers of cycles jump, and without a cycle only deadlines pass.
+    fn is_recent(&self, signal: &SignalInput, moment: Moment) -> bool {
+        let allowed = u64::from(signal.stale_after) + 1;
+        let is_near = |of: Moment| of.epoch == moment.epoch && of.plus(allowed) >= moment;
+        self.age <= signal.stale_after && self.of.is_some_and(is_near)
     }
 }
 
@@ -153,28 +174,28 @@ impl RemoteIo {
         outputs: impl Fn(ProgramId, &[SignalSource]) -> Option<&'a Image>,
     ) {
         let moment = self.moment();
-        for place in 0..self.settings.signals.len() {
-            let signal = self.settings.signals[place];
-            let taken = &mut self.signals.taken[place];
-            let was_valid = taken.is_valid(&signal);
+        let signals = self.settings.signals.iter().zip(&mut self.signals.taken);
+        for (signal, taken) in signals {
             match outputs(signal.from, &self.settings.signal_sources) {
                 Some(outputs) => {
-                    *taken = Taken {
-                        stored: signal.value_in(outputs),
-                        age: Some(0),
-                    };
+                    taken.stored = signal.value_in(outputs);
+                    taken.of = Some(moment);
+                    taken.age = 0;
                 }
-                None => taken.age = taken.age.map(|age| age.saturating_add(1)),
+                None => taken.age = taken.age.saturating_add(1),
             }
-            let valid = taken.is_valid(&signal);
-            if valid != was_valid {
-                let input = signal.place.bit;
-                self.report(Event::SignalValidity {
-                    moment,
-                    input,
-                    valid,
-                });
-            }
+        }
+    }
+
+    /// Reports inputs whose validity changes with the sample of this cycle.
+    pub(super) fn report_validity(&mut self, changed: &[(u16, bool)]) {
+        let moment = self.moment();
+        for &(input, valid) in changed {
+            self.report(Event::SignalValidity {
+                moment,
+                input,
+                valid,
+            });
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::hash_map::RandomState;
 use std::hash::{BuildHasher, Hasher};
 
-use understudy_cluster::{Cluster, InputSource, typed_value};
+use understudy_cluster::{Cluster, InputSource, typed_value, value_text};
 use understudy_remote_io::{OperatorInput, OperatorInputKind, ValueMismatch};
 use understudy_text::spelling::suggestion;
 use understudy_wire::{Member, PointValue, Role, Write, WriteId, WriteRefusal};
@@ -110,7 +110,7 @@ pub fn new_write(
 fn limits(input: &OperatorInput) -> String {
     match input.kind {
         OperatorInputKind::Setpoint { low, high } => {
-            let text = |stored| input.place.of.write(stored);
+            let text = |stored| value_text(input.place.of, stored);
             format!("from {} to {}", text(low), text(high))
         }
         _ => String::new(),
