@@ -339,6 +339,7 @@ fn remote_ios(
     names: &mut Names,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Vec<RemoteIo> {
+    let read = inputs::outputs_read(&sections);
     let mut places: BTreeMap<usize, RemoteIo> = BTreeMap::new();
     let mut taken = BTreeMap::new();
     for section in sections {
@@ -374,10 +375,9 @@ fn remote_ios(
                 period,
                 diagnostics,
             ),
-            field: section
-                .field
-                .as_ref()
-                .and_then(|field| devices::device(field, &section.inputs, member, diagnostics)),
+            field: section.field.as_ref().and_then(|field| {
+                devices::device(field, &section.inputs, &read, member, diagnostics)
+            }),
             value_fault: [ValueFault::Hold, ValueFault::Alarm, ValueFault::FailSafe]
                 [section.value_fault],
             stale_state: [StaleState::Operator, StaleState::Cold][section.stale_state],

@@ -14,10 +14,11 @@ use crate::fields::{MAXIMUM_MISFITS, PlaceEntry, Placed, SourceEntry};
 use crate::file::FieldSection;
 use crate::place::{BitPlace, Place, Registers};
 
-/// The device of a remote I/O; nothing where its section has errors.
+/// The device of a remote I/O; nothing where its section has errors. `read` are the outputs that other programs read.
 pub(super) fn device(
     section: &FieldSection,
     sources: &[SourceEntry],
+    read: &BTreeSet<String>,
     member: &Member,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<FieldDevice> {
@@ -60,8 +61,9 @@ pub(super) fn device(
         let lacking = points
             .names()
             .filter(|name| !entries.contains_key(*name) && !optional.contains(name))
-            .filter(|name| !is_sourced(sources, name));
-        // Where names were misspelt, that was said. Whether another program reads an output is not known here.
+            .filter(|name| !is_sourced(sources, name))
+            .filter(|name| !read.contains(&format!("{}.{name}", member.name)));
+        // Where names were misspelt, that was said.
         if diagnostics.len() == before || warned {
             for name in lacking.take(MAXIMUM_MISFITS) {
                 let message = format!(

@@ -14,7 +14,7 @@ use understudy_wire::{ProgramId, Role};
 
 use super::Member;
 use crate::fields::{MAXIMUM_MISFITS, OperatorText, Placed, SourceEntry, SourceText};
-use crate::file::FieldSection;
+use crate::file::{FieldSection, RemoteIoSection};
 use crate::format::OPERATOR_INPUTS;
 use crate::source::{InputSource, InputSourceKind, OperatorDeclaration, SignalDeclaration};
 use crate::value::stored_value;
@@ -88,6 +88,16 @@ pub(super) fn resolve(
         }));
     }
     sources
+}
+
+/// The outputs that programs read of each other, as `controller.output`.
+pub(super) fn outputs_read(sections: &[RemoteIoSection]) -> BTreeSet<String> {
+    let sources = sections.iter().flat_map(|section| &section.inputs);
+    let from = sources.filter_map(|entry| match &entry.source {
+        SourceText::Signal { from, .. } => from.as_ref(),
+        SourceText::Operator(_) => None,
+    });
+    from.map(|from| from.value.clone()).collect()
 }
 
 fn place(point: &Point) -> InputPlace {

@@ -3,6 +3,7 @@
 mod common;
 mod configuration;
 mod findings;
+mod inputs;
 mod press_cell;
 mod schema;
 mod template;
