@@ -207,13 +207,19 @@ mod tests {
                     stepped: LATE,
                     digest: Digest(u64::MAX),
                 };
-                let recalled = |program| Recalled {
+                // More of them do not fit beside programs of this width.
+                let written = programs.min(2);
+                let recalled = |program: u8| Recalled {
                     program: ProgramId(program),
                     witnessed: true,
                     applied: Some(LATE),
                     excluded: StationSet::from_bits(u64::MAX),
                     accounted_for: StationSet::from_bits(u64::MAX),
-                    writes: all_writes(),
+                    writes: if usize::from(program) < written {
+                        all_writes()
+                    } else {
+                        SmallVec::new()
+                    },
                     inputs: ones(bits),
                 };
                 let word = Word {
@@ -231,7 +237,7 @@ mod tests {
                 check_body(
                     station,
                     Body::Turn(turn),
-                    turn_bytes(programs, programs, bits, bits),
+                    turn_bytes(programs, written, bits, bits),
                 );
             }
         }
