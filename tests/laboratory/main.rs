@@ -15,6 +15,7 @@ mod hosts;
 #[allow(dead_code, reason = "each test uses its part")]
 #[path = "../shared/mod.rs"]
 mod shared;
+mod writes;
 
 use std::collections::BTreeSet;
 use std::fs;

@@ -22,7 +22,7 @@ use std::time::{Duration, Instant};
 
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::mpsc::{Receiver, Sender, channel};
-use understudy_bus::{Cuts, LinkKind};
+use understudy_bus::{Cuts, LinkKind, WRITES_PER_SECOND, WriteLimiter};
 use understudy_cluster::Cluster;
 use understudy_journal::{
     Commands, Journal, JournalState, KEYS, PendingWrites, Record, RunDirectory, RunEvent,
@@ -229,6 +229,8 @@ fn run(
         judged: None,
         commanded: commands.is_some(),
         writes: PendingWrites::default(),
+        // Less than a member takes, so that each caller gets an answer.
+        write_limiter: WriteLimiter::new(WRITES_PER_SECOND / 2),
         directory: directory.path().to_owned(),
         sender,
         watch,
@@ -286,6 +288,7 @@ struct Laboratory<'w> {
     /// Whether somebody gives commands, or said that he might.
     commanded: bool,
     writes: PendingWrites,
+    write_limiter: WriteLimiter,
     directory: PathBuf,
     sender: Sender<Said>,
     watch: &'w mut dyn FnMut(Progress),

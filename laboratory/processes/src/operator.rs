@@ -2,7 +2,7 @@
 
 use understudy_journal::{Command, Commanded, Done, OperatorAction, Refusal, RunEvent};
 use understudy_simulator::{Action, Fault};
-use understudy_wire::{Force, Member, ProgramId};
+use understudy_wire::{Force, Member, ProgramId, WriteRefusal};
 
 use super::Laboratory;
 use crate::process::Process;
@@ -129,6 +129,10 @@ impl Laboratory<'_> {
                 return self
                     .tell(member, line("force", serde_json::to_string(force)))
                     .await;
+            }
+            Command::Write(_) if !self.write_limiter.admits() => {
+                let refusal = WriteRefusal::Busy;
+                return Err(Refusal::Write { refusal });
             }
             Command::Write(write) => {
                 return self

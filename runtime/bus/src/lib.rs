@@ -58,4 +58,5 @@ pub use ports::free_addresses;
 pub use rights::{Rights, keep_times};
 pub use wakefulness::Wakefulness;
 pub use watchdog::Watchdog;
+pub use writes::{WRITES_PER_SECOND, WriteLimiter};
 pub use zenoh_link::ZENOH_RUNTIME;

@@ -12,7 +12,7 @@ use understudy_wire::{
 
 use crate::doorbell::{Inbox, Outbox, doorbell};
 use crate::error::BusError;
-use crate::writes::{Answers, Limiter, answers};
+use crate::writes::{Answers, WRITES_PER_SECOND, WriteLimiter, answers};
 
 /// Orders that wait, at most; what comes on top of them is dropped. To stop and to cut are never dropped.
 const BOUND: usize = 16;
@@ -77,7 +77,7 @@ struct Standing {
 pub struct Orders {
     inbox: Inbox<Order>,
     standing: Arc<Standing>,
-    limiter: Arc<Limiter>,
+    limiter: Arc<WriteLimiter>,
     answers: Answers,
 }
 
@@ -86,7 +86,7 @@ pub struct Orders {
 pub struct Control {
     outbox: Outbox<Order>,
     standing: Arc<Standing>,
-    limiter: Arc<Limiter>,
+    limiter: Arc<WriteLimiter>,
     answers: Arc<Mutex<Option<Receiver<WriteAnswer>>>>,
 }
 
@@ -97,7 +97,7 @@ pub struct Control {
 pub fn orders() -> Result<(Control, Orders), BusError> {
     let (outbox, inbox) = doorbell(BOUND).map_err(BusError::system("an eventfd for orders"))?;
     let standing = Arc::new(Standing::default());
-    let limiter = Arc::new(Limiter::new());
+    let limiter = Arc::new(WriteLimiter::new(WRITES_PER_SECOND));
     let (answers, given) = answers();
     let control = Control {
         outbox,

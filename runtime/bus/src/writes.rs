@@ -15,7 +15,7 @@ use zenoh::query::Query;
 use crate::clock::Clock;
 
 /// Writes that a member takes in a second, of all callers together; the others are refused at once.
-pub(crate) const WRITES_PER_SECOND: u32 = 50;
+pub const WRITES_PER_SECOND: u32 = 50;
 
 /// Answers that wait to be sent; the caller of one that finds no room asks again.
 const WAITING_ANSWERS: usize = 64;
@@ -28,30 +28,33 @@ const FORGOTTEN_AFTER: Duration = Duration::from_secs(30);
 
 /// Bounds the number of writes in a second.
 #[derive(Debug)]
-pub(crate) struct Limiter {
+pub struct WriteLimiter {
     clock: Clock,
+    per_second: u32,
     window: Mutex<(u64, u32)>,
     refused: AtomicU64,
 }
 
-impl Limiter {
-    pub(crate) fn new() -> Self {
+impl WriteLimiter {
+    /// Admits `per_second` writes.
+    pub fn new(per_second: u32) -> Self {
         Self {
             clock: Clock::start(),
+            per_second,
             window: Mutex::new((0, 0)),
             refused: AtomicU64::new(0),
         }
     }
 
     /// Whether one more is taken; counts it where it is not.
-    pub(crate) fn admits(&self) -> bool {
+    pub fn admits(&self) -> bool {
         let second = self.clock.now().0 / 1_000_000_000;
         let mut window = self.window.lock().unwrap_or_else(PoisonError::into_inner);
         if window.0 != second {
             *window = (second, 0);
         }
         window.1 = window.1.saturating_add(1);
-        let admits = window.1 <= WRITES_PER_SECOND;
+        let admits = window.1 <= self.per_second;
         if !admits {
             self.refused.fetch_add(1, Ordering::Relaxed);
         }
@@ -137,7 +140,7 @@ mod tests {
 
     #[test]
     fn a_flood_is_bounded_and_counted() {
-        let limiter = Limiter::new();
+        let limiter = WriteLimiter::new(WRITES_PER_SECOND);
         let admitted = (0..1000).filter(|_| limiter.admits()).count();
         // The second may have ended meanwhile.
         let bound = 2 * WRITES_PER_SECOND as usize;
