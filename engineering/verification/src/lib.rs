@@ -4,6 +4,7 @@ mod drawing;
 mod effort;
 pub mod explicit;
 pub mod induction;
+pub mod numbers;
 mod parity;
 pub mod program;
 pub mod property;

@@ -86,6 +86,15 @@ impl Subject {
         })
     }
 
+    /// A circuit as it is; all its outputs are the program's own.
+    pub(crate) fn of(circuit: Circuit) -> Self {
+        Self {
+            outputs: circuit.outputs().len(),
+            circuit,
+            listed: OnceCell::new(),
+        }
+    }
+
     /// What is proved about: the program's outputs come first, then its memory and pins.
     pub fn circuit(&self) -> &Circuit {
         &self.circuit

@@ -1,0 +1,632 @@
+//! Programs as systems: one alone, or several that read each other's signals.
+//!
+//! ```text
+//! cycle t      y(j)(t)
+//! cycle t+1    remote I/O i samples: y(j)(t) where it could prove it, else the value before it, for so many cycles, else the default
+//! ```
+//!
+//! In every cycle each sample may be missing, and each signal may be lost: what is proved holds whatever fails.
+
+use std::collections::HashMap;
+
+use understudy_logic::{Circuit, Operation as Gate, Variable as Bit};
+use understudy_typed::{Comparison, Elementary, Operation, Points, Program};
+
+use super::execute::{Cells, Execution, Unsupported};
+use super::term::{Term, Terms, Variable};
+use super::{Model, Source, System};
+
+/// A program of a system.
+#[derive(Debug, Clone, Copy)]
+pub enum Code<'a> {
+    /// A Boolean program.
+    Circuit(&'a Circuit),
+    /// A program with numbers.
+    Typed(&'a Program),
+}
+
+/// A program, its name and what its inputs are.
+#[derive(Debug, Clone)]
+pub struct Member<'a> {
+    /// The name that its signals stand behind, and a dot.
+    pub name: String,
+    /// The program.
+    pub code: Code<'a>,
+    /// One for each input, in their order, but for [`Program::RESET`].
+    pub sources: Vec<Source>,
+}
+
+/// Cells of one program, made when they are read first.
+struct ProgramCells<'s> {
+    program: &'s Program,
+    prefix: &'s str,
+    initial: Vec<u64>,
+    cells: &'s mut Vec<super::Cell>,
+    numbers: HashMap<u64, u32>,
+    /// Whether the program is stopped, where it can be: a restart begins with the initial values.
+    stopped: Option<Term>,
+}
+
+impl ProgramCells<'_> {
+    fn number(&mut self, terms: &mut Terms, address: u64, of: Elementary) -> u32 {
+        if let Some(&known) = self.numbers.get(&address) {
+            return known;
+        }
+        let number = self.cells.len() as u32;
+        let name = match self.program.part_at(address) {
+            Some(part) => format!("{}{}", self.prefix, part.name),
+            None => format!("{}memory {}", self.prefix, address / 64),
+        };
+        let slot = self.initial.get((address / 64) as usize).copied();
+        let term = terms.variable(of, Variable::Cell(number));
+        self.cells.push(super::Cell {
+            name,
+            of,
+            initial: slot.unwrap_or(0) >> (address % 64) & of.mask(),
+            term,
+            next: term,
+        });
+        self.numbers.insert(address, number);
+        number
+    }
+}
+
+impl Cells for ProgramCells<'_> {
+    fn before(&mut self, terms: &mut Terms, address: u64, of: Elementary) -> Term {
+        let number = self.number(terms, address, of);
+        let cell = &self.cells[number as usize];
+        let (term, initial, of) = (cell.term, cell.initial, cell.of);
+        match self.stopped {
+            Some(stopped) => {
+                let initial = terms.constant(of, initial);
+                terms.choose(stopped, initial, term)
+            }
+            None => term,
+        }
+    }
+}
+
+/// What other programs read of one: its outputs, and whether it ran in the cycle.
+struct Outputs {
+    points: HashMap<String, Term>,
+    can_be_read: Term,
+}
+
+impl Model {
+    /// One program. Its properties name its BOOL points and variables.
+    ///
+    /// # Errors
+    /// What of the program cannot be followed.
+    pub fn of_program(program: &Program) -> Result<Self, Unsupported> {
+        let mut system = System::new(&program.name);
+        let sources = vec![Source::Any(None); points_but_reset(&program.inputs)];
+        let runs = system.terms.boolean(true);
+        let inputs = sources_as_terms(&mut system, "", &program.inputs, &sources);
+        system.add_program("", program, &inputs, runs)?;
+        Self::of(system)
+    }
+
+    /// All programs of a cluster; their signals stand behind the names of their controllers and a dot.
+    ///
+    /// # Errors
+    /// What of a program cannot be followed.
+    pub fn of_cluster(name: &str, members: &[Member<'_>]) -> Result<Self, Unsupported> {
+        let mut system = System::new(name);
+        // Outputs in the cycle before are cells, so that the order of the programs does not matter.
+        let mut before = Vec::with_capacity(members.len());
+        for member in members {
+            before.push(system.outputs_before(member));
+        }
+        for (place, member) in members.iter().enumerate() {
+            let prefix = format!("{}.", member.name);
+            let sampled = system.input(format!("{prefix}sampled"), Elementary::Bool, None);
+            let inputs = system.sampled(&prefix, member, &before, sampled);
+            let outputs = match member.code {
+                Code::Typed(program) => system.add_program(&prefix, program, &inputs, sampled)?,
+                Code::Circuit(circuit) => system.add_circuit(&prefix, circuit, &inputs, sampled),
+            };
+            system.keep_outputs(&before[place], &outputs, sampled);
+        }
+        Self::of(system)
+    }
+}
+
+/// Inputs of a program but for the reset, which has no source.
+fn points_but_reset(points: &Points) -> usize {
+    points.iter().filter(|point| point.slot != 0).count()
+}
+
+/// Free inputs for all points.
+fn sources_as_terms(
+    system: &mut System,
+    prefix: &str,
+    points: &Points,
+    sources: &[Source],
+) -> Vec<Term> {
+    let mut sources = sources.iter();
+    let terms = points.iter().map(|point| {
+        let range = match point.slot {
+            0 => None,
+            _ => match sources.next() {
+                Some(Source::Any(range)) => range.as_ref(),
+                _ => None,
+            },
+        };
+        system.input(format!("{prefix}{}", point.name), point.of, range)
+    });
+    terms.collect()
+}
+
+/// The cells that hold what others read of a program.
+struct Before {
+    outputs: HashMap<String, u32>,
+    can_be_read: u32,
+}
+
+impl System {
+    fn outputs_before(&mut self, member: &Member<'_>) -> Before {
+        let points: Vec<(String, Elementary)> = match member.code {
+            Code::Typed(program) => {
+                let points = program.outputs.iter();
+                points.map(|point| (point.name.clone(), point.of)).collect()
+            }
+            Code::Circuit(circuit) => {
+                let outputs = circuit.outputs().iter();
+                outputs
+                    .map(|output| (output.name.clone(), Elementary::Bool))
+                    .collect()
+            }
+        };
+        let outputs = points.into_iter().map(|(name, of)| {
+            let shown = format!("{}.{name} before", member.name);
+            (name, self.cell(shown, of, 0))
+        });
+        let outputs = outputs.collect();
+        let name = format!("{} can be read", member.name);
+        Before {
+            outputs,
+            can_be_read: self.cell(name, Elementary::Bool, 0),
+        }
+    }
+
+    fn keep_outputs(&mut self, before: &Before, outputs: &Outputs, sampled: Term) {
+        for (name, &cell) in &before.outputs {
+            if let Some(&value) = outputs.points.get(name) {
+                self.cells[cell as usize].next = value;
+            }
+        }
+        let can_be_read = self.terms.and(sampled, outputs.can_be_read);
+        self.cells[before.can_be_read as usize].next = can_be_read;
+    }
+
+    /// The inputs of a program in a cycle, as its remote I/O samples them.
+    fn sampled(
+        &mut self,
+        prefix: &str,
+        member: &Member<'_>,
+        before: &[Before],
+        sampled: Term,
+    ) -> Vec<Term> {
+        let points: Vec<(String, Elementary, bool)> = match member.code {
+            Code::Typed(program) => {
+                let points = program.inputs.iter();
+                points
+                    .map(|point| (point.name.clone(), point.of, point.slot == 0))
+                    .collect()
+            }
+            Code::Circuit(circuit) => {
+                let inputs = circuit.inputs().iter();
+                inputs
+                    .map(|name| (name.clone(), Elementary::Bool, false))
+                    .collect()
+            }
+        };
+        // A remote I/O that restarts has no value of a signal; it samples nothing meanwhile.
+        let reads = member.sources.iter();
+        let reads = reads.filter(|source| matches!(source, Source::Signal { .. })).count() > 0;
+        let forgets = match reads {
+            true => {
+                let restarts = self.input(format!("{prefix}restarted"), Elementary::Bool, None);
+                let absent = self.terms.not(sampled);
+                self.terms.and(restarts, absent)
+            }
+            false => self.terms.boolean(false),
+        };
+        let mut proved: HashMap<usize, Term> = HashMap::new();
+        let mut valid: HashMap<String, Term> = HashMap::new();
+        let mut terms = Vec::with_capacity(points.len());
+        let mut late = Vec::new();
+        let mut sources = member.sources.iter();
+        for (name, of, is_reset) in points {
+            let source = match is_reset {
+                true => None,
+                false => sources.next(),
+            };
+            let shown = format!("{prefix}{name}");
+            let term = match source {
+                None => self.input(shown, of, None),
+                Some(Source::Any(range)) => self.input(shown, of, range.as_ref()),
+                Some(Source::Valid { of: other }) => {
+                    late.push((terms.len(), other.clone()));
+                    self.terms.boolean(false)
+                }
+                Some(Source::Signal {
+                    program,
+                    output,
+                    default,
+                    stale_after,
+                }) => {
+                    let source = &before[*program];
+                    let is_read = match proved.get(program) {
+                        Some(&known) => known,
+                        None => {
+                            let received = format!("{prefix}receives program {program}");
+                            let received = self.input(received, Elementary::Bool, None);
+                            let can = self.cells[source.can_be_read as usize].term;
+                            let is = self.terms.and(received, can);
+                            proved.insert(*program, is);
+                            is
+                        }
+                    };
+                    let value = source.outputs.get(output);
+                    let value = value.map(|&cell| self.cells[cell as usize].term);
+                    let default = self.terms.constant(of, *default);
+                    let value = value.unwrap_or(default);
+                    let (taken, is_valid) =
+                        self.taken(&shown, value, is_read, forgets, *stale_after);
+                    valid.insert(name.clone(), is_valid);
+                    self.terms.choose(is_valid, taken, default)
+                }
+            };
+            terms.push(term);
+        }
+        for (place, name) in late {
+            if let Some(&is_valid) = valid.get(&name) {
+                terms[place] = is_valid;
+            }
+        }
+        for (name, is_valid) in valid {
+            self.observed.push((format!("{prefix}{name}.valid"), is_valid));
+        }
+        terms
+    }
+
+    /// The newest value of a signal and whether it is recent enough.
+    fn taken(
+        &mut self,
+        name: &str,
+        value: Term,
+        is_read: Term,
+        forgets: Term,
+        stale_after: u32,
+    ) -> (Term, Term) {
+        let of = self.terms.of(value);
+        let kept = self.cell(format!("{name} kept"), of, 0);
+        let age = self.cell(format!("{name} age"), Elementary::Uint, 0xffff);
+        let old = self.cells[age as usize].term;
+        let last = stale_after.min(0xfffe);
+        let limit = self.terms.constant(Elementary::Uint, u64::from(last) + 1);
+        let one = self.terms.constant(Elementary::Uint, 1);
+        let is_old = self.terms.compare(Comparison::GreaterOrEqual, old, limit);
+        let older = self
+            .terms
+            .apply(Operation::Add(Elementary::Uint), Elementary::Uint, &[old, one]);
+        let aged = self.terms.choose(is_old, limit, older);
+        let zero = self.terms.constant(Elementary::Uint, 0);
+        let now = self.terms.choose(is_read, zero, aged);
+        let now = self.terms.choose(forgets, limit, now);
+        self.cells[age as usize].next = now;
+        let kept_value = self.cells[kept as usize].term;
+        let newest = self.terms.choose(is_read, value, kept_value);
+        self.cells[kept as usize].next = newest;
+        let is_valid = self.terms.compare(Comparison::Less, now, limit);
+        (newest, is_valid)
+    }
+
+    /// Adds a Boolean program; it makes a step where `runs` holds.
+    fn add_circuit(
+        &mut self,
+        prefix: &str,
+        circuit: &Circuit,
+        inputs: &[Term],
+        runs: Term,
+    ) -> Outputs {
+        let cells: Vec<u32> = circuit
+            .registers()
+            .iter()
+            .map(|register| {
+                let name = format!("{prefix}{}", register.name);
+                self.cell(name, Elementary::Bool, u64::from(register.initial))
+            })
+            .collect();
+        let graph = circuit.graph();
+        let mut terms: Vec<Term> = Vec::with_capacity(graph.operations().len());
+        for gate in graph.operations() {
+            let of = |expression: &understudy_logic::Expression| terms[expression.index()];
+            let term = match gate {
+                Gate::Constant(value) => self.terms.boolean(*value),
+                Gate::Variable(Bit::Input(input)) => inputs[*input as usize],
+                Gate::Variable(Bit::Register(register)) => {
+                    self.cells[cells[*register as usize] as usize].term
+                }
+                Gate::Not(inner) => self.terms.not(of(inner)),
+                Gate::And(left, right) => self.terms.and(of(left), of(right)),
+                Gate::Or(left, right) => self.terms.or(of(left), of(right)),
+                Gate::Xor(left, right) => {
+                    let xor = Operation::Xor(Elementary::Bool);
+                    self.terms
+                        .apply(xor, Elementary::Bool, &[of(left), of(right)])
+                }
+            };
+            terms.push(term);
+        }
+        for (register, &cell) in circuit.registers().iter().zip(&cells) {
+            let before = self.cells[cell as usize].term;
+            let next = terms[register.next.index()];
+            self.cells[cell as usize].next = self.terms.choose(runs, next, before);
+        }
+        let mut points = HashMap::new();
+        for output in circuit.outputs() {
+            let name = format!("{prefix}{}", output.name);
+            let kept = self.cell(format!("{name} kept"), Elementary::Bool, 0);
+            let before = self.cells[kept as usize].term;
+            let value = self
+                .terms
+                .choose(runs, terms[output.value.index()], before);
+            self.cells[kept as usize].next = value;
+            self.observed.push((name, value));
+            points.insert(output.name.clone(), value);
+        }
+        Outputs {
+            points,
+            can_be_read: self.terms.boolean(true),
+        }
+    }
+
+    /// Adds a program with numbers; it makes a scan where `runs` holds.
+    fn add_program(
+        &mut self,
+        prefix: &str,
+        program: &Program,
+        inputs: &[Term],
+        runs: Term,
+    ) -> Result<Outputs, Unsupported> {
+        let stopped = self.cell(format!("{prefix}{}", Program::FAULT), Elementary::Bool, 0);
+        let was_stopped = self.cells[stopped as usize].term;
+        let scans = self.cell(format!("{prefix}scans"), Elementary::Ulint, 0);
+        let was_scans = self.cells[scans as usize].term;
+        let first = Scan {
+            prefix,
+            program,
+            inputs,
+            scans: was_scans,
+            stopped: None,
+        };
+        let mut numbers = HashMap::new();
+        let mut scan = self.scan(&first, &mut numbers)?;
+        let mut can_fault = self.any_fault(&scan.faults);
+        if !self.terms.is(can_fault, false) {
+            // It can stop: a scan may begin with the initial values.
+            let again = Scan {
+                stopped: Some(was_stopped),
+                ..first
+            };
+            scan = self.scan(&again, &mut numbers)?;
+            can_fault = self.any_fault(&scan.faults);
+        }
+        let resets = program.inputs.iter().zip(inputs);
+        let mut reset = resets.filter(|(point, _)| point.slot == 0).map(|(_, &term)| term);
+        let reset = reset.next().unwrap_or_else(|| self.terms.boolean(false));
+        let running = self.terms.not(was_stopped);
+        let begins = self.terms.or(running, reset);
+        let begins = self.terms.and(runs, begins);
+        // What a fault leaves: the state before the scan.
+        let is_restart = self.terms.and(was_stopped, reset);
+        let mut after = HashMap::new();
+        for (&address, &cell) in &numbers {
+            let (term, initial, of) = {
+                let cell = &self.cells[cell as usize];
+                (cell.term, cell.initial, cell.of)
+            };
+            let initial = self.terms.constant(of, initial);
+            let left = self.terms.choose(is_restart, initial, term);
+            let new = scan.memory.get(&address).copied().unwrap_or(left);
+            let new = self.as_type(new, of);
+            let kept = self.terms.choose(can_fault, left, new);
+            let next = self.terms.choose(begins, kept, term);
+            self.cells[cell as usize].next = next;
+            after.insert(address, next);
+        }
+        let faulted = self.terms.choose(begins, can_fault, was_stopped);
+        self.cells[stopped as usize].next = faulted;
+        let one = self.terms.constant(Elementary::Ulint, 1);
+        let zero = self.terms.constant(Elementary::Ulint, 0);
+        let begun = self.terms.choose(is_restart, zero, was_scans);
+        let more = Operation::Add(Elementary::Ulint);
+        let more = self.terms.apply(more, Elementary::Ulint, &[begun, one]);
+        let counted = self.terms.choose(can_fault, begun, more);
+        self.cells[scans as usize].next = self.terms.choose(begins, counted, was_scans);
+        self.faults.extend(scan.faults);
+        Ok(self.observe(prefix, program, &after, faulted))
+    }
+
+    /// Names what properties and others read.
+    fn observe(
+        &mut self,
+        prefix: &str,
+        program: &Program,
+        after: &HashMap<u64, Term>,
+        faulted: Term,
+    ) -> Outputs {
+        let mut points = HashMap::new();
+        for point in &program.outputs {
+            let name = format!("{prefix}{}", point.name);
+            let value = match point.slot {
+                0 => Some(faulted),
+                slot => after.get(&(64 * u64::from(slot))).copied(),
+            };
+            let Some(value) = value else { continue };
+            points.insert(point.name.clone(), value);
+            match point.of {
+                Elementary::Bool => self.observed.push((name, value)),
+                _ => self.shown.push((name, value)),
+            }
+        }
+        let mut rest: Vec<(u64, Term)> = after.iter().map(|(&at, &term)| (at, term)).collect();
+        rest.sort_unstable();
+        let is_point = |address: u64| {
+            let slots = program.outputs.iter().chain(&program.inputs);
+            let mut slots = slots.map(|point| 64 * u64::from(point.slot));
+            slots.any(|slot| slot == address)
+        };
+        for (address, value) in rest {
+            if self.terms.of(value) == Elementary::Bool
+                && !is_point(address)
+                && let Some(part) = program.part_at(address)
+            {
+                let name = format!("{prefix}{}", part.name);
+                if self.observed.iter().all(|(known, _)| *known != name) {
+                    self.observed.push((name, value));
+                }
+            }
+        }
+        Outputs {
+            points,
+            can_be_read: self.terms.not(faulted),
+        }
+    }
+
+    fn any_fault(&mut self, faults: &[(Term, String)]) -> Term {
+        let mut any = self.terms.boolean(false);
+        for &(condition, _) in faults {
+            any = self.terms.or(any, condition);
+        }
+        any
+    }
+
+    fn as_type(&mut self, term: Term, of: Elementary) -> Term {
+        let known = self.terms.of(term);
+        if known == of {
+            return term;
+        }
+        match self.terms.value(term) {
+            Some(stored) => self.terms.constant(of, stored),
+            None => self
+                .terms
+                .apply(Operation::Reinterpret(known, of), of, &[term]),
+        }
+    }
+
+    /// One scan of a program from its cells on.
+    fn scan(
+        &mut self,
+        scan: &Scan<'_>,
+        numbers: &mut HashMap<u64, u32>,
+    ) -> Result<Scanned, Unsupported> {
+        let Scan {
+            prefix,
+            program,
+            inputs,
+            ..
+        } = *scan;
+        let mut cells = ProgramCells {
+            program,
+            prefix,
+            initial: program.initial_state(),
+            cells: &mut self.cells,
+            numbers: std::mem::take(numbers),
+            stopped: scan.stopped,
+        };
+        let count = match scan.stopped {
+            Some(stopped) => {
+                let zero = self.terms.constant(Elementary::Ulint, 0);
+                self.terms.choose(stopped, zero, scan.scans)
+            }
+            None => scan.scans,
+        };
+        let period = self.terms.constant(Elementary::Time, program.period as u64);
+        let elapsed = self
+            .terms
+            .apply(Operation::Elapsed, Elementary::Time, &[count, period]);
+        // What is shown or read by others has a cell, whether the scan reads it or not.
+        for point in &program.outputs {
+            if point.slot != 0 {
+                cells.number(&mut self.terms, 64 * u64::from(point.slot), point.of);
+            }
+        }
+        for address in bool_variables(program) {
+            cells.number(&mut self.terms, address, Elementary::Bool);
+        }
+        let mut execution = Execution::new(program, &mut self.terms, &mut cells, elapsed);
+        for (point, &input) in program.inputs.iter().zip(inputs) {
+            if point.slot != 0 {
+                execution.put(point.slot, input);
+            }
+        }
+        for task in &program.tasks {
+            let runs = match task.every {
+                0 | 1 => execution.terms.boolean(true),
+                every => {
+                    let every = execution.terms.constant(Elementary::Ulint, every.into());
+                    let modulo = Operation::Modulo(Elementary::Ulint);
+                    let rest = execution
+                        .terms
+                        .apply(modulo, Elementary::Ulint, &[count, every]);
+                    execution.terms.equals(rest, 0)
+                }
+            };
+            execution.task(task.routine, task.own, runs)?;
+        }
+        for point in &program.outputs {
+            execution.finite(&point.name, point.slot, point.of);
+        }
+        let faults = std::mem::take(&mut execution.faults);
+        let memory = execution.written();
+        *numbers = cells.numbers;
+        Ok(Scanned { memory, faults })
+    }
+}
+
+/// How a scan begins.
+#[derive(Clone, Copy)]
+struct Scan<'a> {
+    prefix: &'a str,
+    program: &'a Program,
+    inputs: &'a [Term],
+    scans: Term,
+    stopped: Option<Term>,
+}
+
+/// How it ends, where no fault ends it.
+struct Scanned {
+    memory: HashMap<u64, Term>,
+    faults: Vec<(Term, String)>,
+}
+
+/// Most BOOL variables that properties can name.
+const NAMED: usize = 10_000;
+
+/// Addresses of the BOOLs in the state that people can see.
+fn bool_variables(program: &Program) -> Vec<u64> {
+    let mut found = Vec::new();
+    for variable in &program.variables {
+        let first = 64 * u64::from(variable.slot);
+        let mut address = first;
+        let end = first + 64 * variable.of.slots();
+        while address < end && found.len() < NAMED {
+            match program.part_at(address) {
+                Some(part) if part.address == address => match part.of.elementary() {
+                    Some(Elementary::Bool) => {
+                        found.push(address);
+                        let is_element = part.name.ends_with(']');
+                        address += if is_element { 1 } else { 64 };
+                    }
+                    Some(of) if part.name.ends_with(']') => address += u64::from(of.bits()),
+                    _ => address += 64 * part.of.slots().max(1),
+                },
+                _ => address = (address / 64 + 1) * 64,
+            }
+        }
+    }
+    found
+}
