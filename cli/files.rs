@@ -91,6 +91,25 @@ fn nearest_file(path: &Path) -> Option<PathBuf> {
     Some(folder.join(nearest))
 }
 
+/// A program without errors, whatever it is written in, and its file with the warnings.
+///
+/// # Errors
+/// If the file cannot be read, is no program or has errors.
+pub(crate) fn program(path: &Path, wanted: Wanted<'_>) -> Result<(Source, Report), Answer> {
+    let text = text_of(Kind::Ladder, path)?;
+    let name = path.display().to_string();
+    let read = read_source(&name, &text, wanted);
+    let report = Report {
+        name,
+        text,
+        diagnostics: read.diagnostics,
+    };
+    match read.source {
+        Some(source) if !report.has_errors() => Ok((source, report)),
+        _ => Err(Answer::bad_files(vec![report])),
+    }
+}
+
 /// A ladder without errors, and its file with the warnings.
 ///
 /// # Errors

@@ -1,6 +1,7 @@
-//! `understudy verify`: proofs of properties of ladder programs.
+//! `understudy verify`: proofs of properties of programs.
 
 mod answer;
+mod numbers;
 pub(crate) mod patience;
 
 use std::fmt::Display;
@@ -10,11 +11,12 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use understudy_cluster::{Cluster, Overrides};
+use understudy_interchange::{Source, Wanted};
 use understudy_ladder::Program;
 use understudy_logic::Circuit;
 use understudy_parity::ParityController;
 use understudy_text::duration::parse_positive;
-use understudy_text::{Report, has_errors};
+use understudy_text::{Diagnostic, Report, has_errors};
 use understudy_verification::program::{Bounds, Remarks, Subject};
 use understudy_verification::property::{Properties, Property, not_of_one_scan, read, read_one};
 use understudy_verification::symbolic::Resolved;
@@ -26,7 +28,7 @@ use crate::files;
 use answer::{Finding, ProgramAnswer};
 use patience::Patience;
 
-/// Prove properties of ladder programs or show counterexamples
+/// Prove properties of programs or show counterexamples
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -35,18 +37,24 @@ Example:
   understudy verify press.ladder --properties press.properties --period 20ms
   understudy verify press.ladder --property \"never ram_down and ram_up\" --draw runs.html
   understudy verify press.ladder --smv scan --output press.smv
+  understudy verify examples/heated-tank/tank.st --property \"never program.fault\"
   understudy verify examples/press-cell/cluster.toml
+  understudy verify examples/two-shuttles/cluster.toml --property \"never left.inside and right.inside\"
   understudy verify examples/boiler/complete.ladder --period 100ms --budget 60s
 
 Without a property the command proves the standard property of every ladder program: each output can always be switched on and off again. It
-also remarks on rungs without effect, coils with conflicting values in one scan, and sequence steps that are passed in one scan. For a
-cluster it proves that the understudy equals the sum of its members. Formulas, sentences and property files: docs/reference/properties.md.
+also remarks on rungs without effect, coils with conflicting values in one scan, and sequence steps that are passed in one scan. Of a program
+with numbers it proves that no program fault stops it. For a cluster it proves that the understudy equals the sum of its members, or the
+given properties of all programs together. Formulas, sentences and property files: docs/reference/properties.md.
 
 Exit status: 0 if everything is proved, 1 if a property fails or is undecided, 2 for invalid input.")]
 pub(crate) struct Arguments {
-    /// Ladder program or cluster file
+    /// Program or cluster file
     #[arg(value_name = "FILE")]
     file: PathBuf,
+    /// Program of a file that has several
+    #[arg(long, value_name = "NAME")]
+    program: Option<String>,
     /// File with one property per line
     #[arg(long, value_name = "FILE")]
     properties: Option<PathBuf>,
@@ -96,9 +104,22 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     if is_cluster {
         return cluster(arguments, &patience);
     }
-    let (program, mut report) = files::ladder(&arguments.file)?;
+    let wanted = Wanted {
+        period: Some(arguments.period),
+        program: arguments.program.as_deref(),
+    };
+    let (program, mut report) = match files::program(&arguments.file, wanted)? {
+        (Source::Typed(program), report) => {
+            return numbers::of_program(arguments, &program, report, &patience);
+        }
+        (Source::Ladder(program), report) => (program, report),
+        (Source::Library(_), _) => {
+            let message = "the file has no PROGRAM: properties are of programs";
+            return Err(Answer::failed(Status::BadInput, "U0436", message));
+        }
+    };
     let subject = Subject::new(&program, arguments.period).map_err(not_lowered)?;
-    let asked = match asked(arguments, &subject) {
+    let asked = match asked(arguments, &|property| subject.resolve(property)) {
         Ok(asked) => asked,
         Err(mut answer) => {
             answer.reports.insert(0, report);
@@ -151,7 +172,10 @@ struct Asked {
     fair: Vec<Resolved>,
 }
 
-fn asked(arguments: &Arguments, subject: &Subject) -> Result<Asked, Answer> {
+/// The formula of a property over the signals of what is verified.
+type Resolve<'a> = &'a dyn Fn(&Property) -> Result<Resolved, Vec<Diagnostic>>;
+
+fn asked(arguments: &Arguments, resolve: Resolve<'_>) -> Result<Asked, Answer> {
     let mut asked = Asked::default();
     let mut reports = Vec::new();
     if let Some(path) = &arguments.properties {
@@ -178,13 +202,13 @@ fn asked(arguments: &Arguments, subject: &Subject) -> Result<Asked, Answer> {
     for (name, text, found) in reports {
         let mut diagnostics = found.diagnostics;
         for property in found.properties {
-            match subject.resolve(&property) {
+            match resolve(&property) {
                 Ok(formula) => asked.properties.push((property, formula)),
                 Err(unknown) => diagnostics.extend(unknown),
             }
         }
         for condition in found.fair {
-            match subject.resolve(&condition) {
+            match resolve(&condition) {
                 Ok(formula) if formula.is_of_one_scan() => asked.fair.push(formula),
                 Ok(_) => diagnostics.push(not_of_one_scan(0..text.len())),
                 Err(unknown) => diagnostics.extend(unknown),
@@ -264,42 +288,49 @@ fn draw(
     Ok(path.display().to_string())
 }
 
-/// Proves the standard properties of all programs of a cluster, and that the understudy is the sum of its members.
+/// Proves the given properties of all programs of a cluster together, or else the standard properties of each, and that the understudy
+/// is the sum of its members.
 fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Result<Answer, Answer> {
-    let of_a_ladder = !arguments.property.is_empty()
-        || arguments.properties.is_some()
-        || arguments.smv.is_some()
-        || arguments.draw.is_some();
-    if of_a_ladder {
-        let message = "properties, --draw and --smv apply to one program; name a ladder file instead of the cluster";
+    if arguments.smv.is_some() || arguments.draw.is_some() {
+        let message =
+            "--draw and --smv apply to one ladder program; name its file instead of the cluster";
         return Err(Answer::failed(Status::BadInput, "U0437", message));
     }
     let (cluster, reports) = files::cluster(&arguments.file, Overrides::default())?;
-    let understudy = files::parity_of(&cluster, "verify")?;
     let go_on = |work| patience.goes_on(work);
     let bounds = bounds(arguments, &go_on);
+    let is_asked = !arguments.property.is_empty() || arguments.properties.is_some();
+    if is_asked {
+        let together = numbers::of_cluster(arguments, &cluster, bounds, patience)?;
+        return Ok(answer::of_programs(vec![together], None, None)
+            .with_used(reports)
+            .and_next(&[&"simulate", &arguments.file]));
+    }
     let mut programs = Vec::new();
     for controller in cluster.controllers() {
         patience.turn_to(format!("`{}`", controller.name));
-        let Some(ladder) = controller.ladder() else {
-            continue;
-        };
         let period = cluster.agreement().schedule.period();
-        let subject = Subject::new(ladder, period).map_err(not_lowered)?;
-        let remarks = subject
-            .remarks(ladder, period, bounds)
-            .map_err(not_lowered)?;
-        programs.push(ProgramAnswer::of(&subject, bounds, &remarks));
+        match (controller.ladder(), controller.code.typed()) {
+            (Some(ladder), _) => {
+                let subject = Subject::new(ladder, period).map_err(not_lowered)?;
+                let remarks = subject
+                    .remarks(ladder, period, bounds)
+                    .map_err(not_lowered)?;
+                programs.push(ProgramAnswer::of(&subject, bounds, &remarks));
+            }
+            (None, Some(program)) => programs.push(numbers::standard(program, bounds)?),
+            (None, None) => {}
+        }
     }
-    Ok(
-        answer::of_programs(programs, Some(parity(&cluster, understudy)), None)
-            .with_used(reports)
-            .and_next(&[&"simulate", &arguments.file]),
-    )
+    let parity = cluster.parity();
+    let parity = parity.map(|understudy| parity_proof(&cluster, understudy));
+    Ok(answer::of_programs(programs, parity, None)
+        .with_used(reports)
+        .and_next(&[&"simulate", &arguments.file]))
 }
 
 /// Result of the proof of the understudy.
-fn parity(cluster: &Cluster, understudy: &ParityController) -> Result<String, String> {
+fn parity_proof(cluster: &Cluster, understudy: &ParityController) -> Result<String, String> {
     let controllers = cluster.controllers().iter();
     let members: Vec<Circuit> = controllers
         .filter_map(|controller| controller.circuit().cloned())

@@ -115,3 +115,95 @@ fn an_edge_that_undoes_itself_is_remarked_on_and_drawn() {
     let both = understudy(&["verify", &ladder, "--draw", &page, "--smv", "scan"]);
     assert_eq!(both.status, 2, "{}", both.output);
 }
+
+const SHUTTLES: &str = "examples/two-shuttles/cluster.toml";
+
+#[test]
+fn two_programs_that_read_each_other_are_proved_together() {
+    let property = "never left.inside and right.inside";
+    let answer = understudy(&["verify", SHUTTLES, "--property", property]);
+    assert_eq!(answer.status, 0, "{}", answer.shown());
+    assert_snapshot!(answer.shown());
+}
+
+/// Changes one text of the example; each change breaks the interlock.
+#[test]
+fn every_broken_interlock_is_found_with_a_run() {
+    let changes = [
+        // The right shuttle counts as outside while that is not known.
+        (
+            "cluster.toml",
+            "right_inside = { from = \"right.inside\", default = true",
+            "right_inside = { from = \"right.inside\", default = false",
+        ),
+        // A grant is kept after it was lost.
+        (
+            "cluster.toml",
+            "granted = { from = \"left.grant\", default = false, stale_after = 0",
+            "granted = { from = \"left.grant\", default = false, stale_after = 50",
+        ),
+        // The left shuttle does not wait for the cycle in which its grant may still arrive.
+        (
+            "left.st",
+            "may_enter := NOT grant AND NOT granted AND NOT right_inside",
+            "may_enter := NOT grant AND NOT right_inside",
+        ),
+        (
+            "left.st",
+            "may_enter := NOT grant AND NOT granted AND NOT right_inside",
+            "may_enter := NOT grant AND NOT granted",
+        ),
+    ];
+    for (place, (file, from, to)) in changes.into_iter().enumerate() {
+        let folder = empty_folder(&format!("verify_interlock_{place}"));
+        for entry in fs::read_dir("examples/two-shuttles").expect("the example") {
+            let path = entry.expect("an entry").path();
+            let name = path.file_name().expect("a name");
+            fs::copy(&path, folder.join(name)).expect("copied");
+        }
+        let changed = folder.join(file);
+        let text = fs::read_to_string(&changed).expect("a text");
+        assert!(text.contains(from), "{file} has `{from}`");
+        fs::write(&changed, text.replace(from, to)).expect("written");
+        let cluster = folder.join("cluster.toml").display().to_string();
+        let property = "never left.inside and right.inside";
+        let answer = understudy(&["verify", &cluster, "--json", "--property", property]);
+        let found = &answer.json()["result"]["programs"][0]["properties"][0];
+        assert_eq!(found["verdict"], json!("fails"), "change {place}: {found}");
+        let last = |name: &str| {
+            let values = found["scans"]["signals"][name].as_array();
+            values.and_then(|values| values.last()).cloned()
+        };
+        assert_eq!(last("left.inside"), Some(json!(1)), "{found}");
+        assert_eq!(last("right.inside"), Some(json!(1)), "{found}");
+    }
+}
+
+#[test]
+fn a_program_with_numbers_is_proved_or_its_run_has_the_numbers() {
+    let folder = empty_folder("verify_numbers");
+    let file = folder.join("tank.st");
+    let text = "PROGRAM tank
+  VAR_INPUT level : REAL; parts : INT; END_VAR
+  VAR_OUTPUT inlet : BOOL; outlet : BOOL; share : INT; END_VAR
+  inlet := level < 40.0;
+  outlet := level > 60.0;
+  share := 100 / parts;
+END_PROGRAM
+";
+    fs::write(&file, text).expect("written");
+    let file = file.display().to_string();
+    let answer = understudy(&[
+        "verify",
+        &file,
+        "--property",
+        "never inlet and outlet",
+        "--property",
+        "never program.fault",
+        "--property",
+        "always inlet | outlet",
+    ]);
+    assert_eq!(answer.status, 1);
+    let shown = answer.shown();
+    assert_snapshot!(shown.replace(&folder.display().to_string(), "FOLDER"));
+}

@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_logic::Circuit;
+use understudy_verification::numbers::{Answer as NumbersProof, Run};
 use understudy_verification::program::{
     Answer as Proof, Bounds, Lamp, OutputFinding, Remarks, Subject,
 };
@@ -18,7 +19,7 @@ use crate::answer::{Answer, Status};
 /// Result of `verify`.
 #[derive(Debug, Serialize, JsonSchema)]
 pub(crate) struct Verification {
-    /// One entry for each ladder program.
+    /// One entry for each program; of a cluster with given properties, one for all programs together.
     programs: Vec<ProgramAnswer>,
     /// Result of the proof of a cluster's understudy.
     understudy: Option<String>,
@@ -28,13 +29,13 @@ pub(crate) struct Verification {
     page: Option<String>,
 }
 
-/// Results for one ladder program.
+/// Results for one program.
 #[derive(Debug, Serialize, JsonSchema)]
 pub(crate) struct ProgramAnswer {
     name: String,
     /// Number of state bits.
     registers: usize,
-    /// For each output, whether it can always be switched on and off again.
+    /// For each output of a ladder program, whether it can always be switched on and off again.
     switches: Vec<Switch>,
     /// Remarks on the order and the effect of its rungs; they do not affect the verdict.
     remarks: Vec<RemarkAnswer>,
@@ -89,6 +90,9 @@ pub(crate) struct Scans {
     count: usize,
     /// Values of each relevant signal by scan.
     signals: BTreeMap<String, Vec<u8>>,
+    /// Numbers by scan, as IEC 61131-3 writes them.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    numbers: BTreeMap<String, Vec<String>>,
     /// Scan to which the run returns after the last one.
     again_from: Option<usize>,
     #[serde(skip)]
@@ -106,14 +110,48 @@ impl Scans {
         Self {
             count: trace.scans.len(),
             signals: signals.collect(),
+            numbers: BTreeMap::new(),
             again_from: trace.again_from,
             table: scan_table(circuit, trace),
             trace: trace.clone(),
         }
     }
+
+    /// A run with numbers.
+    fn with_numbers(circuit: &Circuit, run: &Run) -> Self {
+        let mut scans = Self::of(circuit, &run.trace);
+        for row in &run.numbers {
+            let _ = writeln!(scans.table, "{}: {}", row.name, values(&row.values));
+            scans.numbers.insert(row.name.clone(), row.values.clone());
+        }
+        scans
+    }
+}
+
+/// Values of a number from scan 0 on, the last ones where there are many.
+fn values(values: &[String]) -> String {
+    const SHOWN: usize = 8;
+    let hidden = values.len().saturating_sub(SHOWN);
+    let shown = values[hidden..].join(", ");
+    match hidden {
+        0 => shown,
+        _ => format!("…, {shown}"),
+    }
 }
 
 impl ProgramAnswer {
+    /// A program with numbers, or several together, without results.
+    pub(super) fn of_numbers(name: &str, circuit: &Circuit) -> Self {
+        Self {
+            name: name.to_owned(),
+            registers: circuit.registers().len(),
+            switches: Vec::new(),
+            remarks: Vec::new(),
+            undecided_remarks: 0,
+            properties: Vec::new(),
+        }
+    }
+
     /// Results of the standard questions, without properties.
     pub(super) fn of(subject: &Subject, bounds: Bounds<'_>, remarks: &Remarks) -> Self {
         let circuit = subject.circuit();
@@ -236,13 +274,40 @@ impl Finding {
         formula: &Resolved,
         proof: Proof,
     ) -> Self {
-        let named = formula.map(&|signal: &Signal| Some(signal.name(circuit).to_owned()));
         let scans = |trace: Option<Trace>| trace.map(|trace| Scans::of(circuit, &trace));
         let (verdict, scans, message) = match proof {
             Proof::Holds(trace) => ("holds", scans(trace), None),
             Proof::Fails(trace) => ("fails", scans(trace), None),
             Proof::Undecided(error) => ("undecided", None, Some(error.to_string())),
         };
+        Self::told(circuit, property, formula, verdict, message, scans)
+    }
+
+    /// The result for a property of programs with numbers.
+    pub(super) fn of_numbers(
+        circuit: &Circuit,
+        property: &Property,
+        formula: &Resolved,
+        proof: NumbersProof,
+    ) -> Self {
+        let scans = |run: Option<Run>| run.map(|run| Scans::with_numbers(circuit, &run));
+        let (verdict, scans, message) = match proof {
+            NumbersProof::Holds(run) => ("holds", scans(run), None),
+            NumbersProof::Fails(run) => ("fails", scans(run), None),
+            NumbersProof::Undecided(reason) => ("undecided", None, Some(reason)),
+        };
+        Self::told(circuit, property, formula, verdict, message, scans)
+    }
+
+    fn told(
+        circuit: &Circuit,
+        property: &Property,
+        formula: &Resolved,
+        verdict: &'static str,
+        message: Option<String>,
+        scans: Option<Scans>,
+    ) -> Self {
+        let named = formula.map(&|signal: &Signal| Some(signal.name(circuit).to_owned()));
         Self {
             name: property.name.clone(),
             property: property.text.clone(),

@@ -170,7 +170,8 @@ impl System {
     }
 
     fn describe(&self, term: Term) -> String {
-        self.terms.describe(term, &|variable| self.name_of(variable))
+        self.terms
+            .describe(term, &|variable| self.name_of(variable))
     }
 }
 
@@ -235,10 +236,15 @@ impl Model {
         bounds: Bounds<'_>,
     ) -> Answer {
         let cone = Cone::of(self.circuit(), fair.iter().chain([property]));
-        let is_exact = cone.variables.iter().all(|variable| self.is_exact(*variable));
+        let is_exact = cone
+            .variables
+            .iter()
+            .all(|variable| self.is_exact(*variable));
         let replay = Replay::new(&self.system, &self.abstraction, bounds.go_on);
         match answer {
-            CircuitAnswer::Holds(None) if is_exact || is_of_all_runs(property) => Answer::Holds(None),
+            CircuitAnswer::Holds(None) if is_exact || is_of_all_runs(property) => {
+                Answer::Holds(None)
+            }
             CircuitAnswer::Holds(trace) if is_exact => {
                 Answer::Holds(trace.and_then(|trace| replay.follow(&trace, &[]).run))
             }
@@ -270,9 +276,9 @@ impl Model {
                     }
                 }
             }
-            CircuitAnswer::Fails(None) => Answer::Undecided(
-                "it depends on comparisons of computed numbers".to_owned(),
-            ),
+            CircuitAnswer::Fails(None) => {
+                Answer::Undecided("it depends on comparisons of computed numbers".to_owned())
+            }
             CircuitAnswer::Undecided(undecided) => Answer::Undecided(undecided_text(&undecided)),
         }
     }
@@ -288,10 +294,9 @@ impl Model {
                 self.system.terms.node(term),
                 term::Node::Variable(Variable::Input(_))
             ),
-            Meaning::NotANumber(_)
-            | Meaning::Less(..)
-            | Meaning::Equal(..)
-            | Meaning::Free(..) => false,
+            Meaning::NotANumber(_) | Meaning::Less(..) | Meaning::Equal(..) | Meaning::Free(..) => {
+                false
+            }
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Inputs that do not come from the field.
 
-use understudy_remote_io::{OperatorInput, SignalInput};
+use understudy_remote_io::{OperatorInput, OperatorInputKind, SignalInput};
 
 /// Input of a program with a source of its own.
 #[derive(Debug, Clone)]
@@ -31,6 +31,16 @@ pub struct OperatorDeclaration {
     pub unit: Option<String>,
     /// Whether the page asks before it writes.
     pub confirm: bool,
+}
+
+impl OperatorDeclaration {
+    /// Lowest and highest stored value of a setpoint.
+    pub fn limits(&self) -> Option<(u64, u64)> {
+        match self.input.kind {
+            OperatorInputKind::Setpoint { low, high } => Some((low, high)),
+            OperatorInputKind::Level | OperatorInputKind::Pulse(_) => None,
+        }
+    }
 }
 
 /// Input that is an output of another program.

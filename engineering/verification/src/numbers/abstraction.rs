@@ -79,7 +79,11 @@ fn real(of: Elementary, stored: u64) -> Option<f64> {
 /// Reals in their order as integers; both zeros are 0.
 fn rank(value: f64) -> i64 {
     let bits = value.to_bits() as i64;
-    if bits < 0 { i64::MIN.wrapping_sub(bits) } else { bits }
+    if bits < 0 {
+        i64::MIN.wrapping_sub(bits)
+    } else {
+        bits
+    }
 }
 
 /// A number of type `of` above one boundary and at most at the next.
@@ -96,7 +100,11 @@ pub(super) fn between(of: Elementary, above: Option<i128>, at_most: Option<i128>
         return Some(value as u64 & of.mask());
     }
     let unrank = |rank: i64| {
-        let bits = if rank < 0 { i64::MIN.wrapping_sub(rank) } else { rank };
+        let bits = if rank < 0 {
+            i64::MIN.wrapping_sub(rank)
+        } else {
+            rank
+        };
         f64::from_bits(bits as u64)
     };
     let greatest = match of {
@@ -105,7 +113,9 @@ pub(super) fn between(of: Elementary, above: Option<i128>, at_most: Option<i128>
     };
     let (least, greatest) = (rank(-greatest), rank(greatest));
     // The position 2 r + 1 lies above `above` and is at most `at_most`.
-    let low = above.map_or(least.into(), |above| above.div_euclid(2) + above.rem_euclid(2));
+    let low = above.map_or(least.into(), |above| {
+        above.div_euclid(2) + above.rem_euclid(2)
+    });
     let high = at_most.map_or(greatest.into(), |at_most| (at_most - 1).div_euclid(2));
     let low = i64::try_from(low.max(least.into())).ok()?;
     let high = i64::try_from(high.min(greatest.into())).ok()?;
@@ -250,7 +260,10 @@ impl<'s> Pass<'s> {
         // Operands first, so that no long chain of terms is walked at once.
         let roots = self.system.observed.iter().map(|(_, term)| *term).collect();
         let cells = &self.system.cells;
-        let reached = self.system.terms.reached(roots, |cell| cells[cell as usize].next);
+        let reached = self
+            .system
+            .terms
+            .reached(roots, |cell| cells[cell as usize].next);
         for term in reached {
             if self.is_bits(term) {
                 self.bits(term);
@@ -403,7 +416,9 @@ impl<'s> Pass<'s> {
         let pairs = then.iter().zip(otherwise);
         pairs
             .map(|(&then, &otherwise)| {
-                self.builder.graph().if_then_else(condition, then, otherwise)
+                self.builder
+                    .graph()
+                    .if_then_else(condition, then, otherwise)
             })
             .collect()
     }
@@ -649,7 +664,10 @@ impl<'s> Pass<'s> {
             };
         }
         // less, equal; neither where one of them is NaN.
-        let (less, equal, nan) = match (self.system.terms.value(left), self.system.terms.value(right)) {
+        let (less, equal, nan) = match (
+            self.system.terms.value(left),
+            self.system.terms.value(right),
+        ) {
             (_, Some(constant)) => self.against(left, of, constant, false),
             (Some(constant), None) => self.against(right, of, constant, true),
             (None, None) => self.order(left, right),
@@ -764,9 +782,19 @@ impl<'s> Pass<'s> {
                 let condition = self.bits(condition)[0];
                 let then = self.at_most(then, boundary);
                 let otherwise = self.at_most(otherwise, boundary);
-                self.builder.graph().if_then_else(condition, then, otherwise)
+                self.builder
+                    .graph()
+                    .if_then_else(condition, then, otherwise)
             }
             Node::Variable(Variable::Cell(cell)) => self.cell_at_most(cell, of, boundary),
+            // The position of -x is 2 - that of x.
+            Node::Apply(Operation::Negate(of), operands) if of.is_real() => {
+                let is = self.at_most(operands[0], 1 - boundary);
+                let nan = self.nan(operands[0]);
+                let graph = self.builder.graph();
+                let out = graph.or(is, nan);
+                graph.not(out)
+            }
             _ => {
                 let (least, greatest) = self.limits(term, of);
                 if boundary < least || boundary >= greatest {
@@ -856,7 +884,9 @@ impl<'s> Pass<'s> {
             Node::Variable(Variable::Input(_)) => self.constant(false),
             Node::Variable(Variable::Cell(cell)) => {
                 let initial = position(of, self.system.cells[cell as usize].initial).is_none();
-                let made = self.builder.register(format!("cell {cell} is NaN"), initial);
+                let made = self
+                    .builder
+                    .register(format!("cell {cell} is NaN"), initial);
                 self.cell_nans.insert(cell, made);
                 self.pending.push(Pending::NotANumber(cell));
                 made.1
@@ -865,9 +895,14 @@ impl<'s> Pass<'s> {
                 let condition = self.bits(condition)[0];
                 let then = self.nan(then);
                 let otherwise = self.nan(otherwise);
-                self.builder.graph().if_then_else(condition, then, otherwise)
+                self.builder
+                    .graph()
+                    .if_then_else(condition, then, otherwise)
             }
             Node::Apply(Operation::Convert(from, _), _) if !from.is_real() => self.constant(false),
+            Node::Apply(Operation::Negate(_) | Operation::Absolute(_), operands) => {
+                self.nan(operands[0])
+            }
             Node::Apply(..) | Node::Unknown(_) => {
                 let name = format!("{} is NaN", self.system.describe(term));
                 self.input(&name, Meaning::NotANumber(term))
@@ -885,7 +920,11 @@ pub(super) fn boundary_text(of: Elementary, boundary: i128) -> String {
     }
     let is_included = boundary.rem_euclid(2) == 1;
     let rank = i64::try_from(boundary.div_euclid(2)).unwrap_or(0);
-    let bits = if rank < 0 { i64::MIN.wrapping_sub(rank) } else { rank };
+    let bits = if rank < 0 {
+        i64::MIN.wrapping_sub(rank)
+    } else {
+        rank
+    };
     let value = f64::from_bits(bits as u64);
     let stored = match of {
         Elementary::Real => u64::from((value as f32).to_bits()),
@@ -899,8 +938,18 @@ pub(super) fn boundary_text(of: Elementary, boundary: i128) -> String {
 fn is_by_bits(operation: Operation) -> bool {
     use Operation as O;
     match operation {
-        O::Add(_) | O::Subtract(_) | O::Negate(_) | O::Not(_) | O::And(_) | O::Or(_) | O::Xor(_)
-        | O::Absolute(_) | O::Minimum(_) | O::Maximum(_) | O::Extract { .. } | O::Insert { .. } => true,
+        O::Add(_)
+        | O::Subtract(_)
+        | O::Negate(_)
+        | O::Not(_)
+        | O::And(_)
+        | O::Or(_)
+        | O::Xor(_)
+        | O::Absolute(_)
+        | O::Minimum(_)
+        | O::Maximum(_)
+        | O::Extract { .. }
+        | O::Insert { .. } => true,
         O::Convert(from, to) | O::Reinterpret(from, to) => !from.is_real() && !to.is_real(),
         _ => false,
     }

@@ -660,10 +660,7 @@ impl<'a> Execution<'a> {
             let inside = self.between(value, index.low.into(), index.high.into());
             let outside = self.terms.not(inside);
             let (low, high) = (index.low, index.high);
-            self.fault(
-                outside,
-                format!("the index is outside of {low} to {high}"),
-            );
+            self.fault(outside, format!("the index is outside of {low} to {high}"));
             if let Some(known) = self.terms.value(value) {
                 // A known index outside is a fault: any place serves.
                 let known = (known as i64).clamp(low, high);
@@ -893,7 +890,10 @@ impl<'a> Execution<'a> {
                 let last = numbers.len() as i128 - 2;
                 let inside = self.between(numbers[0], 0, last);
                 let outside = self.terms.not(inside);
-                self.fault(outside, "MUX selects an input that it does not have".to_owned());
+                self.fault(
+                    outside,
+                    "MUX selects an input that it does not have".to_owned(),
+                );
                 let mut chosen = numbers[numbers.len() - 1];
                 for (place, &operand) in numbers[1..].iter().enumerate().rev().skip(1) {
                     let here = self.terms.equals(numbers[0], place as u64);

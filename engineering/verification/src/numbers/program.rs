@@ -223,7 +223,10 @@ impl System {
         };
         // A remote I/O that restarts has no value of a signal; it samples nothing meanwhile.
         let reads = member.sources.iter();
-        let reads = reads.filter(|source| matches!(source, Source::Signal { .. })).count() > 0;
+        let reads = reads
+            .filter(|source| matches!(source, Source::Signal { .. }))
+            .count()
+            > 0;
         let forgets = match reads {
             true => {
                 let restarts = self.input(format!("{prefix}restarted"), Elementary::Bool, None);
@@ -275,7 +278,12 @@ impl System {
                     let (taken, is_valid) =
                         self.taken(&shown, value, is_read, forgets, *stale_after);
                     valid.insert(name.clone(), is_valid);
-                    self.terms.choose(is_valid, taken, default)
+                    let input = self.terms.choose(is_valid, taken, default);
+                    match of {
+                        Elementary::Bool => self.observed.push((shown, input)),
+                        _ => self.shown.push((shown, input)),
+                    }
+                    input
                 }
             };
             terms.push(term);
@@ -286,7 +294,8 @@ impl System {
             }
         }
         for (name, is_valid) in valid {
-            self.observed.push((format!("{prefix}{name}.valid"), is_valid));
+            self.observed
+                .push((format!("{prefix}{name}.valid"), is_valid));
         }
         terms
     }
@@ -308,9 +317,11 @@ impl System {
         let limit = self.terms.constant(Elementary::Uint, u64::from(last) + 1);
         let one = self.terms.constant(Elementary::Uint, 1);
         let is_old = self.terms.compare(Comparison::GreaterOrEqual, old, limit);
-        let older = self
-            .terms
-            .apply(Operation::Add(Elementary::Uint), Elementary::Uint, &[old, one]);
+        let older = self.terms.apply(
+            Operation::Add(Elementary::Uint),
+            Elementary::Uint,
+            &[old, one],
+        );
         let aged = self.terms.choose(is_old, limit, older);
         let zero = self.terms.constant(Elementary::Uint, 0);
         let now = self.terms.choose(is_read, zero, aged);
@@ -370,9 +381,7 @@ impl System {
             let name = format!("{prefix}{}", output.name);
             let kept = self.cell(format!("{name} kept"), Elementary::Bool, 0);
             let before = self.cells[kept as usize].term;
-            let value = self
-                .terms
-                .choose(runs, terms[output.value.index()], before);
+            let value = self.terms.choose(runs, terms[output.value.index()], before);
             self.cells[kept as usize].next = value;
             self.observed.push((name, value));
             points.insert(output.name.clone(), value);
@@ -415,7 +424,9 @@ impl System {
             can_fault = self.any_fault(&scan.faults);
         }
         let resets = program.inputs.iter().zip(inputs);
-        let mut reset = resets.filter(|(point, _)| point.slot == 0).map(|(_, &term)| term);
+        let mut reset = resets
+            .filter(|(point, _)| point.slot == 0)
+            .map(|(_, &term)| term);
         let reset = reset.next().unwrap_or_else(|| self.terms.boolean(false));
         let running = self.terms.not(was_stopped);
         let begins = self.terms.or(running, reset);

@@ -83,7 +83,9 @@ impl<'s> Replay<'s> {
                 break;
             }
         }
-        let run = self.is_known(&trace.signals).then(|| self.run(trace, &scans, is_broken));
+        let run = self
+            .is_known(&trace.signals)
+            .then(|| self.run(trace, &scans, is_broken));
         Followed {
             run,
             is_broken,
@@ -264,11 +266,9 @@ impl<'s> Replay<'s> {
         let mut choice = attempt;
         for (number, input) in self.system.inputs.iter().enumerate() {
             let Some(boundaries) = self.abstraction.boundaries.get(&input.term) else {
-                let is_followed = self
-                    .abstraction
-                    .meanings
-                    .iter()
-                    .any(|meaning| matches!(meaning, Meaning::Bit(of, _) if *of as usize == number));
+                let is_followed = self.abstraction.meanings.iter().any(
+                    |meaning| matches!(meaning, Meaning::Bit(of, _) if *of as usize == number),
+                );
                 if !is_followed {
                     let (least, greatest) = input.limits;
                     inputs[number] = some_value(input.of, least - 1, greatest, choice % 3);

@@ -162,7 +162,12 @@ impl Terms {
     }
 
     /// An operation on numbers whose result is of type `of`.
-    pub(crate) fn apply(&mut self, operation: Operation, of: Elementary, operands: &[Term]) -> Term {
+    pub(crate) fn apply(
+        &mut self,
+        operation: Operation,
+        of: Elementary,
+        operands: &[Term],
+    ) -> Term {
         let values: Option<Vec<u64>> = operands.iter().map(|&term| self.value(term)).collect();
         if let Some(values) = values {
             // What is a fault has no result; the scan ends there.
@@ -255,9 +260,11 @@ impl Terms {
                     let operands: Vec<u64> = operands.iter().map(of_term).collect();
                     operation.apply(&operands).unwrap_or(0)
                 }
-                Node::Choose([condition, then, otherwise]) => {
-                    of_term(if of_term(condition) != 0 { then } else { otherwise })
-                }
+                Node::Choose([condition, then, otherwise]) => of_term(if of_term(condition) != 0 {
+                    then
+                } else {
+                    otherwise
+                }),
             };
             values.push(value);
         }
@@ -301,7 +308,10 @@ impl Terms {
                 let sign = sign(*operation);
                 match (sign, &**operands) {
                     (_, &[operand])
-                        if matches!(operation, Operation::Convert(..) | Operation::Reinterpret(..)) =>
+                        if matches!(
+                            operation,
+                            Operation::Convert(..) | Operation::Reinterpret(..)
+                        ) =>
                     {
                         self.write(operand, name, depth, text);
                     }

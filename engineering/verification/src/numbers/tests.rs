@@ -66,7 +66,7 @@ fn compare(program: &Program, seed: u64, scans: usize) -> bool {
             let constants = system.terms.constants(point.of);
             let mut stored = value(&mut random, point.of, &constants);
             if point.slot == 0 {
-                stored = u64::from(random.number() % 5 == 0);
+                stored = u64::from(random.number().is_multiple_of(5));
             }
             point.set(&mut image, stored);
             given.push(stored);
@@ -253,7 +253,11 @@ fn systems_and_circuits_do_what_the_machine_does() {
 #[test]
 fn examples_do_what_the_machine_does() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
-    for file in ["two-shuttles/left.st", "two-shuttles/right.st", "two-shuttles/track.st"] {
+    for file in [
+        "two-shuttles/left.st",
+        "two-shuttles/right.st",
+        "two-shuttles/track.st",
+    ] {
         let text = std::fs::read_to_string(root.join(file)).expect("the example");
         compare(&lowered(&text), 7, 300);
     }
@@ -268,15 +272,16 @@ fn programs_of_other_compilers_do_what_the_machine_does() {
     let mut count = 0;
     let folder = Path::new(&data).join("numbers");
     for entry in std::fs::read_dir(folder).expect("the folder").flatten() {
-        if entry.path().extension().is_some_and(|extension| extension == "st") {
+        if entry
+            .path()
+            .extension()
+            .is_some_and(|extension| extension == "st")
+        {
             let text = std::fs::read_to_string(entry.path()).expect("a text");
             let program = lowered(&text);
-            match Model::of_program(&program) {
-                Ok(_) => {
-                    compare(&program, 3, 60);
-                    count += 1;
-                }
-                Err(error) => eprintln!("{}: {error}", entry.path().display()),
+            if Model::of_program(&program).is_ok() {
+                compare(&program, 3, 60);
+                count += 1;
             }
         }
     }
@@ -293,12 +298,18 @@ fn ask(model: &Model, property: &str) -> Answer {
 #[test]
 fn what_holds_for_all_numbers_is_proved() {
     let model = Model::of_program(&lowered(PROGRAMS[5])).expect("followed");
-    assert_eq!(ask(&model, "never pump and program.fault"), Answer::Holds(None));
+    assert_eq!(
+        ask(&model, "never pump and program.fault"),
+        Answer::Holds(None)
+    );
     assert!(matches!(ask(&model, "never done"), Answer::Fails(Some(_))));
     // Enumerations and step numbers are followed bit by bit, so that what can happen is known as well.
     assert!(matches!(ask(&model, "AG EF pump"), Answer::Holds(_)));
     let model = Model::of_program(&lowered(PROGRAMS[2])).expect("followed");
-    assert_eq!(ask(&model, "AG (alarm -> AX (alarm | !alarm))"), Answer::Holds(None));
+    assert_eq!(
+        ask(&model, "AG (alarm -> AX (alarm | !alarm))"),
+        Answer::Holds(None)
+    );
 }
 
 #[test]
@@ -314,14 +325,19 @@ fn the_order_of_comparisons_is_kept() {
          END_PROGRAM",
     );
     let model = Model::of_program(&program).expect("followed");
-    assert_eq!(ask(&model, "never higher and not high"), Answer::Holds(None));
+    assert_eq!(
+        ask(&model, "never higher and not high"),
+        Answer::Holds(None)
+    );
     let Answer::Fails(Some(run)) = ask(&model, "never high and not higher") else {
         panic!("it fails");
     };
     let last = run.trace.scans.len() - 1;
     let number = |name: &str| -> f64 {
         let row = run.numbers.iter().find(|row| row.name == name);
-        row.expect("the input is shown").values[last].parse().expect("a number")
+        row.expect("the input is shown").values[last]
+            .parse()
+            .expect("a number")
     };
     let product = number("a") * number("b");
     assert!(product > 80.0 && product <= 90.0, "{product}");

@@ -1,0 +1,163 @@
+//! Proofs about programs with numbers, and about the programs of a cluster together.
+
+use understudy_cluster::{Cluster, InputSourceKind, RemoteIo};
+use understudy_text::Report;
+use understudy_typed::Program;
+use understudy_verification::numbers::{Code, Member, Model, Source, Unsupported};
+use understudy_verification::program::Bounds;
+use understudy_verification::property::{Property, read_one};
+use understudy_verification::symbolic::Resolved;
+
+use super::answer::{self, Finding, ProgramAnswer};
+use super::patience::Patience;
+use super::{Arguments, Asked, asked, bounds};
+use crate::answer::{Answer, Status};
+
+/// The standard property of a program with numbers.
+const STANDARD: &str = "never program.fault";
+
+/// Proves the properties of one program.
+pub(super) fn of_program(
+    arguments: &Arguments,
+    program: &Program,
+    report: Report,
+    patience: &Patience<'_>,
+) -> Result<Answer, Answer> {
+    if arguments.smv.is_some() || arguments.draw.is_some() {
+        let message = "--draw and --smv work on Boolean programs, and the program has numbers";
+        return Err(Answer::failed(Status::BadInput, "U0438", message));
+    }
+    patience.turn_to("the statements of the program".to_owned());
+    let model = Model::of_program(program).map_err(|error| unsupported(&error))?;
+    let mut asked = match asked(arguments, &|property| model.resolve(property)) {
+        Ok(asked) => asked,
+        Err(mut answer) => {
+            answer.reports.insert(0, report);
+            return Err(answer);
+        }
+    };
+    if asked.properties.is_empty() {
+        asked.properties.extend(standard_property(&model, STANDARD));
+    }
+    let go_on = |work| patience.goes_on(work);
+    let proved = prove(
+        &model,
+        &program.name,
+        asked,
+        bounds(arguments, &go_on),
+        patience,
+    );
+    Ok(answer::of_programs(vec![proved], None, None)
+        .with_used(vec![report])
+        .and_next(&[&"init", &"cell", &"--from", &arguments.file]))
+}
+
+/// Proves the standard property of a program of a cluster.
+pub(super) fn standard(program: &Program, bounds: Bounds<'_>) -> Result<ProgramAnswer, Answer> {
+    let model = Model::of_program(program).map_err(|error| unsupported(&error))?;
+    let mut proved = ProgramAnswer::of_numbers(&program.name, model.circuit());
+    if let Some((property, formula)) = standard_property(&model, STANDARD) {
+        let answers = model.check(std::slice::from_ref(&formula), &[], bounds, &mut || {});
+        let findings = answers
+            .into_iter()
+            .map(|proof| Finding::of_numbers(model.circuit(), &property, &formula, proof));
+        proved.properties.extend(findings);
+    }
+    Ok(proved)
+}
+
+/// Proves properties of the programs of a cluster together: signals arrive a cycle later, and each one may be lost.
+pub(super) fn of_cluster(
+    arguments: &Arguments,
+    cluster: &Cluster,
+    bounds: Bounds<'_>,
+    patience: &Patience<'_>,
+) -> Result<ProgramAnswer, Answer> {
+    patience.turn_to("the programs together".to_owned());
+    let members = members(cluster);
+    let model = Model::of_cluster(cluster.name(), &members).map_err(|error| unsupported(&error))?;
+    let asked = asked(arguments, &|property| model.resolve(property))?;
+    let name = "all programs together";
+    Ok(prove(&model, name, asked, bounds, patience))
+}
+
+fn prove(
+    model: &Model,
+    name: &str,
+    asked: Asked,
+    bounds: Bounds<'_>,
+    patience: &Patience<'_>,
+) -> ProgramAnswer {
+    let mut proved = ProgramAnswer::of_numbers(name, model.circuit());
+    let (properties, formulas): (Vec<Property>, Vec<Resolved>) =
+        asked.properties.into_iter().unzip();
+    let mut answered = 0;
+    let count = formulas.len();
+    let about = |answered| format!("{answered} of {count} properties answered");
+    patience.turn_to(about(0));
+    let answers = model.check(&formulas, &asked.fair, bounds, &mut || {
+        answered += 1;
+        patience.turn_to(about(answered));
+    });
+    for ((property, formula), proof) in properties.iter().zip(&formulas).zip(answers) {
+        let finding = Finding::of_numbers(model.circuit(), property, formula, proof);
+        proved.properties.push(finding);
+    }
+    proved
+}
+
+fn standard_property(model: &Model, text: &str) -> Option<(Property, Resolved)> {
+    let property = read_one(text).ok()?;
+    let formula = model.resolve(&property).ok()?;
+    Some((property, formula))
+}
+
+/// The programs of a cluster with the sources of their inputs.
+fn members(cluster: &Cluster) -> Vec<Member<'_>> {
+    let controllers = cluster.controllers().iter().zip(cluster.remote_ios());
+    let members = controllers.map(|(controller, remote_io)| {
+        let code = match (controller.circuit(), controller.code.typed()) {
+            (Some(circuit), _) => Code::Circuit(circuit),
+            (None, Some(program)) => Code::Typed(program),
+            (None, None) => unreachable!("a program is one or the other"),
+        };
+        let points = controller.interface.inputs.iter();
+        let points = points.filter(|point| point.name != Program::RESET);
+        let sources = points.map(|point| {
+            let source = remote_io
+                .inputs
+                .iter()
+                .find(|input| input.name == point.name);
+            match source.map(|input| &input.kind) {
+                Some(InputSourceKind::Operator(declaration)) => {
+                    Source::Any(declaration.limits().map(|(low, high)| low..=high))
+                }
+                Some(InputSourceKind::Signal(declaration)) => Source::Signal {
+                    program: declaration.input.from.index(),
+                    output: declaration.output.clone(),
+                    default: declaration.input.default,
+                    stale_after: declaration.input.stale_after,
+                },
+                None => match point.name.strip_suffix(".valid") {
+                    Some(of) if is_signal(remote_io, of) => Source::Valid { of: of.to_owned() },
+                    _ => Source::Any(None),
+                },
+            }
+        });
+        Member {
+            name: controller.name.clone(),
+            code,
+            sources: sources.collect(),
+        }
+    });
+    members.collect()
+}
+
+fn is_signal(remote_io: &RemoteIo, name: &str) -> bool {
+    let mut inputs = remote_io.inputs.iter();
+    inputs.any(|input| input.name == name && input.signal().is_some())
+}
+
+fn unsupported(error: &Unsupported) -> Answer {
+    Answer::failed(Status::Failed, "U0447", error)
+}
