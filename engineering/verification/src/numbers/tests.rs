@@ -1,10 +1,7 @@
 //! A system does what the machine does, and its circuit has every run of it.
 
-use std::path::Path;
-
 use understudy_structured_text::{Options, lower};
 use understudy_testing::random::Dice;
-use understudy_testing::skip;
 use understudy_typed::{Elementary, Fault, Machine, Program, Scratch};
 
 use super::abstraction::{Meaning, position};
@@ -252,40 +249,16 @@ fn systems_and_circuits_do_what_the_machine_does() {
 
 #[test]
 fn examples_do_what_the_machine_does() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
-    for file in [
-        "two-shuttles/left.st",
-        "two-shuttles/right.st",
-        "two-shuttles/track.st",
+    for text in [
+        include_str!("../../../../examples/two-shuttles/left.st"),
+        include_str!("../../../../examples/two-shuttles/right.st"),
+        include_str!("../../../../examples/two-shuttles/track.st"),
+        include_str!("../../../../examples/heated-tank/level.st"),
+        include_str!("../../../../examples/heated-tank/temperature.st"),
+        include_str!("../../../../examples/heated-tank/tank.st"),
     ] {
-        let text = std::fs::read_to_string(root.join(file)).expect("the example");
-        compare(&lowered(&text), 7, 300);
+        compare(&lowered(text), 7, 300);
     }
-}
-
-#[test]
-fn programs_of_other_compilers_do_what_the_machine_does() {
-    let Some(data) = std::env::var_os("UNDERSTUDY_DATA") else {
-        skip("UNDERSTUDY_DATA names no folder");
-        return;
-    };
-    let mut count = 0;
-    let folder = Path::new(&data).join("numbers");
-    for entry in std::fs::read_dir(folder).expect("the folder").flatten() {
-        if entry
-            .path()
-            .extension()
-            .is_some_and(|extension| extension == "st")
-        {
-            let text = std::fs::read_to_string(entry.path()).expect("a text");
-            let program = lowered(&text);
-            if Model::of_program(&program).is_ok() {
-                compare(&program, 3, 60);
-                count += 1;
-            }
-        }
-    }
-    assert!(count >= 8, "{count} programs are followed");
 }
 
 fn ask(model: &Model, property: &str) -> Answer {
