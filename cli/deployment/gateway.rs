@@ -1,4 +1,4 @@
-//! `understudy gateway`: read-only interfaces of a run.
+//! `understudy gateway`: interfaces of a run for other systems.
 
 use std::fmt::Write as _;
 use std::net::SocketAddr;
@@ -7,24 +7,27 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use serde_json::json;
 use understudy_gateway::{
-    Area, Followed, GatewayError, Rate, RegisterMap, Run, mirror, serve_metrics, serve_modbus,
+    Area, Followed, GatewayError, Rate, RegisterMap, Run, WriteGate, mirror, serve_metrics,
+    serve_modbus,
 };
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::overrides::parse_address;
 
-/// Publish a run, read-only, by Prometheus, Modbus TCP or Zenoh
+/// Publish a run by Prometheus, Modbus TCP or Zenoh
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy gateway metrics runs/latest --listen 127.0.0.1:9464
   understudy gateway modbus runs/latest --listen 127.0.0.1:1502
+  understudy gateway modbus runs/latest --allow-writes
   understudy gateway registers runs/latest
   understudy gateway zenoh runs/latest --listen 127.0.0.1:7447 --mirror 5/s
 
 The gateway reads the journal of a run, live or finished, and ends with SIGINT or SIGTERM. Connections are neither encrypted nor
-authenticated: bind the gateway to loopback or to a separate network (docs/how-to/monitoring.md).")]
+authenticated: bind the gateway to loopback or to a separate network (docs/how-to/monitoring.md). With --allow-writes every
+client that reaches the gateway has the role of an operator (docs/how-to/operator-inputs.md).")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     what: What,
@@ -43,13 +46,16 @@ enum What {
         #[arg(long)]
         once: bool,
     },
-    /// Process image as a read-only Modbus TCP server
+    /// Process image as a Modbus TCP server
     Modbus {
         #[command(flatten)]
         run: RunArgument,
         /// Listening address; port 0 selects a free port
         #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:1502", value_parser = parse_address)]
         listen: SocketAddr,
+        /// Let clients write operator inputs, with the role of an operator
+        #[arg(long)]
+        allow_writes: bool,
     },
     /// Print the register map of the Modbus TCP server
     Registers {
@@ -94,9 +100,15 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
             serve_metrics(&run, *listen, &mut ready).map_err(failed)?;
             Ok(ended())
         }
-        What::Modbus { run, listen } => {
-            let run = Followed::new(&run.open()?).map_err(failed)?;
-            serve_modbus(run, *listen, &mut ready).map_err(failed)?;
+        What::Modbus {
+            run,
+            listen,
+            allow_writes,
+        } => {
+            let run = run.open()?;
+            let gate = allow_writes.then(|| WriteGate::new(&run));
+            let run = Followed::new(&run).map_err(failed)?;
+            serve_modbus(run, gate, *listen, &mut ready).map_err(failed)?;
             Ok(ended())
         }
         What::Registers { run } => {

@@ -9,7 +9,9 @@ use serde_json::json;
 use understudy_bus::{Call, Request};
 use understudy_cluster::{Cluster, Overrides, typed_value};
 use understudy_executable::Interface;
-use understudy_journal::{Command, Done, OperatorAction, Refusal, new_write};
+use understudy_journal::{
+    Command, Done, OperatorAction, Refusal, RequestedValue, WriteRequest, new_write,
+};
 use understudy_keys::{Date, OperatorKeys};
 use understudy_member::tls_keys;
 use understudy_typed::Elementary;
@@ -128,7 +130,11 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
         What::Unforce => Command::Unforce {
             signal: place(arguments, written(arguments)?.cluster())?.0,
         },
-        What::Write => Command::Write(write(arguments, written(arguments)?.cluster())?),
+        What::Write => Command::Write(write(
+            arguments,
+            written(arguments)?.cluster(),
+            Role::Engineer,
+        )?),
         What::Kill => Command::Kill,
         What::Restart => Command::Restart,
         What::Release => Command::Release,
@@ -143,13 +149,16 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
         }
     };
     let run = written(arguments)?;
-    let action = OperatorAction::Command {
-        member: crate::member::find(run.cluster(), &arguments.name)?,
-        command,
-        owner: crate::inspect::top::owner(),
-        reason: arguments.reason.clone(),
+    let member = crate::member::find(run.cluster(), &arguments.name)?;
+    let done = match command {
+        Command::Write(write) => run.commander().write_and_wait(member, &write),
+        command => run.commander().act_and_wait(&OperatorAction::Command {
+            member,
+            command,
+            owner: crate::inspect::top::owner(),
+            reason: arguments.reason.clone(),
+        }),
     };
-    let done = run.commander().act_and_wait(&action);
     let done = done.map_err(|refusal| refused(&refusal))?;
     let mut text = format!("{word} {}: done", arguments.name);
     let mut result = json!({ "run": run.path(), "name": arguments.name, "done": word });
@@ -220,22 +229,20 @@ fn force(arguments: &Arguments, cluster: &Cluster) -> Result<Force, Answer> {
 }
 
 /// A write of an operator input.
-fn write(arguments: &Arguments, cluster: &Cluster) -> Result<Write, Answer> {
+fn write(arguments: &Arguments, cluster: &Cluster, role: Role) -> Result<Write, Answer> {
     let text = arguments.signal.as_deref().unwrap_or_default();
     let (input, value) = text.split_once('=').unwrap_or((text, ""));
     let member = crate::member::find(cluster, &arguments.name)?;
-    let write = new_write(cluster, member, input.trim(), value);
-    let write = write
-        .map_err(|problem| Answer::failed(Status::BadInput, problem.code(), problem.to_string()))?;
-    let write = Write {
-        role: Role::Engineer,
-        owner: crate::inspect::top::owner(),
-        reason: arguments.reason.clone(),
-        ..write
+    let owner = crate::inspect::top::owner();
+    let request = WriteRequest {
+        input: input.trim(),
+        value: RequestedValue::Text(value),
+        role,
+        owner: &owner,
+        reason: &arguments.reason,
     };
-    let checked = write.check();
-    checked.map_err(|error| Answer::failed(Status::BadInput, "U0556", error.to_string()))?;
-    Ok(write)
+    new_write(cluster, member, &request)
+        .map_err(|problem| Answer::failed(Status::BadInput, problem.code(), problem.to_string()))
 }
 
 /// The named run, or the newest running one of the cluster.
@@ -256,10 +263,7 @@ fn written(arguments: &Arguments) -> Result<Run, Answer> {
 }
 
 fn refused(refusal: &Refusal) -> Answer {
-    let message = refusal.to_string();
-    // Messages of other processes begin with a code.
-    let code = message.split(':').next().unwrap_or_default().to_owned();
-    Answer::failed(Status::Failed, &code, message)
+    Answer::failed(Status::Failed, &refusal.code(), refusal.to_string())
 }
 
 /// The answer of a remote I/O to a write.
@@ -289,10 +293,7 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
         What::ColdStart | What::AcceptState => Some(Request::Choose(arguments.choice())),
         What::Force => Some(Request::Force(force(arguments, &cluster)?)),
         What::Unforce => Some(Request::Unforce(place(arguments, &cluster)?.0)),
-        What::Write => Some(Request::Write(Write {
-            role: keys.role,
-            ..write(arguments, &cluster)?
-        })),
+        What::Write => Some(Request::Write(write(arguments, &cluster, keys.role)?)),
         What::Stop => Some(Request::Stop),
         What::Journal => None,
         What::Kill | What::Restart => {

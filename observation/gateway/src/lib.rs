@@ -1,4 +1,4 @@
-//! A run for other systems, read-only.
+//! A run for other systems: read, and with an option its operator inputs written.
 //!
 //! ```text
 //!   journal ──► Followed: snapshot ──┬─► Metrics     ──► Prometheus, over HTTP
@@ -6,7 +6,7 @@
 //!                                    └─► documents   ──► JSON under keys of Zenoh, at a limited rate
 //! ```
 //!
-//! The gateways read the journal only. No member is involved, and nothing here can be written.
+//! The gateways read the journal only, without any member. Writes go to the process that writes the run.
 
 #![allow(
     clippy::disallowed_methods,
@@ -21,6 +21,7 @@ mod metrics;
 mod mirror;
 mod modbus;
 mod register_map;
+mod writing;
 
 pub use error::GatewayError;
 pub use followed::{BOUNDS, Followed, Observation};
@@ -29,6 +30,7 @@ pub use metrics::{Metrics, exposition_of};
 pub use mirror::{Rate, mirror};
 pub use modbus::serve_modbus;
 pub use register_map::{Area, Place, ProcessImage, RegisterMap};
+pub use writing::{MAXIMUM_WRITES, WRITES_PER_SECOND, WriteGate};
 
 /// A run that is followed.
 pub use understudy_view::Run;

@@ -1,8 +1,9 @@
-//! The process image over Modbus TCP, read-only: write requests are answered by exception 1, *illegal function*. While the journal is being read,
-//! every request is answered by exception 6, *server device busy*.
+//! The process image over Modbus TCP. Without a [`WriteGate`] write requests are answered by exception 1, *illegal function*. While the
+//! journal is being read, every request to read is answered by exception 6, *server device busy*.
 
-use std::future::{Ready, ready};
-use std::net::{Ipv4Addr, SocketAddr};
+use std::future::Future;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -10,12 +11,21 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio_modbus::server::Service;
 use tokio_modbus::server::tcp::Server;
 use tokio_modbus::{ExceptionCode, Request, Response};
-use understudy_bus::{Connections, Listener, relay};
+use understudy_bus::{Connections, Listener, RelayedCallers, relay_known};
+use understudy_journal::{Refusal, RequestedValue, WriteRequest};
+use understudy_wire::{MAXIMUM_OWNER_LENGTH, Role};
 
 use crate::error::GatewayError;
 use crate::followed::Followed;
-use crate::register_map::{ProcessImage, RegisterMap};
+use crate::register_map::{ProcessImage, RegisterMap, Target};
 use crate::serve_until_asked;
+use crate::writing::WriteGate;
+
+/// Values of one request to write.
+const MOST_WRITES: usize = 8;
+
+/// Reason of every write in the journal.
+const REASON: &str = "by Modbus TCP";
 
 /// Connections at once.
 const MOST_CLIENTS: usize = 64;
@@ -29,32 +39,40 @@ const MOST_BITS: u16 = 2000;
 /// Likewise.
 const MOST_REGISTERS: u16 = 125;
 
-/// Serves the process image of `run` until SIGINT or SIGTERM; `ready` gets the address.
+/// Serves the process image of `run` until SIGINT or SIGTERM; `ready` gets the address. Clients write operator inputs through `gate`, with
+/// the role of an operator.
 ///
 /// # Errors
 /// It cannot listen there, or the cluster has more signals than there are addresses.
 pub fn serve_modbus(
     run: Followed,
+    gate: Option<WriteGate>,
     address: SocketAddr,
     ready: impl FnOnce(SocketAddr),
 ) -> Result<(), GatewayError> {
-    let map = Arc::new(RegisterMap::new(run.cluster())?);
-    let run = Arc::new(run);
-    serve_until_asked(address, ready, |listener| serve(listener, run, map))
+    let map = RegisterMap::new(run.cluster())?;
+    let served = Arc::new(Served { run, map, gate });
+    serve_until_asked(address, ready, |listener| serve(listener, served))
 }
 
-async fn serve(
-    listener: TcpListener,
-    run: Arc<Followed>,
-    map: Arc<RegisterMap>,
-) -> std::io::Result<()> {
+/// What all clients share.
+struct Served {
+    run: Followed,
+    map: RegisterMap,
+    gate: Option<WriteGate>,
+}
+
+async fn serve(listener: TcpListener, served: Arc<Served>) -> std::io::Result<()> {
     let inner = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await?;
     let address = inner.local_addr()?;
     let connections = Connections::new(MOST_CLIENTS, 3);
-    let relayed = relay(Listener::new(listener, connections, PATIENCE), address);
-    let connected = move |stream: TcpStream, _: SocketAddr| {
-        let (run, map) = (Arc::clone(&run), Arc::clone(&map));
-        async move { Ok(Some((Client { run, map }, stream))) }
+    let callers = RelayedCallers::default();
+    let listener = Listener::new(listener, connections, PATIENCE);
+    let relayed = relay_known(listener, address, callers.clone());
+    let connected = move |stream: TcpStream, seen: SocketAddr| {
+        let served = Arc::clone(&served);
+        let caller = callers.of(seen).unwrap_or(seen).ip();
+        async move { Ok(Some((Client { served, caller }, stream))) }
     };
     // The library ends with the first connection that the system refuses, so it only gets admitted connections.
     let server = Server::new(inner);
@@ -66,21 +84,112 @@ async fn serve(
 }
 
 struct Client {
-    run: Arc<Followed>,
-    map: Arc<RegisterMap>,
+    served: Arc<Served>,
+    caller: IpAddr,
 }
 
 impl Service for Client {
     type Request = Request<'static>;
     type Response = Response;
     type Exception = ExceptionCode;
-    type Future = Ready<Result<Response, ExceptionCode>>;
+    type Future = Pin<Box<dyn Future<Output = Result<Response, ExceptionCode>> + Send>>;
 
     fn call(&self, request: Self::Request) -> Self::Future {
-        // Stale values would be mistaken for the present.
-        let present = self.run.snapshot();
-        let present = present.map_err(|_reading| ExceptionCode::ServerDeviceBusy);
-        ready(present.and_then(|present| answer(&self.map.image(&present), &request)))
+        let (served, caller) = (Arc::clone(&self.served), self.caller);
+        Box::pin(async move {
+            let Served { run, map, gate } = &*served;
+            if let (Some(gate), Some(written)) = (gate, written(map, &request)) {
+                write(gate, caller, &written?).await?;
+                return Ok(confirmation(&request));
+            }
+            // Stale values would be mistaken for the present.
+            let present = run.snapshot();
+            let present = present.map_err(|_reading| ExceptionCode::ServerDeviceBusy)?;
+            answer(&map.image(&present), &request)
+        })
+    }
+}
+
+/// Values of operator inputs, as they are stored.
+type Written<'a> = Vec<(&'a Target, u64)>;
+
+/// The operator inputs that a request writes; nothing for one that writes none.
+fn written<'a>(
+    map: &'a RegisterMap,
+    request: &Request<'_>,
+) -> Option<Result<Written<'a>, ExceptionCode>> {
+    Some(match request {
+        Request::WriteSingleCoil(address, value) => map.written_coils(*address, &[*value]),
+        Request::WriteMultipleCoils(address, values) => map.written_coils(*address, values),
+        Request::WriteSingleRegister(address, word) => map.written_registers(*address, &[*word]),
+        Request::WriteMultipleRegisters(address, words) => map.written_registers(*address, words),
+        _ => return None,
+    })
+}
+
+/// Writes one value after the other; none where one of them is invalid.
+async fn write(
+    gate: &WriteGate,
+    caller: IpAddr,
+    written: &[(&Target, u64)],
+) -> Result<(), ExceptionCode> {
+    if written.is_empty() || written.len() > MOST_WRITES {
+        return Err(ExceptionCode::IllegalDataValue);
+    }
+    // A long IPv6 address loses its end.
+    let owner = format!("modbus {}", caller.to_canonical());
+    let owner: String = owner.chars().take(MAXIMUM_OWNER_LENGTH).collect();
+    let checked = written.iter().map(|(target, stored)| {
+        let request = WriteRequest {
+            input: &target.point.name,
+            value: RequestedValue::Stored(*stored),
+            role: Role::Operator,
+            owner: &owner,
+            reason: REASON,
+        };
+        let write = gate.check(target.member, &request);
+        write
+            .map(|write| (target.member, write))
+            .map_err(|refusal| exception(&refusal))
+    });
+    let checked: Vec<_> = checked.collect::<Result<_, _>>()?;
+    for (place, (member, write)) in checked.into_iter().enumerate() {
+        let done = gate.send(member, write, None).await;
+        done.map_err(|refusal| match place {
+            0 => exception(&refusal),
+            // The values before it are in effect.
+            _ => ExceptionCode::ServerDeviceFailure,
+        })?;
+    }
+    Ok(())
+}
+
+/// The exception of a refusal: *busy* where the same request may be sent again, because it had no effect.
+fn exception(refusal: &Refusal) -> ExceptionCode {
+    match refusal.code().as_str() {
+        "U0640" | "U0643" => ExceptionCode::IllegalDataAddress,
+        "U0641" | "U0642" => ExceptionCode::IllegalDataValue,
+        "U0551" | "U0557" | "U0645" | "U0646" | "U0647" => ExceptionCode::ServerDeviceBusy,
+        _ => ExceptionCode::ServerDeviceFailure,
+    }
+}
+
+/// The answer to a request whose values are in effect.
+fn confirmation(request: &Request<'_>) -> Response {
+    let count = |count: usize| u16::try_from(count).unwrap_or(u16::MAX);
+    match request {
+        Request::WriteSingleCoil(address, value) => Response::WriteSingleCoil(*address, *value),
+        Request::WriteSingleRegister(address, word) => {
+            Response::WriteSingleRegister(*address, *word)
+        }
+        Request::WriteMultipleCoils(address, values) => {
+            Response::WriteMultipleCoils(*address, count(values.len()))
+        }
+        Request::WriteMultipleRegisters(address, words) => {
+            Response::WriteMultipleRegisters(*address, count(words.len()))
+        }
+        // Others are not written.
+        _ => Response::Custom(0, Vec::new().into()),
     }
 }
 

@@ -2,20 +2,23 @@
 //!
 //! ```text
 //!   discrete inputs   the BOOLs of u(1), u(2), ... one after the other, in order of declaration
-//!   coils             the BOOLs of y(1), y(2), ... as driven; read-only
+//!   coils             the BOOLs of y(1), y(2), ... as driven; then those that operators write
 //!   registers         0..16 the run, 16.. the stations, 96.. the programs, 1120.. the numbers of u(1), y(1), u(2), ...;
-//!                     read as input or as holding registers
+//!                     read as input or as holding registers; setpoints of operators can be written
 //! ```
 //!
 //! Numbers of 32 bits take two registers and numbers of 64 bits four, the most significant one first. Addresses are those on the wire, from 0.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 
-use understudy_cluster::Cluster;
+use tokio_modbus::ExceptionCode;
+use understudy_cluster::{Cluster, OperatorDeclaration, value_text};
 use understudy_executable::Interface;
+use understudy_remote_io::OperatorInputKind;
 use understudy_typed::{Elementary, Point, Points};
 use understudy_view::{RunState, Snapshot, StationState, stored};
-use understudy_wire::MAXIMUM_PROGRAMS;
+use understudy_wire::{MAXIMUM_PROGRAMS, Member, ProgramId};
 
 use crate::error::GatewayError;
 
@@ -43,9 +46,9 @@ const ADDRESSES: usize = 1 << 16;
 pub enum Area {
     /// Read by function 2.
     DiscreteInput,
-    /// Read by function 1.
+    /// Read by function 1, and written by 5 and 15.
     Coil,
-    /// Read by functions 3 and 4.
+    /// Read by functions 3 and 4, and written by 6 and 16.
     Register,
 }
 
@@ -62,6 +65,19 @@ pub struct Place {
     pub name: String,
     /// Meaning of its values.
     pub meaning: Cow<'static, str>,
+    /// Whether it is an operator input.
+    pub writable: bool,
+}
+
+/// An operator input.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Target {
+    /// Remote I/O of its program.
+    pub(crate) member: Member,
+    /// The input.
+    pub(crate) point: Point,
+    /// Number of registers.
+    width: usize,
 }
 
 /// The map of one cluster.
@@ -73,6 +89,12 @@ pub struct RegisterMap {
     /// Registers of all numbers.
     numbers: usize,
     stations: usize,
+    /// The operator inputs behind the outputs among the coils.
+    coils: Vec<Target>,
+    /// Address of the first of these coils.
+    first_coil: usize,
+    /// Setpoints by their first registers.
+    setpoints: BTreeMap<usize, Target>,
 }
 
 /// The process image that clients read.
@@ -135,6 +157,7 @@ impl RegisterMap {
     pub fn new(cluster: &Cluster) -> Result<Self, GatewayError> {
         let programs = cluster.controllers();
         let mut places = Vec::new();
+        let (mut coils, mut first_coil) = (Vec::new(), 0);
         for (area, meaning) in [(Area::DiscreteInput, INPUT), (Area::Coil, OUTPUT)] {
             let signals = programs.iter().flat_map(|program| {
                 let Interface { inputs, outputs } = &program.interface;
@@ -152,7 +175,22 @@ impl RegisterMap {
                 width: 1,
                 name,
                 meaning: meaning.into(),
+                writable: false,
             }));
+            if area == Area::Coil {
+                first_coil = places.len() - first;
+                for target in targets(cluster, |of| of == Elementary::Bool) {
+                    places.push(Place {
+                        area,
+                        address: (places.len() - first) as u16,
+                        width: 1,
+                        name: target.name,
+                        meaning: target.meaning.into(),
+                        writable: true,
+                    });
+                    coils.push(target.target);
+                }
+            }
             let bits = places.len() - first;
             if bits > ADDRESSES {
                 return Err(GatewayError::TooManyBits {
@@ -167,6 +205,7 @@ impl RegisterMap {
             width,
             name,
             meaning: meaning.into(),
+            writable: false,
         };
         for (address, width, name, meaning) in OF_RUN {
             places.push(register(address.into(), width, name.to_owned(), meaning));
@@ -194,17 +233,29 @@ impl RegisterMap {
         }
         let interfaces: Vec<Interface> = programs.iter().map(|it| it.interface.clone()).collect();
         let mut address = NUMBERS;
+        let mut setpoints = BTreeMap::new();
+        let mut written: BTreeMap<String, WritableInput> =
+            targets(cluster, |of| of != Elementary::Bool)
+                .map(|target| (target.name.clone(), target))
+                .collect();
         for (program, interface) in programs.iter().zip(&interfaces) {
             for (points, meaning) in [(&interface.inputs, INPUT), (&interface.outputs, OUTPUT)] {
                 for point in points.iter().filter(|point| point.of != Elementary::Bool) {
                     let width = registers_of(point);
+                    let name = format!("{}.{}", program.name, point.name);
+                    let target = written.remove(&name);
+                    let meaning = target.as_ref().map_or(meaning, |target| &target.meaning);
                     places.push(Place {
                         area: Area::Register,
                         address: address as u16,
                         width: width as u16,
-                        name: format!("{}.{}", program.name, point.name),
+                        name,
                         meaning: format!("{}: {meaning}", point.of).into(),
+                        writable: target.is_some(),
                     });
+                    if let Some(target) = target {
+                        setpoints.insert(address, target.target);
+                    }
                     address += width;
                 }
             }
@@ -220,7 +271,45 @@ impl RegisterMap {
             interfaces,
             numbers: address - NUMBERS,
             stations: count,
+            coils,
+            first_coil,
+            setpoints,
         })
+    }
+
+    /// The operator inputs of `values` from a coil on, each with its value as stored.
+    pub(crate) fn written_coils(
+        &self,
+        address: u16,
+        values: &[bool],
+    ) -> Result<Vec<(&Target, u64)>, ExceptionCode> {
+        let first = usize::from(address).checked_sub(self.first_coil);
+        let targets = first.and_then(|first| self.coils.get(first..first + values.len()));
+        let targets = targets.ok_or(ExceptionCode::IllegalDataAddress)?;
+        let values = values.iter().map(|value| u64::from(*value));
+        Ok(targets.iter().zip(values).collect())
+    }
+
+    /// The setpoints of `words` from a register on, each with its value as stored. Half a setpoint has no address.
+    pub(crate) fn written_registers(
+        &self,
+        address: u16,
+        words: &[u16],
+    ) -> Result<Vec<(&Target, u64)>, ExceptionCode> {
+        let mut address = usize::from(address);
+        let mut left = words;
+        let mut written = Vec::new();
+        while !left.is_empty() {
+            let target = self.setpoints.get(&address);
+            let target = target.filter(|target| target.width <= left.len());
+            let target = target.ok_or(ExceptionCode::IllegalDataAddress)?;
+            let (own, rest) = left.split_at(target.width);
+            let stored = stored_of(target.point.of, own).ok_or(ExceptionCode::IllegalDataValue)?;
+            written.push((target, stored));
+            address += target.width;
+            left = rest;
+        }
+        Ok(written)
     }
 
     /// Every place, by table and address.
@@ -312,8 +401,83 @@ impl RegisterMap {
                 &mut image.registers,
             );
         }
+        for target in &self.coils {
+            let Member::RemoteIo(program) = target.member else {
+                continue;
+            };
+            let program = snapshot.programs.get(program.index());
+            let inputs = program.and_then(|program| program.inputs.as_deref());
+            let value = inputs.and_then(|inputs| stored(&target.point, inputs));
+            image.coils.push(value == Some(1));
+        }
         image
     }
+}
+
+/// An operator input as a place of the map.
+struct WritableInput {
+    name: String,
+    meaning: String,
+    target: Target,
+}
+
+/// The operator inputs of all programs whose type is `wanted`.
+fn targets(
+    cluster: &Cluster,
+    wanted: impl Fn(Elementary) -> bool + Copy,
+) -> impl Iterator<Item = WritableInput> {
+    let programs = cluster.controllers().iter().zip(cluster.remote_ios());
+    programs
+        .enumerate()
+        .flat_map(move |(index, (controller, remote_io))| {
+            let member = Member::RemoteIo(ProgramId(index as u8));
+            let inputs = remote_io.inputs.iter();
+            inputs.filter_map(move |source| {
+                let declaration = source.operator()?;
+                let point = controller.interface.inputs.find(&source.name)?;
+                wanted(point.of).then(|| WritableInput {
+                    name: format!("{}.{}", controller.name, source.name),
+                    meaning: meaning_of(declaration),
+                    target: Target {
+                        member,
+                        point: point.clone(),
+                        width: registers_of(point),
+                    },
+                })
+            })
+        })
+}
+
+/// How an operator writes an input.
+fn meaning_of(declaration: &OperatorDeclaration) -> String {
+    let input = &declaration.input;
+    let role = input.role.word();
+    match input.kind {
+        OperatorInputKind::Level => format!("level, written by the role {role}"),
+        OperatorInputKind::Pulse(_) => format!("pulse: TRUE presses it, by the role {role}"),
+        OperatorInputKind::Setpoint { low, high } => {
+            let text = |stored| value_text(input.place.of, stored);
+            let unit = declaration.unit.as_deref().unwrap_or_default();
+            let range = format!("{} to {} {unit}", text(low), text(high));
+            format!("setpoint, {}, written by the role {role}", range.trim_end())
+        }
+    }
+}
+
+/// The value of registers, as a signal of that type stores it; nothing where it does not fit.
+fn stored_of(of: Elementary, words: &[u16]) -> Option<u64> {
+    let value = words
+        .iter()
+        .fold(0, |value, word| value << 16 | u64::from(*word));
+    if of.bits() >= 16 {
+        return Some(value);
+    }
+    let stored = value & of.mask();
+    let is_whole = match of.is_signed() {
+        true => of.signed(stored) == i128::from(value as u16 as i16),
+        false => stored == value,
+    };
+    is_whole.then_some(stored)
 }
 
 /// The points of an image that is written as bits, such as `0110`: BOOLs as bits, numbers as registers; 0 where nothing is known.
@@ -345,4 +509,23 @@ fn registers_of(point: &Point) -> usize {
 fn state_number(state: StationState) -> u16 {
     let place = StationState::ALL.iter().position(|known| *known == state);
     place.map_or(0, |place| place as u16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn registers_hold_the_values_that_fit() {
+        let check = |of, words: &[u16], expected| {
+            assert_eq!(stored_of(of, words), expected, "{of} {words:?}");
+        };
+        check(Elementary::Real, &[0x42f0, 0], Some(0x42f0_0000));
+        check(Elementary::Int, &[0xffff], Some(0xffff));
+        check(Elementary::Sint, &[0xffff], Some(0xff));
+        check(Elementary::Sint, &[127], Some(127));
+        check(Elementary::Sint, &[128], None);
+        check(Elementary::Usint, &[255], Some(255));
+        check(Elementary::Usint, &[256], None);
+    }
 }

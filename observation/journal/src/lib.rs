@@ -27,7 +27,8 @@ pub use named_files::{ALLOWED_FOLDERS, named_file};
 pub use numbering::Numbering;
 pub use operator::{
     Acknowledgement, Command, Commanded, Commander, Commands, Done, OperatorAction, PendingWrites,
-    Refusal, RunSocket, WriteProblem, commands, new_write, write_answer,
+    Refusal, RequestedValue, RunSocket, WriteProblem, WriteRequest, WriteSessions, commands,
+    new_write, write_answer,
 };
 pub use record::{Happening, LABORATORY, Record, RunEvent, moment};
 pub use rules::{Process, SourceCounts, is_blocked, is_provable};

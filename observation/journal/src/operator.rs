@@ -10,6 +10,7 @@
 
 mod acknowledgement;
 mod new_write;
+mod sessions;
 mod socket;
 
 use std::path::{Path, PathBuf};
@@ -27,7 +28,8 @@ use understudy_remote_io::Event as RemoteIoEvent;
 use crate::record::{Happening, Record};
 
 pub use acknowledgement::Acknowledgement;
-pub use new_write::{WriteProblem, new_write};
+pub use new_write::{RequestedValue, WriteProblem, WriteRequest, new_write};
+pub use sessions::WriteSessions;
 pub use socket::RunSocket;
 pub(crate) use socket::SOCKET;
 
@@ -124,6 +126,9 @@ pub enum Refusal {
         /// Reason.
         refusal: WriteRefusal,
     },
+    /// A write as it was asked for is not a write to the program.
+    #[error(transparent)]
+    Problem(#[from] WriteProblem),
     /// The outcome of a write is not known yet.
     #[error(
         "U0648: the remote I/O has taken the value, and no output with it was applied in time: check the state of the program"
@@ -261,6 +266,18 @@ enum Way {
     Run(Arc<Path>),
 }
 
+/// Waits for an action on a thread that has nothing else to do.
+fn block_on<T>(action: impl Future<Output = T>) -> Result<T, Refusal> {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build();
+    let runtime = runtime.map_err(|error| Refusal::System {
+        name: "a runtime".to_owned(),
+        reason: error.to_string(),
+    })?;
+    Ok(runtime.block_on(action))
+}
+
 /// The end of whoever writes the run.
 #[derive(Debug)]
 pub struct Commands {
@@ -326,14 +343,7 @@ impl Commander {
     /// # Errors
     /// [`Refusal`].
     pub fn act_and_wait(&self, action: &OperatorAction) -> Result<Done, Refusal> {
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build();
-        let runtime = runtime.map_err(|error| Refusal::System {
-            name: "a runtime".to_owned(),
-            reason: error.to_string(),
-        })?;
-        runtime.block_on(self.act(action.clone()))
+        block_on(self.act(action.clone()))?
     }
 
     async fn act(&self, action: OperatorAction) -> Result<Done, Refusal> {

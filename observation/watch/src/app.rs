@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError, RwLock, RwLockReadGuard};
 
 use tokio::sync::{Semaphore, watch};
-use understudy_journal::Commander;
+use understudy_journal::{Commander, WriteSessions};
 use understudy_view::{Alarm, Reading, Run};
 
 use crate::api::not_remembered;
@@ -34,6 +34,8 @@ pub(crate) struct App {
     model: Arc<RwLock<Model>>,
     pub(crate) newest: watch::Receiver<Newest>,
     pub(crate) commanding: Commanding,
+    /// Writes to operator inputs.
+    pub(crate) writes: WriteSessions,
     pub(crate) logins: Option<Logins>,
     /// Names of the page besides its addresses.
     pub(crate) names: Vec<String>,
@@ -57,6 +59,7 @@ impl App {
         Self {
             model,
             newest,
+            writes: WriteSessions::new(commanding.commander.clone()),
             commanding,
             logins,
             names,

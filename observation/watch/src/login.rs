@@ -158,12 +158,7 @@ fn read_tokens(text: &str) -> Result<Vec<(Hash, Person)>, String> {
     let mut wrong = Vec::new();
     for (number, line) in lines {
         let words: Vec<&str> = line.split_whitespace().collect();
-        let role = match words.first() {
-            Some(&"viewer") => Some(Role::Viewer),
-            Some(&"operator") => Some(Role::Operator),
-            Some(&"engineer") => Some(Role::Engineer),
-            _ => None,
-        };
+        let role = words.first().and_then(|word| Role::of_word(word));
         match (role, words.as_slice()) {
             (Some(role), [_, name, token]) if token.len() >= LEAST_TOKEN_LENGTH => {
                 let person = Person {

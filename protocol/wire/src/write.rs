@@ -27,6 +27,14 @@ pub struct WriteId {
     pub number: u32,
 }
 
+impl WriteId {
+    /// Identifier of the next write of the session; `None` where all numbers are used.
+    pub fn next(self) -> Option<Self> {
+        let number = self.number.checked_add(1)?;
+        Some(Self { number, ..self })
+    }
+}
+
 /// Rights of the person or program that writes, in ascending order.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default, Serialize, Deserialize,
@@ -43,6 +51,12 @@ pub enum Role {
 }
 
 impl Role {
+    /// The role of that name.
+    pub fn of_word(word: &str) -> Option<Self> {
+        let all = [Self::Viewer, Self::Operator, Self::Engineer];
+        all.into_iter().find(|role| role.word() == word)
+    }
+
     /// Its name in files and messages.
     pub fn word(self) -> &'static str {
         match self {

@@ -28,7 +28,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::time::{Instant, Sleep, sleep};
 
 pub(crate) use relay::Relay;
-pub use relay::{inner_address, relay};
+pub use relay::{RelayedCallers, inner_address, relay, relay_known};
 
 /// Descriptors that no listener gives to its callers; half of all where a process may have fewer than twice as many.
 pub const RESERVED_DESCRIPTORS: usize = 512;

@@ -36,8 +36,8 @@ pub use announcer::Announcer;
 pub use channel::{Admitted, ChannelSettings, DONE, TlsKeys};
 pub use clock::Clock;
 pub use connections::{
-    Connection, Connections, Listener, RESERVED_DESCRIPTORS, RefusedConnections, Slot,
-    inner_address, relay,
+    Connection, Connections, Listener, RESERVED_DESCRIPTORS, RefusedConnections, RelayedCallers,
+    Slot, inner_address, relay, relay_known,
 };
 pub use control::{Commands, Interruption, hold_back_signals};
 pub use endpoints::{Endpoints, Peer};

@@ -1,4 +1,4 @@
-//! A write as a person asks for it: by the name of the input and the text of the value.
+//! A write as a person or a program asks for it: by the name of the input.
 
 use std::collections::hash_map::RandomState;
 use std::hash::{BuildHasher, Hasher};
@@ -6,7 +6,31 @@ use std::hash::{BuildHasher, Hasher};
 use understudy_cluster::{Cluster, InputSource, typed_value, value_text};
 use understudy_remote_io::{OperatorInput, OperatorInputKind, ValueMismatch};
 use understudy_text::spelling::suggestion;
-use understudy_wire::{Member, PointValue, Role, Write, WriteId, WriteRefusal};
+use understudy_wire::{ForceError, Member, PointValue, Role, Write, WriteId, WriteRefusal};
+
+/// A write as a person or a program asks for it.
+#[derive(Debug, Clone, Copy)]
+pub struct WriteRequest<'a> {
+    /// Name of the operator input.
+    pub input: &'a str,
+    /// Value.
+    pub value: RequestedValue<'a>,
+    /// Rights of the writer, as the receiver of the request has found them.
+    pub role: Role,
+    /// Person or program that writes.
+    pub owner: &'a str,
+    /// Reason.
+    pub reason: &'a str,
+}
+
+/// A requested value.
+#[derive(Debug, Clone, Copy)]
+pub enum RequestedValue<'a> {
+    /// As a person types it.
+    Text(&'a str),
+    /// As the input stores it.
+    Stored(u64),
+}
 
 /// Reason why a text is not a write.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -41,6 +65,9 @@ pub enum WriteProblem {
         /// The limits.
         help: String,
     },
+    /// The owner or the reason is missing or too long.
+    #[error("U0556: {0}")]
+    Text(#[from] ForceError),
 }
 
 impl WriteProblem {
@@ -50,20 +77,28 @@ impl WriteProblem {
             Self::NoInput { .. } => WriteRefusal::NotWritable.code(),
             Self::Value { .. } => WriteRefusal::Type.code(),
             Self::Limits { .. } => WriteRefusal::Limits.code(),
+            Self::Text(_) => "U0556",
         }
     }
 }
 
-/// A write in a session of its own, without role, owner and reason.
+/// The first identifier of a new session.
+pub(super) fn new_id() -> WriteId {
+    // Different in each call of each process; it need not be secret.
+    let session = RandomState::new().build_hasher().finish();
+    WriteId { session, number: 1 }
+}
+
+/// A checked write, in a session of its own.
 ///
 /// # Errors
 /// [`WriteProblem`].
 pub fn new_write(
     cluster: &Cluster,
     member: Member,
-    input: &str,
-    text: &str,
+    request: &WriteRequest<'_>,
 ) -> Result<Write, WriteProblem> {
+    let input = request.input;
     let remote_io = match member {
         Member::RemoteIo(program) => cluster.remote_ios().get(program.index()),
         Member::Station(_) | Member::Plant(_) => None,
@@ -80,12 +115,19 @@ pub fn new_write(
         });
     };
     let of = declared.place.of;
+    let text = match request.value {
+        RequestedValue::Text(text) => text.trim().to_owned(),
+        RequestedValue::Stored(stored) => value_text(of, stored),
+    };
     let invalid = |help: String| WriteProblem::Value {
         input: input.to_owned(),
         text: text.chars().take(60).collect(),
         help,
     };
-    let stored = typed_value(text.trim(), of).map_err(invalid)?;
+    let stored = match request.value {
+        RequestedValue::Text(_) => typed_value(&text, of).map_err(invalid)?,
+        RequestedValue::Stored(stored) => stored,
+    };
     let value = PointValue::new(of.bits(), stored);
     declared.check(value).map_err(|mismatch| match mismatch {
         ValueMismatch::Type => invalid(format!("the input is {of}")),
@@ -95,16 +137,16 @@ pub fn new_write(
             help: limits(&declared),
         },
     })?;
-    // Different in each call of each process; it need not be secret.
-    let session = RandomState::new().build_hasher().finish();
-    Ok(Write {
-        id: WriteId { session, number: 1 },
+    let write = Write {
+        id: new_id(),
         input: declared.place.bit,
         value,
-        role: Role::default(),
-        owner: String::new(),
-        reason: String::new(),
-    })
+        role: request.role,
+        owner: request.owner.to_owned(),
+        reason: request.reason.to_owned(),
+    };
+    write.check()?;
+    Ok(write)
 }
 
 fn limits(input: &OperatorInput) -> String {

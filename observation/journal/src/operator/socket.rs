@@ -16,7 +16,7 @@ use tokio::net::{UnixListener, UnixStream};
 use tokio::sync::Semaphore;
 use tokio::task::JoinHandle;
 
-use super::{Commander, Done, OperatorAction, Refusal, acknowledgement};
+use super::{Command, Commander, Done, OperatorAction, Refusal, acknowledgement};
 
 /// In the directory of a run.
 pub(crate) const SOCKET: &str = "operator.sock";
@@ -140,7 +140,14 @@ pub(super) async fn ask(run: &Path, action: &OperatorAction) -> Result<Done, Ref
         Ok(Ok(Answer {
             refused: Some(why), ..
         })) => Err(Refusal::Said(why)),
-        Ok(Err(_)) | Err(_) => Err(Refusal::Busy),
+        // A write may have been taken before the answer was lost.
+        Ok(Err(_)) | Err(_) => Err(match action {
+            OperatorAction::Command {
+                command: Command::Write(_),
+                ..
+            } => Refusal::Undecided,
+            _ => Refusal::Busy,
+        }),
     }
 }
 

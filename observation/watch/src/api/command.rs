@@ -7,9 +7,9 @@ use axum::extract::rejection::JsonRejection;
 use axum::extract::{Extension, State};
 use serde::Deserialize;
 use serde_json::{Value, json};
-use understudy_journal::{Command, new_write};
+use understudy_journal::{Command, Done, Refusal, RequestedValue, WriteRequest, new_write};
 use understudy_wire::{
-    Force, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH, PointValue, SignalPlace, StateChoice, Write,
+    Force, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH, PointValue, SignalPlace, StateChoice,
 };
 
 use super::Answered;
@@ -88,17 +88,20 @@ pub(super) async fn command(
         AskedCommand::Rejoin => Command::Rejoin,
         AskedCommand::Unforce { signal } => Command::Unforce { signal },
         AskedCommand::Write { input, value } => {
-            let model = app.model();
-            let unknown = || Problem::unknown("the run has not started".to_owned());
-            let cluster = model.cluster().ok_or_else(unknown)?;
-            let write = new_write(cluster, member, &input, &value);
-            let write = write.map_err(|problem| Problem::bad(problem.to_string()))?;
-            Command::Write(Write {
+            let request = WriteRequest {
+                input: &input,
+                value: RequestedValue::Text(&value),
                 role: person.role,
-                owner: owner.clone(),
-                reason: reason.clone(),
-                ..write
-            })
+                owner: &owner,
+                reason: &reason,
+            };
+            let unknown = || Problem::unknown("the run has not started".to_owned());
+            let write = {
+                let model = app.model();
+                new_write(model.cluster().ok_or_else(unknown)?, member, &request)
+            };
+            let write = write.map_err(|problem| Problem::bad(problem.to_string()))?;
+            return answered(app.writes.write(member, write).await);
         }
         AskedCommand::Force {
             signal,
@@ -113,7 +116,10 @@ pub(super) async fn command(
         }),
     };
     let commander = &app.commanding.commander;
-    let done = commander.give(member, command, owner, reason).await;
+    answered(commander.give(member, command, owner, reason).await)
+}
+
+fn answered(done: Result<Done, Refusal>) -> Answered<Json<Value>> {
     let done = done.map_err(|refusal| Problem::refused(&refusal.to_string()))?;
     Ok(Json(match done.cycle {
         Some(cycle) => json!({ "cycle": cycle }),

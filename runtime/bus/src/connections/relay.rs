@@ -1,16 +1,18 @@
 //! Connections for a library that accepts for itself.
 
+use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
 use tokio::io::{copy, split};
-use tokio::net::{TcpListener, TcpStream};
+use tokio::net::{TcpListener, TcpSocket};
 use tokio::sync::oneshot;
 
-use super::{Connections, Listener};
+use super::{Connections, Listener, lock};
 use crate::rights::run_in_background;
 
 /// A free port of the loopback interface, for a library that accepts for itself.
@@ -23,23 +25,54 @@ pub fn inner_address() -> io::Result<SocketAddr> {
     std::net::TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?.local_addr()
 }
 
+/// Callers whose connections are relayed, by the addresses that the library sees.
+#[derive(Debug, Clone, Default)]
+pub struct RelayedCallers(Arc<Mutex<BTreeMap<SocketAddr, SocketAddr>>>);
+
+impl RelayedCallers {
+    /// The caller behind the address that the library sees.
+    pub fn of(&self, seen: SocketAddr) -> Option<SocketAddr> {
+        lock(&self.0).get(&seen).copied()
+    }
+}
+
 /// Hands every connection that `listener` accepts over to the listener at `inner`, byte by byte, until either side has ended it. Each takes
 /// three descriptors: two here, and one there.
-pub async fn relay(mut listener: Listener, inner: SocketAddr) -> Infallible {
+pub async fn relay(listener: Listener, inner: SocketAddr) -> Infallible {
+    relay_known(listener, inner, RelayedCallers::default()).await
+}
+
+/// As [`relay`]; `callers` knows each caller while its connection is open.
+pub async fn relay_known(
+    mut listener: Listener,
+    inner: SocketAddr,
+    callers: RelayedCallers,
+) -> Infallible {
     loop {
-        let (caller, _) = listener.accept().await;
+        let (caller, peer) = listener.accept().await;
+        let callers = callers.clone();
         tokio::spawn(async move {
-            let Ok(answerer) = TcpStream::connect(inner).await else {
+            let socket = TcpSocket::new_v4().and_then(|socket| {
+                socket.bind((Ipv4Addr::LOCALHOST, 0).into())?;
+                let seen = socket.local_addr()?;
+                Ok((socket, seen))
+            });
+            let Ok((socket, seen)) = socket else {
                 return;
             };
-            let _ = answerer.set_nodelay(true);
-            let (mut from_caller, mut to_caller) = split(caller);
-            let (mut from_answerer, mut to_answerer) = answerer.into_split();
-            // Why it ends is the matter of those who talk.
-            tokio::select! {
-                _ = copy(&mut from_caller, &mut to_answerer) => {}
-                _ = copy(&mut from_answerer, &mut to_caller) => {}
+            // The library may ask as soon as it accepts.
+            lock(&callers.0).insert(seen, peer);
+            if let Ok(answerer) = socket.connect(inner).await {
+                let _ = answerer.set_nodelay(true);
+                let (mut from_caller, mut to_caller) = split(caller);
+                let (mut from_answerer, mut to_answerer) = answerer.into_split();
+                // Why it ends is the matter of those who talk.
+                tokio::select! {
+                    _ = copy(&mut from_caller, &mut to_answerer) => {}
+                    _ = copy(&mut from_answerer, &mut to_caller) => {}
+                }
             }
+            lock(&callers.0).remove(&seen);
         });
     }
 }
