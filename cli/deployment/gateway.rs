@@ -72,6 +72,9 @@ enum What {
         /// Maximum rate of each changed document: 1/s to 50/s
         #[arg(long = "mirror", value_name = "RATE", default_value = "5/s")]
         rate: Rate,
+        /// Let clients write operator inputs, with the role of an operator
+        #[arg(long)]
+        allow_writes: bool,
     },
 }
 
@@ -118,9 +121,16 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
                 json!({ "registers": map.places() }),
             ))
         }
-        What::Zenoh { run, listen, rate } => {
-            let run = Followed::new(&run.open()?).map_err(failed)?;
-            mirror(&run, *listen, *rate, &mut ready).map_err(failed)?;
+        What::Zenoh {
+            run,
+            listen,
+            rate,
+            allow_writes,
+        } => {
+            let run = run.open()?;
+            let gate = allow_writes.then(|| WriteGate::new(&run));
+            let run = Followed::new(&run).map_err(failed)?;
+            mirror(&run, gate, *listen, *rate, &mut ready).map_err(failed)?;
             Ok(ended())
         }
     }

@@ -20,6 +20,7 @@ mod labels;
 mod metrics;
 mod mirror;
 mod modbus;
+mod questions;
 mod register_map;
 mod writing;
 

@@ -3,9 +3,12 @@
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::str::FromStr;
+use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::{Map, Value, json};
+use tokio::runtime::Runtime;
+use tokio::sync::Semaphore;
 use understudy_bus::Announcer;
 use understudy_cluster::Cluster;
 use understudy_executable::Interface;
@@ -15,6 +18,8 @@ use understudy_view::{ProgramSnapshot, Snapshot};
 
 use crate::error::GatewayError;
 use crate::followed::Followed;
+use crate::questions;
+use crate::writing::{MAXIMUM_WRITES, WriteGate};
 use crate::{asked_to_end, runtime};
 
 /// Maximum rate at which each document is published.
@@ -35,19 +40,24 @@ impl FromStr for Rate {
 }
 
 /// Publishes the changes of `run` under `understudy/mirror/CLUSTER/...` until SIGINT or SIGTERM, to the clients of `address`; `ready` gets the
-/// address when it listens. A late client queries the newest documents.
+/// address when it listens. A late client queries the newest documents. With a `gate`, questions under the key `write` are writes to operator
+/// inputs, with the role of an operator.
 ///
 /// # Errors
 /// Zenoh does not start there.
 pub fn mirror(
     run: &Followed,
+    gate: Option<WriteGate>,
     address: SocketAddr,
     rate: Rate,
     ready: impl FnOnce(SocketAddr),
 ) -> Result<(), GatewayError> {
     let runtime = runtime()?;
     let root = format!("understudy/mirror/{}", run.cluster().name());
-    let announcer = Announcer::open(address, &root)?;
+    let mut announcer = Announcer::open(address, &root)?;
+    if let Some(gate) = gate {
+        take_writes(&mut announcer, gate, &runtime)?;
+    }
     let end = {
         let _entered = runtime.enter();
         asked_to_end()
@@ -79,6 +89,28 @@ pub fn mirror(
             }
         }
     });
+    Ok(())
+}
+
+/// Writes each in a task of its own; as many as fit at once.
+fn take_writes(
+    announcer: &mut Announcer,
+    gate: WriteGate,
+    runtime: &Runtime,
+) -> Result<(), GatewayError> {
+    let gate = Arc::new(gate);
+    let handle = runtime.handle().clone();
+    let places = Arc::new(Semaphore::new(MAXIMUM_WRITES));
+    announcer.take_questions("write", move |question| {
+        let Ok(place) = Arc::clone(&places).try_acquire_owned() else {
+            return question.answer(&questions::busy().to_string());
+        };
+        let gate = Arc::clone(&gate);
+        handle.spawn(async move {
+            let _place = place;
+            questions::write(&gate, question).await;
+        });
+    })?;
     Ok(())
 }
 

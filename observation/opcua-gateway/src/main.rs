@@ -11,7 +11,7 @@ use serde_json::json;
 use understudy_opcua_gateway::{Login, OpcuaError, Settings, Variable, serve, variables};
 use understudy_view::Run;
 
-/// Show a run as an OPC UA server; nothing can be written.
+/// Show a run as an OPC UA server.
 #[derive(Debug, Parser)]
 #[command(
     name = "understudy-opcua",
@@ -21,6 +21,7 @@ Example:
   understudy-opcua serve runs/latest
   understudy-opcua nodes runs/latest
   understudy-opcua serve runs/latest --listen 192.0.2.7:4840 --certificates opcua
+  understudy-opcua serve runs/latest --certificates opcua --logins logins
 
 It reads the journal of the run, finished or not, as `understudy gateway` does
 (docs/how-to/monitoring.md). Exit status: 0 when all is well, 1 when it cannot serve, 2 when an
@@ -61,7 +62,8 @@ Example:
 
 Without --certificates there is no security, and only this machine is served. With it the
 policies are Basic256Sha256 and Aes256_Sha256_RsaPss. A client that is not trusted yet is
-refused, and lies in FOLDER/rejected for you to move to FOLDER/trusted.")]
+refused, and lies in FOLDER/rejected for you to move to FOLDER/trusted. A login with the role
+operator or engineer writes operator inputs; without logins nothing can be written.")]
 struct ServeArguments {
     #[command(flatten)]
     run: RunArgument,
@@ -74,7 +76,15 @@ struct ServeArguments {
     /// A folder for the certificate of the server, made where there is none, and for those of clients
     #[arg(long, value_name = "FOLDER")]
     certificates: Option<PathBuf>,
-    /// User name for the login; without it no login is needed
+    /// File with a line `ROLE NAME PASSWORD` for each login, readable by its owner only; roles: viewer, operator, engineer
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "certificates",
+        conflicts_with = "user"
+    )]
+    logins: Option<PathBuf>,
+    /// User name of a viewer; without it and --logins no login is needed
     #[arg(
         long,
         value_name = "NAME",
@@ -132,15 +142,16 @@ fn main() -> ExitCode {
 
 fn serve_run(arguments: &ServeArguments) -> Result<(), OpcuaError> {
     let run = Run::open(&arguments.run.run)?;
-    let login = match (&arguments.user, &arguments.password_file) {
-        (Some(user), Some(file)) => Some(Login::read(user, file)?),
-        _ => None,
+    let logins = match (&arguments.logins, &arguments.user, &arguments.password_file) {
+        (Some(file), ..) => Login::read_all(file)?,
+        (_, Some(user), Some(file)) => vec![Login::read(user, file)?],
+        _ => Vec::new(),
     };
     let settings = Settings {
         address: arguments.listen,
         host: arguments.host.clone(),
         certificates: arguments.certificates.clone(),
-        login,
+        logins,
     };
     serve(&run, &settings, |address| {
         say(&format!("listening on {address}"));
@@ -170,6 +181,7 @@ fn document(variable: &Variable) -> serde_json::Value {
         "identifier": variable.path(),
         "type": variable.kind().word(),
         "meaning": variable.meaning(),
+        "writable": variable.is_writable(),
     })
 }
 

@@ -1,4 +1,4 @@
-//! Who may read: the certificate of the server, those of clients that are trusted, and a login.
+//! Who may read and write: the certificate of the server, those of clients that are trusted, and logins with roles.
 //!
 //! ```text
 //!   FOLDER/own/cert.der          for clients to trust; made where there is none
@@ -14,6 +14,7 @@ use std::os::unix::fs::{DirBuilderExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
 use opcua::crypto::{CertificateStore, X509Data};
+use understudy_wire::{MAXIMUM_OWNER_LENGTH, Role};
 
 use crate::error::OpcuaError;
 
@@ -22,6 +23,10 @@ const KEY_BITS: u32 = 2048;
 
 /// That the certificate holds, as those of `understudy keys` do.
 const DAYS: u32 = 730;
+
+/// What a line of a file of logins is.
+const EXPECTED: &str =
+    "expected `viewer NAME PASSWORD`, `operator NAME PASSWORD` or `engineer NAME PASSWORD`";
 
 /// Where the server listens, and who may read.
 #[derive(Debug, Clone)]
@@ -32,15 +37,17 @@ pub struct Settings {
     pub host: Option<String>,
     /// With a folder everything is signed and encrypted, and clients are known by their certificates.
     pub certificates: Option<PathBuf>,
-    /// Without a login, every client with a trusted certificate may read.
-    pub login: Option<Login>,
+    /// Without logins, every client with a trusted certificate may read, and none may write.
+    pub logins: Vec<Login>,
 }
 
-/// A name with its password.
+/// A name with its password and its role.
 #[derive(Clone)]
 pub struct Login {
     /// Who.
     pub user: String,
+    /// Rights: a viewer reads, others also write operator inputs.
+    pub role: Role,
     /// The secret.
     password: String,
 }
@@ -52,7 +59,50 @@ impl std::fmt::Debug for Login {
 }
 
 impl Login {
-    /// The password is the first line of `file`, which only its owner may read.
+    /// The logins of `file`, which only its owner may read: a line `ROLE NAME PASSWORD` each.
+    ///
+    /// # Errors
+    /// [`OpcuaError::Password`].
+    pub fn read_all(file: &Path) -> Result<Vec<Self>, OpcuaError> {
+        let wrong = |reason: String| OpcuaError::Password {
+            path: file.to_owned(),
+            reason,
+        };
+        let text = fs::read_to_string(file).map_err(|error| wrong(error.to_string()))?;
+        private(file).map_err(wrong)?;
+        let mut logins: Vec<Self> = Vec::new();
+        for (number, line) in text.lines().map(str::trim).enumerate() {
+            let number = number + 1;
+            if line.is_empty() || line.starts_with('#') {
+                continue;
+            }
+            let words: Vec<&str> = line.split_whitespace().collect();
+            let [role, user, password] = words[..] else {
+                return Err(wrong(format!("line {number}: {EXPECTED}")));
+            };
+            let role = Role::of_word(role);
+            let role = role.ok_or_else(|| wrong(format!("line {number}: {EXPECTED}")))?;
+            if user.chars().count() > MAXIMUM_OWNER_LENGTH {
+                return Err(wrong(format!(
+                    "line {number}: a name has at most {MAXIMUM_OWNER_LENGTH} characters"
+                )));
+            }
+            if logins.iter().any(|login| login.user == user) {
+                return Err(wrong(format!("line {number}: {user} has a line already")));
+            }
+            logins.push(Self {
+                user: user.to_owned(),
+                role,
+                password: password.to_owned(),
+            });
+        }
+        if logins.is_empty() {
+            return Err(wrong("it contains no login".to_owned()));
+        }
+        Ok(logins)
+    }
+
+    /// A viewer. The password is the first line of `file`, which only its owner may read.
     ///
     /// # Errors
     /// [`OpcuaError::Password`].
@@ -66,6 +116,7 @@ impl Login {
         match text.lines().next() {
             Some(password) if !password.is_empty() => Ok(Self {
                 user: user.to_owned(),
+                role: Role::Viewer,
                 password: password.to_owned(),
             }),
             _ => Err(wrong("its first line is to be the password".to_owned())),

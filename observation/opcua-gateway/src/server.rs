@@ -1,6 +1,6 @@
 //! The server: nodes that are made once, and values that are set when they change.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -11,23 +11,24 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use opcua::crypto::SecurityPolicy;
 use opcua::nodes::{BaseEventType, EventNotifier, ObjectBuilder, VariableBuilder};
 use opcua::server::address_space::AddressSpace;
-use opcua::server::diagnostics::NamespaceMetadata;
-use opcua::server::node_manager::memory::{SimpleNodeManager, simple_node_manager};
 use opcua::server::{
     ANONYMOUS_USER_TOKEN_ID, Server, ServerBuilder, ServerEndpoint, ServerHandle, ServerUserToken,
 };
 use opcua::types::{
-    BuildInfo, ByteString, DataValue, DateTime, MessageSecurityMode, NodeId, ObjectId,
-    ObjectTypeId, QualifiedName, VariableTypeId, Variant,
+    BuildInfo, ByteString, DataTypeId, DataValue, DateTime, EUInformation, ExtensionObject,
+    MessageSecurityMode, NodeId, ObjectId, ObjectTypeId, QualifiedName, Range, VariableTypeId,
+    Variant,
 };
 use tokio::net::TcpListener;
 use understudy_bus::{Connections, Listener, relay};
-use understudy_gateway::{Followed, serve_until_asked};
+use understudy_gateway::{Followed, WriteGate, serve_until_asked};
 use understudy_view::{Event, Level, Run};
+use understudy_wire::Role;
 
 use crate::error::OpcuaError;
-use crate::security::{Settings, certificate_and_key};
-use crate::tree::{Kind, Reading, Seen, Variable, message, variables};
+use crate::manager::{NodeManager, Writing, node_manager};
+use crate::security::{Login, Settings, certificate_and_key};
+use crate::tree::{Kind, Reading, Seen, Variable, WritableInput, message, variables};
 use crate::trust::{self, Feed};
 
 /// Between two looks at what is newest; a run is followed no faster.
@@ -77,8 +78,13 @@ pub fn serve(
         what: "the folder that it is started in",
         source,
     })?;
+    let variables = variables(run.cluster());
+    let logins = tokens(&settings.logins);
+    let may_write = logins.values().any(|login| login.role >= Role::Operator);
+    let writing = may_write.then(|| Writing::new(WriteGate::new(run), logins, &variables));
     let shown = Shown {
-        variables: variables(run.cluster()),
+        variables,
+        writing: writing.map(Arc::new),
         journal: run.path().join("journal.jsonl"),
         followed: Followed::new(run)?,
     };
@@ -88,9 +94,19 @@ pub fn serve(
     Ok(served?)
 }
 
+/// The logins by the tokens of their users.
+fn tokens(logins: &[Login]) -> BTreeMap<String, Login> {
+    let logins = logins.iter();
+    logins
+        .map(|login| (format!("login {}", login.user), login.clone()))
+        .collect()
+}
+
 /// What is served.
 struct Shown {
     variables: Vec<Variable>,
+    /// Nothing where no login may write.
+    writing: Option<Arc<Writing>>,
     journal: PathBuf,
     followed: Followed,
 }
@@ -99,8 +115,9 @@ async fn listen(listener: TcpListener, settings: &Settings, shown: Shown) -> io:
     let port = listener.local_addr()?.port();
     let name = shown.followed.cluster().name().to_owned();
     let namespace = format!("urn:understudy:{name}");
-    let (server, handle) = server(settings, port, &namespace).map_err(io::Error::other)?;
-    let manager = handle.node_managers().get_of_type::<SimpleNodeManager>();
+    let writing = shown.writing.clone();
+    let (server, handle) = server(settings, port, &namespace, writing).map_err(io::Error::other)?;
+    let manager = handle.node_managers().get_of_type::<NodeManager>();
     let (Some(manager), Some(index)) = (manager, handle.get_namespace_index(&namespace)) else {
         return Err(io::Error::other("the server has no place for nodes"));
     };
@@ -109,6 +126,7 @@ async fn listen(listener: TcpListener, settings: &Settings, shown: Shown) -> io:
         index,
         &name,
         &shown.variables,
+        shown.writing.is_some(),
     );
     let mut showing = Showing::new(&shown, &handle, manager, index);
     // Clients are served once there is a state.
@@ -136,6 +154,7 @@ fn server(
     settings: &Settings,
     port: u16,
     namespace: &str,
+    writing: Option<Arc<Writing>>,
 ) -> Result<(Server, ServerHandle), String> {
     let version = env!("CARGO_PKG_VERSION");
     let product = "urn:understudy:opcua-gateway";
@@ -152,28 +171,22 @@ fn server(
             software_version: version.into(),
             ..Default::default()
         })
-        .with_node_manager(simple_node_manager(
-            NamespaceMetadata {
-                namespace_uri: namespace.to_owned(),
-                ..Default::default()
-            },
-            "understudy",
-        ));
+        .with_node_manager(node_manager(namespace.to_owned(), writing));
     builder = builder.hello_timeout(HELLO_TIMEOUT_S);
     builder.limits_mut().max_sessions = MOST_SESSIONS;
     builder
         .limits_mut()
         .subscriptions
         .max_monitored_item_queue_size = LONGEST_QUEUE;
-    let user = match &settings.login {
-        None => ANONYMOUS_USER_TOKEN_ID,
-        Some(login) => {
-            let token = ServerUserToken::user_pass(login.user.as_str(), login.password());
-            builder = builder.add_user_token("reader", token);
-            "reader"
-        }
-    };
-    let users = [user.to_owned()];
+    let logins = tokens(&settings.logins);
+    let mut users: Vec<String> = logins.keys().cloned().collect();
+    if users.is_empty() {
+        users.push(ANONYMOUS_USER_TOKEN_ID.to_owned());
+    }
+    for (token, login) in logins {
+        let user = ServerUserToken::user_pass(login.user.as_str(), login.password());
+        builder = builder.add_user_token(token, user);
+    }
     let builder = match &settings.certificates {
         None => builder
             // No folder can be made there, so that nothing is written unasked.
@@ -195,7 +208,13 @@ fn server(
 }
 
 /// The folders and variables, without values.
-fn add_nodes(space: &mut AddressSpace, index: u16, cluster: &str, variables: &[Variable]) {
+fn add_nodes(
+    space: &mut AddressSpace,
+    index: u16,
+    cluster: &str,
+    variables: &[Variable],
+    writes: bool,
+) {
     let root = NodeId::new(index, ROOT);
     ObjectBuilder::new(&root, QualifiedName::new(index, cluster), cluster)
         .is_folder()
@@ -222,14 +241,53 @@ fn add_nodes(space: &mut AddressSpace, index: u16, cluster: &str, variables: &[V
         let name = variable.name();
         let node = NodeId::new(index, variable.path());
         let rank = if kind == Kind::Strings { 1 } else { -1 };
-        VariableBuilder::new(&node, QualifiedName::new(index, name), name)
+        let limits = variable.writable().and_then(|input| input.limits);
+        let type_of = match limits {
+            Some(_) => VariableTypeId::AnalogItemType,
+            None => VariableTypeId::BaseDataVariableType,
+        };
+        let builder = VariableBuilder::new(&node, QualifiedName::new(index, name), name)
             .description(variable.meaning())
             .data_type(kind.data_type())
             .value_rank(rank)
             .minimum_sampling_interval(LOOK.as_millis() as f64)
-            .has_type_definition(VariableTypeId::BaseDataVariableType)
-            .organized_by(parent)
+            .has_type_definition(type_of)
+            .organized_by(parent);
+        let builder = match variable.is_writable() && writes {
+            true => builder.writable(),
+            false => builder,
+        };
+        builder.insert(space);
+        if let Some(input) = variable.writable() {
+            add_properties(space, index, &variable.path(), input);
+        }
+    }
+}
+
+/// Range and unit of a setpoint.
+fn add_properties(space: &mut AddressSpace, index: u16, path: &str, input: &WritableInput) {
+    let mut add = |name: &str, of: DataTypeId, value: ExtensionObject| {
+        let property = NodeId::new(index, format!("{path}/{name}"));
+        VariableBuilder::new(&property, QualifiedName::new(0, name), name)
+            .data_type(of)
+            .value(Variant::from(value))
+            .has_type_definition(VariableTypeId::PropertyType)
+            .property_of(NodeId::new(index, path))
             .insert(space);
+    };
+    if let Some((low, high)) = input.limits {
+        let range = ExtensionObject::from_message(Range { low, high });
+        add("EURange", DataTypeId::Range, range);
+    }
+    if let Some(unit) = &input.unit {
+        // Without a code of UNECE the name is the unit.
+        let unit = EUInformation {
+            unit_id: -1,
+            display_name: unit.as_str().into(),
+            ..EUInformation::default()
+        };
+        let unit = ExtensionObject::from_message(unit);
+        add("EngineeringUnits", DataTypeId::EUInformation, unit);
     }
 }
 
@@ -237,7 +295,7 @@ fn add_nodes(space: &mut AddressSpace, index: u16, cluster: &str, variables: &[V
 struct Showing<'a> {
     shown: &'a Shown,
     handle: &'a ServerHandle,
-    manager: Arc<SimpleNodeManager>,
+    manager: Arc<NodeManager>,
     index: u16,
     nodes: Vec<NodeId>,
     set: Vec<Option<Reading>>,
@@ -247,7 +305,7 @@ impl<'a> Showing<'a> {
     fn new(
         shown: &'a Shown,
         handle: &'a ServerHandle,
-        manager: Arc<SimpleNodeManager>,
+        manager: Arc<NodeManager>,
         index: u16,
     ) -> Self {
         let variables = shown.variables.iter();

@@ -12,9 +12,11 @@
 mod signals;
 
 use opcua::types::{DataTypeId, StatusCode, UAString, Variant};
-use understudy_cluster::{Cluster, Controller};
+use understudy_cluster::{Cluster, Controller, InputSource};
 use understudy_gateway::Observation;
+use understudy_typed::Point;
 use understudy_view::{Event, ProgramSnapshot, StationSnapshot};
+use understudy_wire::Member;
 
 use crate::trust::{self, Feed};
 
@@ -112,6 +114,19 @@ impl Reading {
     };
 }
 
+/// An operator input.
+#[derive(Debug, Clone)]
+pub(crate) struct WritableInput {
+    /// Remote I/O of its program.
+    pub(crate) member: Member,
+    /// The input.
+    pub(crate) point: Point,
+    /// Lowest and highest value of a setpoint.
+    pub(crate) limits: Option<(f64, f64)>,
+    /// Unit of a setpoint.
+    pub(crate) unit: Option<String>,
+}
+
 type Read = Box<dyn Fn(&Seen<'_>) -> Reading + Send + Sync>;
 
 /// One variable.
@@ -120,6 +135,7 @@ pub struct Variable {
     name: String,
     kind: Kind,
     meaning: &'static str,
+    writable: Option<WritableInput>,
     read: Read,
 }
 
@@ -149,6 +165,15 @@ impl Variable {
         self.meaning
     }
 
+    /// Whether it is an operator input.
+    pub fn is_writable(&self) -> bool {
+        self.writable.is_some()
+    }
+
+    pub(crate) fn writable(&self) -> Option<&WritableInput> {
+        self.writable.as_ref()
+    }
+
     /// Its value in an observation of a live run; nothing where it has none.
     pub fn value(&self, observation: &Observation) -> Option<Variant> {
         let feed = Feed::Live;
@@ -173,8 +198,9 @@ pub fn variables(cluster: &Cluster) -> Vec<Variable> {
     for (rank, name) in stations.enumerate() {
         tree.station(rank, name);
     }
-    for (place, controller) in cluster.controllers().iter().enumerate() {
-        tree.program(place, controller);
+    let programs = cluster.controllers().iter().zip(cluster.remote_ios());
+    for (place, (controller, remote_io)) in programs.enumerate() {
+        tree.program(place, controller, &remote_io.inputs);
     }
     tree.variables
 }
@@ -208,6 +234,7 @@ impl Tree {
             name: name.to_owned(),
             kind,
             meaning,
+            writable: None,
             read: Box::new(read),
         });
     }
@@ -268,7 +295,7 @@ impl Tree {
         }
     }
 
-    fn program(&mut self, place: usize, controller: &Controller) {
+    fn program(&mut self, place: usize, controller: &Controller, sources: &[InputSource]) {
         let name = controller.name.as_str();
         self.enter(&["Programs", name]);
         let of = move |read: fn(&ProgramSnapshot) -> Option<Variant>| {
@@ -310,7 +337,7 @@ impl Tree {
             "Finished" UInt64 "finished parts of a simulated plant" => count(|of| of.finished);
             "PlantFaults" UInt64 "plant faults of a simulated plant" => count(|of| of.plant_faults);
         }
-        self.signals(place, controller);
+        self.signals(place, controller, sources);
     }
 }
 

@@ -1,6 +1,7 @@
 //! Texts under keys of Zenoh, for other systems: said when they change, and to be asked for.
 //!
-//! A session of its own, over TCP and without the cluster's keys: nothing that it does reaches a member.
+//! A session of its own, over TCP and without the cluster's keys: nothing that it does reaches a member. Questions under a key of their own
+//! are handed to the program that answers them.
 
 use std::collections::BTreeMap;
 use std::net::{SocketAddr, TcpListener};
@@ -9,7 +10,7 @@ use std::time::Duration;
 
 use zenoh::Wait;
 use zenoh::bytes::Encoding;
-use zenoh::query::Queryable;
+use zenoh::query::{Query, Queryable};
 
 use crate::connections::{Connections, Relay, inner_address};
 use crate::error::{BusError, reason};
@@ -23,17 +24,44 @@ const HANDSHAKE_TIMEOUT_MS: u32 = 3_000;
 /// An open session gives signs of life more often.
 const PATIENCE: Duration = Duration::from_secs(30);
 
+/// Bytes of a question.
+const LONGEST_QUESTION: usize = 4096;
+
+/// A question of a client, with the text that came with it.
+pub struct Question {
+    query: Query,
+    /// Its text.
+    pub text: String,
+}
+
+impl std::fmt::Debug for Question {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(formatter, "Question({})", self.text)
+    }
+}
+
+impl Question {
+    /// Answers in JSON. A client that has gone gets nothing.
+    pub fn answer(self, text: &str) {
+        let key = self.query.key_expr().clone();
+        let reply = self.query.reply(key, text);
+        let _ = reply.encoding(Encoding::APPLICATION_JSON).wait();
+    }
+}
+
 /// The newest text under each key.
 type Newest = Arc<Mutex<BTreeMap<String, String>>>;
 
 /// Says texts to whoever has called its address.
 pub struct Announcer {
     root: String,
+    address: SocketAddr,
     // No call comes to a session that ends.
     _relay: Relay,
     session: zenoh::Session,
     newest: Newest,
     _queryable: Queryable<()>,
+    questions: Option<Queryable<()>>,
 }
 
 impl Announcer {
@@ -76,11 +104,46 @@ impl Announcer {
         let relay = Relay::start(listener, connections, PATIENCE, inner).map_err(listen)?;
         Ok(Self {
             root: root.to_owned(),
+            address,
             _relay: relay,
             session,
             newest,
             _queryable: queryable,
+            questions: None,
         })
+    }
+
+    /// Hands each question under the key that ends in `key` to `take`, which must not wait. A question has a text; a longer one than
+    /// 4,096 bytes is not answered.
+    ///
+    /// # Errors
+    /// Zenoh does not take it.
+    pub fn take_questions(
+        &mut self,
+        key: &str,
+        take: impl Fn(Question) + Send + Sync + 'static,
+    ) -> Result<(), BusError> {
+        let key = format!("{}/{key}", self.root);
+        let own = key.clone();
+        let declared = self.session.declare_queryable(key).callback(move |query| {
+            // Questions about several keys ask for texts.
+            if query.key_expr().as_str() != own {
+                return;
+            }
+            let payload = query
+                .payload()
+                .filter(|text| text.len() <= LONGEST_QUESTION);
+            let text = payload.and_then(|text| text.try_to_string().ok());
+            if let Some(text) = text.map(|text| text.into_owned()) {
+                take(Question { query, text });
+            }
+        });
+        let declared = declared.wait().map_err(|error| BusError::Zenoh {
+            address: self.address,
+            reason: reason(&error),
+        })?;
+        self.questions = Some(declared);
+        Ok(())
     }
 
     /// Says `text` under the key that ends in `key`, and keeps it for those who ask.

@@ -32,7 +32,7 @@ mod watchdog;
 mod writes;
 mod zenoh_link;
 
-pub use announcer::Announcer;
+pub use announcer::{Announcer, Question};
 pub use channel::{Admitted, ChannelSettings, DONE, TlsKeys};
 pub use clock::Clock;
 pub use connections::{

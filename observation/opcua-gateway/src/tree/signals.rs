@@ -1,31 +1,46 @@
 //! The signals of a program: its inputs, its outputs, and the markers that its state is made of.
 
 use opcua::types::Variant;
-use understudy_cluster::Controller;
+use understudy_cluster::{Controller, InputSource};
 use understudy_logic::Circuit;
+use understudy_remote_io::OperatorInputKind;
 use understudy_typed::{Elementary, Point};
 use understudy_view::stored;
+use understudy_wire::{Member, ProgramId};
 
-use super::{Kind, Tree};
+use super::{Kind, Tree, WritableInput};
 use crate::trust;
 
 /// Bits that a number of OPC UA holds.
 const WORD_BITS: usize = 64;
 
 impl Tree {
-    pub(super) fn signals(&mut self, place: usize, controller: &Controller) {
+    pub(super) fn signals(
+        &mut self,
+        place: usize,
+        controller: &Controller,
+        sources: &[InputSource],
+    ) {
         self.enter(&["Programs", &controller.name, "Inputs"]);
         let inputs = &controller.interface.inputs;
         for point in inputs {
             let status = inputs.find(&format!("{}.failed", point.name)).cloned();
             let (name, own) = (point.name.clone(), point.clone());
-            self.add(&name, kind_of(point.of), "as last sampled", move |seen| {
+            let source = sources.iter().find(|source| source.name == point.name);
+            let writable = source.and_then(|source| written(place, point, source));
+            let meaning = writable
+                .as_ref()
+                .map_or("as last sampled", |(meaning, _)| *meaning);
+            self.add(&name, kind_of(point.of), meaning, move |seen| {
                 let program = seen.program(place);
                 let image = program.and_then(|program| program.inputs.as_deref());
                 let failed = status.as_ref().and_then(|status| stored(status, image?));
                 let trust = program.map(|it| trust::input(it, &own.name, failed == Some(1)));
                 seen.present(variant_of(&own, image), trust.unwrap_or_default())
             });
+            if let (Some(added), Some((_, writable))) = (self.variables.last_mut(), writable) {
+                added.writable = Some(writable);
+            }
         }
         self.enter(&["Programs", &controller.name, "Outputs"]);
         for point in &controller.interface.outputs {
@@ -59,6 +74,36 @@ impl Tree {
             );
         }
     }
+}
+
+/// An operator input, with the meaning of its variable.
+fn written(
+    place: usize,
+    point: &Point,
+    source: &InputSource,
+) -> Option<(&'static str, WritableInput)> {
+    let declaration = source.operator()?;
+    let number = |stored| match variant_of_stored(point.of, stored) {
+        Variant::Double(number) => number,
+        Variant::Int64(number) => number as f64,
+        Variant::UInt64(number) => number as f64,
+        _ => 0.0,
+    };
+    let (meaning, limits) = match declaration.input.kind {
+        OperatorInputKind::Level => ("level that operators write, as last sampled", None),
+        OperatorInputKind::Pulse(_) => ("pulse: writing TRUE presses it", None),
+        OperatorInputKind::Setpoint { low, high } => (
+            "setpoint that operators write, as last sampled",
+            Some((number(low), number(high))),
+        ),
+    };
+    let writable = WritableInput {
+        member: Member::RemoteIo(ProgramId(u8::try_from(place).ok()?)),
+        point: point.clone(),
+        limits,
+        unit: declaration.unit.clone(),
+    };
+    Some((meaning, writable))
 }
 
 /// A marker: one bit of the state, or the number that several are.
@@ -130,14 +175,17 @@ fn kind_of(of: Elementary) -> Kind {
 
 /// The value of a point in an image such as `0110`.
 fn variant_of(point: &Point, image: Option<&str>) -> Option<Variant> {
-    let value = stored(point, image?)?;
-    Some(match (point.of, kind_of(point.of)) {
+    Some(variant_of_stored(point.of, stored(point, image?)?))
+}
+
+fn variant_of_stored(of: Elementary, value: u64) -> Variant {
+    match (of, kind_of(of)) {
         (_, Kind::Boolean) => Variant::from(value != 0),
         (Elementary::Real, _) => f64::from(f32::from_bits(value as u32)).into(),
         (_, Kind::Double) => f64::from_bits(value).into(),
         (of, Kind::Int64) => (of.signed(value) as i64).into(),
         _ => value.into(),
-    })
+    }
 }
 
 #[cfg(test)]
