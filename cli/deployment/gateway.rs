@@ -4,12 +4,19 @@ use std::fmt::Write as _;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
+use std::sync::atomic::Ordering;
+use std::time::SystemTime;
+
 use clap::{Args, Subcommand};
 use serde_json::json;
+use understudy_bus::interruption;
 use understudy_gateway::{
-    Area, Followed, GatewayError, Rate, RegisterMap, Run, WriteGate, mirror, serve_metrics,
-    serve_modbus,
+    Area, Followed, GatewayError, Rate, RegisterMap, Run, WriteGate, forward_signals, mirror,
+    serve_metrics, serve_modbus,
 };
+
+use understudy_keys::{Date, OperatorKeys};
+use understudy_member::tls_keys;
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
@@ -24,6 +31,7 @@ Example:
   understudy gateway modbus runs/latest --allow-writes
   understudy gateway registers runs/latest
   understudy gateway zenoh runs/latest --listen 127.0.0.1:7447 --mirror 5/s
+  understudy gateway signals runs/latest --from 192.168.20.1:7447
 
 The gateway reads the journal of a run, live or finished, and ends with SIGINT or SIGTERM. Connections are neither encrypted nor
 authenticated: bind the gateway to loopback or to a separate network (docs/how-to/monitoring.md). With --allow-writes every
@@ -61,6 +69,17 @@ enum What {
     Registers {
         #[command(flatten)]
         run: RunArgument,
+    },
+    /// Write the signals of other groups to the inputs of a run
+    Signals {
+        #[command(flatten)]
+        run: RunArgument,
+        /// Address of the other group's `gateway zenoh`, or of a Zenoh router that it is connected to
+        #[arg(long, value_name = "ADDRESS", value_parser = parse_address)]
+        from: SocketAddr,
+        /// Folder of an operator's keys, for a router with mutual TLS
+        #[arg(long, value_name = "DIR")]
+        keys: Option<PathBuf>,
     },
     /// States, values, remaining redundancy and events as JSON under Zenoh keys
     Zenoh {
@@ -112,6 +131,26 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
             let gate = allow_writes.then(|| WriteGate::new(&run));
             let run = Followed::new(&run).map_err(failed)?;
             serve_modbus(run, gate, *listen, &mut ready).map_err(failed)?;
+            Ok(ended())
+        }
+        What::Signals { run, from, keys } => {
+            let run = run.open()?;
+            let gate = WriteGate::new(&run);
+            let keys = match keys {
+                Some(folder) => {
+                    let date = Date::of(SystemTime::now());
+                    let keys = OperatorKeys::load(folder, run.cluster(), date);
+                    let keys = keys.map_err(|errors| crate::deployment::keys::failed(&errors))?;
+                    Some(tls_keys(&keys.tls))
+                }
+                None => None,
+            };
+            let interrupted = interruption()?;
+            let ends = || interrupted.load(Ordering::Relaxed) || run.is_finished();
+            forward_signals(&gate, *from, keys.as_ref(), &ends, &mut |said| {
+                console.note(said)
+            })
+            .map_err(failed)?;
             Ok(ended())
         }
         What::Registers { run } => {

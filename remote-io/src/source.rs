@@ -59,6 +59,14 @@ pub enum OperatorInputKind {
         /// Highest value.
         high: u64,
     },
+    /// A signal of another group: a value holds for this number of samples, at least 1, after it is written, and then the
+    /// initial value does.
+    Group {
+        /// Samples.
+        stale_after: u32,
+        /// Bit of u(i) that is TRUE while a written value holds.
+        valid: Option<u16>,
+    },
 }
 
 /// Reason why an operator input cannot take a value.
@@ -83,9 +91,12 @@ impl OperatorInput {
         let stored = value.stored();
         match self.kind {
             OperatorInputKind::Level | OperatorInputKind::Pulse(_) => Ok(()),
-            OperatorInputKind::Setpoint { .. } if !is_number(of, stored) => {
+            OperatorInputKind::Setpoint { .. } | OperatorInputKind::Group { .. }
+                if !is_number(of, stored) =>
+            {
                 Err(ValueMismatch::Type)
             }
+            OperatorInputKind::Group { .. } => Ok(()),
             OperatorInputKind::Setpoint { low, high } => {
                 let is_inside = in_order(of, low, stored) && in_order(of, stored, high);
                 is_inside.then_some(()).ok_or(ValueMismatch::Limits)

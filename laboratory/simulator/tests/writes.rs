@@ -36,6 +36,7 @@ controller = "reader"
 
 [remote_io.inputs]
 count = { from = "counter.count", default = -1.0, stale_after = 2 }
+far = { from = "line-9/press.level", default = -2.0, stale_after = 100 }
 "#;
 
 const COUNTER: &str = "
@@ -50,12 +51,16 @@ END_PROGRAM";
 
 const READER: &str = "
 PROGRAM reader
-  VAR_INPUT count : REAL; END_VAR
-  VAR_OUTPUT seen : REAL; END_VAR
+  VAR_INPUT count : REAL; far : REAL; END_VAR
+  VAR_OUTPUT seen : REAL; far_seen : REAL; END_VAR
   seen := count;
+  far_seen := far;
 END_PROGRAM";
 
 const PROGRAM: ProgramId = ProgramId(0);
+const READER_PROGRAM: ProgramId = ProgramId(1);
+/// First bit of the signal of another group.
+const FAR: u16 = 32;
 /// First bits of the inputs.
 const PRESS: u16 = 0;
 const VALUE: u16 = 32;
@@ -163,9 +168,17 @@ impl Bench {
     }
 
     fn write(&mut self, write: &Write) {
+        self.write_to(PROGRAM, write);
+    }
+
+    fn write_to(&mut self, program: ProgramId, write: &Write) {
         let seen = &mut self.seen;
         let mut observe = |_, _, member, record: Record<'_>| seen.observe(member, record);
-        self.simulation.write(PROGRAM, write, &mut observe);
+        self.simulation.write(program, write, &mut observe);
+    }
+
+    fn far_seen(&self) -> f32 {
+        real_at(self.seen.outputs[1].as_ref().expect("applied"), 32)
     }
 
     fn outcome(&self, write: &Write) -> Option<WriteOutcome> {
@@ -217,6 +230,36 @@ fn a_write_is_in_effect_and_read_by_another_program() {
     bench.write(&write(1, 2, PRESS, true.into()));
     bench.pass(8);
     assert_eq!(bench.count(), 2.0);
+}
+
+#[test]
+fn a_signal_of_another_group_ends_where_nobody_writes_it_again() {
+    let mut bench = Bench::new(Network::default(), 1);
+    let far = |number, value| write(1, number, FAR, real(value));
+    assert_eq!(bench.far_seen(), -2.0);
+    bench.write_to(READER_PROGRAM, &far(1, 5.0));
+    bench.pass(90);
+    assert_eq!(bench.far_seen(), 5.0);
+    // Written again before it ends, and with another value.
+    bench.write_to(READER_PROGRAM, &far(2, 5.0));
+    bench.pass(60);
+    assert_eq!(bench.far_seen(), 5.0);
+    bench.write_to(READER_PROGRAM, &far(3, 6.0));
+    bench.pass(97);
+    assert_eq!(bench.far_seen(), 6.0);
+    bench.pass(6);
+    assert_eq!(bench.far_seen(), -2.0);
+    // A restart of the remote I/O ends it: nobody knows how old the value is.
+    bench.write_to(READER_PROGRAM, &far(4, 7.0));
+    bench.pass(10);
+    assert_eq!(bench.far_seen(), 7.0);
+    let reader = Member::RemoteIo(READER_PROGRAM);
+    bench.fault(reader, Action::Crash);
+    bench.pass(3);
+    bench.fault(reader, Action::Restart);
+    bench.pass(60);
+    assert_eq!(bench.far_seen(), -2.0);
+    assert_eq!(bench.seen.cold_starts, 0);
 }
 
 #[test]

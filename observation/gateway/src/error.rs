@@ -44,6 +44,14 @@ pub enum GatewayError {
     /// The journal cannot be read.
     #[error("U0593: {0}")]
     Journal(Trouble),
+    /// Nothing to forward.
+    #[error(
+        "U0597: no input of `{cluster}` takes a signal of another group; declare one in its cluster file: ready = {{ from = \"line-1/press.done\", default = false, stale_after = 100 }}"
+    )]
+    NoGroupSignals {
+        /// Name of the cluster.
+        cluster: String,
+    },
     /// Zenoh did not start.
     #[error(transparent)]
     Bus(#[from] BusError),
@@ -57,6 +65,7 @@ impl GatewayError {
             Self::System { .. } => "U0591",
             Self::TooManyBits { .. } | Self::TooManyRegisters { .. } => "U0592",
             Self::Journal(_) => "U0593",
+            Self::NoGroupSignals { .. } => "U0597",
             Self::Bus(error) => error.code(),
         }
     }

@@ -15,6 +15,7 @@
 
 mod error;
 mod followed;
+mod groups;
 mod http;
 mod labels;
 mod metrics;
@@ -26,6 +27,7 @@ mod writing;
 
 pub use error::GatewayError;
 pub use followed::{BOUNDS, Followed, Observation};
+pub use groups::forward_signals;
 pub use http::serve_metrics;
 pub use metrics::{Metrics, exposition_of};
 pub use mirror::{Rate, mirror};

@@ -461,6 +461,9 @@ fn meaning_of(declaration: &OperatorDeclaration) -> String {
             let range = format!("{} to {} {unit}", text(low), text(high));
             format!("setpoint, {}, written by the role {role}", range.trim_end())
         }
+        OperatorInputKind::Group { .. } => {
+            format!("signal of another group, written by the role {role}")
+        }
     }
 }
 

@@ -71,7 +71,10 @@ pub(crate) fn configuration_text(cluster: &Cluster, plants: &[String]) -> String
 /// Source of an input; texts for people are not in it.
 fn source_text(source: &InputSource) -> String {
     match &source.kind {
-        InputSourceKind::Operator(declaration) => format!("{:?}", declaration.input),
+        InputSourceKind::Operator(declaration) => match &declaration.group {
+            Some(group) => format!("{:?} {group:?}", declaration.input),
+            None => format!("{:?}", declaration.input),
+        },
         InputSourceKind::Signal(declaration) => format!("{:?}", declaration.input),
     }
 }

@@ -31,6 +31,8 @@ pub use fields::{MAXIMUM_NAME_LENGTH, is_name, why_unreachable};
 pub use place::{BitPlace, ByteOrder, Place, PlaceError, RegisterTable, Registers};
 pub use read::{Loaded, MAXIMUM_TEXT_BYTES, Overrides, read, read_with};
 pub use schema::schema;
-pub use source::{InputSource, InputSourceKind, OperatorDeclaration, SignalDeclaration};
+pub use source::{
+    GroupSignal, InputSource, InputSourceKind, OperatorDeclaration, SignalDeclaration,
+};
 pub use template::{TemplateFile, minimal, modbus_cell, press_cell, read_with_files, template};
 pub use value::{stored_value, typed_value, value_text};

@@ -31,6 +31,19 @@ pub struct OperatorDeclaration {
     pub unit: Option<String>,
     /// Whether the page asks before it writes.
     pub confirm: bool,
+    /// The output of another group that the gateway writes; nothing for an input that people write.
+    pub group: Option<GroupSignal>,
+}
+
+/// An output of a program of another group.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GroupSignal {
+    /// Name of the cluster.
+    pub group: String,
+    /// Name of the controller.
+    pub controller: String,
+    /// Name of the output.
+    pub output: String,
 }
 
 impl OperatorDeclaration {
@@ -38,7 +51,9 @@ impl OperatorDeclaration {
     pub fn limits(&self) -> Option<(u64, u64)> {
         match self.input.kind {
             OperatorInputKind::Setpoint { low, high } => Some((low, high)),
-            OperatorInputKind::Level | OperatorInputKind::Pulse(_) => None,
+            OperatorInputKind::Level
+            | OperatorInputKind::Pulse(_)
+            | OperatorInputKind::Group { .. } => None,
         }
     }
 }

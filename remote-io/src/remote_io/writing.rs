@@ -42,7 +42,7 @@ pub(super) struct Writing {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 struct Written {
     stored: u64,
-    /// Samples of a pulse that are still to be taken, the one that ends it included.
+    /// Samples until the value ends: of a pulse, the one after it included; of a signal of another group.
     left: u32,
     /// The write that it comes from.
     by: WriteId,
@@ -152,7 +152,9 @@ impl Writing {
             return Err(WriteRefusal::Order { expected });
         }
         let is_undecided = place.is_ok_and(|place| !self.sessions[place].is_decided());
-        if is_undecided || !self.values[at].is_sampled || self.values[at].left > 0 {
+        let is_pressed =
+            matches!(input.kind, OperatorInputKind::Pulse(_)) && self.values[at].left > 0;
+        if is_undecided || !self.values[at].is_sampled || is_pressed {
             return Err(WriteRefusal::Busy);
         }
         let session = Session {
@@ -196,6 +198,9 @@ impl Writing {
     pub(super) fn put(&self, inputs: &[OperatorInput], image: &mut Image) {
         for (input, written) in inputs.iter().zip(&self.values) {
             input.place.set(image, written.stored);
+            if let Some(valid) = input.valid() {
+                image.set(usize::from(valid), written.left > 0);
+            }
         }
     }
 
@@ -247,9 +252,8 @@ impl Writing {
             }
             // A value that still holds is in this sample.
             let still = session.input.is_none_or(|input| {
-                let is_over = matches!(inputs[input].kind, OperatorInputKind::Pulse(_))
-                    && self.values[input].stored == 0;
-                self.values[input].by == session.id && !is_over
+                let written = &self.values[input];
+                written.by == session.id && !written.is_over(&inputs[input])
             });
             if still {
                 session.progress = now;
@@ -258,13 +262,17 @@ impl Writing {
             }
         }
         self.drop_void(&void, moment);
-        for written in &mut self.values {
+        for (input, written) in inputs.iter().zip(&mut self.values) {
             written.is_sampled = true;
             if written.left > 0 {
                 written.left -= 1;
-                // The last sample of a pulse is FALSE, so that the next one is seen.
-                if written.left <= 1 {
-                    written.stored = 0;
+                match input.kind {
+                    // The last sample of a pulse is FALSE, so that the next one is seen.
+                    OperatorInputKind::Pulse(_) if written.left <= 1 => written.stored = 0,
+                    OperatorInputKind::Group { .. } if written.left == 0 => {
+                        written.stored = input.initial;
+                    }
+                    _ => {}
                 }
             }
         }
@@ -286,8 +294,7 @@ impl Writing {
             session.progress = Progress::Taken;
             let is_over = session.input.is_some_and(|input| {
                 let written = &self.values[input];
-                let is_pulse = matches!(inputs[input].kind, OperatorInputKind::Pulse(_));
-                written.by != session.id || (is_pulse && written.stored == 0)
+                written.by != session.id || written.is_over(&inputs[input])
             });
             if is_over {
                 void.push(session.id);
@@ -333,7 +340,7 @@ impl Writing {
     }
 
     /// After a restart: values and writes as stations recall them. A pulse lasts its whole time from now on, so that the
-    /// program sees one pulse.
+    /// program sees one pulse. A signal of another group is not valid until it is written again.
     pub(super) fn recall(
         &mut self,
         inputs: &[OperatorInput],
@@ -341,10 +348,14 @@ impl Writing {
         writes: impl IntoIterator<Item = WriteId>,
     ) {
         for (input, written) in inputs.iter().zip(&mut self.values) {
-            let stored = input.place.get(image);
+            let is_group = matches!(input.kind, OperatorInputKind::Group { .. });
+            let stored = match is_group {
+                true => input.initial,
+                false => input.place.get(image),
+            };
             *written = Written {
                 stored,
-                left: input.samples(stored),
+                left: if is_group { 0 } else { input.samples(stored) },
                 by: WriteId::default(),
                 is_sampled: true,
             };
@@ -366,12 +377,32 @@ impl Session {
     }
 }
 
+impl Written {
+    /// Whether the value ended by itself.
+    fn is_over(&self, input: &OperatorInput) -> bool {
+        match input.kind {
+            OperatorInputKind::Pulse(_) => self.stored == 0,
+            OperatorInputKind::Group { .. } => self.left == 0,
+            OperatorInputKind::Level | OperatorInputKind::Setpoint { .. } => false,
+        }
+    }
+}
+
 impl OperatorInput {
-    /// Samples until the input may be written again: those of a pulse, and the FALSE after it.
+    /// Samples until a written value ends: those of a pulse, and the FALSE after it.
     fn samples(&self, stored: u64) -> u32 {
         match self.kind {
             OperatorInputKind::Pulse(samples) if stored != 0 => samples.saturating_add(1),
+            OperatorInputKind::Group { stale_after, .. } => stale_after.max(1),
             _ => 0,
+        }
+    }
+
+    /// Bit of u(i) that is TRUE while a value of another group holds.
+    pub fn valid(&self) -> Option<u16> {
+        match self.kind {
+            OperatorInputKind::Group { valid, .. } => valid,
+            _ => None,
         }
     }
 }

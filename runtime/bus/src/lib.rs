@@ -10,6 +10,7 @@ mod clock;
 mod connections;
 mod control;
 pub mod doctor;
+mod documents;
 mod doorbell;
 mod endpoints;
 mod error;
@@ -40,6 +41,7 @@ pub use connections::{
     Slot, inner_address, relay, relay_known,
 };
 pub use control::{Commands, Interruption, hold_back_signals};
+pub use documents::Documents;
 pub use endpoints::{Endpoints, Peer};
 pub use error::BusError;
 pub use field::{FieldDriver, Look, NoField, SimulatedField};

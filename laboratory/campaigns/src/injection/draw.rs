@@ -243,6 +243,7 @@ impl Draw<'_> {
         let stored = match input.kind {
             OperatorInputKind::Pulse(_) => 1,
             OperatorInputKind::Level => self.random.random_range(0..2),
+            OperatorInputKind::Group { .. } => self.one_of(&[0, 1, input.initial]),
             OperatorInputKind::Setpoint { low, high } => self.one_of(&[low, input.initial, high]),
         };
         Some((input.place.bit, PointValue::new(of.bits(), stored)))

@@ -92,6 +92,7 @@ fn written(
     let (meaning, limits) = match declaration.input.kind {
         OperatorInputKind::Level => ("level that operators write, as last sampled", None),
         OperatorInputKind::Pulse(_) => ("pulse: writing TRUE presses it", None),
+        OperatorInputKind::Group { .. } => ("signal of another group, as last sampled", None),
         OperatorInputKind::Setpoint { low, high } => (
             "setpoint that operators write, as last sampled",
             Some((number(low), number(high))),

@@ -16,7 +16,9 @@ use super::Member;
 use crate::fields::{MAXIMUM_MISFITS, OperatorText, Placed, SourceEntry, SourceText};
 use crate::file::{FieldSection, RemoteIoSection};
 use crate::format::OPERATOR_INPUTS;
-use crate::source::{InputSource, InputSourceKind, OperatorDeclaration, SignalDeclaration};
+use crate::source::{
+    GroupSignal, InputSource, InputSourceKind, OperatorDeclaration, SignalDeclaration,
+};
 use crate::value::stored_value;
 
 /// The suffix of the input that says whether a signal is valid.
@@ -79,7 +81,10 @@ pub(super) fn resolve(
                     default: default.as_ref(),
                     stale_after: *stale_after,
                 };
-                signal.resolve(point, valid, index, members, diagnostics)
+                match from.as_ref().and_then(|from| group_signal(&from.value)) {
+                    Some(group) => signal.of_group(group, point, valid, period, diagnostics),
+                    None => signal.resolve(point, valid, index, members, diagnostics),
+                }
             }
         };
         sources.extend(kind.map(|kind| InputSource {
@@ -97,6 +102,7 @@ pub(super) fn outputs_read(sections: &[RemoteIoSection]) -> BTreeSet<String> {
         SourceText::Signal { from, .. } => from.as_ref(),
         SourceText::Operator(_) => None,
     });
+    let from = from.filter(|from| group_signal(&from.value).is_none());
     from.map(|from| from.value.clone()).collect()
 }
 
@@ -220,8 +226,38 @@ fn operator(
             title: text.title.clone(),
             unit: text.unit.clone(),
             confirm: text.confirm,
+            group: None,
         })
     })
+}
+
+/// The parts of `group/controller.output`.
+fn group_signal(from: &str) -> Option<GroupSignal> {
+    let (group, signal) = from.split_once('/')?;
+    let (controller, output) = signal.split_once('.').unwrap_or((signal, ""));
+    Some(GroupSignal {
+        group: group.to_owned(),
+        controller: controller.to_owned(),
+        output: output.to_owned(),
+    })
+}
+
+/// Shortest time for which a value of another group holds.
+const GROUP_STALE_AFTER: Duration = Duration::from_secs(1);
+
+/// The bit of the input that says whether a signal is valid, where there is one; nothing where it is no BOOL.
+fn valid_bit(
+    valid: Option<&Point>,
+    span: &Range<usize>,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<Option<u16>> {
+    if let Some(valid) = valid.filter(|valid| valid.of != Elementary::Bool) {
+        let message = format!("`{}` is {}", valid.name, valid.of);
+        let help = "the input that says whether a signal is valid is a BOOL";
+        diagnostics.push(misfit(message, span.clone(), help));
+        return None;
+    }
+    Some(valid.map(|valid| place(valid).bit))
 }
 
 /// A signal as it is declared.
@@ -232,6 +268,59 @@ struct Signal<'a> {
 }
 
 impl Signal<'_> {
+    fn of_group(
+        &self,
+        group: GroupSignal,
+        point: &Point,
+        valid: Option<&Point>,
+        period: Duration,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Option<InputSourceKind> {
+        let default = self
+            .default
+            .and_then(|default| value("default", default, point.of, diagnostics));
+        let Placed { value: from, span } = self.from?;
+        let is_name = |text: &str| !text.is_empty() && !text.contains(['/', '*', '$', '?', '#']);
+        if ![&group.group, &group.controller, &group.output]
+            .into_iter()
+            .all(|text| is_name(text))
+        {
+            let message = format!("`{from}` names no output of another group");
+            let help = "write cluster, controller and output, such as \"line-1/press.done\"";
+            diagnostics.push(Diagnostic::error("U0209", message, span.clone()).with_help(help));
+            return None;
+        }
+        let least = GROUP_STALE_AFTER
+            .as_nanos()
+            .div_ceil(period.as_nanos().max(1));
+        if u128::from(self.stale_after) < least {
+            let message = format!(
+                "`stale_after` of the signal `{from}` is {} cycles",
+                self.stale_after
+            );
+            let help = format!(
+                "a signal of another group takes at least 1 s: write `stale_after = {least}` or more"
+            );
+            diagnostics.push(Diagnostic::error("U0225", message, span.clone()).with_help(help));
+        }
+        let valid = valid_bit(valid, span, diagnostics)?;
+        Some(InputSourceKind::Operator(OperatorDeclaration {
+            input: OperatorInput {
+                place: place(point),
+                kind: OperatorInputKind::Group {
+                    stale_after: self.stale_after,
+                    valid,
+                },
+                initial: default?,
+                role: Role::Operator,
+            },
+            title: None,
+            unit: None,
+            confirm: false,
+            group: Some(group),
+        }))
+    }
+
     fn resolve(
         &self,
         point: &Point,
@@ -290,17 +379,12 @@ impl Signal<'_> {
             ));
             return None;
         }
-        if let Some(valid) = valid.filter(|valid| valid.of != Elementary::Bool) {
-            let message = format!("`{}` is {}", valid.name, valid.of);
-            let help = "the input that says whether a signal is valid is a BOOL";
-            diagnostics.push(misfit(message, span.clone(), help));
-            return None;
-        }
+        let valid = valid_bit(valid, span, diagnostics)?;
         let signal = SignalInput {
             from: ProgramId(source as u8),
             output: place(found).bit,
             place: place(point),
-            valid: valid.map(|valid| place(valid).bit),
+            valid,
             default: default?,
             stale_after: self.stale_after,
         };

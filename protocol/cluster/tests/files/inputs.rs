@@ -96,6 +96,44 @@ ready = { from = "right.done", default = true, stale_after = 7 }
 }
 
 #[test]
+fn a_signal_of_another_group_is_an_input_that_ends() {
+    let declared = |from: &str, stale_after: u32| {
+        let default = if from.contains("level") {
+            "-1.5"
+        } else {
+            "true"
+        };
+        let name = if from.contains("level") {
+            "speed"
+        } else {
+            "ready"
+        };
+        format!(
+            "{name} = {{ from = \"{from}\", default = {default}, stale_after = {stale_after} }}\n"
+        )
+    };
+    let inputs = declared("line-1/press.done", 50) + &declared("line-1/press.level", 75);
+    let cluster = load(&with_inputs(&inputs), &FILES)
+        .cluster
+        .expect("it is right");
+    let settings = cluster
+        .remote_io_settings(ProgramId(0))
+        .expect("it is there");
+    let kinds: Vec<OperatorInputKind> = settings.operator_inputs.iter().map(|it| it.kind).collect();
+    let group = |stale_after| OperatorInputKind::Group {
+        stale_after,
+        valid: None,
+    };
+    assert_eq!(kinds, [group(50), group(75)]);
+    assert_eq!(settings.operator_inputs[0].initial, 1);
+    assert!(settings.signals.is_empty() && cluster.neighbours().is_empty());
+    insta::assert_snapshot!(check(
+        "ready = { from = \"line-1/press\", default = false }\n\
+         speed = { from = \"line-1/press.level\", default = 0.0, stale_after = 49 }\n"
+    ));
+}
+
+#[test]
 fn what_is_declared_wrongly_is_said() {
     insta::assert_snapshot!(check(
         r#"starts = { operator = "pulse" }
