@@ -27,7 +27,7 @@ use understudy_remote_io::Event as RemoteIoEvent;
 use crate::record::{Happening, Record};
 
 pub use acknowledgement::Acknowledgement;
-pub use new_write::{WriteProblem, new_write};
+pub use new_write::{WriteProblem, force_value, new_write};
 pub use socket::RunSocket;
 pub(crate) use socket::SOCKET;
 

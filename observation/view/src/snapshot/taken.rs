@@ -226,6 +226,7 @@ impl Picture<'_> {
             awaits_release: own.awaits_release,
             forced: self.forced(program),
             forces: own.forced,
+            validity: own.validity,
             protection: own.protection,
             lost: own.lost,
             finished: own.plant.map(|(finished, _)| finished),

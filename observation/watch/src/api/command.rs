@@ -7,9 +7,12 @@ use axum::extract::rejection::JsonRejection;
 use axum::extract::{Extension, State};
 use serde::Deserialize;
 use serde_json::{Value, json};
-use understudy_journal::{Command, new_write};
+use understudy_cluster::Cluster;
+use understudy_journal::{Command, force_value, new_write};
+use understudy_typed::Point;
 use understudy_wire::{
-    Force, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH, PointValue, SignalPlace, StateChoice, Write,
+    Force, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH, Member, PointValue, Role, SignalPlace,
+    StateChoice, Write,
 };
 
 use super::Answered;
@@ -43,7 +46,7 @@ enum AskedCommand {
     Rejoin,
     Force {
         signal: SignalPlace,
-        value: PointValue,
+        value: AskedValue,
         seconds: u32,
     },
     Unforce {
@@ -54,6 +57,45 @@ enum AskedCommand {
         input: String,
         value: String,
     },
+}
+
+/// Value of a force.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum AskedValue {
+    Stored(PointValue),
+    /// As a person types it.
+    Typed(String),
+}
+
+impl AskedValue {
+    /// The value for a signal of the program of `member`.
+    fn of(self, cluster: &Cluster, member: Member, signal: SignalPlace) -> Answered<PointValue> {
+        let text = match self {
+            Self::Stored(value) => return Ok(value),
+            Self::Typed(text) => text,
+        };
+        let code = "U0556";
+        let point = point_of(cluster, member, signal).ok_or_else(|| {
+            let name = cluster.member_name(member).unwrap_or_default();
+            Problem::invalid(code, format!("`{name}` has no such signal"))
+        })?;
+        force_value(&text, point.of).map_err(|message| Problem::invalid(code, message))
+    }
+}
+
+/// The signal of a remote I/O that begins at a place.
+fn point_of(cluster: &Cluster, member: Member, signal: SignalPlace) -> Option<&Point> {
+    let Member::RemoteIo(program) = member else {
+        return None;
+    };
+    let interface = &cluster.controllers().get(program.index())?.interface;
+    let points = match signal {
+        SignalPlace::Input(_) => &interface.inputs,
+        SignalPlace::Output(_) => &interface.outputs,
+    };
+    let first = u32::from(signal.first_bit());
+    points.iter().find(|point| point.bit == first)
 }
 
 pub(super) async fn command(
@@ -73,52 +115,82 @@ pub(super) async fn command(
     }
     let owner = named(&person, asked.owner)?;
     let reason = readable(asked.reason, MAXIMUM_REASON_LENGTH, "the reason")?;
-    let member = app.model().member(&asked.member);
-    let member = member.ok_or_else(|| {
-        Problem::unknown(format!("the cluster has no member {:.60}", asked.member))
-    })?;
-    let command = match asked.command {
-        AskedCommand::Kill => Command::Kill,
-        AskedCommand::Restart => Command::Restart,
-        AskedCommand::Stop => Command::Stop,
-        AskedCommand::Continue => Command::Continue,
-        AskedCommand::Release => Command::Release,
-        AskedCommand::Choose { choice } => Command::Choose { choice },
-        AskedCommand::Isolate => Command::Isolate,
-        AskedCommand::Rejoin => Command::Rejoin,
-        AskedCommand::Unforce { signal } => Command::Unforce { signal },
-        AskedCommand::Write { input, value } => {
-            let model = app.model();
-            let unknown = || Problem::unknown("the run has not started".to_owned());
-            let cluster = model.cluster().ok_or_else(unknown)?;
-            let write = new_write(cluster, member, &input, &value);
-            let write = write.map_err(|problem| Problem::bad(problem.to_string()))?;
-            Command::Write(Write {
-                role: person.role,
-                owner: owner.clone(),
-                reason: reason.clone(),
-                ..write
-            })
-        }
-        AskedCommand::Force {
-            signal,
-            value,
-            seconds,
-        } => Command::Force(Force {
-            signal,
-            value,
-            seconds,
-            owner: owner.clone(),
-            reason: reason.clone(),
-        }),
+    let (member, command) = {
+        let model = app.model();
+        let member = model.member(&asked.member);
+        let member = member.ok_or_else(|| {
+            Problem::unknown(format!("the cluster has no member {:.60}", asked.member))
+        })?;
+        let started = || Problem::unknown("the run has not started");
+        let cluster = model.cluster().ok_or_else(started)?;
+        let by = By {
+            role: person.role,
+            owner: &owner,
+            reason: &reason,
+        };
+        (member, asked.command.given(cluster, member, by)?)
     };
     let commander = &app.commanding.commander;
     let done = commander.give(member, command, owner, reason).await;
     let done = done.map_err(|refusal| Problem::refused(&refusal.to_string()))?;
-    Ok(Json(match done.cycle {
-        Some(cycle) => json!({ "cycle": cycle }),
-        None => json!({}),
-    }))
+    let Some(cycle) = done.cycle else {
+        return Ok(Json(json!({})));
+    };
+    let model = app.model();
+    let known = model.known();
+    let run_cycle = known.and_then(|known| known.run.cycle_of(member, cycle));
+    Ok(Json(json!({ "cycle": cycle, "run_cycle": run_cycle })))
+}
+
+/// Person who gives a command.
+struct By<'a> {
+    role: Role,
+    owner: &'a str,
+    reason: &'a str,
+}
+
+impl AskedCommand {
+    /// The command to a member of the cluster.
+    fn given(self, cluster: &Cluster, member: Member, by: By<'_>) -> Answered<Command> {
+        let (owner, reason) = (by.owner.to_owned(), by.reason.to_owned());
+        Ok(match self {
+            Self::Kill => Command::Kill,
+            Self::Restart => Command::Restart,
+            Self::Stop => Command::Stop,
+            Self::Continue => Command::Continue,
+            Self::Release => Command::Release,
+            Self::Choose { choice } => Command::Choose { choice },
+            Self::Isolate => Command::Isolate,
+            Self::Rejoin => Command::Rejoin,
+            Self::Unforce { signal } => Command::Unforce { signal },
+            Self::Write { input, value } => {
+                let write = new_write(cluster, member, &input, &value);
+                let write = write.map_err(|problem| {
+                    let code = problem.code();
+                    let message = problem.to_string();
+                    let words = message.strip_prefix(&format!("{code}: "));
+                    Problem::invalid(code, words.unwrap_or(&message))
+                })?;
+                Command::Write(Write {
+                    role: by.role,
+                    owner,
+                    reason,
+                    ..write
+                })
+            }
+            Self::Force {
+                signal,
+                value,
+                seconds,
+            } => Command::Force(Force {
+                signal,
+                value: value.of(cluster, member, signal)?,
+                seconds,
+                owner,
+                reason,
+            }),
+        })
+    }
 }
 
 /// The person who is logged in; otherwise the name in the request.
