@@ -213,3 +213,107 @@ fn readable(text: String, most: usize, what: &str) -> Answered<String> {
         )))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::path::Path;
+
+    use super::*;
+
+    fn shuttles() -> Cluster {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/two-shuttles");
+        let text = |name: &str| fs::read_to_string(folder.join(name));
+        let file = text("cluster.toml").expect("an example");
+        let mut open = |name: &str| text(name).map_err(|error| error.to_string());
+        let loaded = understudy_cluster::read("cluster.toml", &file, &mut open);
+        loaded.cluster.expect("no errors")
+    }
+
+    /// What a request to a member becomes; the code of the problem otherwise.
+    fn given(member: &str, request: Value) -> Result<Command, String> {
+        let cluster = shuttles();
+        let member = cluster
+            .members()
+            .find(|found| cluster.member_name(*found) == Some(member))
+            .expect("a member");
+        let by = By {
+            role: Role::Operator,
+            owner: "anna",
+            reason: "a test",
+        };
+        let asked: AskedCommand = serde_json::from_value(request).expect("a request");
+        asked
+            .given(&cluster, member, by)
+            .map_err(|problem| format!("{problem:?}"))
+    }
+
+    fn write(member: &str, input: &str, value: &str) -> Result<Command, String> {
+        given(
+            member,
+            json!({ "command": "write", "input": input, "value": value }),
+        )
+    }
+
+    fn has(found: Result<Command, String>, wanted: &[&str]) {
+        let problem = found.expect_err("a problem");
+        for text in wanted {
+            assert!(problem.contains(text), "{problem}");
+        }
+    }
+
+    #[test]
+    fn a_write_has_the_role_of_its_person_and_is_checked() {
+        let Ok(Command::Write(found)) = write("left-io", "speed", "120.5") else {
+            panic!("no write");
+        };
+        assert_eq!(found.role, Role::Operator);
+        assert_eq!((&*found.owner, &*found.reason), ("anna", "a test"));
+        assert_eq!(found.value, PointValue::new(32, u64::from(120.5f32.to_bits())));
+        has(
+            write("left-io", "speed", "201"),
+            &["U0642", "from 0.0 to 200.0"],
+        );
+        has(write("left-io", "speed", "fast"), &["U0641", "fast"]);
+        has(write("left-io", "start", "2"), &["U0641"]);
+        has(write("left-io", "stard", "true"), &["U0640", "start"]);
+        // A signal of another program, a wire, and a member without inputs.
+        has(write("left-io", "right_wants", "true"), &["U0640"]);
+        has(write("left-io", "position", "1.0"), &["U0640"]);
+        has(write("left", "start", "true"), &["U0640"]);
+    }
+
+    #[test]
+    fn a_force_takes_a_number_as_a_person_types_it() {
+        let force = |member: &str, signal: Value, value: Value| {
+            given(
+                member,
+                json!({ "command": "force", "signal": signal, "value": value, "seconds": 5 }),
+            )
+        };
+        let value = |found: Result<Command, String>| match found {
+            Ok(Command::Force(force)) => force.value,
+            other => panic!("{other:?}"),
+        };
+        let speed = || json!({ "input": 64 });
+        let stored = PointValue::new(32, u64::from(12.5f32.to_bits()));
+        assert_eq!(value(force("left-io", speed(), json!("12.5"))), stored);
+        assert_eq!(value(force("left-io", speed(), json!(stored))), stored);
+        let start = json!({ "input": 32 });
+        assert_eq!(
+            value(force("left-io", start.clone(), json!("1"))),
+            PointValue::Bit(true)
+        );
+        has(
+            force("left-io", speed(), json!("fast")),
+            &["U0556", "finite number"],
+        );
+        has(force("left-io", start, json!("12.5")), &["U0556"]);
+        let nothing = json!({ "output": 7000 });
+        has(
+            force("left-io", nothing, json!("1")),
+            &["U0556", "no such signal"],
+        );
+        has(force("left", speed(), json!("1")), &["U0556"]);
+    }
+}
