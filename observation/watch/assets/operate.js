@@ -5,7 +5,6 @@ import { tell } from "/ask.js";
 import { el, keyed, setAttribute, setText, valueText } from "/element.js";
 import { obstacle, owner, setOwner } from "/commands.js";
 import { isDown, makeReads } from "/reads.js";
-import { state as stateNow } from "/time.js";
 
 let run = null;
 let reads = null;
@@ -110,6 +109,9 @@ function makeControl(program, input, index) {
     refresh();
   };
   const write = (text) => {
+    if (parts.busy) {
+      return;
+    }
     if (!confirm) {
       send(text);
       return;
@@ -133,15 +135,21 @@ function makeControl(program, input, index) {
     if (lamp) {
       setAttribute(lamp, "data-on", valueText(parts.sampled));
     }
-    const blocked = Boolean(parts.obstacle) || parts.busy;
     if (parts.obstacle) {
       asks.hidden = true;
     }
-    setter.show(blocked);
+    // While a write is under way its control keeps the focus.
+    for (const target of setter.targets) {
+      setAttribute(target, "aria-disabled", String(parts.busy));
+    }
+    setter.show(Boolean(parts.obstacle));
   };
   const element = el("li", { class: "control", "data-input": input.name, "data-kind": kind },
-    el("div", { class: "control-head" }, el("span", { id: `${key}-title`, class: "control-title" }, title), lamp, value),
-    setter.element, asks, why, answer);
+    el("div", { class: "control-row" },
+      // A button has its title itself.
+      kind === "pulse" ? null : el("span", { id: `${key}-title`, class: "control-title" }, title),
+      setter.element, el("span", { class: "control-now" }, lamp, value)),
+    asks, why, answer);
   const show = (sampled, because, described) => {
     parts.sampled = sampled;
     const own = because ? null : input.operator.why;
@@ -168,7 +176,7 @@ function makeLevel(parts, write) {
   const show = (blocked) => {
     button.disabled = blocked || parts.sampled === undefined || parts.sampled === null;
     setAttribute(button, "aria-checked", String(parts.sampled === true));
-    setText(button.lastChild, parts.sampled ? "on" : "off");
+    setText(button.lastChild, { true: "on", false: "off" }[parts.sampled] ?? "?");
   };
   return { element: el("div", { class: "control-setter" }, button), targets: [button], focus: () => button.focus(), show };
 }
@@ -237,4 +245,3 @@ function makeSetpoint(parts, write, say) {
   return { element: form, targets: [entry, slider, button], focus: () => entry.focus(), show, written: () => { typed = false; } };
 }
 
-export const enter = () => stateNow() && show(stateNow());

@@ -2,12 +2,14 @@
 
 import { el, setAttribute, setText, shorten, svg, valueText } from "/element.js";
 
-const WIDTH = 150;
-const GAP = 90;
+// Two programs fit on a telephone.
+const WIDTH = 110;
+const GAP = 98;
+const MARGIN = 6;
 const BOX = 34;
 const ROW = 46;
-const TOP = 12;
-const LETTER = 7;
+const TOP = 8;
+const LETTER = 6.4;
 
 // Members that answer no write.
 export const isDown = (member) => member.down || member.state === "suspended";
@@ -21,13 +23,13 @@ export function makeReads(run) {
     return null;
   }
   const columns = run.programs.filter((program) => signals.some(({ reader, from }) => reader === program || from === program));
-  const center = (program) => GAP / 2 + columns.indexOf(program) * (WIDTH + GAP) + WIDTH / 2;
-  const width = columns.length * (WIDTH + GAP);
+  const center = (program) => MARGIN + columns.indexOf(program) * (WIDTH + GAP) + WIDTH / 2;
+  const width = columns.length * (WIDTH + GAP) - GAP + 2 * MARGIN;
   const height = TOP + BOX + signals.length * ROW + 22;
   const lines = columns.map((program) => svg("line", { class: "lifeline", x1: center(program), x2: center(program), y1: TOP + BOX, y2: height - 6 }));
   const boxes = columns.map((program) => svg("g", {}, svg("title", {}, program.name),
     svg("rect", { x: center(program) - WIDTH / 2, y: TOP, width: WIDTH, height: BOX, rx: 5 }),
-    svg("text", { class: "name", x: center(program), y: TOP + 22, "text-anchor": "middle" }, shorten(program.name, 17))));
+    svg("text", { class: "name", x: center(program), y: TOP + 22, "text-anchor": "middle" }, shorten(program.name, 12))));
   const arrows = signals.map((signal, row) => makeArrow(signal, center(signal.from), center(signal.reader), TOP + BOX + (row + 1) * ROW));
   const picture = svg("svg", { class: "picture reads", viewBox: `0 0 ${width} ${height}`, width, height, role: "img", "aria-labelledby": "reads-title", "aria-describedby": "reads-list" }, lines, boxes, arrows.map((arrow) => arrow.element));
   const items = signals.map((_, row) => el("li", { id: id(row) }));
@@ -51,7 +53,7 @@ export function makeReads(run) {
 function makeArrow({ input, from, reader }, x1, x2, y) {
   const way = Math.sign(x2 - x1) || 1;
   const name = input.from.output === input.name ? input.name : `${input.from.output} → ${input.name}`;
-  const letters = Math.floor((Math.max(Math.abs(x2 - x1), WIDTH) - 20) / LETTER);
+  const letters = Math.floor(Math.abs(x2 - x1) / LETTER) - 2;
   const words = svg("text", { class: "arrow-words", x: (x1 + x2) / 2, y: y - 8, "text-anchor": "middle" });
   const tip = x2 - way * 3;
   const element = svg("g", { class: "arrow", "data-signal": `${from.name}.${input.from.output}>${reader.name}.${input.name}` },
@@ -59,7 +61,7 @@ function makeArrow({ input, from, reader }, x1, x2, y) {
     svg("path", { d: `M ${tip} ${y} l ${-way * 11} -5 v 10 z` }), words);
   const show = (value, valid) => {
     setAttribute(element, "data-valid", String(valid));
-    const end = ` = ${value}${valid === false ? " (default)" : ""}`;
+    const end = ` = ${value}`;
     setText(words, `${shorten(name, Math.max(6, letters - end.length))}${end}`);
   };
   return { element, show };

@@ -278,16 +278,16 @@ fn signals(run: &RunModel, index: usize, program: &ProgramSnapshot) -> Vec<Shown
         .flat_map(|remote_io| remote_io.signals());
     let shown = declared.filter_map(|signal| {
         let SignalInput { place, valid, .. } = signal.input;
-        let bit = |bit: u16| program.inputs.as_ref()?.as_bytes().get(usize::from(bit));
+        let sampled = program.inputs.as_deref();
         Some(ShownSignal {
             input: interface
                 .inputs
                 .iter()
                 .position(|point| point.bit == u32::from(place.bit))?,
-            valid: match valid {
-                Some(valid) => bit(valid).map(|bit| *bit == b'1'),
+            valid: sampled.and_then(|sampled| match valid {
+                Some(valid) => Some(*sampled.as_bytes().get(usize::from(valid))? == b'1'),
                 None => program.validity.get(&place.bit).copied(),
-            },
+            }),
         })
     });
     shown.collect()

@@ -5,9 +5,7 @@ use std::sync::Arc;
 use understudy_journal::{Happening, Record};
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_view::{Bounds, Filter, Listing, Model};
-use understudy_wire::{
-    Member, Moment, PointValue, ProgramId, Role, Write, WriteId, WriteRefusal,
-};
+use understudy_wire::{Member, Moment, PointValue, ProgramId, Role, Write, WriteId, WriteRefusal};
 
 use crate::support::{records, scenario, shuttles};
 

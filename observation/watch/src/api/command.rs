@@ -269,7 +269,10 @@ mod tests {
         };
         assert_eq!(found.role, Role::Operator);
         assert_eq!((&*found.owner, &*found.reason), ("anna", "a test"));
-        assert_eq!(found.value, PointValue::new(32, u64::from(120.5f32.to_bits())));
+        assert_eq!(
+            found.value,
+            PointValue::new(32, u64::from(120.5f32.to_bits()))
+        );
         has(
             write("left-io", "speed", "201"),
             &["U0642", "from 0.0 to 200.0"],
