@@ -60,6 +60,12 @@ async function drive() {
   await click(`${automatic} .confirm`);
   await until("the mode", `${value("left", "automatic")} === "0" && document.querySelector("${automatic} [role=switch]").getAttribute("aria-checked") === "false"`);
 
+  // A cycle of the past takes no write.
+  await click("#back");
+  await until("the reason", `${text("#operate-obstacle")}.includes("this is a replay: go live to command") && document.querySelector("${control("left", "start")} button").disabled`);
+  await click("#live");
+  await until("a control again", `document.querySelector("${control("left", "start")} button").disabled === false`);
+
   // Who reads whom.
   await until("valid signals", `document.querySelectorAll(".arrow[data-valid=true]").length === 3`);
   await until("the list", `${text("#reads-list")}.includes("right reads left.grant as granted = ")`);
@@ -76,12 +82,14 @@ async function drive() {
   await until("default values", `document.querySelectorAll(".arrow[data-valid=false]").length === 2`);
   await picture("operate-down-dark");
   await scheme("light");
+  await until("the light", "document.documentElement.dataset.theme === 'light'");
   await size(390, 844, true);
   await picture("operate-phone-down");
   await until("its return", command("right-io", "restart"));
   await until("a control again", `document.querySelector("${control("right", "start")} button").disabled === false`);
   await picture("operate-phone");
   await scheme("dark");
+  await until("the dark", "document.documentElement.dataset.theme === 'dark'");
   await picture("operate-phone-dark");
   const wide = await evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth");
   if (wide > 1) {
