@@ -2,9 +2,9 @@
 // the answer to a write, or the reason why it cannot be written, is next to it.
 
 import { tell } from "/ask.js";
-import { el, keyed, setAttribute, setText, valueText } from "/element.js";
+import { el, setAttribute, setText, valueText } from "/element.js";
 import { obstacle, owner, setOwner } from "/commands.js";
-import { isDown, makeReads } from "/reads.js";
+import { makeReads } from "/reads.js";
 
 let run = null;
 let reads = null;
@@ -45,6 +45,9 @@ export function show(state) {
   }
   reads?.show(state);
 }
+
+// A remote I/O that answers no write.
+const isDown = (member) => member.down || member.state === "suspended";
 
 // The panel of a program.
 function makePanel(program) {

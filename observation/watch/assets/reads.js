@@ -11,11 +11,6 @@ const ROW = 46;
 const TOP = 8;
 const LETTER = 6.4;
 
-// Members that answer no write.
-export const isDown = (member) => member.down || member.state === "suspended";
-
-const id = (index) => `reads-${index}`;
-
 export function makeReads(run) {
   const signals = run.programs.flatMap((reader) =>
     reader.inputs.flatMap((input, index) => (input.from ? [{ reader, input, index, from: run.programs[input.from.program] }] : [])));
@@ -32,7 +27,7 @@ export function makeReads(run) {
     svg("text", { class: "name", x: center(program), y: TOP + 22, "text-anchor": "middle" }, shorten(program.name, 12))));
   const arrows = signals.map((signal, row) => makeArrow(signal, center(signal.from), center(signal.reader), TOP + BOX + (row + 1) * ROW));
   const picture = svg("svg", { class: "picture reads", viewBox: `0 0 ${width} ${height}`, width, height, role: "img", "aria-labelledby": "reads-title", "aria-describedby": "reads-list" }, lines, boxes, arrows.map((arrow) => arrow.element));
-  const items = signals.map((_, row) => el("li", { id: id(row) }));
+  const items = signals.map(() => el("li"));
   const element = el("section", { class: "card", "aria-labelledby": "reads-title" },
     el("h2", { id: "reads-title" }, "Signals between programs"),
     el("div", { class: "picture-frame", tabindex: "0", role: "region", "aria-label": "Picture of the signals between programs" }, picture),

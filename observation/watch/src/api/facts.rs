@@ -357,3 +357,44 @@ pub(super) async fn events(
         events: events.collect(),
     }))
 }
+
+#[cfg(test)]
+mod tests {
+    use understudy_remote_io::InputPlace;
+    use understudy_typed::Elementary;
+
+    use super::*;
+
+    #[test]
+    fn an_input_says_why_a_person_may_not_write_it() {
+        let declared = OperatorDeclaration {
+            input: OperatorInput {
+                place: InputPlace {
+                    bit: 0,
+                    of: Elementary::Int,
+                },
+                kind: OperatorInputKind::Setpoint {
+                    low: (-5i16) as u16 as u64,
+                    high: 7,
+                },
+                initial: 0,
+                role: Role::Engineer,
+            },
+            title: None,
+            unit: Some("mm".to_owned()),
+            confirm: true,
+        };
+        let facts = |role| {
+            let facts = operator_facts("gap", &declared, role);
+            serde_json::to_value(facts).expect("JSON")
+        };
+        let operator = facts(Role::Operator);
+        assert_eq!(operator["title"], "gap");
+        assert_eq!(
+            (&operator["low"], &operator["high"]),
+            (&(-5).into(), &7.into())
+        );
+        assert_eq!(operator["why"], "it requires the role engineer");
+        assert_eq!(facts(Role::Engineer)["why"], Value::Null);
+    }
+}
