@@ -7,18 +7,16 @@ use std::time::{Duration, SystemTime};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use understudy_bus::{Call, Request};
-use understudy_cluster::{Cluster, Overrides, typed_value};
+use understudy_cluster::{Cluster, Overrides};
 use understudy_executable::Interface;
 use understudy_journal::{
-    Command, Done, OperatorAction, Refusal, RequestedValue, WriteRequest, new_write,
+    Command, Done, OperatorAction, Refusal, RequestedValue, WriteRequest, force_value, new_write,
 };
 use understudy_keys::{Date, OperatorKeys};
 use understudy_member::tls_keys;
 use understudy_typed::Elementary;
 use understudy_view::{Run, find_running_of};
-use understudy_wire::{
-    Cycle, Force, Member, PointValue, Role, SignalPlace, StateChoice, Write, WriteAnswer,
-};
+use understudy_wire::{Cycle, Force, Member, Role, SignalPlace, StateChoice, Write, WriteAnswer};
 
 use crate::answer::{Answer, Status};
 use crate::files;
@@ -210,11 +208,8 @@ fn place<'a>(
 /// A force of a signal as a whole.
 fn force(arguments: &Arguments, cluster: &Cluster) -> Result<Force, Answer> {
     let (signal, of, text) = place(arguments, cluster)?;
-    let stored = typed_value(text, of).map_err(|help| {
-        let message = format!("invalid value `{text}` of a {of}: {help}");
-        Answer::failed(Status::BadInput, "U0556", message)
-    })?;
-    let value = PointValue::new(of.bits(), stored);
+    let value = force_value(text, of)
+        .map_err(|message| Answer::failed(Status::BadInput, "U0556", message))?;
     let force = Force {
         signal,
         value,

@@ -2,103 +2,12 @@
 //
 //   node tests/page/browser.mjs http://127.0.0.1:7480/ PICTURES [PROCESS [AXE.min.js]]
 //
-// The page may command a laboratory of the press cell. With the process of its server, this is suspended for some seconds. Where the browser does not start at all, the exit status is 77. With the file of axe-core, each view is checked for accessibility too.
+// The page may command a laboratory of the press cell. With the process of its server, this is suspended for some seconds. With the file of axe-core, each view is checked for accessibility too.
 
-import { spawn } from "node:child_process";
-import { mkdirSync, mkdtempSync, readFileSync, writeFileSync } from "node:fs";
-import { tmpdir } from "node:os";
-import { join } from "node:path";
+import { accessible, call, click, evaluate, more, open, picture, problems, run, scheme, size, text, until } from "./chromium.mjs";
 
-const [url, pictures, server, axe] = process.argv.slice(2);
-const DEADLINE = 60_000;
-mkdirSync(pictures, { recursive: true });
+const [server, axe] = more;
 
-const profile = mkdtempSync(join(tmpdir(), "understudy-browser-"));
-const chromium = spawn(
-  process.env.UNDERSTUDY_BROWSER || "chromium",
-  ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--remote-debugging-pipe", `--user-data-dir=${profile}`, "about:blank"],
-  { stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"] },
-);
-const [, , , toBrowser, fromBrowser] = chromium.stdio;
-// What it does not take is told by its end.
-toBrowser.on("error", () => {});
-const waiting = new Map();
-const problems = [];
-let session;
-let started = false;
-let number = 0;
-
-const ended = (how) => {
-  console.error(`the browser ended: ${how}`);
-  process.exit(started ? 1 : 77);
-};
-chromium.on("error", ended);
-chromium.on("exit", (code, signal) => ended(code ?? signal));
-let rest = "";
-
-fromBrowser.setEncoding("utf8");
-fromBrowser.on("data", (data) => {
-  const messages = (rest + data).split("\0");
-  rest = messages.pop();
-  for (const text of messages) {
-    const message = JSON.parse(text);
-    started = true;
-    if (message.id) {
-      const { resolve, reject } = waiting.get(message.id);
-      waiting.delete(message.id);
-      message.error ? reject(new Error(message.error.message)) : resolve(message.result);
-    } else if (message.method === "Runtime.exceptionThrown") {
-      const { exceptionDetails: details } = message.params;
-      problems.push(details.exception?.description ?? details.text);
-    } else if (message.method === "Log.entryAdded" && message.params.entry.level === "error") {
-      problems.push(`${message.params.entry.text} ${message.params.entry.url ?? ""}`);
-    }
-  }
-});
-
-function call(method, params = {}) {
-  number += 1;
-  toBrowser.write(`${JSON.stringify({ id: number, method, params, sessionId: session })}\0`);
-  const id = number;
-  return new Promise((resolve, reject) => waiting.set(id, { resolve, reject }));
-}
-
-async function evaluate(expression) {
-  const { result, exceptionDetails } = await call("Runtime.evaluate", { expression, awaitPromise: true, returnByValue: true });
-  if (exceptionDetails) {
-    throw new Error(`${expression}: ${exceptionDetails.exception?.description ?? exceptionDetails.text}`);
-  }
-  return result.value;
-}
-
-async function until(what, expression) {
-  const started = Date.now();
-  while (!(await evaluate(expression))) {
-    if (Date.now() - started > DEADLINE) {
-      await picture("failed");
-      throw new Error(`${what} did not come: ${expression}`);
-    }
-    await new Promise((resolve) => setTimeout(resolve, 100));
-  }
-}
-
-async function picture(name) {
-  await evaluate("(() => { document.getElementById('toast')?.hidePopover?.(); })()");
-  const { data } = await call("Page.captureScreenshot", { format: "png" });
-  writeFileSync(join(pictures, `${name}.png`), Buffer.from(data, "base64"));
-}
-
-async function size(width, height, mobile) {
-  await call("Emulation.setDeviceMetricsOverride", { width, height, deviceScaleFactor: mobile ? 2 : 1, mobile });
-}
-
-async function scheme(value) {
-  await evaluate("localStorage.removeItem('theme')");
-  await call("Emulation.setEmulatedMedia", { features: [{ name: "prefers-color-scheme", value }] });
-}
-
-const text = (selector) => `(document.querySelector(${JSON.stringify(selector)})?.textContent ?? "")`;
-const click = (selector) => evaluate(`(() => { const found = document.querySelector(${JSON.stringify(selector)}); if (!found) throw new Error("nothing is there"); found.dispatchEvent(new MouseEvent("click", { bubbles: true })); })()`);
 const member = (name) => `g.member[data-name="${name}"]`;
 const stateOf = (name) => `document.querySelector('${member(name)}')?.dataset.state`;
 const lampOf = (program) => `[...document.querySelectorAll("#protection-list li")].find((line) => line.textContent.includes(" ${program}: "))?.dataset.protection`;
@@ -108,26 +17,8 @@ const command = async (name, what) => {
   await click(`[data-command=${what}]`);
   await until("it is done", "!document.getElementById('command').open");
 };
-const open = (view) => evaluate(`location.hash = ${JSON.stringify(view)}`);
-
-async function accessible(view) {
-  if (!axe) {
-    return;
-  }
-  await evaluate(`${readFileSync(axe, "utf8")}; 0`);
-  const found = await evaluate("axe.run().then(({ violations }) => violations.map(({ id, impact, nodes }) => `${id} (${impact}): ${nodes.slice(0, 3).map((node) => node.target.join(' ')).join(' | ')}`))");
-  console.log(`axe ${view}: ${found.length === 0 ? "nothing" : found.join("\n  ")}`);
-  if (found.length > 0) {
-    problems.push(...found.map((line) => `axe ${view}: ${line}`));
-  }
-}
 
 async function drive() {
-  const { targetId } = await call("Target.createTarget", { url: "about:blank" });
-  session = (await call("Target.attachToTarget", { targetId, flatten: true })).sessionId;
-  await Promise.all(["Page.enable", "Runtime.enable", "Log.enable"].map((method) => call(method)));
-  await size(1280, 900, false);
-  await call("Page.navigate", { url });
   await until("everybody", `['robot', 'press', 'understudy'].every((name) => document.querySelector('g.member[data-name="' + name + '"]')?.dataset.state === 'publishing')`);
   await scheme("light");
   await until("a margin", `${text("#redundancy-words")}.includes("any one further failure")`);
@@ -136,7 +27,7 @@ async function drive() {
   const tour = (part) => `document.querySelector("#tour ${part}")`;
   await until("the tour", `${tour(".tour-step")}?.textContent === "1 of 3"`);
   await picture("tour");
-  await accessible("tour");
+  await accessible("tour", axe);
   const before = await evaluate("document.activeElement === document.body");
   if (!before) {
     problems.push("the tour took the focus without being asked for");
@@ -157,13 +48,13 @@ async function drive() {
   await until("its end by a key", `document.getElementById("tour") === null && document.activeElement?.id === "tour-start"`);
   await until("a margin again", `${text("#redundancy-words")}.includes("any one further failure")`);
   await picture("cluster");
-  await accessible("cluster");
+  await accessible("cluster", axe);
 
   // A kill: the outputs move on, and the margin shrinks.
   await click(member("robot"));
   await until("the dialog", "document.getElementById('command').open");
   await picture("command");
-  await accessible("command");
+  await accessible("command", axe);
   await click("[data-command=kill]");
   await until("its end", `${stateOf("robot")} === "killed"`);
   await until("a smaller margin", `${text("#redundancy-words")}.includes("1 of 2 failures")`);
@@ -172,7 +63,7 @@ async function drive() {
   await scheme("dark");
   await until("the dark", "document.documentElement.dataset.theme === 'dark'");
   await picture("killed-dark");
-  await accessible("killed, dark");
+  await accessible("killed, dark", axe);
   await scheme("light");
 
   await until("a lost protection", `${lampOf("robot")} === "unprotected" && ${text("#protection-list")}.includes("robot is killed")`);
@@ -182,7 +73,7 @@ async function drive() {
   const asked = `document.querySelector(".signal[data-kind=output]").dispatchEvent(new MouseEvent("click", { bubbles: true }))`;
   await until("an answer", `(${asked}, new Promise((resolve) => setTimeout(resolve, 1000)).then(() => !document.getElementById("why").hidden && ${text("#why")}.includes("Lineage")))`);
   await picture("why");
-  await accessible("why");
+  await accessible("why", axe);
   await click("#why .drawer-head button");
 
   // A button that cannot act says why.
@@ -200,11 +91,11 @@ async function drive() {
   await command("understudy", "rejoin");
   await until("the question", `${lampOf("robot")} === "lost" && document.querySelector("[data-choice=newest]").offsetParent !== null`);
   await picture("lost");
-  await accessible("lost");
+  await accessible("lost", axe);
   await click("[data-choice=newest]");
   await until("what it does", `${text("#command")}.includes("The plant has moved on since")`);
   await picture("choice");
-  await accessible("choice");
+  await accessible("choice", axe);
   await click("#confirm-choice");
   await until("an older state that goes on", `${lampOf("robot")} !== "lost" && document.querySelector(".picture-frame .flow[data-source=reconstructed]") !== null`);
   await command("robot", "restart");
@@ -244,21 +135,21 @@ async function drive() {
   await until("a ladder with power", `document.querySelector("#ladder-picture svg .live") !== null && ${text("#ladder-stamp")}.includes("as evaluated")`);
   await until("a cross-reference", `document.querySelectorAll("#ladder-cross tbody tr").length > 3`);
   await picture("ladder");
-  await accessible("ladder");
+  await accessible("ladder", axe);
   await evaluate("(() => { const palette = document.getElementById('ladder-palette'); palette.value = 'tia'; palette.dispatchEvent(new Event('change')); })()");
   await scheme("dark");
   await picture("ladder-tia-dark");
-  await accessible("ladder, dark");
+  await accessible("ladder, dark", axe);
   await scheme("light");
   await evaluate("(() => { const choose = document.getElementById('ladder-program'); choose.value = [...choose.options].at(-1).value; choose.dispatchEvent(new Event('change')); })()");
   await until("the sum", `${text("#ladder-stamp")}.includes("the sum of")`);
   await picture("sum");
-  await accessible("sum");
+  await accessible("sum", axe);
 
   await open("trends");
   await until("trends", `document.querySelector("#trend-plot canvas") !== null`);
   await picture("trends");
-  await accessible("trends");
+  await accessible("trends", axe);
 
   await open("events");
   await until("events", `${text("#event-table tbody")}.includes("killed")`);
@@ -266,12 +157,12 @@ async function drive() {
   await click("#alarm-list li[data-open=true] button");
   await until("its acknowledgement", `${text("#alarm-list")}.includes("acknowledged by")`);
   await picture("events");
-  await accessible("events");
+  await accessible("events", axe);
 
   await open("compare");
   await until("a comparison", `${text("#view-compare")}.includes("Compare")`);
   await picture("compare");
-  await accessible("compare");
+  await accessible("compare", axe);
 
   // Replay: back to the cycle of the kill.
   await open("events");
@@ -297,16 +188,7 @@ async function drive() {
       problems.push(`phone ${view}: ${wide} pixels too wide`);
     }
   }
-  await accessible("phone");
+  await accessible("phone", axe);
 }
 
-drive()
-  .catch((error) => problems.push(error.stack))
-  .finally(() => {
-    chromium.removeAllListeners("exit");
-    chromium.kill();
-    for (const problem of problems) {
-      console.error(problem);
-    }
-    process.exitCode = problems.length > 0 ? 1 : 0;
-  });
+run(drive);

@@ -1,9 +1,11 @@
 //! A real browser drives every view of a real laboratory, where `UNDERSTUDY_BROWSER` names a Chromium and Node is installed.
 
 use std::process::Command;
+
+use serde_json::Value;
 use understudy_testing::skip;
 
-use crate::{Page, empty_folder, member, one_at_a_time, understudy};
+use crate::{Page, empty_folder, one_at_a_time, understudy};
 
 /// The exit status of the script where no browser starts.
 const NOT_STARTED: i32 = 77;
@@ -13,16 +15,16 @@ fn is_there(program: &str) -> bool {
     output.is_ok_and(|output| output.status.success())
 }
 
-#[test]
-fn a_browser_sees_a_kill_and_asks_why() {
+/// Starts a page that commands a laboratory of `cluster`, and drives it by a script in this folder.
+fn drive(name: &str, cluster: &str, script: &str, more: impl Fn(&Page) -> Vec<String>) {
     let browser = std::env::var("UNDERSTUDY_BROWSER").unwrap_or_default();
     if browser.is_empty() || !is_there("node") || !is_there(&browser) {
         skip("UNDERSTUDY_BROWSER names no Chromium, or Node is not installed");
         return;
     }
     let _turn = one_at_a_time();
-    let folder = empty_folder("browser");
-    let mut command = understudy(&["watch", "examples/press-cell/cluster.toml"]);
+    let folder = empty_folder(name);
+    let mut command = understudy(&["watch", cluster]);
     command
         .args(["--address", "127.0.0.1:0", "--allow-commands"])
         .args(["--link", "udp", "--period", "50ms"])
@@ -30,13 +32,18 @@ fn a_browser_sees_a_kill_and_asks_why() {
         .arg(folder.join("runs"));
     let page = Page::start(command);
     page.wait_for("a cluster synchronised", |state| {
-        member(state, "robot")["state"] == "publishing"
+        let members = state["members"].as_array();
+        let mut stations = members
+            .into_iter()
+            .flatten()
+            .filter(|member| ["controller", "understudy"].contains(&&*text(&member["kind"])));
+        stations.all(|station| station["state"] == "publishing")
     });
     let output = Command::new("node")
-        .arg("tests/page/browser.mjs")
+        .arg(format!("tests/page/{script}"))
         .arg(format!("http://{}/", page.address))
         .arg(folder.join("pictures"))
-        .arg(page.id().to_string())
+        .args(more(&page))
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .output()
         .expect("node runs");
@@ -47,4 +54,22 @@ fn a_browser_sees_a_kill_and_asks_why() {
         return;
     }
     assert!(output.status.success(), "{said:.4000}{errors:.4000}");
+}
+
+fn text(value: &Value) -> String {
+    value.as_str().unwrap_or_default().to_owned()
+}
+
+#[test]
+fn a_browser_sees_a_kill_and_asks_why() {
+    let cluster = "examples/press-cell/cluster.toml";
+    drive("browser", cluster, "browser.mjs", |page| {
+        vec![page.id().to_string()]
+    });
+}
+
+#[test]
+fn a_browser_starts_a_shuttle_and_sees_since_when() {
+    let cluster = "examples/two-shuttles/cluster.toml";
+    drive("operate", cluster, "operate.mjs", |_| Vec::new());
 }

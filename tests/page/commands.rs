@@ -14,8 +14,13 @@ use crate::{Page, empty_folder, member, one_at_a_time, understudy};
 const PERIOD: &str = "50ms";
 
 fn started(name: &str) -> (Page, std::path::PathBuf) {
+    let cluster = "examples/press-cell/cluster.toml";
+    started_of(name, cluster, &["robot", "press", "understudy"])
+}
+
+fn started_of(name: &str, cluster: &str, stations: &[&str]) -> (Page, std::path::PathBuf) {
     let runs = empty_folder(name);
-    let mut command = understudy(&["watch", "examples/press-cell/cluster.toml"]);
+    let mut command = understudy(&["watch", cluster]);
     command
         .args(["--address", "127.0.0.1:0", "--allow-commands"])
         .args(["--link", "udp", "--period", PERIOD])
@@ -23,8 +28,8 @@ fn started(name: &str) -> (Page, std::path::PathBuf) {
         .arg(&runs);
     let page = Page::start(command);
     page.wait_for("a cluster synchronised", |state| {
-        let publishing = |name| member(state, name)["state"] == "publishing";
-        ["robot", "press", "understudy"].into_iter().all(publishing)
+        let publishing = |name: &&str| member(state, name)["state"] == "publishing";
+        stations.iter().all(publishing)
     });
     (page, runs)
 }
@@ -223,4 +228,64 @@ fn every_command_is_done_or_refused_and_is_in_the_journal() {
             .as_array()
             .is_some_and(|all| all.iter().all(wrong))
     );
+}
+
+#[test]
+fn a_write_is_answered_with_its_cycle_or_a_code() {
+    let _turn = one_at_a_time();
+    let cluster = "examples/two-shuttles/cluster.toml";
+    let (page, _) = started_of("writes", cluster, &["left", "right", "understudy"]);
+    let facts = page.get("/api/run").json();
+    assert!(facts["commands"]["write_why"].is_null(), "{facts:#}");
+    let inputs = facts["programs"][0]["inputs"].as_array().expect("inputs");
+    let place = |name: &str| {
+        let found = inputs.iter().position(|input| input["name"] == name);
+        found.expect("an input")
+    };
+    let speed = &inputs[place("speed")]["operator"];
+    assert_eq!(
+        speed,
+        &json!({ "kind": "setpoint", "title": "Speed", "unit": "mm/s", "confirm": false, "low": 0.0, "high": 200.0, "why": null })
+    );
+    let from = &inputs[place("right_wants")]["from"];
+    assert_eq!(from, &json!({ "program": 1, "output": "wants" }));
+
+    let write =
+        |input: &str, value: &str| json!({ "command": "write", "input": input, "value": value });
+    let refused = |code: &str| (400, code.to_owned());
+    let left = "left-io";
+    assert_eq!(give(&page, left, &write("speed", "250")), refused("U0642"));
+    assert_eq!(give(&page, left, &write("speed", "fast")), refused("U0641"));
+    assert_eq!(give(&page, left, &write("spead", "1")), refused("U0640"));
+    let force =
+        json!({ "command": "force", "signal": { "input": 64 }, "value": "fast", "seconds": 5 });
+    assert_eq!(give(&page, left, &force), refused("U0556"));
+
+    let body = json!({ "member": left, "command": write("speed", "180"), "owner": "anna", "reason": "a test" });
+    let answer = page.post("/api/command", &body.to_string());
+    assert_eq!(answer.status, 200, "{}", answer.body);
+    let answer = answer.json();
+    let cycle = answer["run_cycle"].as_i64().expect("a cycle");
+    assert!(answer["cycle"].as_i64() >= Some(cycle), "{answer}");
+    let at = |cycle: i64| {
+        let state = page.get(&format!("/api/state?cycle={cycle}")).json();
+        state["programs"][0]["input_values"][place("speed")].as_f64()
+    };
+    page.wait_for("the cycle of the write", |state| {
+        state["cycle"].as_i64() >= Some(cycle)
+    });
+    assert_eq!(at(cycle), Some(180.0));
+    assert_ne!(at(cycle - 1), Some(180.0));
+    page.wait_for("valid signals", |state| {
+        let signals = state["programs"][0]["signals"].as_array();
+        signals.is_some_and(|all| all.len() == 2 && all.iter().all(|one| one["valid"] == true))
+    });
+    let events = page.get("/api/events?find=speed").json().to_string();
+    assert!(
+        events.contains("anna writes 180.0 mm/s to input speed: a test"),
+        "{events:.2000}"
+    );
+    assert!(events.contains("speed = 180.0 mm/s of anna is in effect"));
+    assert!(events.contains("anna commands write speed = 180.0 mm/s of left-io"));
+    assert_eq!(page.end(), 0);
 }

@@ -22,13 +22,13 @@ mod writer;
 pub use clock::monotonic_ns;
 pub use journal::{JOURNAL_LIMIT_BYTES, Journal, JournalError, JournalState, records, records_of};
 pub use kept::{KeptError, keep_cluster, kept_cluster};
-pub use members::Members;
+pub use members::{Members, NamedSignal};
 pub use named_files::{ALLOWED_FOLDERS, named_file};
 pub use numbering::Numbering;
 pub use operator::{
     Acknowledgement, Command, Commanded, Commander, Commands, Done, OperatorAction, PendingWrites,
     Refusal, RequestedValue, RunSocket, WriteProblem, WriteRequest, WriteSessions, commands,
-    new_write, write_answer,
+    force_value, new_write, write_answer,
 };
 pub use record::{Happening, LABORATORY, Record, RunEvent, moment};
 pub use rules::{Process, SourceCounts, is_blocked, is_provable};

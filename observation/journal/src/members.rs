@@ -1,8 +1,9 @@
 //! The members of a cluster by name.
 
-use understudy_cluster::Cluster;
+use understudy_cluster::{Cluster, InputSource};
 use understudy_remote_io::OperatorInput;
-use understudy_wire::{Member, ProgramId, StationId};
+use understudy_typed::{Elementary, Point};
+use understudy_wire::{Member, ProgramId, SignalPlace, StationId};
 
 /// Every member of a cluster with its name: stations by rank, then remote I/Os, then plants.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -10,6 +11,23 @@ pub struct Members {
     members: Vec<(Member, String)>,
     /// Inputs that operators write.
     operator_inputs: Vec<NamedInput>,
+    /// Signals of each program; empty where only the members are known.
+    signals: Vec<Vec<NamedSignal>>,
+}
+
+/// Input or output of a program, by name.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NamedSignal {
+    /// Place in the process image.
+    pub place: SignalPlace,
+    /// Name in the program.
+    pub name: String,
+    /// Type.
+    pub of: Elementary,
+    /// Unit of a setpoint.
+    pub unit: Option<String>,
+    /// The output of another program that it is, such as `press.done`.
+    pub from: Option<String>,
 }
 
 /// Input that operators write, by name.
@@ -40,6 +58,9 @@ impl Members {
         });
         Self {
             operator_inputs: inputs.collect(),
+            signals: (0..cluster.controllers().len())
+                .map(|program| signals(cluster, program))
+                .collect(),
             ..Self::new(cluster.members().map(|member| (member, name(member))))
         }
     }
@@ -51,6 +72,7 @@ impl Members {
         Self {
             members,
             operator_inputs: Vec::new(),
+            signals: Vec::new(),
         }
     }
 
@@ -82,6 +104,12 @@ impl Members {
         inputs.filter(move |input| input.program == program)
     }
 
+    /// The signal of a program at a place.
+    pub fn signal(&self, program: ProgramId, place: SignalPlace) -> Option<&NamedSignal> {
+        let mut signals = self.signals.get(program.index())?.iter();
+        signals.find(|signal| signal.place == place)
+    }
+
     /// Stations in rank order.
     pub fn stations(&self) -> impl Iterator<Item = (StationId, &str)> {
         self.iter().filter_map(|(member, name)| match member {
@@ -105,4 +133,34 @@ impl Members {
             _ => None,
         })
     }
+}
+
+/// Inputs and outputs of a program of the cluster.
+fn signals(cluster: &Cluster, program: usize) -> Vec<NamedSignal> {
+    let interface = &cluster.controllers()[program].interface;
+    let sources = cluster.remote_ios().get(program);
+    let sources = sources.map_or(&[][..], |remote_io| &remote_io.inputs);
+    let named = |place: fn(u16) -> SignalPlace, point: &Point| {
+        let place = place(u16::try_from(point.bit).unwrap_or(u16::MAX));
+        let is_input = matches!(place, SignalPlace::Input(_));
+        let mut sources = sources.iter().filter(|_| is_input);
+        let source = sources.find(|source| source.name == point.name);
+        let signal = source.and_then(InputSource::signal);
+        NamedSignal {
+            place,
+            name: point.name.clone(),
+            of: point.of,
+            unit: source.and_then(|source| source.operator()?.unit.clone()),
+            from: signal.map(|signal| {
+                let from = &cluster.controllers()[signal.input.from.index()].name;
+                format!("{from}.{}", signal.output)
+            }),
+        }
+    };
+    let inputs = interface.inputs.iter();
+    let outputs = interface.outputs.iter();
+    inputs
+        .map(|point| named(SignalPlace::Input, point))
+        .chain(outputs.map(|point| named(SignalPlace::Output, point)))
+        .collect()
 }

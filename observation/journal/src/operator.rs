@@ -28,7 +28,7 @@ use understudy_remote_io::Event as RemoteIoEvent;
 use crate::record::{Happening, Record};
 
 pub use acknowledgement::Acknowledgement;
-pub use new_write::{RequestedValue, WriteProblem, WriteRequest, new_write};
+pub use new_write::{RequestedValue, WriteProblem, WriteRequest, force_value, new_write};
 pub use sessions::WriteSessions;
 pub use socket::RunSocket;
 pub(crate) use socket::SOCKET;

@@ -10,18 +10,19 @@ use understudy_wire::{Element, Member, ProgramId, ProgramSet, Set, Source, Stati
 
 use crate::event::Level;
 pub(crate) use processes::fault_text;
+pub(crate) use signals::Writes;
 
 /// A table of descriptions: each kind of event with its name, its level and its text. It makes the function that describes an event,
 /// and the list of the names.
 macro_rules! descriptions {
-    ($function:ident: $event:ident, $members:ident;
+    ($function:ident: $event:ident, $members:ident: $names:ty;
      $($kind:ident $({ $($fields:tt)* })? $(($($values:tt)*))? => $name:literal $level:ident $text:expr;)*) => {
         pub(super) mod $function {
             /// Name of each kind of event.
             pub(in crate::describe) const NAMES: &[&str] = &[$($name),*];
         }
 
-        pub(super) fn $function(event: &$event, $members: &Members) -> Words {
+        pub(super) fn $function(event: &$event, $members: &$names) -> Words {
             match event {
                 $($event::$kind $({ $($fields)* })? $(($($values)*))? => {
                     ($name, crate::event::Level::$level, String::from($text))
@@ -33,18 +34,19 @@ macro_rules! descriptions {
 
 mod members;
 mod processes;
+mod signals;
 
 /// A record as a sentence.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Description {
+pub(crate) struct Description {
     /// Kind of event, as in the journal.
-    pub event: &'static str,
+    pub(crate) event: &'static str,
     /// Severity of the event.
-    pub level: Level,
+    pub(crate) level: Level,
     /// The event in words.
-    pub text: String,
+    pub(crate) text: String,
     /// Whether it occurs in every cycle.
-    pub is_ordinary: bool,
+    pub(crate) is_ordinary: bool,
 }
 
 /// Every value of [`Description::event`], each once.
@@ -62,11 +64,18 @@ pub(crate) fn event_names() -> BTreeSet<&'static str> {
     names.collect()
 }
 
-/// Describes a record with the names of its cluster.
-pub fn describe(record: &Record, names: &Members) -> Description {
+/// Describes a record with the names of its cluster, and with the writes of the records before it.
+pub(crate) fn describe(record: &Record, names: &Members, writes: &Writes) -> Description {
     let (event, level, text) = match &record.event {
         Happening::Station(event) => members::station(event, names),
-        Happening::RemoteIo(event) => members::remote_io(event, names),
+        Happening::RemoteIo(event) => {
+            let names = signals::Names {
+                members: names,
+                writes,
+                by: record.member,
+            };
+            members::remote_io(event, &names)
+        }
         Happening::Plant(event) => members::plant(event, names),
         Happening::Host(event) => processes::host(event, names),
         Happening::Run(event) => processes::run(event, names),

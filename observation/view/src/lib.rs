@@ -38,7 +38,6 @@ mod value;
 mod why;
 
 pub use alarm::Alarm;
-pub use describe::{Description, describe};
 pub use diff::{Difference, Differing, RunDiff, diff};
 pub use error::ViewError;
 pub use event::{Event, Level};
@@ -61,5 +60,5 @@ pub use station::StationState;
 pub use terminal::{Key, Screen};
 pub use timeline::{Span, Timeline};
 pub use timing::CycleTiming;
-pub use value::{forced_point, forced_value, number_of, stored, value_of};
+pub use value::{elementary, forced_point, forced_value, number_of, stored, value_of};
 pub use why::{Addend, Reason, Reconstructed, Why};

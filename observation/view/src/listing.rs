@@ -11,7 +11,7 @@ use understudy_text::spelling::suggestion;
 use understudy_wire::{Member, Moment, ProgramId, Source};
 
 use crate::cycles::Cycles;
-use crate::describe::{PROGRAM_FAULT, describe, event_names};
+use crate::describe::{PROGRAM_FAULT, Writes, describe, event_names};
 use crate::error::ViewError;
 use crate::event::Level;
 use crate::stop::Stops;
@@ -55,6 +55,7 @@ pub struct JournalLine {
 pub struct Listing {
     filter: Filter,
     members: Members,
+    writes: Writes,
     wanted: Vec<Member>,
     cycles: Cycles,
     sources: BTreeMap<ProgramId, Source>,
@@ -107,6 +108,7 @@ impl Listing {
             wanted: wanted.map(|(member, _)| member).collect(),
             filter,
             members,
+            writes: Writes::default(),
             cycles: Cycles::default(),
             sources: BTreeMap::new(),
             stops: Stops::new(cluster),
@@ -139,10 +141,11 @@ impl Listing {
         let cycle = self.cycles.has_origin().then_some(cycle);
         let changed = self.source_changed(record);
         let fault = self.stops.take(record);
+        self.writes.note(record);
         if !self.is_wanted(record, cycle) {
             return None;
         }
-        let mut description = describe(record, &self.members);
+        let mut description = describe(record, &self.members, &self.writes);
         let wants_source = self.filter.events.is_empty() || self.wants("source");
         if changed && wants_source && !self.filter.ordinary && !self.wants("applied") {
             description.event = "source";

@@ -22,7 +22,7 @@ use understudy_wire::{Member, Moment, ProgramId};
 
 use crate::alarm::Alarms;
 use crate::cycles::Cycles;
-use crate::describe::describe;
+use crate::describe::{Writes, describe};
 use crate::event::{Event, Events, Level};
 use crate::history::History;
 use crate::series::Series;
@@ -67,6 +67,7 @@ impl Default for Bounds {
 pub struct Model {
     pub(crate) cluster: Arc<Cluster>,
     pub(crate) members: Members,
+    pub(crate) writes: Writes,
     cycles: Cycles,
     changes: Changes,
     received: Received,
@@ -99,6 +100,7 @@ impl Model {
             .filter_map(|program| History::new(&cluster, ProgramId(program), bounds.cycles));
         Self {
             members: Members::of(&cluster),
+            writes: Writes::default(),
             cycles: Cycles::default(),
             changes: Changes::new(schedule.stations(), programs),
             received: Received::default(),
@@ -126,6 +128,7 @@ impl Model {
     /// Takes the next record.
     pub fn note(&mut self, record: &Record) {
         self.records += 1;
+        self.writes.note(record);
         self.at_ns = record.at_ns;
         self.alarms.now_ns = record.at_ns;
         self.counters.note(record);
@@ -196,7 +199,7 @@ impl Model {
 
     /// A record that is an event.
     fn happened(&mut self, record: &Record, cycle: i64, cause: Option<String>) {
-        let description = describe(record, &self.members);
+        let description = describe(record, &self.members, &self.writes);
         self.events.push(Event {
             number: 0,
             cycle,

@@ -255,6 +255,9 @@ pub struct ProgramSnapshot {
     /// Signals that are forced.
     #[serde(skip)]
     pub forces: Vec<Force>,
+    /// Whether signals of other programs are valid in this sample, by the first bit of their inputs; those that its remote I/O has reported.
+    #[serde(skip)]
+    pub validity: BTreeMap<u16, bool>,
     /// Whether the failure of one station would be masked; nothing while its remote I/O has not reported it.
     pub protection: Option<Protection>,
     /// What is available where no living station can prove its state.

@@ -34,7 +34,7 @@ pub(crate) fn named(points: &Points, image: &Image) -> impl Iterator<Item = (Str
 }
 
 /// An elementary value as it is stored, as [`value_of`] has it.
-pub(crate) fn elementary(of: Elementary, stored: u64) -> Value {
+pub fn elementary(of: Elementary, stored: u64) -> Value {
     match of {
         Elementary::Bool => Value::Bool(stored != 0),
         of => number(of, stored),

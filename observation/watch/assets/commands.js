@@ -1,12 +1,14 @@
 // Commands to members. The reason is shown next to a button that is disabled.
 
 import { act, tell, toast } from "/ask.js";
-import { el } from "/element.js";
+import { el, setText, valueText } from "/element.js";
 import { isLive, stale, state } from "/time.js";
 
 let run = null;
 
 export const owner = () => run?.person || localStorage.getItem("owner") || "operator";
+
+export const setOwner = (name) => localStorage.setItem("owner", name);
 
 export function prepare(facts) {
   run = facts;
@@ -18,9 +20,9 @@ export function prepare(facts) {
 }
 
 // Reason why no command can be given now, if there is one.
-function obstacle() {
-  if (run.commands.why) {
-    return run.commands.why;
+export function obstacle(forbidden = run.commands.why) {
+  if (forbidden) {
+    return forbidden;
   }
   if (!isLive()) {
     return "this is a replay: go live to command";
@@ -66,7 +68,7 @@ function giver(member) {
   const reason = el("input", { id: "command-reason", type: "text", maxlength: "120", value: "test", required: true });
   const who = el("input", { id: "command-owner", type: "text", maxlength: "40", value: owner(), required: true, disabled: Boolean(run.person) });
   const give = async (command) => {
-    localStorage.setItem("owner", who.value);
+    setOwner(who.value);
     const body = { member: member.name, command, owner: who.value, reason: reason.value };
     const done = await act(() => tell("/api/command", body));
     if (done) {
@@ -136,26 +138,43 @@ export function openChoice(name, which) {
   ]);
 }
 
+// A form for forces. A number is typed as in `understudy operate force`; the server checks its type and range.
 function forcing(member, signal, because, give) {
   const facts = run.programs[member.program];
   const option = (kind) => (item, index) =>
     el("option", { value: `${kind} ${index}`, selected: signal?.kind === kind && signal?.index === index }, `${kind} ${item.name}`);
-  const which = el("select", { id: "force-signal" }, facts.inputs.map(option("input")), facts.outputs.map(option("output")));
-  const value = el("select", { id: "force-value" }, el("option", { value: "1" }, "1"), el("option", { value: "0" }, "0"));
+  const which = el("select", { id: "force-signal", change: () => fit() }, facts.inputs.map(option("input")), facts.outputs.map(option("output")));
+  const bit = el("select", { id: "force-value", "aria-label": "Value" }, el("option", { value: "1" }, "1"), el("option", { value: "0" }, "0"));
+  const number = el("input", { id: "force-number", type: "text", size: "12", autocomplete: "off", "aria-label": "Value", "aria-describedby": "force-type", input: () => fit() });
+  const type = el("span", { id: "force-type", class: "soft" });
   const seconds = el("input", { id: "force-seconds", type: "number", min: "1", max: "3600", value: "60" });
   const chosen = () => {
     const [kind, index] = which.value.split(" ");
-    return { [kind]: Number(index) };
+    return { kind, point: facts[`${kind}s`][Number(index)] };
+  };
+  const place = () => {
+    const { kind, point } = chosen();
+    return { [kind]: point.bit };
   };
   const down = because ?? (member.down ? DOWN : null);
+  const force = el("button", { type: "button", "data-command": "force", click: () => give({ command: "force", signal: place(), value: number.hidden ? bit.value : number.value, seconds: Number(seconds.value) }) }, "Force");
+  const fit = () => {
+    const { point } = chosen();
+    number.hidden = point.type === "BOOL";
+    bit.hidden = !number.hidden;
+    setText(type, number.hidden ? "" : `${point.type}${point.operator?.unit ? `, ${point.operator.unit}` : ""}${point.type === "TIME" ? ", such as 1.5s" : ""}`);
+    force.disabled = Boolean(down) || (!number.hidden && number.value.trim() === "");
+  };
+  fit();
   const forces = state().programs[member.program].forced;
+  const nameOf = (held) => facts[`${held.kind}s`][held.index]?.name ?? `at bit ${held.bit}`;
   const held = forces.map((force) =>
-    el("li", {}, `${force.kind} ${facts[`${force.kind}s`][force.index].name} = ${Number(force.value)}, by ${force.owner}: ${force.reason} `,
-      el("button", { type: "button", disabled: Boolean(down), "data-command": "unforce", click: () => give({ command: "unforce", signal: { [force.kind]: force.index } }) }, "Take back")));
+    el("li", {}, `${force.kind} ${nameOf(force)} = ${valueText(force.value)}, by ${force.owner}: ${force.reason} `,
+      el("button", { type: "button", disabled: Boolean(down), "data-command": "unforce", click: () => give({ command: "unforce", signal: { [force.kind]: force.bit } }) }, "Take back")));
   return el("fieldset", {},
     el("legend", {}, "Force a signal"),
-    el("label", {}, "Signal ", which), " ", el("label", {}, "Value ", value), " ", el("label", {}, "for seconds ", seconds), " ",
-    el("button", { type: "button", disabled: Boolean(down), "data-command": "force", click: () => give({ command: "force", signal: chosen(), value: value.value === "1", seconds: Number(seconds.value) }) }, "Force"),
+    el("label", {}, "Signal ", which), " ", el("span", { class: "force-value" }, "Value ", bit, number, " ", type), " ", el("label", {}, "for seconds ", seconds), " ",
+    force,
     down ? el("span", { class: "soft" }, ` cannot: ${down}`) : null,
     el("ul", { class: "plain" }, held));
 }

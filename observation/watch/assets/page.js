@@ -4,6 +4,7 @@ import { act, ask, tell, toast } from "/ask.js";
 import { setText } from "/element.js";
 import * as time from "/time.js";
 import * as cluster from "/cluster.js";
+import * as operate from "/operate.js";
 import * as ladder from "/ladder.js";
 import * as trends from "/trends.js";
 import * as events from "/events.js";
@@ -12,7 +13,7 @@ import * as commands from "/commands.js";
 import * as tour from "/tour.js";
 import * as why from "/why.js";
 
-const VIEWS = { cluster, ladder, trends, events, compare };
+const VIEWS = { cluster, operate, ladder, trends, events, compare };
 
 function currentView() {
   const name = location.hash.slice(1).split("/")[0];
@@ -96,6 +97,7 @@ async function begin() {
   for (const part of [commands, why, ...Object.values(VIEWS)]) {
     part.prepare(run);
   }
+  document.getElementById("tab-operate").hidden = !operate.has(run);
   document.getElementById("alarm-count").addEventListener("click", () => (location.hash = "events"));
   time.onState((state, live) => {
     head(state, live);

@@ -33,6 +33,8 @@ const ASSETS: &[(&str, &str, &str)] = assets![
     "sources.js": SCRIPT,
     "legend.js": SCRIPT,
     "tour.js": SCRIPT,
+    "operate.js": SCRIPT,
+    "reads.js": SCRIPT,
     "ladder.js": SCRIPT,
     "why.js": SCRIPT,
     "trends.js": SCRIPT,

@@ -84,6 +84,11 @@ impl Problem {
         Self::new(StatusCode::NOT_FOUND, error.code(), error.words())
     }
 
+    /// A value or a name in a command is invalid.
+    pub(crate) fn invalid(code: &str, message: impl Into<String>) -> Self {
+        Self::new(StatusCode::BAD_REQUEST, code, message)
+    }
+
     /// The laboratory refused a command; its text begins with the code.
     pub(crate) fn refused(words: &str) -> Self {
         let (code, message) = words.split_once(": ").unwrap_or(("U0682", words));

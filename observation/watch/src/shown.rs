@@ -7,7 +7,8 @@ use std::time::Instant;
 use serde::Serialize;
 use serde_json::Value;
 use understudy_cluster::Controller;
-use understudy_typed::Points;
+use understudy_remote_io::SignalInput;
+use understudy_typed::{Point, Points};
 use understudy_view::{
     Alarm, LostState, MarginSnapshot, Model as RunModel, OutcomeSnapshot, ProgramSnapshot,
     Protection, Snapshot, forced_point, forced_value, value_of,
@@ -64,6 +65,8 @@ struct ShownProgram {
     input_values: Option<Vec<Value>>,
     output_values: Option<Vec<Value>>,
     published_values: Option<Vec<Value>>,
+    /// Inputs that are outputs of other programs.
+    signals: Vec<ShownSignal>,
     awaits_release: bool,
     forced: Vec<ShownForce>,
     /// Nothing while the remote I/O has not reported it.
@@ -86,10 +89,22 @@ struct ShownLost {
     words: String,
 }
 
+/// Input that is an output of another program.
+#[derive(Debug, Serialize)]
+struct ShownSignal {
+    /// Its place in the run's facts.
+    input: usize,
+    /// Whether the sampled value is that of the other program, not the default one; nothing where that is not known.
+    valid: Option<bool>,
+}
+
 #[derive(Debug, Serialize)]
 struct ShownForce {
     kind: &'static str,
-    index: u16,
+    /// Its place in the run's facts; nothing for an unknown signal.
+    index: Option<usize>,
+    /// Its first bit in the image.
+    bit: u16,
     value: serde_json::Value,
     seconds: u32,
     owner: String,
@@ -227,6 +242,7 @@ fn shown_program(
         input_values: values(&interface.inputs, program.inputs.as_deref()),
         output_values: values(&interface.outputs, program.outputs.as_deref()),
         published_values: values(&interface.outputs, published.map(|word| word.sum.as_str())),
+        signals: signals(run, index, program),
         awaits_release: program.awaits_release,
         forced: program
             .forces
@@ -253,15 +269,42 @@ fn shown_program(
     }
 }
 
+/// The signals of a program, as its newest sample has them.
+fn signals(run: &RunModel, index: usize, program: &ProgramSnapshot) -> Vec<ShownSignal> {
+    let interface = &run.cluster().controllers()[index].interface;
+    let declared = run.cluster().remote_ios().get(index);
+    let declared = declared
+        .into_iter()
+        .flat_map(|remote_io| remote_io.signals());
+    let shown = declared.filter_map(|signal| {
+        let SignalInput { place, valid, .. } = signal.input;
+        let sampled = program.inputs.as_deref();
+        Some(ShownSignal {
+            input: interface
+                .inputs
+                .iter()
+                .position(|point| point.bit == u32::from(place.bit))?,
+            valid: sampled.and_then(|sampled| match valid {
+                Some(valid) => Some(*sampled.as_bytes().get(usize::from(valid))? == b'1'),
+                None => program.validity.get(&place.bit).copied(),
+            }),
+        })
+    });
+    shown.collect()
+}
+
 fn shown_force(controller: Option<&Controller>, force: &Force) -> ShownForce {
     let point = controller.and_then(|controller| forced_point(controller, force));
-    let (kind, index) = match force.signal {
-        SignalPlace::Input(index) => ("input", index),
-        SignalPlace::Output(index) => ("output", index),
+    let interface = controller.map(|controller| &controller.interface);
+    let (kind, points) = match force.signal {
+        SignalPlace::Input(_) => ("input", interface.map(|of| &of.inputs)),
+        SignalPlace::Output(_) => ("output", interface.map(|of| &of.outputs)),
     };
+    let place = |point: &Point| points?.iter().position(|other| other.bit == point.bit);
     ShownForce {
         kind,
-        index,
+        index: point.and_then(place),
+        bit: force.signal.first_bit(),
         value: match point {
             Some(point) => forced_value(point, force),
             None => force.value.stored().into(),

@@ -18,8 +18,15 @@ const VIEWER: &str = "fedcba9876543210fedcba9876543210";
 
 fn looking() -> Commanding {
     Commanding {
-        commander: Commander::of_run("nothing".into()),
         forbidden: Some("a test looks only".to_owned()),
+        ..commanding()
+    }
+}
+
+fn commanding() -> Commanding {
+    Commanding {
+        commander: Commander::of_run("nothing".into()),
+        forbidden: None,
         impossible: Vec::new(),
     }
 }
@@ -52,6 +59,10 @@ struct Page {
 
 impl Page {
     fn start(folder: &Path) -> Self {
+        Self::with(folder, looking())
+    }
+
+    fn with(folder: &Path, commanding: Commanding) -> Self {
         let made = rcgen::generate_simple_self_signed(vec!["127.0.0.1".to_owned()]);
         let made = made.expect("a certificate");
         let (chain, key) = (folder.join("page.pem"), folder.join("page.key"));
@@ -60,7 +71,7 @@ impl Page {
         let served = serve(Settings {
             run: folder.join("nothing"),
             address: "127.0.0.1:0".parse().expect("an address"),
-            commanding: looking(),
+            commanding,
             logins: Some(Logins::of_file(&logins_file(folder, 0o600)).expect("logins")),
             certificate: Some(Certificate { chain, key }),
             names: Vec::new(),
@@ -145,6 +156,39 @@ fn only_who_shows_a_token_sees_the_page() {
     is(&looks_only, "403");
     is(&page.ask("POST", "/api/logout", &session, "{}"), "200");
     is(&page.ask("GET", "/api/run", &session, ""), "401");
+}
+
+/// Operators write inputs; commands to members need an engineer, and a viewer changes nothing.
+#[test]
+fn a_role_limits_writes_and_commands() {
+    let folder = empty_folder("roles");
+    let page = Page::with(&folder, commanding());
+    let write = r#"{"command":"write","input":"start","value":"true"}"#;
+    let give = |token: &str, command: &str| {
+        let session = cookie(&page.log_in(token));
+        let body = format!(
+            r#"{{"member":"left-io","command":{command},"owner":"anna","reason":"a test"}}"#
+        );
+        page.ask("POST", "/api/command", &session, &body)
+    };
+    let is = |answer: String, status: &str, code: &str, text: &str| {
+        assert_eq!(answer.split(' ').nth(1), Some(status), "{answer}");
+        assert!(answer.contains(code) && answer.contains(text), "{answer}");
+    };
+    is(
+        give(VIEWER, write),
+        "403",
+        "U0684",
+        "a viewer may not change anything",
+    );
+    let kill = r#"{"command":"kill"}"#;
+    is(give(OPERATOR, kill), "403", "U0684", "only an engineer");
+    // Allowed; the run has not begun, so it has no member.
+    is(give(OPERATOR, write), "404", "U0681", "left-io");
+    let session = cookie(&page.log_in(OPERATOR));
+    let short = r#"{"member":"left-io","command":{"command":"write","input":"start"},"owner":"anna","reason":"a test"}"#;
+    let answer = page.ask("POST", "/api/command", &session, short);
+    is(answer, "400", "U0682", "value");
 }
 
 #[test]

@@ -6,6 +6,7 @@ use std::hash::{BuildHasher, Hasher};
 use understudy_cluster::{Cluster, InputSource, typed_value, value_text};
 use understudy_remote_io::{OperatorInput, OperatorInputKind, ValueMismatch};
 use understudy_text::spelling::suggestion;
+use understudy_typed::Elementary;
 use understudy_wire::{ForceError, Member, PointValue, Role, Write, WriteId, WriteRefusal};
 
 /// A write as a person or a program asks for it.
@@ -147,6 +148,16 @@ pub fn new_write(
     };
     write.check()?;
     Ok(write)
+}
+
+/// The value of a forced signal as a person types it.
+///
+/// # Errors
+/// What is written instead for a signal of that type.
+pub fn force_value(text: &str, of: Elementary) -> Result<PointValue, String> {
+    let stored = typed_value(text.trim(), of)
+        .map_err(|help| format!("invalid value `{text:.60}` of a {of}: {help}"))?;
+    Ok(PointValue::new(of.bits(), stored))
 }
 
 fn limits(input: &OperatorInput) -> String {

@@ -4,13 +4,12 @@ use understudy_journal::Members;
 use understudy_node::Event as StationEvent;
 use understudy_plant::Event as PlantEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason, ValueFault};
-use understudy_wire::{
-    Member, Moment, PointValue, ProgramSet, SignalPlace, StationId, StationSet, Word,
-};
+use understudy_wire::{Member, Moment, ProgramSet, SignalPlace, StationId, StationSet, Word};
 
+use super::signals::Names;
 use super::{Words, list, program_name, programs, source_text, stations};
 
-descriptions! { station: StationEvent, members;
+descriptions! { station: StationEvent, members: Members;
     Published { words, .. } => "published" Info format!("publishes {}", words_text(words, members));
     Holds { program, lineage, .. } => "holds" Info
         format!("holds the state of {} at lineage {lineage}", program_name(*program, members));
@@ -38,7 +37,7 @@ descriptions! { station: StationEvent, members;
     Stalled { late, .. } => "stalled" Notice format!("host stall: woken {late:.1?} late");
 }
 
-descriptions! { remote_io: RemoteIoEvent, members;
+descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
     Sampled { inputs, .. } => "sampled" Info format!("samples {inputs}");
     Applied { outputs, source, word_of, missing, .. } => "applied" Info
         format!("drives {outputs}, {}", source_text(*source, *word_of, *missing, members));
@@ -91,34 +90,37 @@ descriptions! { remote_io: RemoteIoEvent, members;
     Refused { member, theirs, ours } => "refused" Warning refused_text(*member, theirs, ours, members);
     Stalled { late, .. } => "stalled" Notice format!("host stall: woken {late:.1?} late");
     Forced { force, .. } => "forced" Alarm {
-        let (signal, value) = (place(force.signal), forced_text(force.value));
+        let (signal, value) = (members.place(force.signal), members.value(force.signal, force.value));
         format!("{signal} is forced to {value} for {} s by {}: {}", force.seconds, force.owner, force.reason)
     };
-    Written { write, .. } => "written" Notice format!(
-        "{} writes {} to {}: {}",
-        write.owner, forced_text(write.value), place(SignalPlace::Input(write.input)), write.reason
+    Written { write, .. } => "written" Notice {
+        let place = SignalPlace::Input(write.input);
+        let (input, value) = (members.place(place), members.value(place, write.value));
+        format!("{} writes {value} to {input}: {}", write.owner, write.reason)
+    };
+    WriteInEffect { id, since, .. } => "write-in-effect" Info
+        format!("{} is in effect since cycle {} of the cluster", members.write(*id), since.cycle.0);
+    WriteRefused { write, refusal, .. } => "write-refused" Warning {
+        let place = SignalPlace::Input(write.input);
+        let (input, value) = (members.place(place), members.value(place, write.value));
+        format!("refuses the value {value} of {} for {input}: {refusal}", write.owner)
+    };
+    WriteVoid { id, .. } => "write-void" Warning
+        format!("{} has no effect: no station received it while it lasted", members.write(*id));
+    SignalValidity { input, valid: true, .. } => "signal-validity" Notice format!(
+        "the signal {} is valid at {}", members.source(*input), members.place(SignalPlace::Input(*input))
     );
-    WriteInEffect { since, .. } => "write-in-effect" Info
-        format!("the written value is in effect since cycle {}", since.cycle.0);
-    WriteRefused { write, refusal, .. } => "write-refused" Warning format!(
-        "refuses what {} writes to {}: {refusal}",
-        write.owner, place(SignalPlace::Input(write.input))
-    );
-    WriteVoid { .. } => "write-void" Warning
-        "a written value has no effect: no station received it while it lasted";
-    SignalValidity { input, valid: true, .. } => "signal-valid" Notice
-        format!("the signal of another program at {} is valid", place(SignalPlace::Input(*input)));
-    SignalValidity { input, valid: false, .. } => "signal-stale" Warning format!(
-        "the signal of another program at {} is too old: the default value is sampled",
-        place(SignalPlace::Input(*input))
+    SignalValidity { input, valid: false, .. } => "signal-validity" Warning format!(
+        "the signal {} is too old at {}: the default value is sampled",
+        members.source(*input), members.place(SignalPlace::Input(*input))
     );
     Unforced { signal, expired: true, .. } => "unforced" Notice
-        format!("{} is no longer forced: its time has elapsed", place(*signal));
+        format!("{} is no longer forced: its time has elapsed", members.place(*signal));
     Unforced { signal, expired: false, .. } => "unforced" Notice
-        format!("{} is no longer forced: removed by the operator", place(*signal));
+        format!("{} is no longer forced: removed by the operator", members.place(*signal));
 }
 
-descriptions! { plant: PlantEvent, members;
+descriptions! { plant: PlantEvent, members: Members;
     Stepped { field, .. } => "stepped" Info
         format!("sensors {}, {} parts finished", field.sensors, field.finished);
     Refused { member, theirs, ours } => "refused" Warning refused_text(*member, theirs, ours, members);
@@ -175,24 +177,6 @@ fn value_fault_text(
         ValueFault::FailSafe => "fail-safe",
     };
     format!("{who} disagree and no majority exists; configured reaction: {reaction}")
-}
-
-fn place(signal: SignalPlace) -> String {
-    match signal {
-        SignalPlace::Input(place) => format!("input {}", place + 1),
-        SignalPlace::Output(place) => format!("output {}", place + 1),
-    }
-}
-
-/// A number as its bits: the event does not know its type.
-fn forced_text(value: PointValue) -> String {
-    match value {
-        PointValue::Bit(bit) => u8::from(bit).to_string(),
-        PointValue::Number { width, stored } => {
-            let digits = usize::from(width) / 4;
-            format!("16#{stored:0digits$X}")
-        }
-    }
 }
 
 fn flagged_text(station: StationId, members: &Members) -> String {

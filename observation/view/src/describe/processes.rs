@@ -1,12 +1,13 @@
 //! Events of the processes of members, and of the laboratory that runs them.
 
 use understudy_bus::HostEvent;
-use understudy_journal::{Action, Members, RunEvent};
-use understudy_wire::{Member, StateChoice};
+use understudy_journal::{Action, Command, Members, RunEvent};
+use understudy_wire::{Member, SignalPlace, StateChoice};
 
 use super::Words;
+use super::signals::assignment;
 
-descriptions! { host: HostEvent, members;
+descriptions! { host: HostEvent, members: Members;
     Ready { process, address, .. } => "ready" Info format!("listens as process {process} at {address}");
     RefusedBytes { datagrams, reason } => "refused-bytes" Warning
         format!("{datagrams} datagrams were not frames: {reason}");
@@ -42,13 +43,12 @@ descriptions! { host: HostEvent, members;
     Stopped(_) => "stopped" Info "ended as requested";
 }
 
-descriptions! { run: RunEvent, members;
+descriptions! { run: RunEvent, members: Members;
     Journal { version } => "journal" Info format!("the journal has version {version}");
     Started { member } => "started" Notice format!("{} is started", members.name(*member));
     Fault { action, member, .. } => "fault" Notice fault_text(*action, *member, members);
     Commanded { member, command, owner, reason, refused } => "commanded" Notice {
-        let what = serde_json::to_value(command).unwrap_or_default();
-        let what = what["command"].as_str().unwrap_or("command").to_owned();
+        let what = command_text(command, *member, members);
         let refused = refused.as_ref().map_or_else(String::new, |why| format!("; refused: {why}"));
         format!("{owner} commands {what} of {}: {reason}{refused}", members.name(*member))
     };
@@ -70,6 +70,18 @@ descriptions! { run: RunEvent, members;
     Finished => "finished" Info "the run is over";
 }
 
+/// The word of a command, and the value that it writes or forces.
+fn command_text(command: &Command, member: Member, members: &Members) -> String {
+    let word = serde_json::to_value(command).unwrap_or_default();
+    let word = word["command"].as_str().unwrap_or("command").to_owned();
+    let (place, value) = match command {
+        Command::Write(write) => (SignalPlace::Input(write.input), write.value),
+        Command::Force(force) => (force.signal, force.value),
+        _ => return word,
+    };
+    format!("{word} {}", assignment(Some(member), place, value, members))
+}
+
 /// An action on a member.
 pub(crate) fn fault_text(action: Action, member: Member, members: &Members) -> String {
     let name = members.name(member);
@@ -82,7 +94,11 @@ pub(crate) fn fault_text(action: Action, member: Member, members: &Members) -> S
         Action::Heal { to } => format!("{name} is connected to {} again", members.name(to)),
         Action::Delay { to, by } => format!("{} receives {name} {by:?} later", members.name(to)),
         Action::Release => format!("{name} is released"),
-        Action::Write { .. } => format!("a value is written to {name}"),
+        Action::Write { input, value } => {
+            let place = SignalPlace::Input(input);
+            let assignment = assignment(Some(member), place, value, members);
+            format!("{assignment} is written to {name}")
+        }
         Action::Choose {
             choice: StateChoice::Cold,
         } => format!("the operator starts the program of {name} cold"),

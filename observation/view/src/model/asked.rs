@@ -7,7 +7,7 @@ use understudy_journal::{Members, SourceCounts};
 use understudy_ladder::{Evaluation, Observer};
 use understudy_logic::Scratch;
 use understudy_typed::{Interpreter, Trace};
-use understudy_wire::{Moment, ProgramId, StationId};
+use understudy_wire::{Member, Moment, ProgramId, StationId};
 
 use super::{Counters, Model, SentTurn};
 use crate::alarm::Alarm;
@@ -102,6 +102,21 @@ impl Model {
     /// Times of the newest cycles, oldest first.
     pub fn timings(&self) -> impl DoubleEndedIterator<Item = &CycleTiming> {
         self.timings.iter()
+    }
+
+    /// The cycle of the run that the cluster counts as `cycle`, as the newest deadlines of a remote I/O tell.
+    pub fn cycle_of(&self, remote_io: Member, cycle: u64) -> Option<i64> {
+        let Member::RemoteIo(program) = remote_io else {
+            return None;
+        };
+        let steps = self.history(program)?.steps();
+        if let Some(step) = steps.iter().rev().find(|step| step.moment.cycle.0 == cycle) {
+            return Some(step.cycle);
+        }
+        // Not read yet.
+        let newest = steps.back()?;
+        let later = i64::try_from(cycle.checked_sub(newest.moment.cycle.0)?).ok()?;
+        newest.cycle.checked_add(later)
     }
 
     /// The turns of the stations in a cycle of the cluster.

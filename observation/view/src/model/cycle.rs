@@ -114,6 +114,18 @@ impl Model {
         }
     }
 
+    /// Whether signals of other programs were valid in the sample of a cycle, by the first bit of their inputs; those that the remote I/O has
+    /// reported. Later reports are not part of it, also not of the newest cycle.
+    pub(crate) fn validity(&self, program: ProgramId, cycle: i64) -> BTreeMap<u16, bool> {
+        let remote_io = self.cluster.remote_ios().get(program.index());
+        if remote_io.is_none_or(|remote_io| remote_io.signals().next().is_none()) {
+            return BTreeMap::new();
+        }
+        let standing = self.changes.at(cycle);
+        let own = standing.program(program);
+        own.map_or_else(BTreeMap::new, |own| own.validity.clone())
+    }
+
     /// The stations that any remote I/O received in a cycle.
     pub(crate) fn received(&self, cycle: i64) -> StationSet {
         self.received.at(cycle).unwrap_or_else(|| {

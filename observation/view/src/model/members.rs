@@ -80,7 +80,7 @@ impl Model {
         let subject = (record.name.clone(), "excluded");
         match event {
             StationEvent::Excluded { .. } => {
-                let text = describe(record, &self.members).text;
+                let text = describe(record, &self.members, &self.writes).text;
                 self.alarms.raise(subject, cycle, text);
             }
             StationEvent::Readmitted { .. }
@@ -160,7 +160,7 @@ impl Model {
         let is_remote_io = matches!(member, Member::RemoteIo(_));
         match event {
             HostEvent::FieldLost { .. } | HostEvent::FieldContested if is_remote_io => {
-                let described = describe(record, &self.members);
+                let described = describe(record, &self.members, &self.writes);
                 self.alarms
                     .raise(own(described.event), cycle, described.text);
             }
@@ -171,7 +171,7 @@ impl Model {
                 self.alarms.over(&own("field-contested"), cycle);
             }
             HostEvent::DuplicateFound { member } => {
-                let text = describe(record, &self.members).text;
+                let text = describe(record, &self.members, &self.writes).text;
                 let subject = (self.members.name(*member).to_owned(), "duplicate");
                 self.alarms.raise(subject, cycle, text);
             }

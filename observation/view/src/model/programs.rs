@@ -159,6 +159,9 @@ impl Model {
                 own(ProgramChange::Forced(force.clone()))
             }
             RemoteIoEvent::Unforced { signal, .. } => own(ProgramChange::Unforced(*signal)),
+            RemoteIoEvent::SignalValidity { input, valid, .. } => {
+                own(ProgramChange::Validity(*input, *valid))
+            }
             _ => None,
         };
         if let Some(change) = change {
@@ -170,7 +173,7 @@ impl Model {
             self.alarms.over(&subject("forced"), cycle);
         }
         if let Some(alarm) = alarm {
-            let text = describe(record, &self.members).text;
+            let text = describe(record, &self.members, &self.writes).text;
             self.alarms.raise(subject(alarm), cycle, text);
         }
     }

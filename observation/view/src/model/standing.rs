@@ -13,6 +13,8 @@ use crate::station::StationStanding;
 pub(crate) struct ProgramStanding {
     pub(crate) awaits_release: bool,
     pub(crate) forced: Vec<Force>,
+    /// Whether signals of other programs are valid, by the first bit of their inputs; those that its remote I/O has reported.
+    pub(crate) validity: BTreeMap<u16, bool>,
     /// Stations whose state of it its remote I/O has found faulty.
     pub(crate) excluded: StationSet,
     pub(crate) protection: Option<Protection>,
@@ -235,6 +237,7 @@ pub(super) enum ProgramChange {
     Readmitted(StationId),
     Forced(Force),
     Unforced(SignalPlace),
+    Validity(u16, bool),
     Protection(Box<Protection>),
     Lost(Option<Box<LostState>>),
     Plant { finished: u64, plant_faults: u64 },
@@ -258,6 +261,9 @@ impl ProgramChange {
                 own.forced.push(force.clone());
             }
             Self::Unforced(signal) => own.forced.retain(|other| other.signal != *signal),
+            Self::Validity(input, valid) => {
+                own.validity.insert(*input, *valid);
+            }
             Self::Protection(protection) => own.protection = Some(protection.as_ref().clone()),
             Self::Lost(lost) => own.lost = lost.as_deref().cloned(),
             Self::Plant {

@@ -226,6 +226,9 @@ impl Picture<'_> {
             awaits_release: own.awaits_release,
             forced: self.forced(program),
             forces: own.forced,
+            validity: self
+                .cycle
+                .map_or_else(BTreeMap::new, |cycle| self.model.validity(program, cycle)),
             protection: own.protection,
             lost: own.lost,
             finished: own.plant.map(|(finished, _)| finished),

@@ -16,3 +16,4 @@ mod replay;
 mod screen;
 mod support;
 mod why;
+mod writes;

@@ -1,5 +1,7 @@
 //! Clusters, and runs of them.
 
+use std::fs;
+use std::path::Path;
 use std::sync::Arc;
 
 use understudy_cluster::Cluster;
@@ -13,6 +15,18 @@ use understudy_view::{Bounds, Model};
 /// The cell of section V.
 pub(crate) fn cell() -> Cluster {
     press_cell(Mode::Full)
+}
+
+/// The example with operator inputs and signals.
+pub(crate) fn shuttles() -> Cluster {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/two-shuttles");
+    let text = |name: &str| fs::read_to_string(folder.join(name));
+    let file = text("cluster.toml").expect("an example");
+    let mut open = |name: &str| text(name).map_err(|error| error.to_string());
+    let loaded = understudy_cluster::read("cluster.toml", &file, &mut open);
+    loaded
+        .cluster
+        .unwrap_or_else(|| panic!("{:?}", loaded.reports))
 }
 
 pub(crate) fn scenario(cluster: &Cluster, text: &str) -> Scenario {

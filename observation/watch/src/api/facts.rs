@@ -10,10 +10,12 @@ use axum::extract::{Extension, Query, State};
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
-use understudy_cluster::Controller;
+use serde_json::Value;
+use understudy_cluster::{Controller, OperatorDeclaration};
+use understudy_remote_io::{OperatorInput, OperatorInputKind};
 use understudy_typed::Points;
-use understudy_view::Event;
-use understudy_wire::{Member, ProgramId};
+use understudy_view::{Event, elementary};
+use understudy_wire::{Member, ProgramId, Role};
 
 use super::Answered;
 use super::compare::others;
@@ -69,12 +71,42 @@ struct SignalFacts {
     bit: u32,
     address: Option<String>,
     comment: Option<String>,
+    /// Of an input that operators write.
+    operator: Option<OperatorFacts>,
+    /// Of an input that is an output of another program.
+    from: Option<FromFacts>,
+}
+
+/// Input that operators write.
+#[derive(Debug, Serialize)]
+struct OperatorFacts {
+    /// `level`, `pulse` or `setpoint`.
+    kind: &'static str,
+    title: String,
+    unit: Option<String>,
+    /// Whether the page asks before it writes.
+    confirm: bool,
+    /// Of a setpoint: a time in nanoseconds.
+    low: Option<Value>,
+    high: Option<Value>,
+    /// Reason why this person may not write it.
+    why: Option<String>,
+}
+
+/// Output of another program.
+#[derive(Debug, Serialize)]
+struct FromFacts {
+    program: usize,
+    /// Name of the output.
+    output: String,
 }
 
 #[derive(Debug, Serialize)]
 struct CommandFacts {
     /// Reason why no command can be given.
     why: Option<String>,
+    /// Reason why no operator input can be written.
+    write_why: Option<String>,
     /// Commands that are impossible in this run, each with the reason.
     impossible: BTreeMap<&'static str, String>,
 }
@@ -102,7 +134,7 @@ pub(super) async fn run(
     });
     let programs = run
         .program_ids()
-        .map(|program| program_facts(known, program));
+        .map(|program| program_facts(known, program, person.role));
     Ok(Json(RunFacts {
         title: format!("{} · {}", cluster.name(), model.name()),
         cluster: cluster.name().to_owned(),
@@ -112,6 +144,7 @@ pub(super) async fn run(
         programs: programs.collect(),
         commands: CommandFacts {
             why: app.why_not(&person).map(str::to_owned),
+            write_why: app.why_not_write(&person).map(str::to_owned),
             impossible: app.commanding.impossible.iter().cloned().collect(),
         },
         person: Some(person.name).filter(|name| !name.is_empty()),
@@ -119,19 +152,59 @@ pub(super) async fn run(
     }))
 }
 
-fn program_facts(known: &Known, program: ProgramId) -> ProgramFacts {
+fn program_facts(known: &Known, program: ProgramId, role: Role) -> ProgramFacts {
     let cluster = known.run.cluster();
     let plant = Member::Plant(program);
     let controller = cluster.controllers().get(program.index());
     let name = |member| known.run.members().name(member).to_owned();
+    let mut inputs =
+        controller.map_or_else(Vec::new, |own| signal_facts(own, &own.interface.inputs));
+    let remote_io = cluster.remote_ios().get(program.index());
+    for source in remote_io.iter().flat_map(|remote_io| &remote_io.inputs) {
+        let input = inputs.iter_mut().find(|input| input.name == source.name);
+        if let Some(input) = input {
+            input.operator = source
+                .operator()
+                .and_then(|declared| operator_facts(&source.name, declared, role));
+            input.from = source.signal().map(|signal| FromFacts {
+                program: signal.input.from.index(),
+                output: signal.output.clone(),
+            });
+        }
+    }
     ProgramFacts {
         index: program.index(),
         name: shown::program_name(&known.run, program),
         remote_io: name(Member::RemoteIo(program)),
         plant: cluster.member_name(plant).map(str::to_owned),
-        inputs: controller.map_or_else(Vec::new, |own| signal_facts(own, &own.interface.inputs)),
+        inputs,
         outputs: controller.map_or_else(Vec::new, |own| signal_facts(own, &own.interface.outputs)),
     }
+}
+
+/// Nothing for an input that the gateway of another group writes.
+fn operator_facts(name: &str, declared: &OperatorDeclaration, role: Role) -> Option<OperatorFacts> {
+    let OperatorInput {
+        place,
+        kind,
+        role: required,
+        ..
+    } = declared.input;
+    let (kind, limits) = match kind {
+        OperatorInputKind::Level => ("level", None),
+        OperatorInputKind::Pulse(_) => ("pulse", None),
+        OperatorInputKind::Setpoint { low, high } => ("setpoint", Some((low, high))),
+        OperatorInputKind::Group { .. } => return None,
+    };
+    Some(OperatorFacts {
+        kind,
+        title: declared.title.clone().unwrap_or_else(|| name.to_owned()),
+        unit: declared.unit.clone(),
+        confirm: declared.confirm,
+        low: limits.map(|(low, _)| elementary(place.of, low)),
+        high: limits.map(|(_, high)| elementary(place.of, high)),
+        why: (role < required).then(|| format!("it requires the role {}", required.word())),
+    })
 }
 
 fn signal_facts(controller: &Controller, points: &Points) -> Vec<SignalFacts> {
@@ -156,6 +229,8 @@ fn signal_facts(controller: &Controller, points: &Points) -> Vec<SignalFacts> {
             bit: point.bit,
             address,
             comment,
+            operator: None,
+            from: None,
         }
     });
     facts.collect()
@@ -283,4 +358,45 @@ pub(super) async fn events(
     Ok(Json(Events {
         events: events.collect(),
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use understudy_remote_io::InputPlace;
+    use understudy_typed::Elementary;
+
+    use super::*;
+
+    #[test]
+    fn an_input_says_why_a_person_may_not_write_it() {
+        let declared = OperatorDeclaration {
+            input: OperatorInput {
+                place: InputPlace {
+                    bit: 0,
+                    of: Elementary::Int,
+                },
+                kind: OperatorInputKind::Setpoint {
+                    low: (-5i16) as u16 as u64,
+                    high: 7,
+                },
+                initial: 0,
+                role: Role::Engineer,
+            },
+            title: None,
+            unit: Some("mm".to_owned()),
+            confirm: true,
+        };
+        let facts = |role| {
+            let facts = operator_facts("gap", &declared, role);
+            serde_json::to_value(facts).expect("JSON")
+        };
+        let operator = facts(Role::Operator);
+        assert_eq!(operator["title"], "gap");
+        assert_eq!(
+            (&operator["low"], &operator["high"]),
+            (&(-5).into(), &7.into())
+        );
+        assert_eq!(operator["why"], "it requires the role engineer");
+        assert_eq!(facts(Role::Engineer)["why"], Value::Null);
+    }
 }

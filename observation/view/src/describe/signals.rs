@@ -1,0 +1,141 @@
+//! Signals and their values in words, and the writes that records refer to.
+
+use std::collections::VecDeque;
+use std::ops::Deref;
+
+use understudy_cluster::value_text;
+use understudy_journal::{Happening, Members, NamedSignal, Record};
+use understudy_remote_io::Event as RemoteIoEvent;
+use understudy_typed::Elementary;
+use understudy_wire::{Member, PointValue, SignalPlace, Write, WriteId};
+
+/// Writes that are remembered: their outcomes come within some cycles.
+const MOST: usize = 256;
+
+/// The newest writes: the record of an outcome has the identifier of its write only.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Writes(VecDeque<Write>);
+
+impl Writes {
+    /// Takes the next record of the run.
+    pub(crate) fn note(&mut self, record: &Record) {
+        if let Happening::RemoteIo(RemoteIoEvent::Written { write, .. }) = &record.event {
+            if self.0.len() == MOST {
+                self.0.pop_front();
+            }
+            self.0.push_back(write.clone());
+        }
+    }
+
+    fn find(&self, id: WriteId) -> Option<&Write> {
+        self.0.iter().rev().find(|write| write.id == id)
+    }
+}
+
+/// The names that the events of a remote I/O need.
+pub(super) struct Names<'a> {
+    pub(super) members: &'a Members,
+    pub(super) writes: &'a Writes,
+    /// The member that reports the event.
+    pub(super) by: Option<Member>,
+}
+
+impl Deref for Names<'_> {
+    type Target = Members;
+
+    fn deref(&self) -> &Members {
+        self.members
+    }
+}
+
+impl Names<'_> {
+    /// `input start`; the number of the first bit where the program is not known.
+    pub(super) fn place(&self, place: SignalPlace) -> String {
+        place_text(self.by, place, self.members)
+    }
+
+    /// The value of a signal with its unit.
+    pub(super) fn value(&self, place: SignalPlace, value: PointValue) -> String {
+        signal_value(self.by, place, value, self.members)
+    }
+
+    /// `speed = 120.0 mm/s of anna`, where the write is remembered.
+    pub(super) fn write(&self, id: WriteId) -> String {
+        match self.writes.find(id) {
+            Some(write) => {
+                let place = SignalPlace::Input(write.input);
+                let assignment = assignment(self.by, place, write.value, self.members);
+                format!("{assignment} of {}", write.owner)
+            }
+            None => "a written value".to_owned(),
+        }
+    }
+
+    /// The output of another program at an input: `press.done`.
+    pub(super) fn source(&self, input: u16) -> &str {
+        let signal = signal(self.by, SignalPlace::Input(input), self.members);
+        let from = signal.and_then(|signal| signal.from.as_deref());
+        from.unwrap_or("of another program")
+    }
+}
+
+fn signal(by: Option<Member>, place: SignalPlace, members: &Members) -> Option<&NamedSignal> {
+    let Some(Member::RemoteIo(program)) = by else {
+        return None;
+    };
+    members.signal(program, place)
+}
+
+fn place_text(by: Option<Member>, place: SignalPlace, members: &Members) -> String {
+    let (kind, bit) = match place {
+        SignalPlace::Input(bit) => ("input", bit),
+        SignalPlace::Output(bit) => ("output", bit),
+    };
+    match signal(by, place, members) {
+        Some(signal) => format!("{kind} {}", signal.name),
+        None => format!("{kind} {}", bit + 1),
+    }
+}
+
+/// The value of a signal with its unit; its bits where its type is not known.
+fn signal_value(
+    by: Option<Member>,
+    place: SignalPlace,
+    value: PointValue,
+    members: &Members,
+) -> String {
+    let stored = value.stored();
+    let known = signal(by, place, members);
+    let known = known.filter(|signal| signal.of.bits() == u32::from(value.width()));
+    match (known, value) {
+        (_, PointValue::Bit(bit)) => u8::from(bit).to_string(),
+        (Some(signal), _) => number_text(signal.of, stored, signal.unit.as_deref()),
+        (None, PointValue::Number { width, .. }) => {
+            let digits = usize::from(width) / 4;
+            format!("16#{stored:0digits$X}")
+        }
+    }
+}
+
+fn number_text(of: Elementary, stored: u64, unit: Option<&str>) -> String {
+    // A file has a duration in quotes.
+    let text = value_text(of, stored).replace('"', "");
+    match unit {
+        Some(unit) => format!("{text} {unit}"),
+        None => text,
+    }
+}
+
+/// `speed = 120.0 mm/s`
+pub(super) fn assignment(
+    by: Option<Member>,
+    place: SignalPlace,
+    value: PointValue,
+    members: &Members,
+) -> String {
+    let name = match signal(by, place, members) {
+        Some(signal) => signal.name.clone(),
+        None => place_text(by, place, members),
+    };
+    format!("{name} = {}", signal_value(by, place, value, members))
+}
