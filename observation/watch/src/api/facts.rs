@@ -385,6 +385,7 @@ mod tests {
             title: None,
             unit: Some("mm".to_owned()),
             confirm: true,
+            group: None,
         };
         let facts = |role| {
             let facts = operator_facts("gap", &declared, role);
