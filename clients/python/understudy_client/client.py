@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import getpass
 import json
 import queue
+import secrets
+import threading
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -43,6 +47,52 @@ class Event:
     cause: str | None
 
 
+class WriteError(Exception):
+    """A write that is not in effect. `code` is the stable code, as in the documentation of errors."""
+
+    def __init__(self, code: str, message: str):
+        super().__init__(f"{code}: {message}")
+        self.code = code
+
+
+class WriteRefused(WriteError):
+    """The write has no effect."""
+
+
+class WriteUndecided(WriteError):
+    """The write may have an effect: read the input, or the journal."""
+
+
+#: A session is not used again after this time in seconds, because the remote I/O may have forgotten it.
+_UNUSED_FOR_S = 30.0
+
+#: Time for one answer in seconds: the gateway itself repeats a write for 40 s.
+_ANSWER_S = 45.0
+
+
+@dataclass
+class _Session:
+    """Identifiers of the writes to one remote I/O."""
+
+    session: int = 0
+    number: int = 0
+    used: float = 0.0
+
+    def begin(self) -> dict[str, int]:
+        """Return the identifier of the next write."""
+        if self.number == 0 or time.monotonic() - self.used > _UNUSED_FOR_S:
+            self.session, self.number = secrets.randbits(64), 1
+        return {"session": self.session, "number": self.number}
+
+    def end(self, answer: dict[str, Any]) -> None:
+        """Note an outcome: the number of a write without an effect is free again."""
+        self.used = time.monotonic()
+        if answer["outcome"] == "in-effect":
+            self.number += 1
+        elif answer["outcome"] == "undecided" or answer["code"] == "U0644":
+            self.number = 0
+
+
 class Client:
     """A connection to a gateway, such as `Client("127.0.0.1:7447")`; a context manager.
 
@@ -57,6 +107,8 @@ class Client:
         self._session = zenoh.open(config)
         self._root = f"understudy/mirror/{cluster}"
         self._timeout = timeout
+        self._sessions: dict[str, _Session] = {}
+        self._writing = threading.Lock()
 
     def __enter__(self) -> Client:
         return self
@@ -110,6 +162,42 @@ class Client:
     def program(self, name: str) -> Program:
         """Return one program."""
         return _program(f"programs/{name}", self._one(f"programs/{name}"))
+
+    def write(
+        self, name: str, input: str, value: bool | int | float | str, *, reason: str, owner: str | None = None
+    ) -> int:
+        """Write `value` to an operator input of the remote I/O `name` and return the cycle from which it is in effect.
+
+        The gateway needs `--allow-writes`. `owner` is the user of this process where it is not given. A lost answer is asked for again
+        under the same identifier, which has one effect. One write of a client is under way at a time.
+
+        Raise WriteRefused if the write has no effect, and WriteUndecided if that is not known.
+        """
+        key = f"understudy/mirror/{self.run()['cluster']}/write"
+        question = {"name": name, "input": input, "value": value, "owner": owner or getpass.getuser(), "reason": reason}
+        with self._writing:
+            session = self._sessions.setdefault(name, _Session())
+            answer = self._ask(key, {"id": session.begin(), **question})
+            session.end(answer)
+            if answer.get("code") == "U0644":
+                # The remote I/O has forgotten the session, and has not taken the write.
+                answer = self._ask(key, {"id": session.begin(), **question})
+                session.end(answer)
+        if answer["outcome"] == "in-effect":
+            return answer["cycle"]
+        error = WriteUndecided if answer["outcome"] == "undecided" else WriteRefused
+        raise error(answer["code"], answer["message"])
+
+    def _ask(self, key: str, question: dict[str, Any]) -> dict[str, Any]:
+        """Return the answer to a write; a lost one is asked for a second time."""
+        for _ in range(2):
+            asked = time.monotonic()
+            for reply in self._session.get(key, payload=json.dumps(question), timeout=_ANSWER_S):
+                if reply.ok is not None:
+                    return json.loads(reply.ok.payload.to_string())
+            if time.monotonic() - asked < 1.0:
+                break
+        return {"outcome": "undecided", "code": "U0648", "message": "no answer: does the gateway run with --allow-writes?"}
 
     def events(self) -> Iterator[Event]:
         """Yield each new event, without end."""
