@@ -10,6 +10,7 @@ mod boiler;
 mod campaigns;
 mod deaths;
 mod field;
+mod gates;
 mod handshake;
 mod hosts;
 #[allow(dead_code, reason = "each test uses its part")]
