@@ -237,6 +237,21 @@ fn what_is_wrong_is_said_and_nothing_is_started() {
     login("open");
     write("empty", "\n", 0o600);
     login("empty");
+    let logins = |text: &str| {
+        write("logins", text, 0o600);
+        let arguments = ["serve", "run", "--certificates", "c", "--logins", "logins"];
+        check(&arguments, "U0595");
+    };
+    logins("");
+    logins("owner anna secret\n");
+    logins("operator anna\n");
+    logins("operator anna secret\nviewer anna secret\n");
+    write("logins", "operator anna secret\n", 0o644);
+    check(
+        &["serve", "run", "--certificates", "c", "--logins", "logins"],
+        "U0595",
+    );
+    check(&["serve", "run", "--logins", "logins"], "--certificates");
     assert!(!folder.join("c").exists(), "nothing is half made");
 
     let certificates = |folder: &str| check(&["serve", "run", "--certificates", folder], "U0596");

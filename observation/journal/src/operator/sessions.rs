@@ -197,7 +197,8 @@ mod tests {
     #[test]
     fn numbers_follow_each_other_and_a_refused_one_is_free() {
         let busy = refused(WriteRefusal::Busy);
-        let (outcomes, ids) = run(&[&[done(1)], &[busy.clone()], &[done(3)], &[done(4)]]);
+        let once = [busy.clone()];
+        let (outcomes, ids) = run(&[&[done(1)], &once, &[done(3)], &[done(4)]]);
         assert_eq!(outcomes, [done(1), busy, done(3), done(4)]);
         let numbers: Vec<u32> = ids.iter().map(|id| id.number).collect();
         assert_eq!(numbers, [1, 2, 2, 3]);
