@@ -6,11 +6,11 @@ use std::time::Instant;
 
 use serde::Serialize;
 use serde_json::Value;
-use understudy_cluster::Controller;
+use understudy_cluster::{Controller, Priority};
 use understudy_typed::Points;
 use understudy_view::{
-    Alarm, LostState, MarginSnapshot, Model as RunModel, OutcomeSnapshot, ProgramSnapshot,
-    Protection, Snapshot, forced_point, forced_value, value_of,
+    Alarm, LostState, MarginSnapshot, Model as RunModel, OutcomeSnapshot, ProcessAlarm,
+    ProgramSnapshot, Protection, Snapshot, forced_point, forced_value, value_of,
 };
 use understudy_wire::{Force, Member, ProgramId, SignalPlace, StationId};
 
@@ -42,6 +42,7 @@ pub(crate) struct State {
     /// Alarms that last or are not acknowledged.
     open_alarms: usize,
     alarms: Vec<ShownAlarm>,
+    process_alarms: Vec<ProcessAlarm>,
     event_count: u64,
 }
 
@@ -139,6 +140,12 @@ struct ShownAlarm {
     lasts: bool,
     acknowledged: Option<String>,
     acknowledged_in: Option<i64>,
+    /// `unacknowledged`, `acknowledged`, `returned` or `normal`.
+    state: &'static str,
+    /// Of an alarm on a signal.
+    priority: Option<&'static str>,
+    action: Option<String>,
+    since_before: bool,
 }
 
 /// The newest state while nothing is known.
@@ -182,6 +189,7 @@ pub(crate) fn state(run: &RunModel, cycle: i64, finished: bool) -> Option<State>
         redundancy: redundancy(&snapshot),
         open_alarms: snapshot.alarms.len(),
         alarms: alarms.map(shown_alarm).collect(),
+        process_alarms: snapshot.process_alarms,
         event_count: snapshot.events,
         cycle_master: snapshot.cycle_master,
         scenario_over: snapshot.scenario_over,
@@ -351,6 +359,10 @@ fn failure(outcome: &OutcomeSnapshot) -> Failure {
 
 fn shown_alarm(alarm: Alarm) -> ShownAlarm {
     ShownAlarm {
+        state: alarm.state().word(),
+        priority: alarm.priority.map(Priority::word),
+        action: alarm.action,
+        since_before: alarm.since_before,
         id: alarm.number,
         cycle: alarm.cycle,
         who: alarm.name,
