@@ -3,9 +3,7 @@
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde_json::json;
-use understudy_journal::{
-    AlarmRefusal, OperatorAction, Refusal, Shelving, Unshelving, find_alarm,
-};
+use understudy_journal::{AlarmRefusal, OperatorAction, Refusal, Shelving, Unshelving, find_alarm};
 use understudy_view::{Alarm, Bounds, Run};
 
 use super::{Arguments, What, refused, written};

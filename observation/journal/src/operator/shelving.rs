@@ -113,3 +113,41 @@ fn check_person(owner: &str, reason: &str) -> Result<(), AlarmRefusal> {
     let checked = check_owner_and_reason(owner, reason);
     checked.map_err(|error| AlarmRefusal::Invalid(error.to_string()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unknown_alarm_an_endless_time_and_a_missing_reason_are_refused() {
+        let program = "PROGRAM tank\nVAR_INPUT full : BOOL; END_VAR\nVAR_OUTPUT open : BOOL; END_VAR\nopen := full;\nEND_PROGRAM";
+        let cluster = "[cluster]\nname = \"cell\"\n[[controller]]\nname = \"tank\"\nladder = \"tank.st\"\n\
+            [[alarm]]\nsignal = \"tank.full\"\nwhen = true\ntext = \"full\"\n";
+        let loaded =
+            understudy_cluster::read("cluster.toml", cluster, &mut |_| Ok(program.to_owned()));
+        let cluster = loaded.cluster.expect("it is right");
+        let code = |name: &str, seconds, reason: &str| {
+            let shelving = Shelving {
+                name: name.to_owned(),
+                seconds,
+                owner: "anna".to_owned(),
+                reason: reason.to_owned(),
+                at_unix_s: 0,
+            };
+            let checked = shelving.check(cluster.alarms());
+            checked
+                .err()
+                .map(|refusal| refusal.to_string()[..5].to_owned())
+        };
+        let refused = |code: &str| Some(code.to_owned());
+        assert_eq!(code("tank.full", 600, "repair"), None);
+        assert_eq!(code("tank.full", MAXIMUM_SHELVING_SECONDS, "repair"), None);
+        assert_eq!(code("tank.ful", 600, "repair"), refused("U0660"));
+        for seconds in [0, MAXIMUM_SHELVING_SECONDS + 1, u64::MAX] {
+            assert_eq!(code("tank.full", seconds, "repair"), refused("U0661"));
+        }
+        for reason in ["", " ", "a\nb", &"x".repeat(121)] {
+            assert_eq!(code("tank.full", 600, reason), refused("U0661"), "{reason}");
+        }
+    }
+}
