@@ -1,5 +1,7 @@
 //! `understudy operate`: operator commands, by the socket of a laboratory or by mutual TLS.
 
+mod alarms;
+
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
@@ -34,6 +36,8 @@ Example:
   understudy operate runs/latest --name tank-io force inflow=12.5 --seconds 60 --reason \"valve test\"
   understudy operate runs/latest --name tank-io unforce inflow
   understudy operate runs/latest --name tank-io write setpoint=42.5 --reason \"new batch\"
+  understudy operate runs/latest --name level-high acknowledge-alarm
+  understudy operate runs/latest --name level-high shelve-alarm --seconds 600 --reason \"sensor is exchanged\"
 
 Without --keys the member belongs to a laboratory on this machine: that of the given run, or the running one of the cluster below --out.")]
 pub(crate) struct Arguments {
@@ -43,7 +47,7 @@ pub(crate) struct Arguments {
     /// Folder of the operator's keys, for a remote member
     #[arg(long, value_name = "DIR")]
     keys: Option<PathBuf>,
-    /// Member
+    /// Member; for acknowledge-alarm, shelve-alarm and unshelve-alarm: alarm
     #[arg(long, value_name = "NAME")]
     name: String,
     /// Command or query
@@ -52,7 +56,7 @@ pub(crate) struct Arguments {
     /// For force and write: signal and value, such as inflow=12.5 or lamp=true; for unforce: signal
     #[arg(value_name = "SIGNAL[=VALUE]", required_if_eq_any([("what", "force"), ("what", "unforce"), ("what", "write")]))]
     signal: Option<String>,
-    /// For force: duration
+    /// For force and shelve-alarm: duration
     #[arg(long, value_name = "N", default_value_t = 60)]
     seconds: u32,
     /// For accept-state: cycle of the state as in the event `state-lost`; the command is refused if the newest state is of another cycle
@@ -69,7 +73,23 @@ pub(crate) struct Arguments {
     out: PathBuf,
 }
 
+impl What {
+    /// Whether it is for an alarm, and not for a member.
+    fn is_of_alarm(self) -> bool {
+        matches!(
+            self,
+            Self::AcknowledgeAlarm | Self::ShelveAlarm | Self::UnshelveAlarm
+        )
+    }
+}
+
 impl Arguments {
+    /// The command as it is typed.
+    fn word(&self) -> String {
+        let word = self.what.to_possible_value();
+        word.map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+
     /// Reply to `cold-start` or `accept-state`.
     fn choice(&self) -> StateChoice {
         match self.what {
@@ -107,6 +127,12 @@ enum What {
     Kill,
     /// Restart its process; laboratory only
     Restart,
+    /// Acknowledge an alarm of a signal, or the alarms of a member; run only
+    AcknowledgeAlarm,
+    /// Take an alarm of a signal off the list of open alarms for a limited time; run only
+    ShelveAlarm,
+    /// End the shelving of an alarm; run only
+    UnshelveAlarm,
 }
 
 /// Timeout; a member sends in every cycle.
@@ -114,6 +140,7 @@ const SILENCE: Duration = Duration::from_secs(60);
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     match &arguments.keys {
+        _ if arguments.what.is_of_alarm() => alarms::run(arguments),
         Some(keys) => elsewhere(arguments, keys),
         None => in_laboratory(arguments),
     }
@@ -121,8 +148,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
 
 /// Sends the command to the laboratory that writes the run.
 fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
-    let word = arguments.what.to_possible_value();
-    let word = word.as_ref().map_or("", |value| value.get_name());
+    let word = arguments.word();
     let command = match arguments.what {
         What::Force => Command::Force(force(arguments, written(arguments)?.cluster())?),
         What::Unforce => Command::Unforce {
@@ -139,7 +165,13 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
         What::ColdStart | What::AcceptState => Command::Choose {
             choice: arguments.choice(),
         },
-        What::Status | What::Configuration | What::Stop | What::Journal => {
+        What::Status
+        | What::Configuration
+        | What::Stop
+        | What::Journal
+        | What::AcknowledgeAlarm
+        | What::ShelveAlarm
+        | What::UnshelveAlarm => {
             let message = format!(
                 "`{word}` requires a remote member: give the folder of the operator's keys by --keys; a laboratory accepts kill, restart, release, cold-start, accept-state, force, unforce and write"
             );
@@ -291,7 +323,11 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
         What::Write => Some(Request::Write(write(arguments, &cluster, keys.role)?)),
         What::Stop => Some(Request::Stop),
         What::Journal => None,
-        What::Kill | What::Restart => {
+        What::Kill
+        | What::Restart
+        | What::AcknowledgeAlarm
+        | What::ShelveAlarm
+        | What::UnshelveAlarm => {
             return Err(refused(&Refusal::Elsewhere {
                 name: arguments.name.clone(),
                 reason: "its process runs on another machine: stop or start it there".to_owned(),

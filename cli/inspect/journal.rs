@@ -115,18 +115,19 @@ fn followed(run: &Run, mut listing: Listing, json: bool) -> Answer {
     loop {
         let over = run.is_finished();
         let taken = source.poll(&mut |found| {
-            let line = match found {
-                Ok(record) => listing.take(&record).map(|line| {
-                    if json {
-                        serde_json::to_string(&line).unwrap_or_default()
-                    } else {
-                        line.to_text()
-                    }
-                }),
-                Err(trouble) if json => Some(json!({ "trouble": trouble.to_string() }).to_string()),
-                Err(trouble) => Some(format!("       -  {trouble}")),
+            let text = |line: &JournalLine| {
+                if json {
+                    serde_json::to_string(line).unwrap_or_default()
+                } else {
+                    line.to_text()
+                }
             };
-            if let Some(line) = line {
+            let lines = match found {
+                Ok(record) => listing.take(&record).iter().map(text).collect(),
+                Err(trouble) if json => vec![json!({ "trouble": trouble.to_string() }).to_string()],
+                Err(trouble) => vec![format!("       -  {trouble}")],
+            };
+            for line in lines {
                 reader_is_there &= writeln!(output, "{line}").is_ok();
             }
         });

@@ -105,6 +105,9 @@ fn text(summary: &Summary, directory: Option<&Path>) -> String {
             expectation.expected, expectation.found
         );
     }
+    for alarm in &summary.alarms {
+        let _ = writeln!(text, "alarm {alarm}");
+    }
     for death in &summary.deaths {
         let _ = writeln!(text, "ENDED UNEXPECTEDLY: {death}");
         for line in &death.said {

@@ -5,6 +5,7 @@
 //! newest and when every remote I/O has told of a later one. The records of each member come on a way of their own, and a busy machine may
 //! read one of them long before another: only [`MAXIMUM_OPEN_CYCLES`], which bound its memory, end the wait for a remote I/O that is gone.
 
+mod alarms;
 mod closing;
 mod events;
 mod presence;
@@ -17,8 +18,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_bus::HostEvent;
+use understudy_cluster::AlarmDeclaration;
 use understudy_cycle::Agreement;
-use understudy_journal::{Happening, Members, Numbering, Record, moment};
+use understudy_journal::{AlarmChange, Happening, Members, Numbering, Record, moment};
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_simulator::{Action, Referee, Violation};
@@ -27,6 +29,8 @@ use understudy_wire::{Member, Moment, ProgramId, ProgramSet, Source, StationId, 
 use crate::figure::Signals;
 use crate::scenario::{During, Scenario};
 
+pub(crate) use alarms::AlarmFinding;
+use alarms::Alarms;
 pub use presence::{Interval, Presence};
 pub use service::{Counts, Service};
 pub use stalls::Stall;
@@ -61,6 +65,8 @@ pub struct Terms {
     pub signals: Vec<Signals>,
     /// Programs whose plant is simulated.
     pub plants: ProgramSet,
+    /// Alarms on signals.
+    pub alarms: Arc<[AlarmDeclaration]>,
 }
 
 /// Who says where the origin is.
@@ -133,6 +139,7 @@ pub struct Account {
     presences: Presences,
     pub(crate) services: Vec<ServiceTrack>,
     stalls: Stalls,
+    alarms: Alarms,
     pub(crate) traces: Traces,
     pub(crate) steps: Vec<DoneStep>,
     pub(crate) deaths: Vec<Death>,
@@ -167,6 +174,7 @@ impl Account {
             presences: Presences::new(stations, terms.agreement.flag_after),
             services: vec![ServiceTrack::default(); programs],
             stalls: Stalls::default(),
+            alarms: Alarms::new(&terms.alarms, programs),
             traces: Traces {
                 plants: vec![PlantTrace::default(); programs],
                 stations: vec![Trace::default(); stations],
@@ -256,7 +264,11 @@ impl Account {
             (Happening::Host(HostEvent::JournalLost { records }), Some(member)) => {
                 self.unwritten(member, *records);
             }
-            (Happening::Run(event), _) => self.run(event),
+            (Happening::Run(event), _) => {
+                let changes = self.alarms.fold.run(event);
+                self.alarms_changed(&changes, None);
+                self.run(event);
+            }
             _ => {}
         }
         if let Some((late, member)) = stall_of(record) {
@@ -279,12 +291,34 @@ impl Account {
         measured
     }
 
+    /// Alarms changed with a record of a cycle, or of the newest one; not after the last cycle that is judged.
+    fn alarms_changed(&mut self, changes: &[AlarmChange], number: Option<i64>) {
+        let number = number.or_else(|| self.numbering.latest()).unwrap_or(0);
+        let at = self.since_origin(number);
+        if at.is_none_or(|at| at < self.cycles) {
+            self.alarms.changed(changes, number);
+        }
+    }
+
+    /// Each alarm of the cluster, how often it was raised, and in which cycle first; nothing in place of a cycle before the origin.
+    pub(crate) fn alarm_findings(
+        &self,
+    ) -> impl Iterator<Item = (&AlarmDeclaration, &AlarmFinding, Option<u64>)> {
+        let alarms = self.terms.alarms.iter().zip(&self.alarms.findings);
+        alarms.map(|(alarm, finding)| {
+            let first = finding.first.and_then(|first| self.since_origin(first));
+            (alarm, finding, first)
+        })
+    }
+
     fn unwritten(&mut self, member: Member, records: u64) {
         *self.unwritten.entry(member).or_default() += records;
         if let Member::RemoteIo(program) = member
             && let Some(referee) = self.terms.referees.get_mut(program.index())
         {
             referee.misses_records();
+            let changes = self.alarms.fold.forget(program);
+            self.alarms_changed(&changes, None);
         }
     }
 

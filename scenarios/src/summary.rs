@@ -4,6 +4,7 @@ use std::fmt;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use understudy_cluster::Priority;
 use understudy_journal::{JournalState, source_word};
 use understudy_wire::{Member, ProgramId, Source};
 
@@ -51,6 +52,8 @@ pub struct Summary {
     pub refused: Vec<RefusedSummary>,
     /// Wake-ups of the host that came too late, at most 200 of them.
     pub stalls: Vec<Stall>,
+    /// Alarms of the cluster file that were raised.
+    pub alarms: Vec<AlarmSummary>,
     /// What the scenario expects and what was found.
     pub expectations: Vec<ExpectationSummary>,
     /// How the journal fared.
@@ -183,6 +186,47 @@ pub struct RefusedSummary {
     pub why: String,
 }
 
+/// An alarm of the cluster file that was raised.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct AlarmSummary {
+    /// Its name.
+    pub name: String,
+    /// Its priority.
+    pub priority: Priority,
+    /// What is wrong.
+    pub text: String,
+    /// Times that it was raised.
+    pub raised: u64,
+    /// The cycle in which it was raised first; nothing before the cluster was synchronised.
+    pub first: Option<u64>,
+    /// Whether it is active at the end; nothing where that is unknown.
+    pub active: Option<bool>,
+}
+
+impl fmt::Display for AlarmSummary {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let priority = self.priority.word();
+        write!(
+            formatter,
+            "{} ({priority}): {}; raised ",
+            self.name, self.text
+        )?;
+        match self.raised {
+            1 => formatter.write_str("once")?,
+            times => write!(formatter, "{times} times, first")?,
+        }
+        match self.first {
+            Some(cycle) => write!(formatter, " in cycle {cycle}")?,
+            None => formatter.write_str(" before cycle 0")?,
+        }
+        formatter.write_str(match self.active {
+            Some(true) => ", active at the end",
+            Some(false) => ", over at the end",
+            None => ", unknown at the end",
+        })
+    }
+}
+
 /// One expectation.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct ExpectationSummary {
@@ -237,6 +281,16 @@ impl Summary {
             asked: step.asked,
             measured: step.measured,
         });
+        let alarms = account.alarm_findings();
+        let alarms = alarms.filter(|(_, finding, _)| finding.raised > 0);
+        let alarms = alarms.map(|(alarm, finding, first)| AlarmSummary {
+            name: alarm.name.clone(),
+            priority: alarm.priority,
+            text: alarm.text.clone(),
+            raised: finding.raised,
+            first,
+            active: finding.active,
+        });
         let violations = account.violations.iter();
         let mut summary = Self {
             format: 1,
@@ -280,6 +334,7 @@ impl Summary {
                 })
                 .collect(),
             stalls: finished.stalls,
+            alarms: alarms.collect(),
             expectations: Vec::new(),
             journal,
         };

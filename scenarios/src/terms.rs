@@ -1,5 +1,7 @@
 //! What an account and the two worlds need of a cluster.
 
+use std::sync::Arc;
+
 use understudy_cluster::Cluster;
 use understudy_journal::Members;
 use understudy_simulator::Referee;
@@ -41,6 +43,7 @@ impl Terms {
             agreement: cluster.agreement().clone(),
             referees: referees.collect(),
             signals: signals.collect(),
+            alarms: Arc::clone(cluster.alarms()),
             plants,
         }
     }

@@ -9,30 +9,30 @@ use crate::process::Process;
 
 impl Laboratory<'_> {
     pub(super) async fn obey(&mut self, commanded: Commanded) {
-        let done = match commanded.action.clone() {
-            OperatorAction::Acknowledge(seen) => {
-                self.note(RunEvent::Acknowledged(seen));
+        let OperatorAction::Command {
+            member,
+            command,
+            owner,
+            reason,
+        } = commanded.action.clone()
+        else {
+            let event = commanded.action.alarm_event(&self.account.terms.alarms);
+            let done = event.map(|event| {
+                self.note(event);
                 self.show_journal();
-                Ok(Done::default())
-            }
-            OperatorAction::Command {
-                member,
-                command,
-                owner,
-                reason,
-            } => {
-                let write = match &command {
-                    Command::Write(write) => Some(write.id),
-                    _ => None,
-                };
-                let done = self.obey_command(member, command, owner, reason).await;
-                // Its outcome comes with the journal of the remote I/O.
-                if let (Some(id), Ok(_)) = (write, &done) {
-                    return self.writes.add(id, commanded);
-                }
-                done
-            }
+                Done::default()
+            });
+            return commanded.answer(done);
         };
+        let write = match &command {
+            Command::Write(write) => Some(write.id),
+            _ => None,
+        };
+        let done = self.obey_command(member, command, owner, reason).await;
+        // Its outcome comes with the journal of the remote I/O.
+        if let (Some(id), Ok(_)) = (write, &done) {
+            return self.writes.add(id, commanded);
+        }
         commanded.answer(done);
     }
 

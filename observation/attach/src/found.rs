@@ -1,10 +1,11 @@
 //! Who of a cluster takes a call, and why the others do not.
 
 use std::net::TcpStream;
+use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_bus::{BusError, Call, Peer, Request, TlsKeys};
-use understudy_cluster::{Cluster, Security};
+use understudy_cluster::{AlarmDeclaration, Cluster, Security};
 use understudy_journal::check_version;
 use understudy_wire::{ClusterHash, ConfigurationHash};
 
@@ -22,6 +23,8 @@ pub struct Found {
     pub(crate) members: Vec<(Peer, Result<Call, String>)>,
     /// Inputs and outputs of each program.
     pub(crate) signals: Vec<(usize, usize)>,
+    /// Alarms on signals.
+    pub(crate) alarms: Arc<[AlarmDeclaration]>,
 }
 
 /// What every call needs.
@@ -89,6 +92,7 @@ pub fn find(cluster: &Cluster, keys: TlsKeys, peers: Vec<Peer>) -> Result<Found,
     let controllers = cluster.controllers().iter();
     Ok(Found {
         line,
+        alarms: Arc::clone(cluster.alarms()),
         signals: controllers
             .map(|own| (own.interface.inputs.width(), own.interface.outputs.width()))
             .collect(),

@@ -9,6 +9,7 @@ use std::time::Duration;
 use tokio::sync::mpsc::{Receiver, channel};
 use tokio::sync::oneshot;
 use understudy_bus::{DONE, Request};
+use understudy_cluster::AlarmDeclaration;
 use understudy_journal::{
     Command, Commanded, Commander, Commands, Done, Happening, Journal, OperatorAction, Record,
     Refusal, RunDirectory, RunEvent, RunSocket, commands, monotonic_ns,
@@ -114,6 +115,7 @@ impl Found {
             calls,
             names,
             signals: self.signals,
+            alarms: self.alarms,
             has_origin: false,
         };
         let directory = directory.clone();
@@ -142,6 +144,7 @@ struct Recorder {
     names: BTreeMap<Member, String>,
     /// Inputs and outputs of each program.
     signals: Vec<(usize, usize)>,
+    alarms: Arc<[AlarmDeclaration]>,
     has_origin: bool,
 }
 
@@ -238,28 +241,30 @@ impl Recorder {
             let (member, write) = (*member, write.clone());
             return self.write(member, write, commanded);
         }
-        let done = match commanded.action.clone() {
-            OperatorAction::Acknowledge(seen) => {
-                self.own(RunEvent::Acknowledged(seen));
-                Ok(Done::default())
-            }
-            OperatorAction::Command {
-                member,
-                command,
-                owner,
-                reason,
-            } => {
-                let done = self.command(member, &command).await;
-                self.own(RunEvent::Commanded {
-                    member,
-                    command,
-                    owner,
-                    reason,
-                    refused: done.as_ref().err().map(ToString::to_string),
-                });
-                done
-            }
+        let OperatorAction::Command {
+            member,
+            command,
+            owner,
+            reason,
+        } = commanded.action.clone()
+        else {
+            let event = commanded.action.alarm_event(&self.alarms);
+            let done = event.map(|event| {
+                self.own(event);
+                self.journal.flush();
+                Done::default()
+            });
+            commanded.answer(done);
+            return;
         };
+        let done = self.command(member, &command).await;
+        self.own(RunEvent::Commanded {
+            member,
+            command,
+            owner,
+            reason,
+            refused: done.as_ref().err().map(ToString::to_string),
+        });
         self.journal.flush();
         commanded.answer(done);
     }

@@ -34,6 +34,19 @@ pub(crate) struct OfMember {
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+pub(crate) struct OfAlarm {
+    pub(crate) alarm: String,
+    pub(crate) priority: &'static str,
+    pub(crate) state: &'static str,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+pub(crate) struct OfAlarms {
+    pub(crate) priority: &'static str,
+    pub(crate) state: &'static str,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
 pub(crate) struct OfState {
     pub(crate) station: String,
     pub(crate) state: &'static str,

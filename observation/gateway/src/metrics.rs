@@ -21,7 +21,7 @@ use understudy_wire::Member;
 
 use crate::error::GatewayError;
 use crate::followed::BOUNDS;
-use crate::labels::{OfLacking, OfMember, OfProgram, OfSource, OfState, OfTurn};
+use crate::labels::{OfAlarm, OfAlarms, OfLacking, OfMember, OfProgram, OfSource, OfState, OfTurn};
 
 /// Bounds of the buckets of times, as shares of a period.
 const SHARES: [f64; 12] = [
@@ -60,6 +60,8 @@ metrics! {
     "cycle" cycle: Gauge, "The newest cycle, from the origin of the run";
     "survivable_failures" survives: Gauge, "Remaining redundancy: any further failures of stations that would be masked";
     "open_alarms" open_alarms: Gauge, "Alarms that last or are not acknowledged";
+    "alarms" alarms: Family<OfAlarms, Gauge>, "Alarms on signals by state and priority";
+    "alarm_state" alarm_states: Family<OfAlarm, Gauge>, "1 for the state of the alarm on a signal, 0 for the other states";
     "station_state" station_states: Family<OfState, Gauge>, "1 for the state of the station, 0 for the other states";
     "awaits_release" awaits_release: Family<OfProgram, Gauge>, "1 where the operator has to release the outputs";
     "forced_signals" forced: Family<OfProgram, Gauge>, "Forced signals";

@@ -3,6 +3,7 @@
 //! Every record of a laboratory, of the simulator and of a cluster elsewhere has this form, so that one account judges all of them and every
 //! viewer shows all of them.
 
+mod alarm_fold;
 mod clock;
 mod journal;
 mod kept;
@@ -19,6 +20,7 @@ mod source;
 mod version;
 mod writer;
 
+pub use alarm_fold::{AlarmChange, AlarmFold, AlarmTransition};
 pub use clock::monotonic_ns;
 pub use journal::{JOURNAL_LIMIT_BYTES, Journal, JournalError, JournalState, records, records_of};
 pub use kept::{KeptError, keep_cluster, kept_cluster};
@@ -26,8 +28,9 @@ pub use members::{Members, NamedSignal};
 pub use named_files::{ALLOWED_FOLDERS, named_file};
 pub use numbering::Numbering;
 pub use operator::{
-    Acknowledgement, Command, Commanded, Commander, Commands, Done, OperatorAction, PendingWrites,
-    Refusal, RequestedValue, RunSocket, WriteProblem, WriteRequest, WriteSessions, commands,
+    Acknowledgement, AlarmRefusal, Command, Commanded, Commander, Commands, Done,
+    MAXIMUM_SHELVING_SECONDS, OperatorAction, PendingWrites, Refusal, RequestedValue, RunSocket,
+    Shelving, Unshelving, WriteProblem, WriteRequest, WriteSessions, commands, find_alarm,
     force_value, new_write, write_answer,
 };
 pub use record::{Happening, LABORATORY, Record, RunEvent, moment};

@@ -11,6 +11,7 @@
 mod acknowledgement;
 mod new_write;
 mod sessions;
+mod shelving;
 mod socket;
 
 use std::path::{Path, PathBuf};
@@ -23,13 +24,15 @@ use understudy_wire::{
     WriteRefusal,
 };
 
+use understudy_cluster::AlarmDeclaration;
 use understudy_remote_io::Event as RemoteIoEvent;
 
-use crate::record::{Happening, Record};
+use crate::record::{Happening, Record, RunEvent};
 
 pub use acknowledgement::Acknowledgement;
 pub use new_write::{RequestedValue, WriteProblem, WriteRequest, force_value, new_write};
 pub use sessions::WriteSessions;
+pub use shelving::{AlarmRefusal, MAXIMUM_SHELVING_SECONDS, Shelving, Unshelving, find_alarm};
 pub use socket::RunSocket;
 pub(crate) use socket::SOCKET;
 
@@ -129,6 +132,9 @@ pub enum Refusal {
     /// A write as it was asked for is not a write to the program.
     #[error(transparent)]
     Problem(#[from] WriteProblem),
+    /// The alarm cannot be shelved or acknowledged.
+    #[error("{0}")]
+    Alarm(AlarmRefusal),
     /// The outcome of a write is not known yet.
     #[error(
         "U0648: the remote I/O has taken the value, and no output with it was applied in time: check the state of the program"
@@ -171,6 +177,32 @@ pub enum OperatorAction {
     },
     /// An alarm was seen.
     Acknowledge(Acknowledgement),
+    /// An alarm on a signal is shelved.
+    Shelve(Shelving),
+    /// It is shelved no more.
+    Unshelve(Unshelving),
+}
+
+impl OperatorAction {
+    /// The record of an action on an alarm.
+    ///
+    /// # Errors
+    /// [`Refusal::Alarm`], and [`Refusal::Busy`] for a command to a member.
+    pub fn alarm_event(&self, alarms: &[AlarmDeclaration]) -> Result<RunEvent, Refusal> {
+        let event = match self {
+            Self::Command { .. } => return Err(Refusal::Busy),
+            Self::Acknowledge(seen) => Ok(RunEvent::Acknowledged(seen.clone())),
+            Self::Shelve(shelving) => {
+                let checked = shelving.check(alarms);
+                checked.map(|()| RunEvent::Shelved(shelving.clone()))
+            }
+            Self::Unshelve(unshelving) => {
+                let checked = unshelving.check(alarms);
+                checked.map(|()| RunEvent::Unshelved(unshelving.clone()))
+            }
+        };
+        event.map_err(Refusal::Alarm)
+    }
 }
 
 /// What an action came to.
@@ -346,7 +378,11 @@ impl Commander {
         block_on(self.act(action.clone()))?
     }
 
-    async fn act(&self, action: OperatorAction) -> Result<Done, Refusal> {
+    /// Does what an operator wants, and waits until it is done or refused.
+    ///
+    /// # Errors
+    /// [`Refusal`].
+    pub async fn act(&self, action: OperatorAction) -> Result<Done, Refusal> {
         match &self.0 {
             Way::Run(run) => socket::ask(run, &action).await,
             Way::Queue(queue) => {

@@ -9,7 +9,7 @@ use understudy_simulator::Action;
 use understudy_wire::{Member, Moment};
 
 use crate::members::Members;
-use crate::operator::{Acknowledgement, Command};
+use crate::operator::{Acknowledgement, Command, Shelving, Unshelving};
 
 /// One line of `journal.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -78,6 +78,10 @@ pub enum RunEvent {
     },
     /// Somebody has seen an alarm.
     Acknowledged(Acknowledgement),
+    /// An alarm on a signal was shelved.
+    Shelved(Shelving),
+    /// It was taken back from there.
+    Unshelved(Unshelving),
     /// What a member of a cluster elsewhere says is heard from now on.
     Attached {
         /// Who.

@@ -3,12 +3,14 @@
 //! ```text
 //!   CLUSTER
 //!   ├─ Run, Margin, Alarms, Events
+//!   ├─ Alarms/Signals/ALARM
 //!   ├─ Stations/STATION
 //!   └─ Programs/PROGRAM ── Inputs/SIGNAL, Outputs/SIGNAL, Markers/SIGNAL
 //! ```
 //!
 //! The identifier of a node is its path with `/` between the names, in the namespace `urn:understudy:CLUSTER`.
 
+mod alarms;
 mod signals;
 
 use opcua::types::{DataTypeId, StatusCode, UAString, Variant};
@@ -192,6 +194,9 @@ pub fn variables(cluster: &Cluster) -> Vec<Variable> {
         variables: Vec::new(),
     };
     tree.run();
+    for (place, declared) in cluster.alarms().iter().enumerate() {
+        tree.alarm(place, declared);
+    }
     let programs = cluster.controllers().iter().map(|program| &program.name);
     let understudies = cluster.understudies().iter();
     let stations = programs.chain(understudies.map(|understudy| &understudy.name));

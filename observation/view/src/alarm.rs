@@ -1,15 +1,61 @@
-//! Alarms: conditions that an operator has to acknowledge.
+//! Alarms: conditions that an operator has to acknowledge, of members and of signals of the programs.
 
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use understudy_cluster::{AlarmDeclaration, Priority};
 use understudy_journal::Acknowledgement;
 
 /// Alarms that are kept, at most; the oldest that are over and acknowledged go first.
 const MOST: usize = 1000;
 
-/// One alarm: a value fault, an exclusion, a dispute, a loss.
+/// The kind of an alarm on a signal.
+pub(crate) const PROCESS: &str = "process";
+
+/// State of an alarm, in the sense of ISA-18.2.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum AlarmState {
+    /// Not active, and acknowledged.
+    Normal,
+    /// Active and not acknowledged.
+    Unacknowledged,
+    /// Active and acknowledged.
+    Acknowledged,
+    /// Over and not acknowledged.
+    Returned,
+    /// Shelved by an operator until a cycle.
+    Shelved,
+    /// The value of its signal is unknown, or it was not long enough known.
+    Unknown,
+}
+
+impl AlarmState {
+    /// All states.
+    pub const ALL: [Self; 6] = [
+        Self::Normal,
+        Self::Unacknowledged,
+        Self::Acknowledged,
+        Self::Returned,
+        Self::Shelved,
+        Self::Unknown,
+    ];
+
+    /// The state as JSON and the page write it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Normal => "normal",
+            Self::Unacknowledged => "unacknowledged",
+            Self::Acknowledged => "acknowledged",
+            Self::Returned => "returned",
+            Self::Shelved => "shelved",
+            Self::Unknown => "unknown",
+        }
+    }
+}
+
+/// One alarm: a value fault, an exclusion, a dispute, a loss, or an alarm of the cluster file on a signal.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Alarm {
     /// Number of the alarm.
@@ -18,9 +64,9 @@ pub struct Alarm {
     pub cycle: i64,
     /// The cycle in which it was over; nothing while it lasts.
     pub over: Option<i64>,
-    /// The member.
+    /// The member; the name of an alarm on a signal.
     pub name: String,
-    /// Kind of alarm, such as `value-fault`.
+    /// Kind of alarm, such as `value-fault`; `process` for an alarm on a signal.
     pub alarm: &'static str,
     /// What is wrong.
     pub text: String,
@@ -30,6 +76,14 @@ pub struct Alarm {
     pub acknowledged_by: Option<String>,
     /// The cycle of the acknowledgement.
     pub acknowledged_in: Option<i64>,
+    /// Whether it may have been raised before `cycle`, the first one in which it is known.
+    pub since_before: bool,
+    /// The cycle in which the same alarm was raised again, so that the newer one counts; only of an alarm on a signal.
+    pub repeated_in: Option<i64>,
+    /// Priority of an alarm on a signal.
+    pub priority: Option<Priority>,
+    /// What the operator should do.
+    pub action: Option<String>,
 }
 
 impl Alarm {
@@ -50,6 +104,7 @@ impl Alarm {
         let acknowledged = self.acknowledged_in.is_some_and(|at| at <= cycle);
         (self.cycle <= cycle).then(|| Self {
             over: self.over.filter(|over| *over <= cycle),
+            repeated_in: self.repeated_in.filter(|at| *at <= cycle),
             acknowledged_by: self.acknowledged_by.clone().filter(|_| acknowledged),
             acknowledged_in: self.acknowledged_in.filter(|_| acknowledged),
             ..self.clone()
@@ -58,7 +113,21 @@ impl Alarm {
 
     /// Whether it lasts or is not acknowledged.
     pub fn is_open(&self) -> bool {
-        self.over.is_none() || self.acknowledged_by.is_none()
+        self.repeated_in.is_none() && self.state() != AlarmState::Normal
+    }
+
+    /// Its state by its end and its acknowledgement.
+    pub fn state(&self) -> AlarmState {
+        match (self.over, &self.acknowledged_by) {
+            (None, None) => AlarmState::Unacknowledged,
+            (None, Some(_)) => AlarmState::Acknowledged,
+            (Some(_), None) => AlarmState::Returned,
+            (Some(_), Some(_)) => AlarmState::Normal,
+        }
+    }
+
+    fn is_of(&self, subject: &Subject) -> bool {
+        (&self.name, self.alarm) == (&subject.0, subject.1)
     }
 }
 
@@ -77,6 +146,35 @@ pub(crate) struct Alarms {
 impl Alarms {
     /// Raises an alarm that lasts; one that lasts already is not raised again.
     pub(crate) fn raise(&mut self, subject: Subject, cycle: i64, text: String) {
+        self.raise_alarm(subject, cycle, text, |_| {});
+    }
+
+    /// Raises an alarm on a signal; `since_before` where it may have been active before.
+    pub(crate) fn raise_process(
+        &mut self,
+        declared: &AlarmDeclaration,
+        cycle: i64,
+        since_before: bool,
+    ) {
+        let subject = (declared.name.clone(), PROCESS);
+        let mut before = self.alarms.values_mut().rev();
+        if let Some(alarm) = before.find(|alarm| alarm.is_of(&subject)) {
+            alarm.repeated_in = Some(cycle);
+        }
+        self.raise_alarm(subject, cycle, declared.text.clone(), |alarm| {
+            alarm.since_before = since_before;
+            alarm.priority = Some(declared.priority);
+            alarm.action.clone_from(&declared.action);
+        });
+    }
+
+    fn raise_alarm(
+        &mut self,
+        subject: Subject,
+        cycle: i64,
+        text: String,
+        complete: impl FnOnce(&mut Alarm),
+    ) {
         if self.lasting.contains_key(&subject) {
             return;
         }
@@ -89,7 +187,7 @@ impl Alarms {
                 self.lasting.retain(|_, lasting| *lasting != number);
             }
         }
-        let alarm = Alarm {
+        let mut alarm = Alarm {
             number: self.count,
             cycle,
             over: None,
@@ -99,7 +197,12 @@ impl Alarms {
             raised_ns: self.now_ns,
             acknowledged_by: None,
             acknowledged_in: None,
+            since_before: false,
+            repeated_in: None,
+            priority: None,
+            action: None,
         };
+        complete(&mut alarm);
         self.alarms.insert(self.count, alarm);
         self.lasting.insert(subject, self.count);
     }
@@ -124,21 +227,23 @@ impl Alarms {
         for alarm in self.alarms.values_mut() {
             alarm.cycle = alarm.cycle.saturating_add(by);
             alarm.over = alarm.over.map(|over| over.saturating_add(by));
-            let seen = &mut alarm.acknowledged_in;
-            *seen = seen.map(|seen| seen.saturating_add(by));
+            for at in [&mut alarm.acknowledged_in, &mut alarm.repeated_in] {
+                *at = at.map(|at| at.saturating_add(by));
+            }
         }
     }
 
     /// An alarm was acknowledged; one that is not kept any more is ignored.
     pub(crate) fn acknowledged(&mut self, seen: &Acknowledgement, cycle: i64) {
-        let found = self.alarms.values_mut().find(|alarm| {
+        // An alarm on a signal is acknowledged with those of the same name before it. A reader that began later knows a later time.
+        let is_meant = |alarm: &Alarm| {
             alarm.raised_ns == seen.raised_ns
-                && alarm.name == seen.name
-                && alarm.alarm == seen.alarm
-        });
-        if let Some(alarm) = found
-            && alarm.acknowledged_by.is_none()
-        {
+                || alarm.alarm == PROCESS
+                    && (alarm.since_before || alarm.raised_ns < seen.raised_ns)
+        };
+        let of_name = |alarm: &&mut Alarm| alarm.name == seen.name && alarm.alarm == seen.alarm;
+        let found = self.alarms.values_mut().filter(of_name);
+        for alarm in found.filter(|alarm| is_meant(alarm) && alarm.acknowledged_by.is_none()) {
             alarm.acknowledged_by = Some(seen.owner.clone());
             alarm.acknowledged_in = Some(cycle);
         }

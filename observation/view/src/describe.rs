@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use understudy_cluster::Cluster;
-use understudy_journal::{Happening, Members, Record, source_word};
+use understudy_cluster::{AlarmDeclaration, Cluster};
+use understudy_journal::{AlarmTransition, Happening, Members, Record, source_word};
 use understudy_remote_io::Missing;
 use understudy_typed::Fault;
 use understudy_wire::{Element, Member, ProgramId, ProgramSet, Set, Source, StationId, StationSet};
@@ -58,9 +58,9 @@ pub(crate) fn event_names() -> BTreeSet<&'static str> {
         processes::host::NAMES,
         processes::run::NAMES,
     ];
-    // A listing shows a deadline whose source changed, or at which a program was found stopped, as an event of its own.
+    // A listing shows a deadline whose source changed, at which a program was found stopped, or with which an alarm changed, as an event of its own.
     let names = all.into_iter().flatten().copied();
-    let names = names.chain(["source", PROGRAM_FAULT]);
+    let names = names.chain(["source", PROGRAM_FAULT, ALARM_RAISED, ALARM_OVER]);
     names.collect()
 }
 
@@ -91,10 +91,42 @@ pub(crate) fn describe(record: &Record, names: &Members, writes: &Writes) -> Des
     }
 }
 
-type Words = (&'static str, Level, String);
+pub(crate) type Words = (&'static str, Level, String);
+
+/// The event of an alarm on a signal that is active.
+pub(crate) const ALARM_RAISED: &str = "alarm-raised";
+
+/// The event of an alarm on a signal that is over.
+pub(crate) const ALARM_OVER: &str = "alarm-over";
 
 /// The event of a program fault.
 pub(crate) const PROGRAM_FAULT: &str = "program-fault";
+
+/// An alarm on a signal that was raised or is over, as an event with its level and its text.
+pub(crate) fn alarm_event(declared: &AlarmDeclaration, transition: AlarmTransition) -> Words {
+    let (event, level, what) = match transition {
+        AlarmTransition::Raised { since_before } => {
+            let since = if since_before {
+                ", perhaps since an earlier cycle"
+            } else {
+                ""
+            };
+            let text = &declared.text;
+            (
+                ALARM_RAISED,
+                Level::Alarm,
+                format!("is active{since}: {text}"),
+            )
+        }
+        AlarmTransition::Over => (ALARM_OVER, Level::Notice, "is over".to_owned()),
+    };
+    let (name, priority) = (&declared.name, declared.priority.word());
+    (
+        event,
+        level,
+        format!("the alarm {name} ({priority}) {what}"),
+    )
+}
 
 /// A program fault in words: the program, and where it stopped and why, as far as that is known.
 pub(crate) fn program_fault_text(

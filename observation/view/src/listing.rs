@@ -1,17 +1,18 @@
 //! The journal as a list of lines that a person chose.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use understudy_cluster::Cluster;
-use understudy_journal::{Happening, Members, Record, RunEvent, moment};
+use understudy_cluster::{AlarmDeclaration, Cluster};
+use understudy_journal::{AlarmFold, Happening, Members, Record, RunEvent, moment};
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_text::spelling::suggestion;
 use understudy_wire::{Member, Moment, ProgramId, Source};
 
 use crate::cycles::Cycles;
-use crate::describe::{PROGRAM_FAULT, Writes, describe, event_names};
+use crate::describe::{PROGRAM_FAULT, Writes, alarm_event, describe, event_names};
 use crate::error::ViewError;
 use crate::event::Level;
 use crate::stop::Stops;
@@ -60,6 +61,8 @@ pub struct Listing {
     cycles: Cycles,
     sources: BTreeMap<ProgramId, Source>,
     stops: Stops,
+    declared: Arc<[AlarmDeclaration]>,
+    alarms: AlarmFold,
 }
 
 impl Listing {
@@ -112,6 +115,8 @@ impl Listing {
             cycles: Cycles::default(),
             sources: BTreeMap::new(),
             stops: Stops::new(cluster),
+            declared: Arc::clone(cluster.alarms()),
+            alarms: AlarmFold::new(Arc::clone(cluster.alarms()), cluster.controllers().len()),
         })
     }
 
@@ -130,15 +135,41 @@ impl Listing {
             cycles: self.cycles.again(),
             sources: BTreeMap::new(),
             stops: self.stops.again(),
+            alarms: self.alarms.again(),
             ..self.clone()
         }
     }
 
-    /// Takes the next record; answers with it in words if it is wanted.
-    pub fn take(&mut self, record: &Record) -> Option<JournalLine> {
+    /// Takes the next record; answers with it in words and with the alarms that it changes, as far as they are wanted.
+    pub fn take(&mut self, record: &Record) -> Vec<JournalLine> {
         let cycle = self.cycle_of(record);
-        let _ = self.cycles.take_shift();
+        if let Some(shift) = self.cycles.take_shift() {
+            self.alarms.shift(shift);
+        }
+        let changes = self.alarms.take(record, cycle);
         let cycle = self.cycles.has_origin().then_some(cycle);
+        let mut lines: Vec<JournalLine> = self.line(record, cycle).into_iter().collect();
+        if changes.is_empty() || !self.is_wanted(record, cycle) {
+            return lines;
+        }
+        let alarms = changes.iter().filter_map(|change| {
+            let declared = self.declared.get(change.alarm)?;
+            Some(alarm_event(declared, change.transition?))
+        });
+        let wanted =
+            alarms.filter(|(event, ..)| self.filter.events.is_empty() || self.wants(event));
+        lines.extend(wanted.map(|(event, level, text)| JournalLine {
+            cycle,
+            at_ns: record.at_ns,
+            name: record.name.clone(),
+            event,
+            level,
+            text,
+        }));
+        lines
+    }
+
+    fn line(&mut self, record: &Record, cycle: Option<i64>) -> Option<JournalLine> {
         let changed = self.source_changed(record);
         let fault = self.stops.take(record);
         self.writes.note(record);
@@ -204,9 +235,15 @@ impl Listing {
                 self.cycles.origin_is(*moment, cycle);
                 cycle
             }
-            (Happening::Run(RunEvent::Finished | RunEvent::Acknowledged(_)), _) => {
-                self.cycles.of(None)
-            }
+            (
+                Happening::Run(
+                    RunEvent::Finished
+                    | RunEvent::Acknowledged(_)
+                    | RunEvent::Shelved(_)
+                    | RunEvent::Unshelved(_),
+                ),
+                _,
+            ) => self.cycles.of(None),
             // What is done is felt in the next cycle.
             (Happening::Run(_), _) if self.cycles.latest().is_some() => {
                 self.cycles.of(None).saturating_add(1)

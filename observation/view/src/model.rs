@@ -5,6 +5,7 @@ mod changes;
 mod counters;
 mod cycle;
 mod members;
+mod process_alarms;
 mod programs;
 mod protection;
 mod run_events;
@@ -25,6 +26,7 @@ use crate::cycles::Cycles;
 use crate::describe::{Writes, describe};
 use crate::event::{Event, Events, Level};
 use crate::history::History;
+use crate::process_alarm::ProcessAlarms;
 use crate::series::Series;
 use crate::source::Trouble;
 use crate::timing::Timings;
@@ -78,6 +80,7 @@ pub struct Model {
     series: Series,
     events: Events,
     alarms: Alarms,
+    pub(crate) process_alarms: ProcessAlarms,
     timings: Timings,
     observers: Vec<OnceLock<Option<Observer>>>,
     interpreters: Vec<OnceLock<Option<Interpreter>>>,
@@ -111,6 +114,7 @@ impl Model {
             series: Series::new(programs, schedule.stations(), bounds.changes),
             events: Events::new(bounds.events),
             alarms: Alarms::default(),
+            process_alarms: ProcessAlarms::new(cluster.alarms(), programs),
             timings: Timings::new(schedule, bounds.timings),
             observers: vec![OnceLock::new(); programs],
             interpreters: vec![OnceLock::new(); programs],
@@ -157,6 +161,9 @@ impl Model {
             Trouble::Gone { count } => count.unwrap_or(1),
             _ => 1,
         };
+        let changes = self.process_alarms.fold.forget_all();
+        let cycle = self.cycles.of(None);
+        self.process_alarms_changed("journal", cycle, &changes);
         let event = Event {
             number: 0,
             cycle: self.cycles.of(None),
@@ -193,6 +200,7 @@ impl Model {
         self.series.shift(by);
         self.events.shift(by);
         self.alarms.shift(by);
+        self.process_alarms.shift(by);
         self.timings.shift(by);
         self.closed = self.closed.map(|closed| closed.saturating_add(by));
     }

@@ -11,6 +11,7 @@ use serde_json::Value;
 use understudy_wire::Force;
 
 use crate::alarm::Alarm;
+use crate::process_alarm::ProcessAlarm;
 use crate::protection::{LostState, Protection};
 use crate::station::StationState;
 
@@ -74,8 +75,10 @@ pub struct Snapshot {
     pub timing: Option<TimingSnapshot>,
     /// Late wake-ups of all members so far.
     pub host_stalls: u64,
-    /// Alarms that last or are not acknowledged.
+    /// Alarms that last or are not acknowledged, without the shelved ones.
     pub alarms: Vec<Alarm>,
+    /// Alarms of the cluster file, each with its state.
+    pub process_alarms: Vec<ProcessAlarm>,
     /// Events so far; the number of the newest.
     pub events: u64,
     /// Records read so far.

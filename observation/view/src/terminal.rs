@@ -103,7 +103,7 @@ impl Screen {
             Key::Acknowledge => {
                 let unseen = model
                     .alarms()
-                    .filter(|alarm| alarm.acknowledged_by.is_none());
+                    .filter(|alarm| alarm.acknowledged_by.is_none() && alarm.repeated_in.is_none());
                 return unseen.cloned().collect();
             }
             Key::Pause => self.paused = !self.paused,

@@ -1,9 +1,9 @@
 // Events in order, with cycle and cause, and alarms, which an operator acknowledges.
 
-import { act, ask, tell } from "/ask.js";
-import { el, keyed, setText } from "/element.js";
+import * as alarms from "/alarms.js";
+import { act, ask } from "/ask.js";
+import { el, keyed } from "/element.js";
 import { goTo, isLive, state as stateNow } from "/time.js";
-import { owner } from "/commands.js";
 
 let run = null;
 let filter = "";
@@ -12,7 +12,7 @@ let asked = "";
 export function prepare(facts) {
   run = facts;
   document.getElementById("view-events").append(
-    el("section", { class: "card", "aria-labelledby": "alarms-title" }, el("h2", { id: "alarms-title" }, "Alarms"), el("ul", { id: "alarm-list", class: "plain" }), el("p", { id: "no-alarm" }, "none")),
+    alarms.card(),
     el("section", { class: "card", "aria-labelledby": "events-title" },
       el("h2", { id: "events-title" }, "Events"),
       el("label", {}, "Find ", el("input", { id: "event-find", type: "search", input: (event) => { filter = event.target.value; asked = ""; refresh(isLive() ? undefined : stateNow()?.cycle); } })),
@@ -24,26 +24,12 @@ export function prepare(facts) {
 }
 
 export function show(state, live) {
-  const list = document.getElementById("alarm-list");
-  document.getElementById("no-alarm").hidden = state.alarms.length > 0;
-  keyed(list, state.alarms, (alarm) => alarm.id, makeAlarm, (line, alarm) => {
-    const by = alarm.acknowledged;
-    line.dataset.open = String(!by);
-    setText(line.querySelector(".alarm-words"), `cycle ${alarm.cycle}: ${alarm.who}: ${alarm.what}${alarm.lasts ? "" : " (over)"}`);
-    setText(line.querySelector(".alarm-by"), by ? `acknowledged by ${by} in cycle ${alarm.acknowledged_in}` : "");
-    line.querySelector("button").hidden = Boolean(by);
-  });
+  alarms.show(state);
   const now = live ? `${state.event_count}/${filter}` : `until ${state.cycle}/${filter}`;
   if (now !== asked) {
     asked = now;
     refresh(live ? undefined : state.cycle);
   }
-}
-
-function makeAlarm(alarm) {
-  const acknowledge = () => act(() => tell(`/api/alarms/${alarm.id}/acknowledge`, { owner: owner() }));
-  return el("li", {}, el("span", { "aria-hidden": "true" }, "⚠ "), el("span", { class: "alarm-words" }), " ", el("span", { class: "alarm-by" }), " ",
-    el("button", { type: "button", click: acknowledge }, "Acknowledge"));
 }
 
 let asking = false;

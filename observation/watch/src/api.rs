@@ -48,6 +48,8 @@ pub(crate) fn router(app: Arc<App>) -> Router {
             "/api/alarms/{number}/acknowledge",
             post(alarms::acknowledge),
         )
+        .route("/api/alarms/shelve", post(alarms::shelve))
+        .route("/api/alarms/unshelve", post(alarms::unshelve))
         .route("/api/command", post(command::command))
         .route("/api/login", post(session::log_in))
         .route("/api/logout", post(session::log_out))

@@ -39,6 +39,7 @@ const ASSETS: &[(&str, &str, &str)] = assets![
     "why.js": SCRIPT,
     "trends.js": SCRIPT,
     "bands.js": SCRIPT,
+    "alarms.js": SCRIPT,
     "events.js": SCRIPT,
     "commands.js": SCRIPT,
     "compare.js": SCRIPT,

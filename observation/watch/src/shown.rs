@@ -6,12 +6,12 @@ use std::time::Instant;
 
 use serde::Serialize;
 use serde_json::Value;
-use understudy_cluster::Controller;
+use understudy_cluster::{Controller, Priority};
 use understudy_remote_io::SignalInput;
 use understudy_typed::{Point, Points};
 use understudy_view::{
-    Alarm, LostState, MarginSnapshot, Model as RunModel, OutcomeSnapshot, ProgramSnapshot,
-    Protection, Snapshot, forced_point, forced_value, value_of,
+    Alarm, LostState, MarginSnapshot, Model as RunModel, OutcomeSnapshot, ProcessAlarm,
+    ProgramSnapshot, Protection, Snapshot, forced_point, forced_value, value_of,
 };
 use understudy_wire::{Force, Member, ProgramId, SignalPlace, StationId};
 
@@ -43,6 +43,7 @@ pub(crate) struct State {
     /// Alarms that last or are not acknowledged.
     open_alarms: usize,
     alarms: Vec<ShownAlarm>,
+    process_alarms: Vec<ProcessAlarm>,
     event_count: u64,
 }
 
@@ -154,6 +155,12 @@ struct ShownAlarm {
     lasts: bool,
     acknowledged: Option<String>,
     acknowledged_in: Option<i64>,
+    /// `unacknowledged`, `acknowledged`, `returned` or `normal`.
+    state: &'static str,
+    /// Of an alarm on a signal.
+    priority: Option<&'static str>,
+    action: Option<String>,
+    since_before: bool,
 }
 
 /// The newest state while nothing is known.
@@ -197,6 +204,7 @@ pub(crate) fn state(run: &RunModel, cycle: i64, finished: bool) -> Option<State>
         redundancy: redundancy(&snapshot),
         open_alarms: snapshot.alarms.len(),
         alarms: alarms.map(shown_alarm).collect(),
+        process_alarms: snapshot.process_alarms,
         event_count: snapshot.events,
         cycle_master: snapshot.cycle_master,
         scenario_over: snapshot.scenario_over,
@@ -394,6 +402,10 @@ fn failure(outcome: &OutcomeSnapshot) -> Failure {
 
 fn shown_alarm(alarm: Alarm) -> ShownAlarm {
     ShownAlarm {
+        state: alarm.state().word(),
+        priority: alarm.priority.map(Priority::word),
+        action: alarm.action,
+        since_before: alarm.since_before,
         id: alarm.number,
         cycle: alarm.cycle,
         who: alarm.name,

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::net::SocketAddr;
 use std::sync::Arc;
 
+use crate::alarm::AlarmDeclaration;
 use crate::code::Code;
 use crate::device::FieldDevice;
 use crate::source::{InputSource, OperatorDeclaration, SignalDeclaration};
@@ -182,6 +183,7 @@ pub struct Cluster {
     pub(crate) understudies: Vec<Understudy>,
     pub(crate) remote_ios: Vec<RemoteIo>,
     pub(crate) plants: Vec<Option<PlantPlace>>,
+    pub(crate) alarms: Arc<[AlarmDeclaration]>,
     pub(crate) programs: Arc<[Program]>,
     pub(crate) parity: Option<ParityController>,
 }
@@ -257,6 +259,11 @@ impl Cluster {
         });
         let pairs: BTreeSet<_> = pairs.chain(signals).collect();
         pairs.into_iter().collect()
+    }
+
+    /// Alarms on signals of the programs, in the order of the file.
+    pub fn alarms(&self) -> &Arc<[AlarmDeclaration]> {
+        &self.alarms
     }
 
     /// All programs, compiled, in order.

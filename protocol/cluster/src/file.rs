@@ -14,8 +14,8 @@ use understudy_text::tables::{Value, unknown_key};
 use crate::device::{BAUD_RATES, Connection, Parity, SerialLine};
 use crate::fields::{CODES, ConnectionText, Fields, PlaceEntry, Placed, SourceEntry};
 use crate::format::{
-    CLUSTER, CONTROLLER, FIELD, LADDER_PARAMETERS, MODELS, PLANT, PRESS_PARAMETERS, REMOTE_IO,
-    ROBOT_PARAMETERS, SECTIONS, Section, UNDERSTUDY,
+    ALARM, CLUSTER, CONTROLLER, FIELD, LADDER_PARAMETERS, MODELS, PLANT, PRESS_PARAMETERS,
+    REMOTE_IO, ROBOT_PARAMETERS, SECTIONS, Section, UNDERSTUDY,
 };
 
 /// What a text says; whole only where no diagnostic is an error.
@@ -27,6 +27,24 @@ pub(crate) struct ClusterFile {
     pub(crate) understudies: Option<Vec<UnderstudySection>>,
     pub(crate) remote_ios: Vec<RemoteIoSection>,
     pub(crate) plants: Vec<PlantSection>,
+    pub(crate) alarms: Vec<AlarmSection>,
+}
+
+#[derive(Debug)]
+pub(crate) struct AlarmSection {
+    pub(crate) span: Range<usize>,
+    pub(crate) name: Option<Placed<String>>,
+    pub(crate) signal: Option<Placed<String>>,
+    pub(crate) when: Option<Placed<Constant>>,
+    pub(crate) above: Option<Placed<Constant>>,
+    pub(crate) below: Option<Placed<Constant>>,
+    pub(crate) hysteresis: Option<Placed<Constant>>,
+    pub(crate) on_delay: Duration,
+    pub(crate) off_delay: Duration,
+    /// Index into [`crate::format::PRIORITIES`].
+    pub(crate) priority: usize,
+    pub(crate) text: Option<String>,
+    pub(crate) action: Option<String>,
 }
 
 #[derive(Debug)]
@@ -178,12 +196,31 @@ pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
             address: fields.address("address", diagnostics),
         })
         .collect();
+    let alarms = tables(root, &ALARM, diagnostics).unwrap_or_default();
+    let alarms = alarms
+        .iter()
+        .map(|fields| AlarmSection {
+            span: fields.span.clone(),
+            name: fields.name("name", diagnostics),
+            signal: fields.text("signal", diagnostics),
+            when: fields.constant("when", diagnostics),
+            above: fields.constant("above", diagnostics),
+            below: fields.constant("below", diagnostics),
+            hysteresis: fields.constant("hysteresis", diagnostics),
+            on_delay: fields.time("on_delay", diagnostics),
+            off_delay: fields.time("off_delay", diagnostics),
+            priority: fields.word("priority", diagnostics),
+            text: fields.text("text", diagnostics).map(|text| text.value),
+            action: fields.text("action", diagnostics).map(|text| text.value),
+        })
+        .collect();
     Some(ClusterFile {
         cluster: cluster?,
         controllers,
         understudies,
         remote_ios,
         plants,
+        alarms,
     })
 }
 

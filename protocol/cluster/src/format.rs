@@ -74,6 +74,8 @@ pub(crate) enum Kind {
     Value,
     /// `true` or `false`; `false` where absent.
     Flag,
+    /// `true` or `false`, without a default.
+    State,
     /// `input:N` or `holding:N`.
     Register,
 }
@@ -135,6 +137,7 @@ pub(crate) const VALUE_FAULTS: [&str; 3] = ["hold", "alarm", "fail-safe"];
 pub(crate) const STALE_STATES: [&str; 2] = ["operator", "cold"];
 pub(crate) const OPERATOR_INPUTS: [&str; 3] = ["level", "pulse", "setpoint"];
 pub(crate) const ROLES: [&str; 2] = ["operator", "engineer"];
+pub(crate) const PRIORITIES: [&str; 4] = ["low", "medium", "high", "critical"];
 pub(crate) const PARITIES: [&str; 3] = ["even", "odd", "none"];
 pub(crate) const MODELS: [&str; 2] = ["robot", "press"];
 
@@ -272,9 +275,37 @@ pub(crate) static PLANT: Section = Section {
     },
 };
 
+pub(crate) static ALARM: Section = Section {
+    name: "alarm",
+    repeated: true,
+    meaning: "an alarm on an input or output of a program",
+    keys: keys! {
+        required signal: Kind::Text, "controller and input or output, such as `tank.level`";
+        key name: Kind::Name, "names the alarm; the signal where absent";
+        key when: Kind::State, "value of a BOOL at which the condition holds; an alarm has either `when`, `above` or `below`";
+        key above: Kind::Value, "limit of a number or a TIME above which the condition holds";
+        key below: Kind::Value, "limit of a number or a TIME below which the condition holds";
+        key hysteresis: Kind::Value, "distance from the limit at which the condition is over; 0 where absent";
+        key on_delay: time(Duration::ZERO, LONGEST_DELAY, Duration::ZERO), "time for which the condition must hold before the alarm is active, rounded up to whole cycles";
+        key off_delay: time(Duration::ZERO, LONGEST_DELAY, Duration::ZERO), "time for which the condition must be over before the alarm is, rounded up to whole cycles";
+        key priority: word(&PRIORITIES), "urgency of the response";
+        required text: Kind::Text, "what is wrong";
+        key action: Kind::Text, "what the operator should do";
+    },
+};
+
+/// The longest delay of an alarm.
+const LONGEST_DELAY: Duration = Duration::from_hours(24);
+
 /// In the order of the documentation.
-pub(crate) static SECTIONS: [&Section; 5] =
-    [&CLUSTER, &CONTROLLER, &UNDERSTUDY, &REMOTE_IO, &PLANT];
+pub(crate) static SECTIONS: [&Section; 6] = [
+    &CLUSTER,
+    &CONTROLLER,
+    &UNDERSTUDY,
+    &REMOTE_IO,
+    &PLANT,
+    &ALARM,
+];
 
 pub(crate) static ROBOT_PARAMETERS: Section = Section {
     name: "plant.parameters",
@@ -367,7 +398,7 @@ impl Kind {
                 "a table from inputs to sources, such as { start = { operator = \"pulse\" }, ready = { from = \"press.done\", default = false } }".into()
             }
             Self::Value => "a value of the signal, such as `true`, 12.5 or \"1.5 s\"".into(),
-            Self::Flag => "`true` or `false`".into(),
+            Self::Flag | Self::State => "`true` or `false`".into(),
             Self::Register => "a register in quotes, such as \"holding:4\"".into(),
         }
     }

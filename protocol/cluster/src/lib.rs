@@ -7,6 +7,7 @@
 //!
 //! The format is described in `docs/reference/cluster-file.md`.
 
+mod alarm;
 mod canonical;
 mod cluster;
 mod code;
@@ -23,6 +24,7 @@ mod source;
 mod template;
 mod value;
 
+pub use alarm::{AlarmCondition, AlarmDeclaration, MAXIMUM_ALARMS, Priority};
 pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Security, Understudy};
 pub use code::Code;
 pub use device::{BAUD_RATES, Binding, Connection, FieldDevice, Parity, SerialLine, Side};

@@ -24,12 +24,14 @@
 //! | U0223 | a diagnosing ladder that does not fit its program |
 //! | U0224 | an input with two sources |
 //! | U0225 | a source of an input that does not fit its type |
+//! | U0226 | an alarm whose condition does not fit its signal |
 //! | U0251 | warning: an input that no sensor drives |
 //! | U0252 | warning: an output that moves nothing |
 //! | U0253 | warning: not one understudy where the mode wants one |
 //! | U0254 | warning: parts that never come |
 //! | U0255 | warning: a mark of what is to be filled in |
 
+mod alarms;
 mod devices;
 mod diagnosis;
 mod follows;
@@ -188,6 +190,7 @@ fn build(
         &mut names,
         diagnostics,
     );
+    let alarms = alarms::resolve(file.alarms, &members, period, diagnostics);
     limits::check(&members, &remote_ios, cluster.history, diagnostics);
     let mode = overrides
         .mode
@@ -246,6 +249,7 @@ fn build(
         understudies,
         remote_ios,
         plants: plants.places,
+        alarms: alarms.into(),
         programs,
         parity,
     };

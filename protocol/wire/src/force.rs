@@ -169,7 +169,10 @@ impl Force {
 }
 
 /// Checks who intervenes and why.
-pub(crate) fn check_owner_and_reason(owner: &str, reason: &str) -> Result<(), ForceError> {
+///
+/// # Errors
+/// [`ForceError::Owner`] or [`ForceError::Reason`].
+pub fn check_owner_and_reason(owner: &str, reason: &str) -> Result<(), ForceError> {
     let readable = |text: &str, most: usize| {
         let length = text.chars().count();
         (1..=most).contains(&length)

@@ -19,7 +19,7 @@ pub use audience::Topic;
 pub use codec::{FrameError, MAXIMUM_FRAME_BYTES, decode, encode};
 pub use force::{
     Force, ForceError, MAXIMUM_FORCE_SECONDS, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH,
-    PointValue, SignalPlace,
+    PointValue, SignalPlace, check_owner_and_reason,
 };
 pub use frame::{
     Actuation, Body, Field, Frame, Header, Holding, Join, MAXIMUM_HISTORY, Recalled, Relayed,

@@ -65,6 +65,8 @@ impl Account {
             ..
         } = event
         else {
+            let changes = self.alarms.fold.remote_io(program, 0, event);
+            self.alarms_changed(&changes, None);
             if let RemoteIoEvent::Refused {
                 member,
                 theirs,
@@ -80,6 +82,8 @@ impl Account {
         };
         let idle = *missing == Some(Missing::NoCycle);
         let number = self.numbering.deadline(program, *moment, idle);
+        let changes = self.alarms.fold.remote_io(program, number, event);
+        self.alarms_changed(&changes, Some(number));
         let outcome = Outcome {
             source: *source,
             wrong: violation.is_some(),
@@ -192,6 +196,8 @@ impl Account {
             | RunEvent::Origin { .. }
             | RunEvent::Commanded { .. }
             | RunEvent::Acknowledged(_)
+            | RunEvent::Shelved(_)
+            | RunEvent::Unshelved(_)
             | RunEvent::Attached { .. }
             | RunEvent::Detached { .. }
             | RunEvent::ScenarioOver { .. }

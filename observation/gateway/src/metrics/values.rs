@@ -4,11 +4,14 @@ use std::sync::PoisonError;
 use std::sync::atomic::Ordering;
 
 use prometheus_client::metrics::counter::Counter;
-use understudy_view::{Counters, Model, ProgramSnapshot, Snapshot, StationState};
+use understudy_cluster::Priority;
+use understudy_view::{
+    AlarmState, Counters, Model, ProcessAlarm, ProgramSnapshot, Snapshot, StationState,
+};
 use understudy_wire::{Member, ProgramId};
 
 use super::Metrics;
-use crate::labels::{OfLacking, OfMember, OfProgram, OfSource, OfState, OfTurn};
+use crate::labels::{OfAlarm, OfAlarms, OfLacking, OfMember, OfProgram, OfSource, OfState, OfTurn};
 
 impl Metrics {
     /// Sets every metric but the times of cycles.
@@ -23,6 +26,7 @@ impl Metrics {
         self.values.records.set(whole(snapshot.records));
         self.values.left_out.set(whole(snapshot.left_out));
         self.station_states(snapshot);
+        self.process_alarms(snapshot);
         self.members(model.counters());
         self.turns(model.counters());
         self.protection(snapshot);
@@ -44,6 +48,36 @@ impl Metrics {
                     .station_states
                     .get_or_create(&of_state)
                     .set(i64::from(state == station.state));
+            }
+        }
+    }
+
+    fn process_alarms(&self, snapshot: &Snapshot) {
+        let alarms = &snapshot.process_alarms;
+        for state in AlarmState::ALL {
+            for priority in Priority::ALL {
+                let is_one =
+                    |alarm: &&ProcessAlarm| (alarm.state, alarm.priority) == (state, priority);
+                let of_alarms = OfAlarms {
+                    priority: priority.word(),
+                    state: state.word(),
+                };
+                let count = alarms.iter().filter(is_one).count() as u64;
+                self.values
+                    .alarms
+                    .get_or_create(&of_alarms)
+                    .set(whole(count));
+            }
+            for alarm in alarms {
+                let of_alarm = OfAlarm {
+                    alarm: alarm.name.clone(),
+                    priority: alarm.priority.word(),
+                    state: state.word(),
+                };
+                self.values
+                    .alarm_states
+                    .get_or_create(&of_alarm)
+                    .set(i64::from(alarm.state == state));
             }
         }
     }

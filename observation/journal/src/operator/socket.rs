@@ -130,7 +130,7 @@ pub(super) async fn ask(run: &Path, action: &OperatorAction) -> Result<Done, Ref
                 }),
             };
         }
-        (Err(_), OperatorAction::Command { .. }) => return Err(Refusal::Busy),
+        (Err(_), _) => return Err(Refusal::Busy),
     };
     match told {
         Ok(Ok(Answer {
@@ -220,7 +220,7 @@ mod tests {
                 let commanded = commands.next().await;
                 let done = match commanded.action {
                     OperatorAction::Acknowledge(_) => Ok(Done::default()),
-                    OperatorAction::Command { .. } => Err(Refusal::Down("robot".to_owned())),
+                    _ => Err(Refusal::Down("robot".to_owned())),
                 };
                 commanded.answer(done);
             }

@@ -17,11 +17,10 @@ use opcua::types::Variant;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use serde_json::{Value, json};
-use understudy_cluster::Cluster;
-use understudy_cycle::Mode;
+use understudy_cluster::{Cluster, Overrides, Priority, read_with_files};
 use understudy_gateway::{BOUNDS, Metrics, Observation, RegisterMap};
 use understudy_opcua_gateway::variables;
-use understudy_view::{Bounds, Model, Snapshot, StationState};
+use understudy_view::{AlarmState, Bounds, Model, ProcessAlarm, Snapshot, StationState};
 use understudy_watch::page_state;
 
 use dice::{Entry, journal};
@@ -32,8 +31,28 @@ use naive::Naive;
 const JOURNALS: u64 = 60;
 const CYCLES: usize = 70;
 
+/// Alarms on an input and on an output.
+const ALARMS: &str = r#"
+[[alarm]]
+signal = "robot.part_present"
+name = "no-part"
+when = false
+on_delay = "20ms"
+priority = "medium"
+text = "There is no part"
+
+[[alarm]]
+signal = "robot.grip"
+when = true
+off_delay = "30ms"
+text = "The gripper is closed"
+"#;
+
 fn cell() -> Arc<Cluster> {
-    Arc::new(understudy_testing::press_cell(Mode::Full))
+    let files = understudy_cluster::press_cell();
+    let text = format!("{}{ALARMS}", files[0].text);
+    let loaded = read_with_files(&text, files, Overrides::default());
+    Arc::new(loaded.cluster.expect("it is right"))
 }
 
 fn model(cluster: &Arc<Cluster>, bounds: Bounds, entries: &[Entry]) -> Model {
@@ -103,6 +122,7 @@ fn check(
     assert_eq!(Facts::of(&snapshot), Facts::of(&top), "{context}");
     assert_eq!(snapshot.margin, top.margin, "{context}");
     assert_eq!(snapshot.alarms, top.alarms, "{context}");
+    assert_eq!(snapshot.process_alarms, top.process_alarms, "{context}");
     let metrics = Metrics::new(cluster);
     metrics.show(&model_of_gateways, &snapshot);
     check_metrics(&metrics.exposition(), &top, &context);
@@ -127,6 +147,11 @@ fn check_page(page: &Value, snapshot: &Snapshot, context: &str) {
     assert_eq!(
         page["open_alarms"],
         json!(snapshot.alarms.len()),
+        "{context}"
+    );
+    assert_eq!(
+        page["process_alarms"],
+        json!(snapshot.process_alarms),
         "{context}"
     );
     let survives = &page["redundancy"]["survives"];
@@ -174,6 +199,10 @@ fn check_page(page: &Value, snapshot: &Snapshot, context: &str) {
     }
 }
 
+fn is_medium(alarm: &ProcessAlarm, state: AlarmState) -> bool {
+    alarm.priority == Priority::Medium && alarm.state == state
+}
+
 /// The value of a metric with these labels.
 fn metric(exposition: &str, name: &str, labels: &[(&str, &str)]) -> Option<u64> {
     let line = exposition.lines().find(|line| {
@@ -194,6 +223,20 @@ fn check_metrics(exposition: &str, top: &Snapshot, context: &str) {
     }
     check("survivable_failures", &[], Some(top.margin.survives.into()));
     check("open_alarms", &[], Some(top.alarms.len() as u64));
+    for state in AlarmState::ALL {
+        for alarm in &top.process_alarms {
+            let labels = [("alarm", alarm.name.as_str()), ("state", state.word())];
+            let expected = u64::from(alarm.state == state);
+            check("alarm_state", &labels, Some(expected));
+        }
+        let labels = [
+            ("priority", Priority::Medium.word()),
+            ("state", state.word()),
+        ];
+        let alarms = top.process_alarms.iter();
+        let count = alarms.filter(|alarm| is_medium(alarm, state)).count();
+        check("alarms", &labels, Some(count as u64));
+    }
     let stalls = exposition
         .lines()
         .filter(|line| line.starts_with("understudy_host_stalls_total"));
@@ -323,6 +366,11 @@ fn check_opcua(cluster: &Cluster, top: &Snapshot, observation: &Observation, con
         Some(u64::from(top.margin.survives).into()),
     );
     check("Alarms/Open", Some((top.alarms.len() as u64).into()));
+    for alarm in &top.process_alarms {
+        let path = |name: &str| format!("Alarms/Signals/{}/{name}", alarm.name);
+        check(&path("Active"), alarm.active.map(Variant::from));
+        check(&path("State"), text(alarm.state.word()));
+    }
     for station in &top.stations {
         let path = |name: &str| format!("Stations/{}/{name}", station.name);
         check(&path("State"), text(station.state.word()));

@@ -1,5 +1,7 @@
 //! Events of the processes of members, and of the laboratory that runs them.
 
+use std::time::Duration;
+
 use understudy_bus::HostEvent;
 use understudy_journal::{Action, Command, Members, RunEvent};
 use understudy_wire::{Member, SignalPlace, StateChoice};
@@ -56,6 +58,14 @@ descriptions! { run: RunEvent, members: Members;
         "{} has acknowledged the alarm {} of {} of cycle {}",
         seen.owner, seen.alarm, seen.name, seen.cycle
     );
+    Shelved(shelving) => "shelved" Notice format!(
+        "{} shelves the alarm {} for {}: {}",
+        shelving.owner, shelving.name, duration(shelving.seconds), shelving.reason
+    );
+    Unshelved(unshelving) => "unshelved" Notice format!(
+        "{} ends the shelving of the alarm {}: {}",
+        unshelving.owner, unshelving.name, unshelving.reason
+    );
     Attached { member } => "attached" Notice format!("the journal of {} is received", members.name(*member));
     Detached { member, reason } => "detached" Warning
         format!("the journal of {} is not received: {reason}", members.name(*member));
@@ -80,6 +90,10 @@ fn command_text(command: &Command, member: Member, members: &Members) -> String 
         _ => return word,
     };
     format!("{word} {}", assignment(Some(member), place, value, members))
+}
+
+fn duration(seconds: u64) -> String {
+    understudy_text::duration::text(Duration::from_secs(seconds))
 }
 
 /// An action on a member.

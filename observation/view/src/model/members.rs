@@ -140,6 +140,7 @@ impl Model {
             }
             _ => {}
         }
+        self.fold_process_alarms(record, cycle);
         self.host_alarm(record, member, cycle, event);
         self.happened(record, cycle, None);
     }

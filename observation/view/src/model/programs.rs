@@ -85,6 +85,7 @@ impl Model {
         if let Some(violation) = self.histories[place].note(cycle, event) {
             self.violated(record, cycle, &violation.to_string());
         }
+        self.fold_process_alarms(record, cycle);
         match event {
             RemoteIoEvent::Sampled { moment, .. } => {
                 self.check_words(*moment);

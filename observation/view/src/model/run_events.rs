@@ -12,12 +12,16 @@ impl Model {
         // An action takes effect in the next cycle.
         let cycle = match event {
             RunEvent::Origin { moment, .. } => self.cycles.of(Some(*moment)),
-            RunEvent::Finished | RunEvent::Acknowledged(_) => self.cycles.of(None),
+            RunEvent::Finished
+            | RunEvent::Acknowledged(_)
+            | RunEvent::Shelved(_)
+            | RunEvent::Unshelved(_) => self.cycles.of(None),
             _ => self
                 .cycles
                 .of(None)
                 .saturating_add(i64::from(self.cycles.latest().is_some())),
         };
+        self.fold_process_alarms(record, cycle);
         match event {
             RunEvent::Started { member } => {
                 let name = self.members.name(*member).to_owned();
@@ -44,6 +48,10 @@ impl Model {
             RunEvent::Interrupted => self.interrupted = true,
             RunEvent::Finished => self.finished = true,
             RunEvent::Acknowledged(seen) => self.alarms.acknowledged(seen, cycle),
+            RunEvent::Shelved(shelving) => self.shelved(shelving, cycle),
+            RunEvent::Unshelved(unshelving) => {
+                self.process_alarms.shelve(&unshelving.name, None, cycle);
+            }
             RunEvent::Attached { member } => {
                 self.changes.push(cycle, Change::Attached(*member));
                 // Its records from before are not in this journal.

@@ -1,6 +1,6 @@
 //! How a snapshot is taken from the model of a run.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::Value;
 use understudy_cycle::Mode;
@@ -14,11 +14,12 @@ use super::{
     RemoteIoSnapshot, RemoteIoState, RunState, Snapshot, StationSnapshot, TimingSnapshot,
     WordSnapshot,
 };
-use crate::alarm::Alarm;
+use crate::alarm::{Alarm, AlarmState, PROCESS};
 use crate::describe::{missing_text, program_fault_text};
 use crate::history::Driven;
 use crate::margin::{Margin, Outcome};
 use crate::model::{Model, Standing};
+use crate::process_alarm::ProcessAlarm;
 use crate::station::StationState;
 use crate::value::{forced_point, forced_value, named};
 
@@ -51,10 +52,40 @@ impl Model {
 
     /// The alarms as they were in a cycle, oldest first; all of them in the newest.
     pub fn alarms_at(&self, cycle: i64) -> impl DoubleEndedIterator<Item = Alarm> {
-        let is_present = self.newest().is_none_or(|newest| newest <= cycle);
-        let until = if is_present { i64::MAX } else { cycle };
+        let until = self.recorded_until(cycle);
         self.alarms().filter_map(move |alarm| alarm.at(until))
     }
+
+    /// The alarms as they were in a cycle, and those of the cluster file with their states.
+    pub(crate) fn process_alarms_at(&self, cycle: i64) -> (Vec<Alarm>, Vec<ProcessAlarm>) {
+        let alarms: Vec<Alarm> = self.alarms_at(cycle).collect();
+        let until = self.recorded_until(cycle);
+        let cycle = cycle.min(self.newest().unwrap_or(0));
+        let process = self.process_alarms.at(cycle, until, &alarms, |alarm| {
+            self.program_name(alarm.program).to_owned()
+        });
+        (alarms, process)
+    }
+
+    /// The newest cycle is the present, with everything that was recorded since.
+    fn recorded_until(&self, cycle: i64) -> i64 {
+        let is_present = self.newest().is_none_or(|newest| newest <= cycle);
+        if is_present { i64::MAX } else { cycle }
+    }
+}
+
+/// Alarms that last or are not acknowledged, without the shelved ones.
+fn open_alarms(alarms: Vec<Alarm>, process: &[ProcessAlarm]) -> Vec<Alarm> {
+    let shelved = process
+        .iter()
+        .filter(|alarm| alarm.state == AlarmState::Shelved);
+    let shelved: BTreeSet<&str> = shelved.map(|alarm| alarm.name.as_str()).collect();
+    let is_shelved =
+        |alarm: &Alarm| alarm.alarm == PROCESS && shelved.contains(alarm.name.as_str());
+    let alarms = alarms.into_iter();
+    alarms
+        .filter(|alarm| alarm.is_open() && !is_shelved(alarm))
+        .collect()
 }
 
 /// A cycle that a snapshot is taken of.
@@ -74,6 +105,7 @@ impl Picture<'_> {
         let master = self
             .cycle
             .and_then(|cycle| model.cycle_master(self.standing, cycle));
+        let (alarms, process_alarms) = model.process_alarms_at(cycle);
         let timing = model.timings().rfind(|timing| timing.cycle <= cycle);
         Snapshot {
             cluster: model.cluster().name().to_owned(),
@@ -102,7 +134,8 @@ impl Picture<'_> {
                 cycle_us: timing.cycle_ns.map(|cycle| cycle as f64 / 1e3),
             }),
             host_stalls: self.host_stalls(),
-            alarms: model.alarms_at(cycle).filter(Alarm::is_open).collect(),
+            alarms: open_alarms(alarms, &process_alarms),
+            process_alarms,
             events: model.event_count(),
             records,
             left_out,

@@ -5,10 +5,13 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::text::{Line, Text};
 
+use understudy_cluster::Priority;
+
 use super::Bottom;
 use crate::alarm::Alarm;
 use crate::event::{Event, Level};
 use crate::model::Model;
+use crate::process_alarm::ProcessAlarm;
 use crate::snapshot::Snapshot;
 
 pub(super) fn draw(
@@ -41,7 +44,10 @@ pub(super) fn draw(
     frame.render_widget(Line::from(spans.collect::<Vec<_>>()), head);
     let lines: Vec<Line<'static>> = match bottom {
         Bottom::Events => model.events().map(event).collect(),
-        Bottom::Alarms => model.alarms().map(alarm).collect(),
+        Bottom::Alarms => {
+            let unseen = snapshot.process_alarms.iter().filter_map(unseen);
+            model.alarms().map(alarm).chain(unseen).collect()
+        }
         Bottom::Failures => failures(snapshot),
     };
     // The newest at the bottom, and never past the oldest.
@@ -76,9 +82,17 @@ fn alarm(alarm: &Alarm) -> Line<'static> {
         (Some(over), None) => format!("over in {over}, not acknowledged"),
         (Some(over), Some(by)) => format!("over in {over}, acknowledged by {by}"),
     };
+    let kind = alarm.priority.map_or(alarm.alarm, Priority::word);
+    let before = if alarm.since_before {
+        ", perhaps since an earlier cycle"
+    } else {
+        ""
+    };
+    let action = alarm.action.as_ref();
+    let action = action.map_or(String::new(), |action| format!(" -> {action}"));
     let text = format!(
-        "{:>7} {:12} {:12} {} ({state})",
-        alarm.cycle, alarm.name, alarm.alarm, alarm.text
+        "{:>7} {:12} {kind:12} {} ({state}{before}){action}",
+        alarm.cycle, alarm.name, alarm.text
     );
     let style = if alarm.is_open() {
         colour(Level::Alarm)
@@ -86,6 +100,21 @@ fn alarm(alarm: &Alarm) -> Line<'static> {
         Style::new()
     };
     Line::styled(text, style)
+}
+
+/// An alarm on a signal that is shelved or unknown.
+fn unseen(alarm: &ProcessAlarm) -> Option<Line<'static>> {
+    let why = match (&alarm.shelved, alarm.active) {
+        (Some(shelved), _) => format!(
+            "shelved until cycle {} by {}: {}",
+            shelved.until, shelved.owner, shelved.reason
+        ),
+        (None, None) => format!("unknown: the value of {}", alarm.signal),
+        (None, Some(_)) => return None,
+    };
+    let (name, priority) = (&alarm.name, alarm.priority.word());
+    let text = format!("{:>7} {name:12} {priority:12} {why}", "");
+    Some(Line::styled(text, colour(Level::Warning)))
 }
 
 fn failures(snapshot: &Snapshot) -> Vec<Line<'static>> {

@@ -71,8 +71,8 @@ fn a_run_is_followed_while_it_is_written() {
         .map(|mut listing| {
             let mut first = None;
             run.follow().poll(&mut |record| {
-                let line = listing.take(&record.expect("a record"));
-                first = first.take().or(line);
+                let lines = listing.take(&record.expect("a record"));
+                first = first.take().or(lines.into_iter().next());
             });
             first
         })

@@ -164,7 +164,7 @@ fn a_program_fault_is_an_alarm_until_the_release() {
 
     let mut listing = Listing::new(&cluster, Filter::default()).expect("no names");
     let records = records(&cluster, &scenario(&cluster, RELEASED), 1);
-    let lines = records.iter().filter_map(|record| listing.take(record));
+    let lines = records.iter().flat_map(|record| listing.take(record));
     let faults: Vec<_> = lines.filter(|line| line.event == "program-fault").collect();
     assert_eq!(faults.len(), 1, "{faults:?}");
     assert_eq!(

@@ -1,4 +1,4 @@
-//! Acknowledgement of an alarm.
+//! Acknowledgement and shelving of alarms.
 
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -8,6 +8,7 @@ use axum::extract::rejection::{JsonRejection, PathRejection};
 use axum::extract::{Extension, Path, State};
 use serde::Deserialize;
 use serde_json::{Value, json};
+use understudy_journal::{OperatorAction, Shelving, Unshelving};
 
 use super::{Answered, command::named};
 use crate::app::App;
@@ -37,6 +38,76 @@ pub(super) async fn acknowledge(
     let seen = alarm.acknowledgement(owner, unix_seconds());
     // It is shown as acknowledged once the journal contains it.
     let done = app.commanding.commander.acknowledge(seen).await;
+    done.map_err(|refusal| Problem::refused(&refusal.to_string()))?;
+    Ok(Json(json!({})))
+}
+
+/// An alarm on a signal that is shelved.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Shelved {
+    /// Name of the alarm.
+    name: String,
+    seconds: u64,
+    owner: String,
+    reason: String,
+}
+
+/// An alarm on a signal that is shelved no more.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Unshelved {
+    /// Name of the alarm.
+    name: String,
+    owner: String,
+    reason: String,
+}
+
+pub(super) async fn shelve(
+    State(app): State<Arc<App>>,
+    Extension(person): Extension<Person>,
+    body: Result<Json<Shelved>, JsonRejection>,
+) -> Answered<Json<Value>> {
+    let Json(asked) = body?;
+    let shelving = Shelving {
+        name: asked.name,
+        seconds: asked.seconds,
+        owner: named(&person, asked.owner)?,
+        reason: asked.reason,
+        at_unix_s: unix_seconds(),
+    };
+    act(&app, &person, OperatorAction::Shelve(shelving)).await
+}
+
+pub(super) async fn unshelve(
+    State(app): State<Arc<App>>,
+    Extension(person): Extension<Person>,
+    body: Result<Json<Unshelved>, JsonRejection>,
+) -> Answered<Json<Value>> {
+    let Json(asked) = body?;
+    let unshelving = Unshelving {
+        name: asked.name,
+        owner: named(&person, asked.owner)?,
+        reason: asked.reason,
+        at_unix_s: unix_seconds(),
+    };
+    act(&app, &person, OperatorAction::Unshelve(unshelving)).await
+}
+
+/// Does what a person wants with an alarm; it is shown once the journal contains it.
+async fn act(app: &App, person: &Person, action: OperatorAction) -> Answered<Json<Value>> {
+    if let Some(why) = App::why_not_act(person) {
+        return Err(Problem::forbidden(why));
+    }
+    let alarms = {
+        let model = app.model();
+        let cluster = model.cluster();
+        let unknown = || Problem::unknown("the run has not started".to_owned());
+        Arc::clone(cluster.ok_or_else(unknown)?.alarms())
+    };
+    let checked = action.alarm_event(&alarms);
+    checked.map_err(|refusal| Problem::bad(refusal.to_string()))?;
+    let done = app.commanding.commander.act(action).await;
     done.map_err(|refusal| Problem::refused(&refusal.to_string()))?;
     Ok(Json(json!({})))
 }

@@ -1,5 +1,6 @@
 //! Cluster files as a whole: what loads, what is found, what the hash is of.
 
+mod alarms;
 mod common;
 mod configuration;
 mod findings;

@@ -1,0 +1,298 @@
+//! Evaluation of the alarms of a cluster from the records of its journal.
+//!
+//! ```text
+//!   value ──► condition (with hysteresis) ──► active (with delays)
+//! ```
+//!
+//! Each is true, false or unknown. Invariant: the evaluation depends on the records and their cycles only, and an evaluation that starts in the
+//! middle of a journal is unknown until it equals that of the whole journal.
+
+use std::sync::Arc;
+
+use understudy_bus::HostEvent;
+use understudy_cluster::AlarmDeclaration;
+use understudy_remote_io::{Event as RemoteIoEvent, Missing};
+use understudy_wire::{Image, Member, ProgramId};
+
+use crate::record::{Happening, Record, RunEvent};
+use crate::rules::Process;
+
+/// Condition of an alarm up to a cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Condition {
+    /// Whether the condition holds, with its hysteresis.
+    held: Option<bool>,
+    /// The first cycle of those in a row with this `held`.
+    since: i64,
+    /// Whether the alarm is active, with its delays.
+    active: Option<bool>,
+}
+
+impl Condition {
+    /// Before the first value.
+    const UNKNOWN: Self = Self {
+        held: None,
+        since: 0,
+        active: None,
+    };
+
+    /// At the beginning of a run.
+    const OVER: Self = Self {
+        held: Some(false),
+        since: 0,
+        active: Some(false),
+    };
+
+    /// Takes the value of a cycle.
+    fn step(&mut self, alarm: &AlarmDeclaration, cycle: i64, value: Option<u64>) {
+        let held = value.and_then(|value| {
+            let of = alarm.point.of;
+            alarm.condition.holds(of, value, self.held)
+        });
+        if held != self.held {
+            self.held = held;
+            self.since = cycle;
+        }
+        let Some(held) = held else {
+            self.active = None;
+            return;
+        };
+        let delay = if held {
+            alarm.on_delay
+        } else {
+            alarm.off_delay
+        };
+        if cycle.saturating_sub(self.since) >= i64::from(delay) {
+            self.active = Some(held);
+        }
+    }
+}
+
+/// A program, with what its remote I/O reported.
+#[derive(Debug, Clone, Default)]
+struct Track {
+    /// u(i) as last sampled.
+    inputs: Option<Image>,
+    /// Whether the values before the next ones are not those of the beginning.
+    begun: bool,
+    /// Whether its remote I/O does not run or is not received.
+    silent: bool,
+}
+
+/// The alarms of a cluster, evaluated record by record.
+#[derive(Debug, Clone)]
+pub struct AlarmFold {
+    alarms: Arc<[AlarmDeclaration]>,
+    conditions: Vec<Condition>,
+    /// Whether each was raised and is not known to be over.
+    lasting: Vec<bool>,
+    tracks: Vec<Track>,
+}
+
+/// Change of an alarm by a record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AlarmChange {
+    /// Index of the alarm in the cluster.
+    pub alarm: usize,
+    /// Whether it is active; nothing while that is unknown.
+    pub active: Option<bool>,
+    /// Whether it was raised or is over with this record; neither where it was unknown for a while and is as before.
+    pub transition: Option<AlarmTransition>,
+}
+
+/// Beginning or end of an active alarm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AlarmTransition {
+    /// It is active.
+    Raised {
+        /// Whether it may have been active before: its state was unknown.
+        since_before: bool,
+    },
+    /// It was active and is not any more.
+    Over,
+}
+
+impl AlarmFold {
+    /// The alarms before the first record, of a cluster with so many programs.
+    pub fn new(alarms: Arc<[AlarmDeclaration]>, programs: usize) -> Self {
+        Self {
+            conditions: vec![Condition::UNKNOWN; alarms.len()],
+            lasting: vec![false; alarms.len()],
+            tracks: vec![Track::default(); programs],
+            alarms,
+        }
+    }
+
+    /// Takes the next record, of a cycle of the run; answers with the alarms that it changes.
+    pub fn take(&mut self, record: &Record, cycle: i64) -> Vec<AlarmChange> {
+        match (&record.event, record.member) {
+            (Happening::RemoteIo(event), Some(Member::RemoteIo(program))) => {
+                self.remote_io(program, cycle, event)
+            }
+            (Happening::Host(HostEvent::JournalLost { .. }), Some(Member::RemoteIo(program))) => {
+                self.forget(program)
+            }
+            (Happening::Run(event), _) => self.run(event),
+            _ => Vec::new(),
+        }
+    }
+
+    /// The same alarms before the first record again.
+    #[must_use]
+    pub fn again(&self) -> Self {
+        Self::new(Arc::clone(&self.alarms), self.tracks.len())
+    }
+
+    /// Records were lost: the values are unknown until the next ones.
+    pub fn forget_all(&mut self) -> Vec<AlarmChange> {
+        let programs = (0..self.tracks.len()).map(|program| ProgramId(program as u8));
+        let changes: Vec<_> = programs.map(|program| self.forget(program)).collect();
+        changes.concat()
+    }
+
+    /// Moves every cycle that was taken so far.
+    pub fn shift(&mut self, by: i64) {
+        for condition in &mut self.conditions {
+            condition.since = condition.since.saturating_add(by);
+        }
+    }
+
+    /// Takes a report of a remote I/O, of a cycle of the run.
+    pub fn remote_io(
+        &mut self,
+        program: ProgramId,
+        cycle: i64,
+        event: &RemoteIoEvent,
+    ) -> Vec<AlarmChange> {
+        if self.alarms.is_empty() {
+            return Vec::new();
+        }
+        let Some(track) = self.tracks.get_mut(program.index()) else {
+            return Vec::new();
+        };
+        let (sampled, outputs, missing) = match event {
+            RemoteIoEvent::Applied {
+                sampled,
+                outputs,
+                missing,
+                ..
+            } => (sampled, outputs, missing),
+            RemoteIoEvent::StartedCold { .. } if !track.begun => {
+                track.begun = true;
+                return self.set(program, Condition::OVER);
+            }
+            _ => return Vec::new(),
+        };
+        track.begun = true;
+        if track.silent {
+            return Vec::new();
+        }
+        match (sampled, missing) {
+            (Some(inputs), _) => track.inputs = Some(inputs.clone()),
+            // Nothing was to be sampled: the values are those of the last cycle.
+            (None, Some(Missing::NoCycle) | None) => {}
+            (None, Some(_)) => track.inputs = None,
+        }
+        let inputs = track.inputs.clone();
+        let value = |alarm: &AlarmDeclaration| {
+            let image = if alarm.is_output {
+                Some(outputs)
+            } else {
+                inputs.as_ref()
+            };
+            let image = image?;
+            let ends = alarm.point.bit as usize + alarm.point.of.bits() as usize;
+            (ends <= image.width()).then(|| alarm.point.get(image.words()))
+        };
+        self.change(program, |alarm, condition| {
+            condition.step(alarm, cycle, value(alarm));
+        })
+    }
+
+    /// Takes what happens to the members as the laboratory tells it.
+    pub fn run(&mut self, event: &RunEvent) -> Vec<AlarmChange> {
+        let (member, is_silent) = match event {
+            RunEvent::Fault { action, member, .. } => match Process::after(*action) {
+                Some(process) => (member, !process.is_running()),
+                None => return Vec::new(),
+            },
+            RunEvent::Started { member } => (member, false),
+            RunEvent::Ended { member, .. } | RunEvent::Detached { member, .. } => (member, true),
+            // Its records from before are not in this journal.
+            RunEvent::Attached { member } => {
+                if let Member::RemoteIo(program) = member
+                    && let Some(track) = self.tracks.get_mut(program.index())
+                {
+                    track.silent = false;
+                    return self.forget(*program);
+                }
+                return Vec::new();
+            }
+            _ => return Vec::new(),
+        };
+        let Member::RemoteIo(program) = member else {
+            return Vec::new();
+        };
+        let Some(track) = self.tracks.get_mut(program.index()) else {
+            return Vec::new();
+        };
+        track.silent = is_silent;
+        if is_silent {
+            self.forget(*program)
+        } else {
+            Vec::new()
+        }
+    }
+
+    /// The values of a program are unknown until the next ones.
+    pub fn forget(&mut self, program: ProgramId) -> Vec<AlarmChange> {
+        if let Some(track) = self.tracks.get_mut(program.index()) {
+            track.inputs = None;
+            track.begun = true;
+        }
+        self.set(program, Condition::UNKNOWN)
+    }
+
+    fn set(&mut self, program: ProgramId, to: Condition) -> Vec<AlarmChange> {
+        self.change(program, |_, condition| *condition = to)
+    }
+
+    /// Changes the conditions of a program.
+    fn change(
+        &mut self,
+        program: ProgramId,
+        mut change: impl FnMut(&AlarmDeclaration, &mut Condition),
+    ) -> Vec<AlarmChange> {
+        let mut changes = Vec::new();
+        let alarms = self.alarms.iter().zip(&mut self.conditions).enumerate();
+        for (index, (alarm, condition)) in alarms {
+            if alarm.program != program {
+                continue;
+            }
+            let before = condition.active;
+            change(alarm, condition);
+            let active = condition.active;
+            if active == before {
+                continue;
+            }
+            let lasts = &mut self.lasting[index];
+            let transition = match active {
+                Some(true) if !*lasts => Some(AlarmTransition::Raised {
+                    since_before: before.is_none(),
+                }),
+                Some(false) if *lasts => Some(AlarmTransition::Over),
+                _ => None,
+            };
+            *lasts = active.unwrap_or(*lasts);
+            changes.push(AlarmChange {
+                alarm: index,
+                active,
+                transition,
+            });
+        }
+        changes
+    }
+}
+
+#[cfg(test)]
+mod tests;
