@@ -107,7 +107,7 @@ fn stored_of(of: Elementary, value: &Variant) -> Result<u64, StatusCode> {
         Variant::Int64(value) if of.is_signed() => {
             fits(*value as u64 & of.mask(), i128::from(*value))
         }
-        Variant::UInt64(value) if !of.is_signed() && !of.is_real() => {
+        Variant::UInt64(value) if of != Elementary::Bool && !of.is_signed() && !of.is_real() => {
             fits(*value & of.mask(), i128::from(*value))
         }
         _ => Err(StatusCode::BadTypeMismatch),
