@@ -750,16 +750,7 @@ impl<'a> Execution<'a> {
     /// The number at an address as one of type `of`, which has the width of what was stored there.
     fn typed(&mut self, address: u64, of: Elementary) -> Term {
         let stored = self.get(address, of);
-        let known = self.terms.of(stored);
-        if known == of {
-            return stored;
-        }
-        match self.terms.value(stored) {
-            Some(value) => self.terms.constant(of, value),
-            None => self
-                .terms
-                .apply(Operation::Reinterpret(known, of), of, &[stored]),
-        }
+        self.terms.as_type(stored, of)
     }
 
     /// The parts of a type that are numbers, counted in bits from its start.

@@ -442,7 +442,7 @@ impl System {
             let initial = self.terms.constant(of, initial);
             let left = self.terms.choose(is_restart, initial, term);
             let new = scan.memory.get(&address).copied().unwrap_or(left);
-            let new = self.as_type(new, of);
+            let new = self.terms.as_type(new, of);
             let kept = self.terms.choose(can_fault, left, new);
             let next = self.terms.choose(begins, kept, term);
             self.cells[cell as usize].next = next;
@@ -513,19 +513,6 @@ impl System {
             any = self.terms.or(any, condition);
         }
         any
-    }
-
-    fn as_type(&mut self, term: Term, of: Elementary) -> Term {
-        let known = self.terms.of(term);
-        if known == of {
-            return term;
-        }
-        match self.terms.value(term) {
-            Some(stored) => self.terms.constant(of, stored),
-            None => self
-                .terms
-                .apply(Operation::Reinterpret(known, of), of, &[term]),
-        }
     }
 
     /// One scan of a program from its cells on.

@@ -229,6 +229,21 @@ impl Terms {
         }
     }
 
+    /// What is stored as one type, read as another of the same width; a part of it, or more than it, is not followed.
+    pub(crate) fn as_type(&mut self, term: Term, of: Elementary) -> Term {
+        let known = self.of(term);
+        if known == of {
+            return term;
+        }
+        match self.value(term) {
+            Some(stored) => self.constant(of, stored),
+            None if known.bits() == of.bits() => {
+                self.apply(Operation::Reinterpret(known, of), of, &[term])
+            }
+            None => self.unknown(of),
+        }
+    }
+
     /// `then` where `condition` is TRUE, else `otherwise`.
     pub(crate) fn choose(&mut self, condition: Term, then: Term, otherwise: Term) -> Term {
         match self.value(condition) {
