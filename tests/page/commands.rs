@@ -230,11 +230,24 @@ fn every_command_is_done_or_refused_and_is_in_the_journal() {
     );
 }
 
+/// Waits until the page counts cycles from the origin of the run: before, they have other numbers.
+fn origin_is_known(page: &Page) {
+    page.wait_for("the origin", |_| {
+        let found = page.get("/api/events?find=origin").json();
+        found["events"]
+            .as_array()
+            .is_some_and(|all| !all.is_empty())
+    });
+    let shown = page.wait_for("a state", |_| true);
+    page.wait_for("a newer state", |state| state["cycle"] != shown["cycle"]);
+}
+
 #[test]
 fn a_write_is_answered_with_its_cycle_or_a_code() {
     let _turn = one_at_a_time();
     let cluster = "examples/two-shuttles/cluster.toml";
     let (page, _) = started_of("writes", cluster, &["left", "right", "understudy"]);
+    origin_is_known(&page);
     let facts = page.get("/api/run").json();
     assert!(facts["commands"]["write_why"].is_null(), "{facts:#}");
     let inputs = facts["programs"][0]["inputs"].as_array().expect("inputs");
@@ -268,8 +281,9 @@ fn a_write_is_answered_with_its_cycle_or_a_code() {
     let cycle = answer["run_cycle"].as_i64().expect("a cycle");
     assert!(answer["cycle"].as_i64() >= Some(cycle), "{answer}");
     let at = |cycle: i64| {
-        let state = page.get(&format!("/api/state?cycle={cycle}")).json();
-        state["programs"][0]["input_values"][place("speed")].as_f64()
+        let found = page.get(&format!("/api/state?cycle={cycle}"));
+        assert_eq!(found.status, 200, "{answer}: {:.300}", found.body);
+        found.json()["programs"][0]["input_values"][place("speed")].as_f64()
     };
     page.wait_for("the cycle of the write", |state| {
         state["cycle"].as_i64() >= Some(cycle)

@@ -27,6 +27,11 @@ async function drive() {
   await until("a control that can be used", `document.querySelector("${control("left", "start")} button")?.disabled === false`);
   await until("the sampled speed", `${value("left", "speed")} === "100 mm/s"`);
 
+  // Cycles are counted from the origin.
+  await until("the origin", `fetch("/api/events?find=origin").then((answer) => answer.json()).then(({ events }) => events.length > 0)`);
+  const shown = await evaluate(`${state}.then((state) => state.cycle)`);
+  await until("a newer state", `${state}.then((state) => state.cycle !== ${shown})`);
+
   // Start: the output of the program changes, and the answer has the cycle of the write.
   const running = await output(0, "running");
   if ((await evaluate(running)) !== false) {

@@ -104,11 +104,15 @@ impl Model {
         self.timings.iter()
     }
 
-    /// The cycle of the run that the cluster counts as `cycle`, as the newest deadlines of a remote I/O tell.
+    /// The cycle of the run that the cluster counts as `cycle`, as the newest deadlines of a remote I/O tell; nothing before the origin of the
+    /// run is known.
     pub fn cycle_of(&self, remote_io: Member, cycle: u64) -> Option<i64> {
         let Member::RemoteIo(program) = remote_io else {
             return None;
         };
+        if !self.cycles.has_origin() {
+            return None;
+        }
         let steps = self.history(program)?.steps();
         if let Some(step) = steps.iter().rev().find(|step| step.moment.cycle.0 == cycle) {
             return Some(step.cycle);
