@@ -78,7 +78,7 @@ pub struct Alarm {
     pub acknowledged_in: Option<i64>,
     /// Whether it may have been raised before `cycle`, the first one in which it is known.
     pub since_before: bool,
-    /// The cycle in which the same alarm was raised again, so that the newer one counts; only of an alarm on a signal.
+    /// The cycle in which an alarm on a signal was raised again before it was acknowledged: the newer one counts.
     pub repeated_in: Option<i64>,
     /// Priority of an alarm on a signal.
     pub priority: Option<Priority>,
@@ -158,7 +158,9 @@ impl Alarms {
     ) {
         let subject = (declared.name.clone(), PROCESS);
         let mut before = self.alarms.values_mut().rev();
-        if let Some(alarm) = before.find(|alarm| alarm.is_of(&subject)) {
+        if let Some(alarm) = before.find(|alarm| alarm.is_of(&subject))
+            && alarm.acknowledged_by.is_none()
+        {
             alarm.repeated_in = Some(cycle);
         }
         self.raise_alarm(subject, cycle, declared.text.clone(), |alarm| {

@@ -189,7 +189,9 @@ pub(crate) fn state(run: &RunModel, cycle: i64, finished: bool) -> Option<State>
     let snapshot = run.snapshot_at(cycle)?;
     let (oldest, newest) = (run.oldest()?, run.newest()?);
     let programs = snapshot.programs.iter().enumerate();
-    let alarms = run.alarms_at(cycle).rev().take(LISTED_ALARMS);
+    let alarms = run.alarms_at(cycle).rev();
+    let alarms = alarms.filter(|alarm| alarm.repeated_in.is_none());
+    let alarms = alarms.take(LISTED_ALARMS);
     Some(State {
         age_ms: 0,
         cycle,

@@ -46,7 +46,8 @@ pub(super) fn draw(
         Bottom::Events => model.events().map(event).collect(),
         Bottom::Alarms => {
             let unseen = snapshot.process_alarms.iter().filter_map(unseen);
-            model.alarms().map(alarm).chain(unseen).collect()
+            let alarms = model.alarms().filter(|alarm| alarm.repeated_in.is_none());
+            alarms.map(alarm).chain(unseen).collect()
         }
         Bottom::Failures => failures(snapshot),
     };
