@@ -14,7 +14,7 @@ export function card() {
       el("h3", {}, "Alarms on signals"),
       el("div", { class: "wide", tabindex: "0", role: "region", "aria-label": "Table of the alarms on signals" },
         el("table", { id: "signal-alarm-table" },
-          el("thead", {}, el("tr", {}, ["alarm", "priority", "state", "signal", "action", ""].map((head) => el("th", { scope: "col" }, head)))),
+          el("thead", {}, el("tr", {}, ["alarm", "priority", "state", "signal", "action", "shelving"].map((head) => el("th", { scope: "col" }, head)))),
           el("tbody")))));
 }
 
