@@ -13,7 +13,7 @@ use understudy_ladder::Program;
 use understudy_parity::ParityController;
 use understudy_scenarios::{Scenario, read as read_scenario};
 use understudy_text::spelling::nearest;
-use understudy_text::{Report, decode};
+use understudy_text::{Report, decode, has_errors};
 
 use crate::answer::{Answer, Status};
 use crate::kind::{self, Kind};
@@ -98,6 +98,18 @@ fn nearest_file(path: &Path) -> Option<PathBuf> {
 pub(crate) fn program(path: &Path, wanted: Wanted<'_>) -> Result<(Source, Report), Answer> {
     let text = text_of(Kind::Ladder, path)?;
     let name = path.display().to_string();
+    // A Boolean program has stronger proofs than the same program with numbers.
+    if wanted.program.is_none() {
+        let parsed = parse_program(&name, &text);
+        if !has_errors(&parsed.diagnostics) {
+            let report = Report {
+                name,
+                text,
+                diagnostics: parsed.diagnostics,
+            };
+            return Ok((Source::Ladder(parsed.program), report));
+        }
+    }
     let read = read_source(&name, &text, wanted);
     let report = Report {
         name,

@@ -322,6 +322,31 @@ fn exposed_while_a_state_is_lost(folder: &Path) -> String {
     answer.output
 }
 
+/// Metrics of a cluster with alarms.
+fn exposed_with_alarms(folder: &Path) -> String {
+    let example = |file: &str| {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        root.join("examples/heated-tank")
+            .join(file)
+            .display()
+            .to_string()
+    };
+    let (cluster, scenario) = (example("cluster.toml"), example("kill-each.toml"));
+    let arguments = [
+        "simulate",
+        &cluster,
+        "--scenario",
+        &scenario,
+        "--seed",
+        "1",
+        "--out",
+        "alarms",
+    ];
+    let run = understudy_in(folder, &arguments);
+    assert_eq!(run.status, 0, "{}", run.errors);
+    understudy_in(folder, &["gateway", "metrics", "alarms/latest", "--once"]).output
+}
+
 /// The names of metrics in a text.
 fn metric_names(text: &str) -> std::collections::BTreeSet<String> {
     let belongs = |character: char| character.is_ascii_alphanumeric() || character == '_';
@@ -340,8 +365,8 @@ fn the_dashboard_and_the_page_name_metrics_that_there_are() {
         .filter_map(|line| line.split(['{', ' ']).next())
         .collect();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    // Some have a sample only while something is wrong.
-    let while_lost = exposed_while_a_state_is_lost(&folder);
+    // Some have a sample only while something is wrong, or where alarms are declared.
+    let at_times = exposed_while_a_state_is_lost(&folder) + &exposed_with_alarms(&folder);
     let read = |path: &str| fs::read_to_string(root.join(path)).expect("a file");
     let dashboard = read("deployment/monitoring/dashboards/understudy.json");
     let document: Value = serde_json::from_str(&dashboard).expect("JSON");
@@ -356,7 +381,7 @@ fn the_dashboard_and_the_page_name_metrics_that_there_are() {
     for name in metric_names(&read("docs/how-to/monitoring.md")) {
         let is_there = exposed.contains(name.as_str())
             || exposed.contains(format!("{name}_count").as_str())
-            || while_lost.contains(&format!("\n{name}{{"));
+            || at_times.contains(&format!("\n{name}{{"));
         assert!(is_there, "{name} is not exposed");
     }
 }

@@ -107,9 +107,9 @@ impl Device {
     }
 }
 
-/// Between two looks: the processes of the cluster need the processors.
+/// Between two looks, which read whole journals: the processes of the cluster need the processors.
 fn pause() {
-    std::thread::sleep(Duration::from_millis(2));
+    std::thread::sleep(Duration::from_millis(50));
 }
 
 pub(crate) fn until(what: &str, mut done: impl FnMut() -> bool) {

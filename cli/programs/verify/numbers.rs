@@ -2,7 +2,7 @@
 
 use understudy_cluster::{Cluster, InputSourceKind, RemoteIo};
 use understudy_text::Report;
-use understudy_typed::Program;
+use understudy_typed::{Point, Program};
 use understudy_verification::numbers::{Code, Member, Model, Source, Unsupported};
 use understudy_verification::program::Bounds;
 use understudy_verification::property::{Property, read_one};
@@ -138,9 +138,9 @@ fn members(cluster: &Cluster) -> Vec<Member<'_>> {
                     default: declaration.input.default,
                     stale_after: declaration.input.stale_after,
                 },
-                None => match point.name.strip_suffix(".valid") {
-                    Some(of) if is_signal(remote_io, of) => Source::Valid { of: of.to_owned() },
-                    _ => Source::Any(None),
+                None => match signal_of_valid(remote_io, point) {
+                    Some(of) => Source::Valid { of },
+                    None => Source::Any(None),
                 },
             }
         });
@@ -153,9 +153,14 @@ fn members(cluster: &Cluster) -> Vec<Member<'_>> {
     members.collect()
 }
 
-fn is_signal(remote_io: &RemoteIo, name: &str) -> bool {
+/// The signal that an input says to be valid.
+fn signal_of_valid(remote_io: &RemoteIo, point: &Point) -> Option<String> {
     let mut inputs = remote_io.inputs.iter();
-    inputs.any(|input| input.name == name && input.signal().is_some())
+    let found = inputs.find(|input| {
+        let valid = input.signal().and_then(|signal| signal.input.valid);
+        valid.map(u32::from) == Some(point.bit)
+    });
+    Some(found?.name.clone())
 }
 
 fn unsupported(error: &Unsupported) -> Answer {

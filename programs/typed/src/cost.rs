@@ -27,6 +27,8 @@ pub struct Cost {
     pub loops: Option<u64>,
     /// What the loops of a scan may take; one that wants more is a fault.
     pub budget: u64,
+    /// What the dearest turn of a loop is charged.
+    pub dearest_turn: u64,
     /// Bytes of the state: what is transferred to a station that joins.
     pub state_bytes: u64,
     /// Bytes of all frames: memory that lives in one scan only.
@@ -45,6 +47,7 @@ impl Cost {
                 .fold(0, |sum, each| sum.saturating_add(each.straight)),
             loops: sum(of_tasks.iter().map(|each| each.loops)),
             budget: program.budget,
+            dearest_turn: costs.dearest_turn(program),
             state_bytes: 8 * u64::from(program.state),
             frame_bytes: 8 * u64::from(program.frames),
         }
@@ -145,6 +148,18 @@ impl Costs {
 
     fn of(&self, routine: RoutineId) -> Each {
         self.routines[routine.0 as usize].unwrap_or(NOTHING)
+    }
+
+    fn dearest_turn(&self, program: &Program) -> u64 {
+        let mut dearest = 0;
+        let mut pending: Vec<&[Statement]> = program.routines.iter().map(|it| &*it.body).collect();
+        while let Some(statements) = pending.pop() {
+            for statement in statements {
+                dearest = dearest.max(self.turn(&statement.kind).unwrap_or(0));
+                pending.extend(crate::visit::bodies(statement));
+            }
+        }
+        dearest
     }
 
     /// What a turn of a loop is charged: `None` for a statement that is no loop.

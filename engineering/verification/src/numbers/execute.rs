@@ -174,7 +174,9 @@ impl<'a> Execution<'a> {
             this.body(context)
         })?;
         self.merge(runs, changes.0, HashMap::new());
-        if Cost::new(self.program).is_bounded_by_budget() && self.turns > 0 {
+        let cost = Cost::new(self.program);
+        let turns = u64::from(self.turns).saturating_mul(cost.dearest_turn);
+        if cost.is_bounded_by_budget() && turns > cost.budget {
             let exceeded = self.terms.unknown(Elementary::Bool);
             let budget = self.program.budget;
             self.fault(

@@ -7,7 +7,7 @@ use understudy_text::spelling::suggestion;
 use understudy_typed::{Elementary, Point, Points, Program as TypedProgram};
 
 use super::Member;
-use super::inputs::VALID;
+use super::inputs::names_of_valid;
 use crate::cluster::RemoteIo;
 use crate::device::{Binding, FieldDevice, Side};
 use crate::fields::{MAXIMUM_MISFITS, PlaceEntry, Placed, SourceEntry};
@@ -90,7 +90,7 @@ pub(super) fn device(
 /// Whether an input has a source that is not the field, or says whether that source is valid.
 pub(super) fn is_sourced(sources: &[SourceEntry], input: &str) -> bool {
     let mut names = sources.iter().map(|source| source.name.value.as_str());
-    names.any(|name| name == input || input.strip_suffix(VALID) == Some(name))
+    names.any(|name| name == input || names_of_valid(name).any(|valid| valid == input))
 }
 
 /// An output needs a place that can be written, and one of its own.

@@ -21,8 +21,13 @@ use crate::source::{
 };
 use crate::value::stored_value;
 
-/// The suffix of the input that says whether a signal is valid.
-pub(super) const VALID: &str = ".valid";
+/// Suffixes of the input that says whether a signal is valid; names in Structured Text have no dot.
+const VALID: [&str; 2] = [".valid", "_valid"];
+
+/// Names of the input that says whether the signal `name` is valid.
+pub(super) fn names_of_valid(name: &str) -> impl Iterator<Item = String> + '_ {
+    VALID.iter().map(move |suffix| format!("{name}{suffix}"))
+}
 
 /// The sources of the inputs of `members[index]`, those without errors.
 pub(super) fn resolve(
@@ -51,10 +56,14 @@ pub(super) fn resolve(
             );
             continue;
         };
-        let valid = format!("{}{VALID}", point.name);
-        let valid = inputs
-            .find(&valid)
-            .filter(|_| matches!(source, SourceText::Signal { .. }));
+        let is_signal = matches!(source, SourceText::Signal { .. });
+        let mut names = names_of_valid(&point.name);
+        let valid = names.find_map(|name| inputs.find(&name)).filter(|valid| {
+            // An input that only looks like it has a source of its own.
+            let has_entry = entries.iter().any(|entry| entry.name.value == valid.name);
+            let has_place = field.is_some_and(|field| field.inputs.contains_key(&valid.name));
+            is_signal && (valid.name.ends_with(VALID[0]) || !has_entry && !has_place)
+        });
         for name in [Some(point), valid]
             .into_iter()
             .flatten()

@@ -14,7 +14,7 @@ use understudy_wire::ProgramId;
 
 use super::Member;
 use super::follows;
-use super::inputs::VALID;
+use super::inputs::names_of_valid;
 use super::ladders::Ladders;
 use super::limits::too_wide;
 use super::names::{Names, find_controller};
@@ -166,8 +166,9 @@ fn bound(
             diagnostics
                 .push(Diagnostic::error("U0224", message, section.span.clone()).with_help(help));
         }
-        let valid = format!("{}{VALID}", source.name);
-        problems.retain(|it| !stays_zero(it, &source.name) && !stays_zero(it, &valid));
+        let mut names: Vec<String> = names_of_valid(&source.name).collect();
+        names.push(source.name.clone());
+        problems.retain(|it| !names.iter().any(|name| stays_zero(it, name)));
     }
     let is_read = |output: &str| {
         let mut readers = remote_ios.iter().flat_map(RemoteIo::signals);

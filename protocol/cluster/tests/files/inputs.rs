@@ -134,6 +134,29 @@ fn a_signal_of_another_group_is_an_input_that_ends() {
 }
 
 #[test]
+fn structured_text_reads_whether_a_signal_is_valid() {
+    let left = LEFT.replace("ready : BOOL;", "ready : BOOL; ready_valid : BOOL;");
+    let left = left.replace(
+        "velocity := speed;",
+        "IF ready AND ready_valid THEN velocity := speed; END_IF;",
+    );
+    let files = [("left.st", left.as_str()), FILES[1]];
+    let signal = "ready = { from = \"right.done\", default = false }\n";
+    let settings = |inputs: &str| {
+        let cluster = load(&with_inputs(inputs), &files)
+            .cluster
+            .expect("it is right");
+        cluster
+            .remote_io_settings(ProgramId(0))
+            .expect("it is there")
+    };
+    assert_eq!(settings(signal).signals[0].valid, Some(65));
+    // An input with a source of its own is another one.
+    let level = format!("{signal}ready_valid = {{ operator = \"level\" }}\n");
+    assert_eq!(settings(&level).signals[0].valid, None);
+}
+
+#[test]
 fn what_is_declared_wrongly_is_said() {
     insta::assert_snapshot!(check(
         r#"starts = { operator = "pulse" }
