@@ -12,10 +12,10 @@ use understudy_typed::{Elementary, Point};
 use understudy_wire::ProgramId;
 
 use super::Member;
+use super::inputs::value;
 use crate::alarm::{AlarmCondition, AlarmDeclaration, MAXIMUM_ALARMS, Priority};
 use crate::fields::Placed;
 use crate::file::AlarmSection;
-use crate::value::stored_value;
 
 /// The alarms without errors.
 pub(super) fn resolve(
@@ -151,7 +151,7 @@ fn condition(
                 diagnostics.push(misfit(message, when.span.clone(), help));
                 return None;
             }
-            return stored("when", when, of, diagnostics)
+            return value("when", when, of, diagnostics)
                 .map(|value| AlarmCondition::Is(value != 0));
         }
         (None, Some(above), None) => (above, true),
@@ -166,7 +166,7 @@ fn condition(
         return None;
     }
     let span = limit.span.clone();
-    let limit = stored(key, limit, of, diagnostics);
+    let limit = value(key, limit, of, diagnostics);
     let over = match &section.hysteresis {
         None => limit?,
         Some(hysteresis) => {
@@ -178,7 +178,7 @@ fn condition(
                 );
                 return None;
             }
-            let distance = stored("hysteresis", hysteresis, of, diagnostics)?;
+            let distance = value("hysteresis", hysteresis, of, diagnostics)?;
             let over = moved(of, limit?, distance, is_above);
             let Some(over) = over else {
                 let message = format!("the limit and the hysteresis leave the range of {of}");
@@ -199,22 +199,6 @@ fn condition(
 
 fn misfit(message: String, span: Range<usize>, help: &str) -> Diagnostic {
     Diagnostic::error("U0226", message, span).with_help(help.to_owned())
-}
-
-fn stored(
-    key: &str,
-    value: &Placed<Constant>,
-    of: Elementary,
-    diagnostics: &mut Vec<Diagnostic>,
-) -> Option<u64> {
-    match stored_value(&value.value, of) {
-        Ok(stored) => Some(stored),
-        Err(expected) => {
-            let message = format!("`{key}` of a {of}: {expected}");
-            diagnostics.push(Diagnostic::error("U0204", message, value.span.clone()));
-            None
-        }
-    }
 }
 
 fn is_negative(value: &Constant) -> bool {

@@ -128,7 +128,7 @@ fn misfit(message: String, span: Range<usize>, help: &str) -> Diagnostic {
 }
 
 /// The stored form of a value in the file.
-fn value(
+pub(super) fn value(
     key: &str,
     value: &Placed<Constant>,
     of: Elementary,
