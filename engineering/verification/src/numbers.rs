@@ -1,7 +1,7 @@
 //! Properties of programs with numbers, and of several programs that read each other's signals.
 //!
-//! A program becomes a *system*: terms for the value of each cell of memory after a scan ([`execute`]). Its *abstraction* is a circuit that has
-//! every run of the system and more ([`abstraction`]), which the methods for Boolean programs decide:
+//! A program becomes a *system*: terms for the value of each cell of memory after a scan (`execute`). Its *abstraction* is a circuit that has
+//! every run of the system and more (`abstraction`), which the methods for Boolean programs decide:
 //!
 //! ```text
 //! circuit: holds, property of all runs      holds
