@@ -67,6 +67,8 @@ pub struct Referee {
     seen: VecDeque<Image>,
     /// Bits of u(i) that do not come from the plant, as of the newest sample.
     sourced: Vec<(usize, bool)>,
+    /// Those bits with the writes that the remote I/O has taken since: what a sample without a record may have had.
+    taken: Vec<(usize, bool)>,
     /// Samples for which the program may go on from a state that the operator has chosen.
     choice: u32,
     cold_starts: u64,
@@ -202,6 +204,7 @@ impl Referee {
             blind: false,
             seen: VecDeque::new(),
             sourced: settings.sourced_bits().map(|bit| (bit, false)).collect(),
+            taken: Vec::new(),
             choice: 0,
             cold_starts: 0,
             applied: false,
@@ -295,7 +298,18 @@ impl Referee {
                 }
                 let continued = self.continue_from(*moment, *born, *before);
                 self.step(*moment, inputs);
+                self.taken.clone_from(&self.sourced);
                 continued
+            }
+            Event::Written { write, .. } => {
+                let first = usize::from(write.input);
+                for (place, bit) in &mut self.taken {
+                    let at = place.wrapping_sub(first);
+                    if at < usize::from(write.value.width()) {
+                        *bit = write.value.stored() >> at & 1 == 1;
+                    }
+                }
+                Ok(())
             }
             Event::Applied {
                 moment,
@@ -392,8 +406,27 @@ impl Referee {
         })
     }
 
+    /// What a sample without a record may have had: what the plant has shown, with the values of other sources then, with those that
+    /// were written since, or with those that the stations recall.
+    fn unrecorded(&self) -> Vec<Image> {
+        let mut images: Vec<Image> = self.seen.iter().cloned().collect();
+        for values in [&self.taken, &self.sourced] {
+            for seen in &self.seen {
+                let mut image = seen.clone();
+                for &(place, bit) in values {
+                    image.set(place, bit);
+                }
+                if !images.contains(&image) {
+                    images.push(image);
+                }
+            }
+        }
+        images
+    }
+
     /// Finds the samples without a record that lead to a lineage from a state that may be continued from, and goes there.
     fn recover(&mut self, lineage: Lineage) -> bool {
+        let candidates = self.unrecorded();
         let newest = (self.floor..self.states.len()).rev().take(RECENT_STATES);
         let mut ways: Vec<(usize, Lineage, Vec<usize>)> = newest
             .map(|from| (from, self.states[from].lineage, Vec::new()))
@@ -401,7 +434,7 @@ impl Referee {
         for _ in 0..UNRECORDED_SAMPLES {
             let mut longer = Vec::new();
             for (from, known, samples) in &ways {
-                for (place, sensors) in self.seen.iter().enumerate() {
+                for (place, sensors) in candidates.iter().enumerate() {
                     let samples: Vec<usize> = samples.iter().copied().chain([place]).collect();
                     longer.push((*from, known.after(sensors), samples));
                 }
@@ -411,8 +444,7 @@ impl Referee {
                 self.newest = Some(*from);
                 let stepped = self.states[*from].stepped;
                 for &place in samples {
-                    let sensors = self.seen[place].clone();
-                    self.step(stepped, &sensors);
+                    self.step(stepped, &candidates[place]);
                 }
                 self.truth = None;
                 return true;

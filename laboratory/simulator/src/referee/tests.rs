@@ -3,7 +3,9 @@
 use understudy_cycle::{Agreement, Mode, Schedule};
 use understudy_logic::CircuitBuilder;
 use understudy_remote_io::{Release, StaleState, ValueFault};
-use understudy_wire::{ClusterHash, ConfigurationHash, Cycle, Epoch, ProgramId, StationSet};
+use understudy_wire::{
+    ClusterHash, ConfigurationHash, Cycle, Epoch, ProgramId, Role, StationSet, Write, WriteId,
+};
 
 use super::*;
 
@@ -45,6 +47,13 @@ fn referee() -> Referee {
         stale_state: StaleState::Operator,
     };
     Referee::new(&settings, (&circuit).into())
+}
+
+/// The same remote I/O, whose input operators write.
+fn referee_of_an_operator_input() -> Referee {
+    let mut referee = referee();
+    referee.sourced = vec![(0, false)];
+    referee
 }
 
 fn moment(cycle: u64) -> Moment {
@@ -233,4 +242,34 @@ fn what_follows_missing_records_is_not_judged_until_a_state_is_known() {
     assert_eq!(referee.observe(&sampled(9, &[true], true)), Ok(()));
     let wrong = referee.observe(&applied(9, true, Source::Direct));
     assert!(wrong.is_err(), "{wrong:?}");
+}
+
+#[test]
+fn a_sample_without_a_record_may_have_what_was_written() {
+    let write = Write {
+        id: WriteId {
+            session: 1,
+            number: 1,
+        },
+        input: 0,
+        value: true.into(),
+        role: Role::Operator,
+        owner: "anna".to_owned(),
+        reason: "a test".to_owned(),
+    };
+    let written = Event::Written {
+        moment: moment(1),
+        write,
+    };
+    // The remote I/O was killed after the sample of cycle 2, in which the value was; a pulse is over in the next one.
+    let resumed = sampled(4, &[false, true], false);
+    for is_written in [false, true] {
+        let mut referee = referee_of_an_operator_input();
+        referee.saw(&bit(false));
+        assert_eq!(referee.observe(&sampled(1, &[], false)), Ok(()));
+        if is_written {
+            assert_eq!(referee.observe(&written), Ok(()));
+        }
+        assert_eq!(referee.observe(&resumed).is_ok(), is_written);
+    }
 }
