@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 use std::net::SocketAddr;
 use std::path::PathBuf;
-
 use std::sync::atomic::Ordering;
 use std::time::SystemTime;
 
@@ -14,7 +13,6 @@ use understudy_gateway::{
     Area, Followed, GatewayError, Rate, RegisterMap, Run, WriteGate, forward_signals, mirror,
     serve_metrics, serve_modbus,
 };
-
 use understudy_keys::{Date, OperatorKeys};
 use understudy_member::tls_keys;
 

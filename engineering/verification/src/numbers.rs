@@ -23,7 +23,7 @@ use understudy_logic::Circuit;
 use understudy_text::Diagnostic;
 use understudy_typed::Elementary;
 
-use crate::program::{Answer as CircuitAnswer, Bounds, Subject, Undecided};
+use crate::program::{Answer as CircuitAnswer, Bounds, Subject};
 use crate::property::{Formula, Path, Property};
 use crate::symbolic::{Cone, Resolved, Signal, Trace};
 use abstraction::{Abstraction, Meaning};
@@ -64,8 +64,6 @@ pub struct System {
     observed: Vec<(String, Term)>,
     /// Values that a run shows beside them.
     shown: Vec<(String, Term)>,
-    /// What stops a program, in words, with its condition.
-    faults: Vec<(Term, String)>,
 }
 
 /// An input of a program in a system.
@@ -120,7 +118,6 @@ impl System {
             cells: Vec::new(),
             observed: Vec::new(),
             shown: Vec::new(),
-            faults: Vec::new(),
         }
     }
 
@@ -196,11 +193,6 @@ impl Model {
     /// The circuit that stands for the programs.
     pub fn circuit(&self) -> &Circuit {
         self.subject.circuit()
-    }
-
-    /// Whether a program fault can stop one of the programs at all.
-    pub fn can_fault(&self) -> bool {
-        !self.system.faults.is_empty()
     }
 
     /// The formula of `property` over the signals of the circuit.
@@ -279,7 +271,7 @@ impl Model {
             CircuitAnswer::Fails(None) => {
                 Answer::Undecided("it depends on comparisons of computed numbers".to_owned())
             }
-            CircuitAnswer::Undecided(undecided) => Answer::Undecided(undecided_text(&undecided)),
+            CircuitAnswer::Undecided(undecided) => Answer::Undecided(undecided.to_string()),
         }
     }
 
@@ -299,10 +291,6 @@ impl Model {
             }
         }
     }
-}
-
-fn undecided_text(undecided: &Undecided) -> String {
-    undecided.to_string()
 }
 
 /// Whether a formula speaks of all runs alone: what is true in more runs is true in fewer.

@@ -54,8 +54,8 @@ pub(super) struct Execution<'a> {
     open: Vec<HashMap<u64, Option<Term>>>,
     /// Under which condition the statement is reached, but for faults.
     path: Term,
-    /// Conditions of faults, with the text of each.
-    pub(super) faults: Vec<(Term, String)>,
+    /// Whether a fault ends the scan.
+    pub(super) faulted: Term,
     elapsed: Term,
     turns: u32,
     line: u32,
@@ -111,7 +111,7 @@ impl<'a> Execution<'a> {
         cells: &'a mut dyn Cells,
         elapsed: Term,
     ) -> Self {
-        let path = terms.boolean(true);
+        let (path, faulted) = (terms.boolean(true), terms.boolean(false));
         let routines = program.routines.iter();
         let initial = routines.flat_map(|routine| &routine.initial);
         let frames = initial.map(|initial| (u64::from(initial.slot), initial.value));
@@ -124,7 +124,7 @@ impl<'a> Execution<'a> {
             memory: HashMap::new(),
             open: Vec::new(),
             path,
-            faults: Vec::new(),
+            faulted,
             elapsed,
             turns: 0,
             line: 0,
@@ -178,17 +178,13 @@ impl<'a> Execution<'a> {
         let turns = u64::from(self.turns).saturating_mul(cost.dearest_turn);
         if cost.is_bounded_by_budget() && turns > cost.budget {
             let exceeded = self.terms.unknown(Elementary::Bool);
-            let budget = self.program.budget;
-            self.fault(
-                exceeded,
-                format!("the loops of one scan exceed the budget of {budget} operations"),
-            );
+            self.fault(exceeded);
         }
         Ok(())
     }
 
     /// An output that is no finite number is a fault.
-    pub(super) fn finite(&mut self, name: &str, slot: u32, of: Elementary) {
+    pub(super) fn finite(&mut self, slot: u32, of: Elementary) {
         let largest = match of {
             Elementary::Real => u64::from(f32::MAX.to_bits()),
             Elementary::Lreal => f64::MAX.to_bits(),
@@ -202,8 +198,7 @@ impl<'a> Execution<'a> {
         let above = self.terms.compare(Comparison::GreaterOrEqual, value, least);
         let inside = self.terms.and(below, above);
         let outside = self.terms.not(inside);
-        self.line = 0;
-        self.fault(outside, format!("output {name} is not a finite number"));
+        self.fault(outside);
     }
 
     fn unsupported<T>(&self, context: Context, what: impl Into<String>) -> Result<T> {
@@ -214,15 +209,9 @@ impl<'a> Execution<'a> {
         })
     }
 
-    fn fault(&mut self, condition: Term, what: String) {
+    fn fault(&mut self, condition: Term) {
         let reached = self.terms.and(self.path, condition);
-        if !self.terms.is(reached, false) {
-            let text = match self.line {
-                0 => what,
-                line => format!("line {line}: {what}"),
-            };
-            self.faults.push((reached, text));
-        }
+        self.faulted = self.terms.or(self.faulted, reached);
     }
 
     fn set(&mut self, address: u64, value: Term) {
@@ -662,7 +651,7 @@ impl<'a> Execution<'a> {
             let inside = self.between(value, index.low.into(), index.high.into());
             let outside = self.terms.not(inside);
             let (low, high) = (index.low, index.high);
-            self.fault(outside, format!("the index is outside of {low} to {high}"));
+            self.fault(outside);
             if let Some(known) = self.terms.value(value) {
                 // A known index outside is a fault: any place serves.
                 let known = (known as i64).clamp(low, high);
@@ -693,7 +682,7 @@ impl<'a> Execution<'a> {
         match self.terms.value(address) {
             Some(0) => {
                 let yes = self.terms.boolean(true);
-                self.fault(yes, "a VAR_IN_OUT variable without a variable".to_owned());
+                self.fault(yes);
                 Ok(64 * u64::from(Program::HEADER))
             }
             Some(address) => Ok(address),
@@ -704,9 +693,9 @@ impl<'a> Execution<'a> {
     fn store(&mut self, context: Context, place: &Place, value: Value) -> Result<()> {
         let places = self.places(context, place)?;
         if matches!(value, Value::Text) {
-            if let Type::Text(capacity) = place.of {
+            if matches!(place.of, Type::Text(_)) {
                 let long = self.terms.unknown(Elementary::Bool);
-                self.fault(long, format!("a text does not fit into STRING[{capacity}]"));
+                self.fault(long);
             }
             return Ok(());
         }
@@ -877,16 +866,13 @@ impl<'a> Execution<'a> {
         match operation {
             Operation::Divide(kind) | Operation::Modulo(kind) if !kind.is_real() => {
                 let zero = self.terms.equals(numbers[1], 0);
-                self.fault(zero, "division by zero".to_owned());
+                self.fault(zero);
             }
             Operation::Multiplex(_) => {
                 let last = numbers.len() as i128 - 2;
                 let inside = self.between(numbers[0], 0, last);
                 let outside = self.terms.not(inside);
-                self.fault(
-                    outside,
-                    "MUX selects an input that it does not have".to_owned(),
-                );
+                self.fault(outside);
                 let mut chosen = numbers[numbers.len() - 1];
                 for (place, &operand) in numbers[1..].iter().enumerate().rev().skip(1) {
                     let here = self.terms.equals(numbers[0], place as u64);
@@ -949,9 +935,9 @@ impl<'a> Execution<'a> {
                     }
                 }
                 Value::Text => {
-                    if let Type::Text(capacity) = to.of {
+                    if matches!(to.of, Type::Text(_)) {
                         let long = self.terms.unknown(Elementary::Bool);
-                        self.fault(long, format!("a text does not fit into STRING[{capacity}]"));
+                        self.fault(long);
                     }
                 }
             }

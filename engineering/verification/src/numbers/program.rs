@@ -413,7 +413,7 @@ impl System {
         };
         let mut numbers = HashMap::new();
         let mut scan = self.scan(&first, &mut numbers)?;
-        let mut can_fault = self.any_fault(&scan.faults);
+        let mut can_fault = scan.faulted;
         if !self.terms.is(can_fault, false) {
             // It can stop: a scan may begin with the initial values.
             let again = Scan {
@@ -421,7 +421,7 @@ impl System {
                 ..first
             };
             scan = self.scan(&again, &mut numbers)?;
-            can_fault = self.any_fault(&scan.faults);
+            can_fault = scan.faulted;
         }
         let resets = program.inputs.iter().zip(inputs);
         let mut reset = resets
@@ -457,7 +457,6 @@ impl System {
         let more = self.terms.apply(more, Elementary::Ulint, &[begun, one]);
         let counted = self.terms.choose(can_fault, begun, more);
         self.cells[scans as usize].next = self.terms.choose(begins, counted, was_scans);
-        self.faults.extend(scan.faults);
         Ok(self.observe(prefix, program, &after, faulted))
     }
 
@@ -505,14 +504,6 @@ impl System {
             points,
             can_be_read: self.terms.not(faulted),
         }
-    }
-
-    fn any_fault(&mut self, faults: &[(Term, String)]) -> Term {
-        let mut any = self.terms.boolean(false);
-        for &(condition, _) in faults {
-            any = self.terms.or(any, condition);
-        }
-        any
     }
 
     /// One scan of a program from its cells on.
@@ -576,12 +567,12 @@ impl System {
             execution.task(task.routine, task.own, runs)?;
         }
         for point in &program.outputs {
-            execution.finite(&point.name, point.slot, point.of);
+            execution.finite(point.slot, point.of);
         }
-        let faults = std::mem::take(&mut execution.faults);
+        let faulted = execution.faulted;
         let memory = execution.written();
         *numbers = cells.numbers;
-        Ok(Scanned { memory, faults })
+        Ok(Scanned { memory, faulted })
     }
 }
 
@@ -598,7 +589,8 @@ struct Scan<'a> {
 /// How it ends, where no fault ends it.
 struct Scanned {
     memory: HashMap<u64, Term>,
-    faults: Vec<(Term, String)>,
+    /// Whether a fault ends it.
+    faulted: Term,
 }
 
 /// Most BOOL variables that properties can name.
