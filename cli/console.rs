@@ -14,6 +14,13 @@ use understudy_text::{Diagnostic, Lines, Report, Severity};
 use crate::answer::{Answer, Envelope, Status, shown};
 use crate::excerpt::Shown;
 
+/// Columns of the terminal on standard output; `None` where that is a file or a pipe.
+pub(crate) fn terminal_columns() -> Option<usize> {
+    let size = ratatui::crossterm::terminal::size();
+    let (columns, _) = size.ok().filter(|_| io::stdout().is_terminal())?;
+    Some(usize::from(columns))
+}
+
 /// Output of a command.
 pub struct Console {
     json: bool,

@@ -11,6 +11,7 @@ use understudy_scenarios::{Circumstances, Summary, Table, World};
 use understudy_text::shell;
 
 use crate::answer::{Answer, Status};
+use crate::console;
 
 pub(crate) fn circumstances(
     cluster: &Cluster,
@@ -149,7 +150,11 @@ fn text(summary: &Summary, directory: Option<&Path>) -> String {
 
 /// Table II with a line for each plant and each remote I/O.
 fn push_cycles(text: &mut String, summary: &Summary) {
-    let _ = writeln!(text, "{}", Table::new(summary));
+    let table = Table::new(summary);
+    let _ = match console::terminal_columns() {
+        Some(columns) => writeln!(text, "{table:columns$}"),
+        None => writeln!(text, "{table}"),
+    };
     let names = summary.remote_ios.iter().map(|remote_io| &remote_io.name);
     let names = names.chain(summary.plants.iter().map(|plant| &plant.name));
     let width = names.map(|name| name.chars().count()).max().unwrap_or(0);

@@ -10,7 +10,7 @@ use crate::summary::Summary;
 /// Columns that are still readable.
 const MAXIMUM_COLUMNS: usize = 40;
 
-/// Characters of a line of text; a table that is wider goes on below.
+/// Characters of a line of text where the formatter names no width; a table that is wider goes on below.
 const LINE_LENGTH: usize = 118;
 
 /// The table.
@@ -193,15 +193,17 @@ impl Table {
     }
 }
 
+/// As text; the width of the formatter is the longest line, as in `{table:60}`.
 impl fmt::Display for Table {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let names = self.rows.iter().map(|row| row.name.chars().count());
         let name_width = names.max().unwrap_or(0).max("cycle".len()) + 2;
+        let length = formatter.width().unwrap_or(LINE_LENGTH);
         let mut from = 0;
         while from < self.columns.len() {
             let fits = |to: &usize| {
                 let widths = self.slice(from, *to).widths();
-                name_width + widths.iter().sum::<usize>() <= LINE_LENGTH
+                name_width + widths.iter().sum::<usize>() <= length
             };
             let to = (from + 1..=self.columns.len()).take_while(fits).last();
             let to = to.unwrap_or(from + 1);
@@ -261,5 +263,7 @@ mod tests {
             left_out: 3,
         };
         insta::assert_snapshot!(table);
+        let narrow = format!("{table:60}");
+        assert!(narrow.lines().all(|line| line.chars().count() <= 60));
     }
 }
