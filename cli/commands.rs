@@ -32,7 +32,7 @@ pub(crate) struct Group {
 
 /// One command: its arguments and the function that runs it.
 pub(crate) struct Entry {
-    name: &'static str,
+    pub(crate) name: &'static str,
     parser: Command,
     bind: Bind,
 }
@@ -101,6 +101,13 @@ pub(crate) fn parse() -> Result<Call, clap::Error> {
     })
 }
 
+/// The exit statuses of all commands.
+pub(crate) const EXIT_STATUS: &str = "  0  success
+  1  a run or a check failed
+  2  invalid input, nothing was started
+  3  inconclusive: the host was too slow
+";
+
 /// The whole command line.
 pub(crate) fn parser(groups: &[Group]) -> Command {
     let json = Arg::new("json")
@@ -112,7 +119,7 @@ pub(crate) fn parser(groups: &[Group]) -> Command {
         .version(env!("CARGO_PKG_VERSION"))
         .about("A redundant array of independent controllers: RAID for PLCs")
         .help_template(template(groups))
-        .after_help(
+        .after_help(format!(
             "\
 Example:
   understudy demo          run the press cell of the paper on processes of this machine
@@ -121,13 +128,9 @@ Example:
 `understudy COMMAND --help` describes a command, `understudy explain CODE` an error.
 
 Exit status:
-  0  success
-  1  a run or a check failed
-  2  invalid input, nothing was started
-  3  inconclusive: the host was too slow
-
-Understudy is not a safety PLC.",
-        )
+{EXIT_STATUS}
+Understudy is not a safety PLC."
+        ))
         .subcommand_required(true)
         .arg_required_else_help(true)
         .arg(json)

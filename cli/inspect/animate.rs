@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
-use understudy_view::{Bounds, Run, Scene};
+use understudy_view::{Bounds, Scene};
 
 use crate::answer::Answer;
 use crate::files;
-use crate::inspect::view::RUN;
+use crate::inspect::view::RunArgument;
 
 /// Draw part of a run as an animated SVG picture
 #[derive(Debug, Args)]
@@ -21,9 +21,8 @@ Example:
 Without a range of cycles the picture shows the first kill of a controller, until its outputs are direct again. Browsers and GitHub play
 the animation.")]
 pub(crate) struct Arguments {
-    /// Directory of a run
-    #[arg(value_name = "RUN", default_value = RUN)]
-    run: PathBuf,
+    #[command(flatten)]
+    run: RunArgument,
     /// Controller whose outputs are shown
     #[arg(long, value_name = "CONTROLLER")]
     program: Option<String>,
@@ -45,7 +44,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         to: arguments.to,
     };
     let until = arguments.to.unwrap_or(i64::MAX);
-    let model = Run::open(&arguments.run)?.read_until(Bounds::default(), until)?;
+    let model = arguments.run.open()?.read_until(Bounds::default(), until)?;
     let film = model.film(scene)?;
     files::write(&arguments.output, &film.to_svg())?;
     let file = arguments.output.display().to_string();

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use understudy_view::{Bounds, Model, Run, ViewError, diff};
 
-use crate::answer::Answer;
+use crate::answer::{Answer, Status};
 use crate::inspect::view::several;
 
 /// Compare two runs and show the first difference
@@ -14,8 +14,8 @@ use crate::inspect::view::several;
 Example:
   understudy diff runs/2026-11-21T20-00-00Z runs/latest
 
-Cycles are counted from the origin of each run and compared up to the end of the shorter run. The exit status is 0 for different runs
-too.")]
+Cycles are counted from the origin of each run and compared up to the end of the shorter run. Exit status: 0 if the runs
+are equal, 1 if they differ.")]
 pub(crate) struct Arguments {
     /// Directory of a run
     #[arg(value_name = "RUN")]
@@ -38,7 +38,13 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     match (read(&arguments.left), read(&arguments.right)) {
         (Ok(left), Ok(right)) => {
             let found = diff(&left, &right);
-            Answer::done(found.to_text(), &found).and_next(&[&"journal", &arguments.right])
+            let status = match found.is_equal() {
+                true => Status::Done,
+                false => Status::Failed,
+            };
+            Answer::done(found.to_text(), &found)
+                .with_status(status)
+                .and_next(&[&"journal", &arguments.right])
         }
         (left, right) => {
             let errors: Vec<ViewError> = [left.err(), right.err()].into_iter().flatten().collect();

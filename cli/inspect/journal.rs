@@ -1,7 +1,6 @@
 //! `understudy journal`: the events of a run as text.
 
 use std::io::Write as _;
-use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
@@ -10,7 +9,7 @@ use understudy_text::MAXIMUM_SHOWN;
 use understudy_view::{Filter, JournalLine, Listing, Run, Trouble};
 
 use crate::answer::{Answer, Status};
-use crate::inspect::view::{RUN, several};
+use crate::inspect::view::{RunArgument, several};
 
 /// Print or follow the journal of a run
 #[derive(Debug, Args)]
@@ -23,9 +22,8 @@ Example:
 Without filters all records are shown except the periodic ones of every cycle. Cycles are counted from the origin of the run, as in its
 report. With --follow and --json each line is a JSON object.")]
 pub(crate) struct Arguments {
-    /// Directory of a run
-    #[arg(value_name = "RUN", default_value = RUN)]
-    run: PathBuf,
+    #[command(flatten)]
+    run: RunArgument,
     /// Print new records until the run ends
     #[arg(long)]
     follow: bool,
@@ -53,7 +51,7 @@ pub(crate) struct Arguments {
 const LOOK: Duration = Duration::from_millis(100);
 
 pub(crate) fn run(arguments: &Arguments, json: bool) -> Result<Answer, Answer> {
-    let run = Run::open(&arguments.run)?;
+    let run = arguments.run.open()?;
     let filter = Filter {
         members: arguments.member.clone(),
         events: arguments.event.clone(),

@@ -1,7 +1,6 @@
 //! `understudy top`: a live view of a run on the terminal.
 
 use std::io::{self, IsTerminal};
-use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use clap::Args;
@@ -10,13 +9,13 @@ use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::{self, KeyCode, KeyEventKind, KeyModifiers};
 use understudy_attach::Attached;
 use understudy_journal::{Commander, JOURNAL_LIMIT_BYTES, RunDirectory};
-use understudy_view::{Alarm, Bounds, Key, Model, Run, Screen, Source, find_run_of};
+use understudy_view::{Alarm, Bounds, Key, Model, Run, Screen, Source};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
 use crate::inspect::attach::AttachArguments;
-use crate::inspect::view::RUN;
+use crate::inspect::view::RunArgument;
 
 /// Show a live view of a run on the terminal
 #[derive(Debug, Args)]
@@ -30,15 +29,11 @@ Example:
 For a cluster file the newest run below --out is shown. Keys: q quit, space pause, tab events, alarms and remaining redundancy,
 a acknowledge, arrows scroll, h help. With --once or --json the current state is printed.")]
 pub(crate) struct Arguments {
-    /// Directory of a run, or cluster file
-    #[arg(value_name = "RUN|CLUSTER.toml", default_value = RUN)]
-    run: PathBuf,
+    #[command(flatten)]
+    run: RunArgument,
     /// Print the current state and exit
     #[arg(long)]
     once: bool,
-    /// Directory of runs
-    #[arg(long, value_name = "DIR", default_value = "runs")]
-    out: PathBuf,
     #[command(flatten)]
     elsewhere: AttachArguments,
 }
@@ -101,23 +96,16 @@ fn wait_for_a_cycle(run: &Run) {
 type Opened = (Run, Option<(RunDirectory, Attached)>);
 
 fn open(arguments: &Arguments, console: &mut Console) -> Result<Opened, Answer> {
-    let path = arguments.run.as_path();
-    let is_cluster = path
-        .extension()
-        .is_some_and(|extension| extension == "toml");
-    if !is_cluster && !arguments.elsewhere.is_wanted() {
-        return Ok((Run::open(path)?, None));
+    if !arguments.elsewhere.is_wanted() {
+        return Ok((arguments.run.open()?, None));
     }
+    let path = arguments.run.run.as_path();
     let (cluster, _) = files::cluster(path, Default::default())?;
-    if arguments.elsewhere.is_wanted() {
-        let (out, limit) = (&arguments.out, JOURNAL_LIMIT_BYTES);
-        let attached = arguments
-            .elsewhere
-            .attach(path, &cluster, out, limit, console)?;
-        return Ok((Run::open(attached.0.path())?, Some(attached)));
-    }
-    let run = find_run_of(&arguments.out, &cluster)?;
-    Ok((run, None))
+    let (out, limit) = (&arguments.run.out, JOURNAL_LIMIT_BYTES);
+    let attached = arguments
+        .elsewhere
+        .attach(path, &cluster, out, limit, console)?;
+    Ok((Run::open(attached.0.path())?, Some(attached)))
 }
 
 /// Records the acknowledgement of these alarms in the journal. They are shown as acknowledged once they are read there.

@@ -1,11 +1,41 @@
 //! Shared by the commands that inspect a run.
 
-use understudy_view::ViewError;
+use std::path::PathBuf;
+
+use clap::Args;
+use understudy_view::{Run, ViewError, find_run_of};
 
 use crate::answer::{Answer, Status};
+use crate::files;
 
 /// The newest run, the default.
-pub(crate) const RUN: &str = "runs/latest";
+const RUN: &str = "runs/latest";
+
+/// The run that a command inspects.
+#[derive(Debug, Args)]
+pub(crate) struct RunArgument {
+    /// Directory of a run, or cluster file for its newest run below --out
+    #[arg(value_name = "RUN|CLUSTER.toml", default_value = RUN)]
+    pub(crate) run: PathBuf,
+    /// Directory of runs
+    #[arg(long, value_name = "DIR", default_value = "runs")]
+    pub(crate) out: PathBuf,
+}
+
+impl RunArgument {
+    pub(crate) fn open(&self) -> Result<Run, Answer> {
+        if !self.is_cluster() {
+            return Ok(Run::open(&self.run)?);
+        }
+        let (cluster, _) = files::cluster(&self.run, Default::default())?;
+        Ok(find_run_of(&self.out, &cluster)?)
+    }
+
+    pub(crate) fn is_cluster(&self) -> bool {
+        let extension = self.run.extension();
+        extension.is_some_and(|extension| extension == "toml")
+    }
+}
 
 impl From<ViewError> for Answer {
     fn from(error: ViewError) -> Self {

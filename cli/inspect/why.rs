@@ -1,19 +1,17 @@
 //! `understudy why`: the contacts that determined an output.
 
-use std::path::PathBuf;
-
 use clap::Args;
-use understudy_view::{Bounds, Run};
+use understudy_view::Bounds;
 
 use crate::answer::Answer;
-use crate::inspect::view::RUN;
+use crate::inspect::view::RunArgument;
 
 /// Explain the value of an output in a cycle of a run
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy why press.move_down --at 212
-  understudy why grip --run runs/latest
+  understudy why grip examples/press-cell/cluster.toml
   understudy why robot.%QX0.0 --at 250 --json
 
 The program is evaluated again with the samples of the journal. The explanation names the contacts that determined the output, and the
@@ -26,14 +24,13 @@ pub(crate) struct Arguments {
     /// Cycle, counted from the origin of the run; default: the newest
     #[arg(long, value_name = "CYCLE", allow_hyphen_values = true)]
     at: Option<i64>,
-    /// Directory of a run
-    #[arg(long, value_name = "DIR", default_value = RUN)]
-    run: PathBuf,
+    #[command(flatten)]
+    run: RunArgument,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let until = arguments.at.unwrap_or(i64::MAX);
-    let model = Run::open(&arguments.run)?.read_until(Bounds::default(), until)?;
+    let model = arguments.run.open()?.read_until(Bounds::default(), until)?;
     let why = model.why(&arguments.output, arguments.at)?;
-    Ok(Answer::done(why.to_text(), &why).and_next(&[&"watch", &arguments.run]))
+    Ok(Answer::done(why.to_text(), &why).and_next(&[&"watch", &arguments.run.run]))
 }

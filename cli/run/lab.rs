@@ -199,9 +199,7 @@ pub(crate) fn in_laboratory(
     let answered = answer(&summary, Some(directory.path()));
     let path = directory.path();
     let mut answer = match first_reconstructed(cluster, &summary) {
-        Some((output, cycle)) => {
-            answered.and_next(&[&"why", &output, &"--at", &cycle, &"--run", &path])
-        }
+        Some((output, cycle)) => answered.and_next(&[&"why", &output, &path, &"--at", &cycle]),
         None => answered.and_next(&[&"watch", &path]),
     };
     if let Err(error) = run.written {

@@ -211,6 +211,11 @@ fn shells_and_manuals_are_served() {
             .contains("_understudy")
     );
     assert!(understudy(&["man"]).output.contains(".TH understudy"));
+    let page = understudy(&["man", "verify"]).output;
+    assert!(page.contains(".TH understudy-verify") && page.contains("EXIT STATUS"));
+    let unknown = understudy(&["man", "verfy"]);
+    assert_eq!(unknown.status, 2);
+    assert!(unknown.errors.contains("`verify`"), "{}", unknown.errors);
 }
 
 #[test]

@@ -131,7 +131,10 @@ fn two_runs_are_compared() {
         "simulate", &cluster, "--cycles", "300", "--seed", "1", "--out", "runs",
     ];
     assert_eq!(understudy_in(&folder, &again).status, 0);
-    let other = understudy_in(&folder, &["diff", &first, "runs/latest", "--json"]).json();
+    assert_eq!(same.status, 0);
+    let other = understudy_in(&folder, &["diff", &first, "runs/latest", "--json"]);
+    assert_eq!(other.status, 1, "they differ");
+    let other = other.json();
     let differences = other["result"]["differences"].as_array().expect("a list");
     let part = differences.first().expect("one was killed");
     assert_eq!(part["cycle"], 30);

@@ -55,6 +55,11 @@ pub struct RunDiff {
 }
 
 impl RunDiff {
+    /// Whether inputs, outputs, sources and events are the same.
+    pub fn is_equal(&self) -> bool {
+        self.differences.is_empty()
+    }
+
     /// For a terminal.
     pub fn to_text(&self) -> String {
         let mut text = String::new();
@@ -71,7 +76,7 @@ impl RunDiff {
         match self.differences.first() {
             None => text += "No difference in inputs, outputs, sources and events.\n",
             Some(first) => {
-                text += &format!("They part in cycle {}.\n\n", first.cycle);
+                text += &format!("The first difference is in cycle {}.\n\n", first.cycle);
                 for found in &self.differences {
                     let what = match found.what {
                         Differing::Inputs => "inputs",
