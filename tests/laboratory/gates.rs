@@ -406,10 +406,13 @@ fn a_flood_of_writes_is_bounded_and_disturbs_no_cycle() {
                 let mut stream = TcpStream::connect(&gateway.address).expect("it listens");
                 stream.set_read_timeout(Some(DEADLINE)).expect("a timeout");
                 let next = |left: usize| left.checked_sub(1);
-                while left
-                    .fetch_update(Ordering::SeqCst, Ordering::SeqCst, next)
-                    .is_ok()
-                {
+                let is_next = || {
+                    let taken = left.fetch_update(Ordering::SeqCst, Ordering::SeqCst, next);
+                    taken.is_ok()
+                };
+                // A gateway that has not read the present yet refuses every write.
+                while is_next() || in_effect.load(Ordering::SeqCst) == 0 {
+                    assert!(begun.elapsed() < DEADLINE, "no write is in effect");
                     let count = match press(&mut stream, coil) {
                         0 => &in_effect,
                         6 => &busy,
