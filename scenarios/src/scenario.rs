@@ -9,9 +9,9 @@ use std::ops::Range;
 
 use serde::Serialize;
 use understudy_cluster::value_text;
-use understudy_journal::Members;
+use understudy_journal::{Members, NamedSignal};
 use understudy_simulator::{Action, Disturbance, Fault, Network};
-use understudy_wire::{Member, PointValue, ProgramId, Source};
+use understudy_wire::{Member, PointValue, ProgramId, SignalPlace, Source};
 
 /// A scenario whose names belong to a cluster.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -91,7 +91,7 @@ impl Scenario {
 }
 
 /// Every action as scenario files write it, in the order in which they are explained.
-pub const ACTIONS: [&str; 20] = [
+pub const ACTIONS: [&str; 21] = [
     "crash",
     "restart",
     "restart-misconfigured",
@@ -103,6 +103,7 @@ pub const ACTIONS: [&str; 20] = [
     "cold-start",
     "accept-state",
     "write",
+    "set",
     "cut",
     "heal",
     "delay",
@@ -125,6 +126,14 @@ pub(crate) fn action_text(member: Member, action: Action, members: &Members) -> 
     match action {
         Action::Write { input, value } => match written(member, (input, value), members) {
             Some((name, value)) => format!("{word} {name} := {value}"),
+            None => word.to_owned(),
+        },
+        Action::Set { input, value } => match set(member, input, members) {
+            Some(signal) => format!("{word} {} := {}", signal.name, set_value(signal, value)),
+            None => word.to_owned(),
+        },
+        Action::Unset { input } => match set(member, input, members) {
+            Some(signal) => format!("{word} {}", signal.name),
             None => word.to_owned(),
         },
         Action::Cut { to } | Action::Heal { to } => format!("{word} to {}", members.name(to)),
@@ -154,6 +163,19 @@ pub(crate) fn written(
     let named = inputs.find(|named| named.input.place.bit == input)?;
     let (of, stored) = (named.input.place.of, value.stored());
     Some((named.name.clone(), value_text(of, stored)))
+}
+
+/// The input that a step sets, by its first bit.
+pub(crate) fn set(member: Member, input: u16, members: &Members) -> Option<&NamedSignal> {
+    let Member::RemoteIo(program) = member else {
+        return None;
+    };
+    members.signal(program, SignalPlace::Input(input))
+}
+
+/// A value as scenario files write it.
+pub(crate) fn set_value(signal: &NamedSignal, value: PointValue) -> String {
+    value_text(signal.of, value.stored())
 }
 
 /// What must come of a run. Counts are over all remote I/Os, from the origin to the last cycle.

@@ -8,7 +8,7 @@ use understudy_journal::{Members, source_word};
 use understudy_simulator::{Action, Disturbance, Fault, Network};
 use understudy_wire::{Member, StationId};
 
-use crate::scenario::{Expectation, Scenario, action_word, written};
+use crate::scenario::{Expectation, Scenario, action_word, set, set_value, written};
 
 /// The text; `members` are those of the scenario's cluster, and `remarks` stand above it for people.
 pub fn write(scenario: &Scenario, members: &Members, remarks: &[String]) -> String {
@@ -64,6 +64,17 @@ fn write_step(text: &mut String, step: &Fault, members: &Members) {
     let _ = match step.action {
         Action::Write { input, value } => match written(step.member, (input, value), members) {
             Some((name, value)) => writeln!(text, "input = {}\nvalue = {value}", quoted(&name)),
+            None => Ok(()),
+        },
+        Action::Set { input, value } => match set(step.member, input, members) {
+            Some(signal) => {
+                let (name, value) = (quoted(&signal.name), set_value(signal, value));
+                writeln!(text, "input = {name}\nvalue = {value}")
+            }
+            None => Ok(()),
+        },
+        Action::Unset { input } => match set(step.member, input, members) {
+            Some(signal) => writeln!(text, "input = {}", quoted(&signal.name)),
             None => Ok(()),
         },
         Action::Cut { to } | Action::Heal { to } => writeln!(text, "to = {}", name(to)),

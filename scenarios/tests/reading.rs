@@ -3,8 +3,10 @@
 use std::fmt::Write as _;
 
 use insta::assert_snapshot;
+use understudy_cycle::Mode;
 use understudy_journal::Members;
-use understudy_scenarios::{looks_like_a_scenario, read};
+use understudy_scenarios::{looks_like_a_scenario, read, write};
+use understudy_testing::press_cell;
 use understudy_wire::{Member, ProgramId, StationId};
 
 fn members() -> Members {
@@ -237,4 +239,27 @@ fn any_text_is_answered() {
 fn scenarios_are_told_from_clusters() {
     assert!(looks_like_a_scenario(include_str!("../table-two.toml")));
     assert!(!looks_like_a_scenario("[cluster]\nname = \"a\"\n"));
+}
+
+#[test]
+fn what_sets_inputs_is_read_as_it_is_written() {
+    let members = Members::of(&press_cell(Mode::Full));
+    let step = |action: &str, more: &str| {
+        format!("[[step]]\nat = 10\naction = \"{action}\"\nstation = \"robot-io\"\n{more}\n")
+    };
+    let text = "title = \"Set\"\ncycles = 20\n".to_owned()
+        + &step("set", "input = \"arm_left\"\nvalue = true")
+        + &step("release", "input = \"arm_left\"")
+        + &step("release", "");
+    let found = read("scenario.toml", &text, Some(&members));
+    assert_eq!(found.report.diagnostics, []);
+    let scenario = found.scenario.expect("no diagnostics");
+    let again = write(&scenario, &members, &[]);
+    let again = read("scenario.toml", &again, Some(&members));
+    assert_eq!(again.scenario, Some(scenario));
+    let wrong = step("set", "input = \"arm_lift\"\nvalue = 3");
+    let wrong = format!("title = \"Set\"\ncycles = 20\n{wrong}");
+    let wrong = read("scenario.toml", &wrong, Some(&members));
+    let codes = wrong.report.diagnostics.iter().map(|found| found.code);
+    assert_eq!(codes.collect::<Vec<_>>(), ["U0309"]);
 }

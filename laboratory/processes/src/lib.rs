@@ -250,6 +250,8 @@ fn refuse_what_is_simulated(scenario: &Scenario) -> Result<(), LaboratoryError> 
                 | Action::Continue
                 | Action::Release
                 | Action::Choose { .. }
+                | Action::Set { .. }
+                | Action::Unset { .. }
                 | Action::Write { .. }
                 | Action::Cut { .. }
                 | Action::Heal { .. }

@@ -10,7 +10,7 @@ use understudy_bus::{Cuts, HostEvent, ZENOH_RUNTIME};
 use understudy_journal::{Happening, Record, RunEvent, check_version};
 use understudy_scenarios::action_word;
 use understudy_simulator::{Action, Fault};
-use understudy_wire::Member;
+use understudy_wire::{Member, SignalPlace};
 
 use super::{Deaths, Laboratory, Progress};
 use crate::error::LaboratoryError;
@@ -169,6 +169,8 @@ impl Laboratory<'_> {
             | Action::Release
             | Action::Choose { .. }
             | Action::Write { .. }
+            | Action::Set { .. }
+            | Action::Unset { .. }
                 if !running =>
             {
                 Some("it has ended")
@@ -198,6 +200,16 @@ impl Laboratory<'_> {
                 process
                     .command(&format!("write {}", write.unwrap_or_default()))
                     .await
+            }
+            (Action::Set { .. }, Some(process)) => {
+                let force = step.action.force();
+                let line = serde_json::to_string(&force).map(|it| format!("force {it}"));
+                process.command(&line.unwrap_or_default()).await
+            }
+            (Action::Unset { input }, Some(process)) => {
+                let signal = SignalPlace::Input(input);
+                let line = serde_json::to_string(&signal).map(|it| format!("unforce {it}"));
+                process.command(&line.unwrap_or_default()).await
             }
             (Action::Choose { choice }, Some(process)) => {
                 let line = serde_json::to_string(&choice).map(|it| format!("choose {it}"));

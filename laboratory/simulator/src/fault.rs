@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use understudy_wire::{
-    Member, PointValue, ProgramHash, ProgramId, Role, StateChoice, Write, WriteId,
+    Force, MAXIMUM_FORCE_SECONDS, Member, PointValue, ProgramHash, ProgramId, Role, SignalPlace,
+    StateChoice, Write, WriteId,
 };
 
 /// One thing done to one member.
@@ -58,6 +59,18 @@ pub enum Action {
         input: u16,
         /// Value.
         value: PointValue,
+    },
+    /// An input of the program of a remote I/O is sampled with a value in place of its own, for an hour at most.
+    Set {
+        /// Input, by its first bit in u(i), counted from 0.
+        input: u16,
+        /// Value.
+        value: PointValue,
+    },
+    /// An input of the program of a remote I/O is sampled from the field again.
+    Unset {
+        /// Input, by its first bit in u(i), counted from 0.
+        input: u16,
     },
     /// Its frames reach one other member no more. A full cut is one each way; a partition is one for each pair.
     Cut {
@@ -133,6 +146,20 @@ impl Fault {
 }
 
 impl Action {
+    /// The force of a [`Self::Set`].
+    pub fn force(self) -> Option<Force> {
+        let Self::Set { input, value } = self else {
+            return None;
+        };
+        Some(Force {
+            signal: SignalPlace::Input(input),
+            value,
+            seconds: MAXIMUM_FORCE_SECONDS,
+            owner: "scenario".to_owned(),
+            reason: "step of the scenario".to_owned(),
+        })
+    }
+
     /// Its kind in one word, as journals and scenario files write it.
     pub fn word(self) -> &'static str {
         match self {
@@ -143,12 +170,13 @@ impl Action {
             Self::Stop => "stop",
             Self::Continue => "continue",
             Self::Slow { .. } => "slow",
-            Self::Release => "release",
+            Self::Release | Self::Unset { .. } => "release",
             Self::Choose {
                 choice: StateChoice::Cold,
             } => "cold-start",
             Self::Choose { .. } => "accept-state",
             Self::Write { .. } => "write",
+            Self::Set { .. } => "set",
             Self::Cut { .. } => "cut",
             Self::Heal { .. } => "heal",
             Self::Delay { .. } => "delay",

@@ -110,6 +110,12 @@ impl Members {
         signals.find(|signal| signal.place == place)
     }
 
+    /// Inputs of a program in the order of its process image.
+    pub fn inputs(&self, program: ProgramId) -> impl Iterator<Item = &NamedSignal> {
+        let signals = self.signals.get(program.index()).into_iter().flatten();
+        signals.filter(|signal| matches!(signal.place, SignalPlace::Input(_)))
+    }
+
     /// Stations in rank order.
     pub fn stations(&self) -> impl Iterator<Item = (StationId, &str)> {
         self.iter().filter_map(|(member, name)| match member {

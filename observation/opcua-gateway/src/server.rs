@@ -40,6 +40,12 @@ const MOST_CONNECTIONS: usize = 64;
 /// Time limit in seconds for the hello message of a client.
 const HELLO_TIMEOUT_S: u32 = 3;
 
+/// The longest lifetime of the keys of a connection, a day: clients ask for an hour, and renew the keys after three quarters of it.
+///
+/// async-opcua-server 0.19 forgets the old keys at a renewal that is later than 5/4 of the lifetime after the connection was opened; a request
+/// that is on its way at that moment closes the connection. With its default of 5 minutes that happened after 6 to 19 minutes.
+const LONGEST_TOKEN_MS: u32 = 24 * 3_600_000;
+
 /// A connection over which the server sends nothing for so long is closed; a subscription is kept alive more often.
 const PATIENCE: Duration = Duration::from_secs(300);
 
@@ -172,7 +178,9 @@ fn server(
             ..Default::default()
         })
         .with_node_manager(node_manager(namespace.to_owned(), writing));
-    builder = builder.hello_timeout(HELLO_TIMEOUT_S);
+    builder = builder
+        .hello_timeout(HELLO_TIMEOUT_S)
+        .max_secure_channel_token_lifetime_ms(LONGEST_TOKEN_MS);
     builder.limits_mut().max_sessions = MOST_SESSIONS;
     builder
         .limits_mut()

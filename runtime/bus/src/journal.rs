@@ -406,9 +406,11 @@ mod tests {
                 _ => 0,
             })
             .sum();
+        // A thread that began late may have said the first of them before it was held.
+        let in_all = lost + unsaid;
         assert!(
-            lost >= u64::from(RECORDS) - 8 - 1 - BURST,
-            "{lost} of {number}"
+            in_all >= u64::from(RECORDS) - 8 - 1 - BURST,
+            "{in_all} of {number}"
         );
         assert_eq!(kept + lost + unsaid, u64::from(number));
     }

@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::time::Duration;
 
 use understudy_cluster::stored_value;
+use understudy_journal::NamedSignal;
 use understudy_remote_io::ValueMismatch;
 use understudy_simulator::{Action, Fault};
 use understudy_text::Diagnostic;
@@ -110,7 +111,7 @@ impl Reader<'_> {
         let of_station = |member: Member| matches!(member, Member::Station(_));
         let (fits, wanted): (fn(Member) -> bool, &str) = match word {
             "crash" | "restart" | "stop" | "continue" => (any, ""),
-            "release" | "cold-start" | "accept-state" | "write" => {
+            "release" | "cold-start" | "accept-state" | "write" | "set" => {
                 (of_remote_io, "names a remote I/O")
             }
             "flip-state" | "flip-word" => (of_station, "names a controller or an understudy"),
@@ -119,7 +120,7 @@ impl Reader<'_> {
         if let Some(member) = member.filter(|&member| !fits(member)) {
             let name = station.value;
             let message = match (word, member) {
-                ("release" | "cold-start" | "accept-state" | "write", _) => {
+                ("release" | "cold-start" | "accept-state" | "write" | "set", _) => {
                     format!("`{name}` is not a remote I/O, and `{word}` concerns one")
                 }
                 _ => format!("`{name}` cannot be the target of `{word}`"),
@@ -142,6 +143,9 @@ impl Reader<'_> {
             }
             "stop" => one(Action::Stop),
             "continue" => one(Action::Continue),
+            "release" if fields.has("input") => one(Action::Unset {
+                input: self.input(fields, member)?.place.first_bit(),
+            }),
             "release" => one(Action::Release),
             "cold-start" => one(Action::Choose {
                 choice: StateChoice::Cold,
@@ -150,6 +154,25 @@ impl Reader<'_> {
                 choice: StateChoice::Newest { cycle: None },
             }),
             "write" => one(self.written(fields, member)?),
+            "set" => {
+                fields.require(&["value"], &mut self.diagnostics);
+                let value = fields.get("value");
+                let value = value.and_then(|value| value.constant(&mut self.diagnostics));
+                let signal = self.input(fields, member)?;
+                let Placed { value, span } = value?;
+                match stored_value(&value, signal.of) {
+                    Ok(stored) => one(Action::Set {
+                        input: signal.place.first_bit(),
+                        value: PointValue::new(signal.of.bits(), stored),
+                    }),
+                    Err(problem) => {
+                        let message = format!("`{}` is {}: {problem}", signal.name, signal.of);
+                        let error = Diagnostic::error("U0304", message, span);
+                        self.diagnostics.push(error);
+                        None
+                    }
+                }
+            }
             "slow" => one(Action::Slow {
                 by: self.slowness(fields)?,
             }),
@@ -188,6 +211,28 @@ impl Reader<'_> {
                 })
             }
         }
+    }
+
+    /// The input that a step sets.
+    fn input(
+        &mut self,
+        fields: &mut Fields<'_, '_>,
+        member: Option<Member>,
+    ) -> Option<&NamedSignal> {
+        fields.require(&["input"], &mut self.diagnostics);
+        let name = fields.text("input", &mut self.diagnostics)?;
+        let Some(Member::RemoteIo(program)) = member else {
+            return None;
+        };
+        let inputs = || self.members.into_iter().flat_map(|it| it.inputs(program));
+        let found = inputs().find(|signal| signal.name == name.value);
+        if found.is_none() {
+            let help = suggestion(name.value, inputs().map(|signal| signal.name.as_str()));
+            let message = format!("the program has no input `{}`", name.value);
+            let error = Diagnostic::error("U0309", message, name.span);
+            self.diagnostics.push(error.with_help(help));
+        }
+        found
     }
 
     /// An input that operators write, and its value.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use understudy_cycle::{Agreement, Input, Machine, RemoteIoInput};
 use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
-use understudy_wire::{ConfigurationHash, Epoch, Frame, Member};
+use understudy_wire::{ConfigurationHash, Epoch, Frame, Member, SignalPlace};
 
 use super::{Observe, Record, Simulation};
 use crate::fault::{Action, Fault};
@@ -47,6 +47,16 @@ impl Simulation {
                     Input::RemoteIo(RemoteIoInput::Choose(choice)),
                     observe,
                 );
+            }
+            (Member::RemoteIo(_), Action::Set { .. }) => {
+                if let Some(force) = action.force() {
+                    let force = RemoteIoInput::Force(&force);
+                    self.give(member, Input::RemoteIo(force), observe);
+                }
+            }
+            (Member::RemoteIo(_), Action::Unset { input }) => {
+                let unforce = RemoteIoInput::Unforce(SignalPlace::Input(input));
+                self.give(member, Input::RemoteIo(unforce), observe);
             }
             (Member::RemoteIo(_), Action::Write { .. }) => {
                 if let Some(write) = fault.write() {

@@ -113,6 +113,19 @@ pub(crate) fn fault_text(action: Action, member: Member, members: &Members) -> S
             let assignment = assignment(Some(member), place, value, members);
             format!("{assignment} is written to {name}")
         }
+        Action::Set { input, value } => {
+            let place = SignalPlace::Input(input);
+            let assignment = assignment(Some(member), place, value, members);
+            format!("{assignment} is set at {name}")
+        }
+        Action::Unset { input } => {
+            let signal = match member {
+                Member::RemoteIo(program) => members.signal(program, SignalPlace::Input(input)),
+                _ => None,
+            };
+            let input = signal.map_or("an input", |signal| &signal.name);
+            format!("{input} of {name} is the field's again")
+        }
         Action::Choose {
             choice: StateChoice::Cold,
         } => format!("the operator starts the program of {name} cold"),
