@@ -81,7 +81,8 @@ async def opcua():
     )
 
     def client(user, password):
-        client = Client(f"opc.tcp://{sys.argv[2]}/", timeout=PATIENCE_S)
+        # With its default it gives up a server that a busy machine keeps waiting for a second.
+        client = Client(f"opc.tcp://{sys.argv[2]}/", timeout=PATIENCE_S, watchdog_intervall=PATIENCE_S)
         client.application_uri = uri
         client.set_user(user)
         client.set_password(password)
