@@ -9,6 +9,7 @@ One line of JSON for each value: `stored`, its bits as a REAL, and `outcome`, `i
 
 import asyncio
 import json
+import logging
 import shutil
 import struct
 import sys
@@ -26,6 +27,10 @@ STEP = 0.001
 
 def bits(value):
     return struct.unpack(">I", struct.pack(">f", value))[0]
+
+
+# Of the libraries, so that a connection that ends says why.
+logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s %(message)s")
 
 
 async def each(write):

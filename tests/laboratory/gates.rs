@@ -89,8 +89,11 @@ impl Gateway {
         errors.read_line(&mut line).expect("text");
         let address = line.trim().rsplit_once(' ').expect("an address").1;
         let address = address.to_owned();
-        // Refused writes are logged.
-        std::thread::spawn(move || std::io::copy(&mut errors, &mut std::io::sink()));
+        // Refused writes are logged, and whatever goes wrong.
+        let name = address.replace([':', '/'], "-");
+        let log = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("gateway-{name}.log"));
+        let mut log = fs::File::create(log).expect("a file");
+        std::thread::spawn(move || std::io::copy(&mut errors, &mut log));
         Self { child, address }
     }
 
